@@ -11,7 +11,7 @@ import pytest
 
 from study_app.errors import Problem, StudyError
 
-PROBLEMS = Problem("blocks.b", "is unknown", 3, "did you mean c?"), Problem("x", "is missing")
+PROBLEMS = Problem("blocks.b", "is unknown", 3, hint="did you mean c?"), Problem("x", "is missing")
 GIVEN = {"int": -6, "tuple[Problem, ...]": PROBLEMS}
 
 

@@ -118,7 +118,7 @@ def _result(
         low, high = (float(end) for end in two_sided.confidence_interval(0.95))
         mean = float(values[0].mean() - (values[1].mean() if one.groups else 0.0))
         effect, low, high = (math.exp(end) if ratio else end for end in (mean, low, high))
-        ends = Interval(low, high, 0.95, "Welch's t" if one.groups else "Student's t")
+        ends = Interval(low=low, high=high, level=0.95, method="Welch's t" if one.groups else "Student's t")
         if one.bound is not None:
             reach = abs(math.log(one.bound)) if ratio else one.bound
             within = two_sided.confidence_interval(1 - 2 * alpha)

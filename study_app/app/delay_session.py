@@ -362,7 +362,14 @@ class Painting(QObject):
         participant = ParticipantWindow(words("en"), clock=time.monotonic, windowed=shown_on is operated_on)
         place(operator, operated_on, corner=shown_on is operated_on)
         task = Explore(kind="explore", min_s=0.0, max_s=3600.0, instruction="The servo is being timed.")
-        self._page = TaskPage(1, "The servo is being timed.", task, protocol.device.workspace_m, 0.0034, None)
+        self._page = TaskPage(
+            trial=1,
+            instruction="The servo is being timed.",
+            task=task,
+            workspace_m=protocol.device.workspace_m,
+            body_radius_m=0.0034,
+            progress=None,
+        )
         return participant, operator
 
     def begin(self) -> None:

@@ -30,7 +30,7 @@ class Costs:
     effects: tuple[EffectCost, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Errors:
     """The errors of a scene against the exact definition (``evidence.reference_model``), along programmed paths.
 

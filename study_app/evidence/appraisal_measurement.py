@@ -64,7 +64,7 @@ def errors(scene: Scene) -> Errors:
         force_n = max(newtons for _, newtons in found)
         wake = max(share for share, _ in found) if "wake" in kept else None
     left_out = tuple(effect for effect in liquid.effects if effect not in kept)
-    return Errors(wake, force_n, lag_s(scene), left_out)
+    return Errors(wake=wake, force_n=force_n, lag_s=lag_s(scene), left_out=left_out)
 
 
 def lag_s(scene: Scene) -> float:

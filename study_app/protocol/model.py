@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
-from study_app.haptics.model.ranges import DensityKgM3, DiameterM, DragCoefficient, FadeS, Metres, later, within
+from study_app.haptics.model.ranges import DensityKgM3, DiameterM, DragCoefficient, FadeS, Metres, Vector, later, within
 from study_app.haptics.model.scene import (
     FADE_S,
     Accuracy,
@@ -126,7 +126,7 @@ class DeviceNeeds(Table):
     )
 
     @property
-    def workspace_m(self) -> tuple[float, float, float]:
+    def workspace_m(self) -> Vector:
         """Full sizes of the tank, hand frame [m]."""
         x, y, z = self.workspace_mm
         return (x / 1000, y / 1000, z / 1000)

@@ -47,7 +47,7 @@ MEASURED_S = 2.0  # so long the servo is looked at before a session
 PLAYED_MEASURED_S = 0.5  # and before one that is played from the designer
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class NewSession:
     """What the operator chose; ``results`` is the study's folder, ``screen`` counts from 1 (None: the last).
 

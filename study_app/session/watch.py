@@ -46,7 +46,7 @@ class Mark:
     words: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Watched:
     """A recorded trial, or one of its ``intervals`` (0: it has none); times are since its task began [s].
 
@@ -203,7 +203,8 @@ def _marks(own: Sequence[events.Event], begun: events.Event, ended: Any, until_s
             if isinstance(line, events.TargetReached) and line.t_task_s is not None:
                 at_s = line.t_task_s
             if line is ended or not isinstance(line, _ENDS):
-                yield Mark(at_s, *told)
+                kind, words = told
+                yield Mark(at_s, kind, words)
 
 
 def _told(line: events.Event) -> tuple[Kind, str] | None:
@@ -241,7 +242,7 @@ def _page(
         named = key.condition(started.block, started.code) if interval is None else None
         body = protocol.scene_for(named or protocol.conditions_in(started.block)[0]).body
     about = {name: getattr(started, name) for name in ("block", "phase", "part", "index", "of", "code")}
-    trial = Trial(started.trial, **about, items=())
+    trial = Trial(number=started.trial, **about, items=())
     page = task_page(protocol, progress_of(lines).language, trial, body)
     if interval is None:
         return page

@@ -93,11 +93,11 @@ EXCLUSIONS: tuple[Column, ...] = (
 
 
 def _measure(name: str, description: str, unit: str = "", **more: Any) -> Column:
-    return optional(name, "number", description, unit, minimum=0, **more)
+    return optional(name, "number", description, unit=unit, minimum=0, **more)
 
 
 def _signed(name: str, description: str, unit: str = "", **more: Any) -> Column:
-    return optional(name, "number", description, unit, sealed=True, later=True, **more)
+    return optional(name, "number", description, unit=unit, sealed=True, later=True, **more)
 
 
 def _count(name: str, description: str, **more: Any) -> Column:
@@ -106,7 +106,7 @@ def _count(name: str, description: str, **more: Any) -> Column:
 
 def _delay_error(name: str, which: str, of_trial: Literal["sum", "max", "mean"]) -> Column:
     description = f"Visual delay, achieved minus requested: {which}."
-    return optional(name, "number", description, "ms", sealed=True, of_trial=of_trial)
+    return optional(name, "number", description, unit="ms", sealed=True, of_trial=of_trial)
 
 
 RESPONSES: tuple[Column, ...] = (
@@ -162,7 +162,7 @@ TRIALS: tuple[Column, ...] = (
     Column("of", "integer", "Number of trials in the block.", minimum=1),
     CODE,
     Column("trial_started_at", "time", "Time when the trial began."),
-    Column("trial_started_s", "number", "Time when the trial began, on the session's clock.", "s", minimum=0),
+    Column("trial_started_s", "number", "Time when the trial began, on the session's clock.", unit="s", minimum=0),
     optional(
         "outcome",
         "text",
@@ -322,7 +322,7 @@ VIDEO: tuple[Column, ...] = (
 INTERVALS: tuple[Column, ...] = (
     *(column for column in TRIALS[: TRIALS.index(CODE) + 1] if column.name not in _NOT_OF_INTERVALS),
     Column("interval", "integer", "Which interval of the trial, from 1.", minimum=1),
-    Column("interval_started_s", "number", "When the interval began, on the session's clock.", "s", minimum=0),
+    Column("interval_started_s", "number", "When the interval began, on the session's clock.", unit="s", minimum=0),
     _measure("gap_s", "From the end of the interval before to the beginning of this one; n/a for the first.", "s"),
     optional(
         "presented",

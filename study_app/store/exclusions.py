@@ -21,7 +21,7 @@ from study_app.store.progress import progress_of
 NAMED_IDS = 6
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Exclusion:
     """One session, or one trial of it, that is left out; a row of ``exclusions.csv``."""
 
@@ -77,7 +77,9 @@ def exclude(
     study = StudyFolder(folder)
     _check_there(study, participant, session, trial)
     at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
-    new = Exclusion(participant, session, trial, by, reason, at)
+    new = Exclusion(
+        participant=participant, session=session, trial=trial, rule_or_person=by, reason=reason, excluded_at=at
+    )
     with open_alone(folder):
         rows = exclusions(folder)
         for row in rows:
@@ -112,7 +114,11 @@ def include(
         rows = exclusions(folder)
         taken = next((row for row in rows if row.what == (participant, session, trial)), None)
         if taken is None:
-            name = named(Exclusion(participant, session, trial, "", "", ""))
+            name = named(
+                Exclusion(
+                    participant=participant, session=session, trial=trial, rule_or_person="", reason="", excluded_at=""
+                )
+            )
             listed = "; ".join(named(row) for row in rows) or "nothing"
             raise StoreError(f"{name} is not excluded; excluded: {listed}")
         at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
@@ -182,7 +188,14 @@ def _exclusion(path: Path, number: int, row: list[str]) -> Exclusion:
     try:
         participant, session, trial, by, reason, at = row
         by, reason = unguarded(by), unguarded(reason)
-        return Exclusion(participant, int(session), None if trial == MISSING else int(trial), by, reason, at)
+        return Exclusion(
+            participant=participant,
+            session=int(session),
+            trial=None if trial == MISSING else int(trial),
+            rule_or_person=by,
+            reason=reason,
+            excluded_at=at,
+        )
     except ValueError as error:
         raise StoreError(
             f"{path}, row {number}: {','.join(row)!r} is not an exclusion (participant, session, trial or {MISSING}, "

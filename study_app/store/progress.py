@@ -23,7 +23,7 @@ class TrialAnswer:
     seconds: float | None
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class Progress:
     """The progress of a session and its events, from the lines of its journal given to `take`.
 

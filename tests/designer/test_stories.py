@@ -70,7 +70,7 @@ def banner(record: Record) -> None:
     for end, acts in ends.items():
         record.note("open another", lambda: designer.open("demo"))
         text = designer.file.read_text()
-        keep(designer.file, Draft(f"{text}# {end}\n", content_hash(text.encode())))
+        keep(designer.file, Draft(text=f"{text}# {end}\n", base=content_hash(text.encode())))
         record.note("open a draft", designer.open)
         record.ask(SetText(TITLE, "en", end))
         if end == "close":

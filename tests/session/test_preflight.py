@@ -54,10 +54,10 @@ def studies() -> dict[str, Protocol]:
 def timing(
     rate_hz: float, p99_s: float = 1e-4, gap_s: float = 2e-3, late: int = 0, ticks: int = 2000
 ) -> dict[str, Any]:
-    return {"timing": Timing(ticks, rate_hz, p99_s, gap_s, late)}
+    return {"timing": Timing(ticks=ticks, rate_hz=rate_hz, lateness_p99_s=p99_s, worst_gap_s=gap_s, overruns=late)}
 
 
-LIVE = OutletStatus("LSL markers", listens=True)
+LIVE = OutletStatus(title="LSL markers", listens=True)
 FACTS: tuple[tuple[str, dict[str, Any]], ...] = (
     *(("small", {"fresh_share": share}) for share in (0.49, 0.5)),
     ("small", timing(0.0, ticks=0)),
@@ -82,10 +82,10 @@ FACTS: tuple[tuple[str, dict[str, Any]], ...] = (
       for share in (0.032, 0.05, 0.051)),
     *(("small", {"tick_s": tick_s}) for tick_s in (1e-4, 2e-4, 2.01e-4, 1e-3)),
     *(("small", {"outlets": (one,)}) for one in (
-        LIVE, replace(LIVE, listens=False), OutletStatus("LSL samples", withheld=True),
-        OutletStatus("LSL samples", listens=True, shows_force=True),
-        OutletStatus("LSL samples", listens=False, shows_force=True), OutletStatus("Serial port"),
-        OutletStatus("Serial port", lost="it is gone"))),
+        LIVE, replace(LIVE, listens=False), OutletStatus(title="LSL samples", withheld=True),
+        OutletStatus(title="LSL samples", listens=True, shows_force=True),
+        OutletStatus(title="LSL samples", listens=False, shows_force=True), OutletStatus(title="Serial port"),
+        OutletStatus(title="Serial port", lost="it is gone"))),
     *(("small", {"key_hash": key, "participant": who}) for key, who in (("0" * 64, "P001"), (None, "Anna"))),
     *((
         "small", {"device": device, "dynamics": dynamics, "velocity_errors": errors})
@@ -127,7 +127,18 @@ def test_another_file_of_the_same_version_is_a_warning(tmp_path: Path, recorded:
     place.path.mkdir(parents=True)
     ran = {"key_hash": "", "protocol_hash": recorded, "protocol": {"study": {"version": study.study.version}}}
     receipt.write(place.receipt, ran)
-    chosen = NewSession("rek2024", "P002", 1, 7, "AK", "en", "scripted", True, None, tmp_path)
+    chosen = NewSession(
+        source="rek2024",
+        participant="P002",
+        session=1,
+        seed=7,
+        operator="AK",
+        language="en",
+        device="scripted",
+        windowed=True,
+        screen=None,
+        results=tmp_path,
+    )
     assert ran_otherwise(chosen) == who
     found = checks(replace(small.WELL, ran_otherwise=who), study)
     assert [check.verdict for check in found if check.name == "Study file"] == ["warning"] * bool(who)

@@ -153,7 +153,18 @@ def square(tmp_path: Path) -> Path:
 def chosen_for(path: Path, participant: str, row_of: str | None) -> NewSession:
     results = path.parent / "results"
     return NewSession(
-        str(path), participant, 1, SEED, "AK", "en", "mouse", True, None, results, recordings=False, row_of=row_of
+        source=str(path),
+        participant=participant,
+        session=1,
+        seed=SEED,
+        operator="AK",
+        language="en",
+        device="mouse",
+        windowed=True,
+        screen=None,
+        results=results,
+        recordings=False,
+        row_of=row_of,
     )
 
 

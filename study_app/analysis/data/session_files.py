@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -111,7 +111,15 @@ def unreadable(path: Path, error: OSError, remedy: str = "restore it from a copy
     )
 
 
-@dataclass(frozen=True)
+class Bench(NamedTuple):
+    """Damping, friction and mass in a receipt's bench, each the mean over its axes."""
+
+    damping_nspm: float
+    friction_n: float
+    mass_kg: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Session:
     """What was asked, what was answered, and the facts of the visit (``visit``: one row of ``Study.participants``).
 
@@ -128,7 +136,7 @@ class Session:
     visit: Mapping[str, Any]
     others: OtherQuestions = NO_QUESTIONS
     levels: tuple[LevelBlock, ...] = ()
-    own_dynamics: tuple[float, float, float] | None = None
+    own_dynamics: Bench | None = None
     device_velocity: bool = False
 
     @property
@@ -182,18 +190,24 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
             "written by another version of the program; restore it from a copy"
         ) from error
     return Session(
-        folder, study, title, version, protocol, blocks, visit, others, levels, own_dynamics, device_velocity
+        folder=folder,
+        study=study,
+        title=title,
+        version=version,
+        protocol=protocol,
+        blocks=blocks,
+        visit=visit,
+        others=others,
+        levels=levels,
+        own_dynamics=own_dynamics,
+        device_velocity=device_velocity,
     )
 
 
-def _own_dynamics(bench: Mapping[str, Any] | None) -> tuple[float, float, float] | None:
-    """Return damping, friction and mass of a receipt's bench, each the mean over its axes."""
+def _own_dynamics(bench: Mapping[str, Any] | None) -> Bench | None:
     if bench is None:
         return None
-    damping_nspm, friction_n, mass_kg = (
-        float(np.mean([float(value) for value in bench[name]])) for name in ("damping_nspm", "friction_n", "mass_kg")
-    )
-    return damping_nspm, friction_n, mass_kg
+    return Bench(**{name: float(np.mean([float(value) for value in bench[name]])) for name in Bench._fields})
 
 
 def estimators_of(records: Sequence[Session]) -> str | None:
@@ -209,8 +223,8 @@ def mean_dynamics(records: Sequence[Session]) -> OwnDynamics | None:
     known = [one.own_dynamics for one in records if one.own_dynamics is not None]
     if not known:
         return None
-    damping_nspm, friction_n, mass_kg = np.mean(known, axis=0).tolist()
-    return OwnDynamics(damping_nspm, friction_n, mass_kg, len(known), len(records))
+    means = Bench._make(np.mean(known, axis=0).tolist())
+    return OwnDynamics(**means._asdict(), sessions=len(known), of=len(records))
 
 
 def _masking(answer: Mapping[str, Any] | None) -> str | None:

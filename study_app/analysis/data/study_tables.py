@@ -122,7 +122,7 @@ def _of_site(site: str, settings: Settings, table: pd.DataFrame) -> pd.DataFrame
     if "code" not in table:
         return table
     codes = [
-        None if pd.isna(code) else renamed(site, settings.get((block, code), Setting(code))).code
+        None if pd.isna(code) else renamed(site, settings.get((block, code), Setting(code=code))).code
         for block, code in zip(table["block"], table["code"], strict=True)
     ]
     return table.assign(code=pd.array(codes, dtype="string"))
@@ -138,14 +138,16 @@ def pooled_dynamics(sites: Iterable[OwnDynamics | None], sessions: int) -> OwnDy
         float(np.average([getattr(one, name) for one in known], weights=weights))
         for name in ("damping_nspm", "friction_n", "mass_kg")
     )
-    return OwnDynamics(damping_nspm, friction_n, mass_kg, sum(weights), sessions)
+    return OwnDynamics(
+        damping_nspm=damping_nspm, friction_n=friction_n, mass_kg=mass_kg, sessions=sum(weights), of=sessions
+    )
 
 
 COMPLETED: Final = "completed"
 _TRIAL: Final = ["participant", "session", "trial"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Study:
     """All sessions of one study.
 

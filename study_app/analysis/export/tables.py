@@ -101,7 +101,7 @@ def names_of_sealed(study: Study) -> set[str]:
     return {column.name for column in INTERVALS if column.sealed} if study.levels else set()
 
 
-OF_A_FORM: Final = Setting("")
+OF_A_FORM: Final = Setting(code="")
 """Stands for the setting of an answer in a form, which has none."""
 
 _BY_NAME: Final = {column.name: column for column in (*TRIALS_2, *RESPONSES)}
@@ -129,7 +129,7 @@ MEASURED: Final = (
         "agree_percent",
         "number",
         f"Share of the valid answers that agree (levels {AGREEMENT[0]} to {AGREEMENT[-1]}).",
-        "%",
+        unit="%",
         minimum=0,
         maximum=100,
     ),

@@ -28,10 +28,10 @@ JUDGED: Final = (
 OPENED: Final = (
     Column("condition", "text", "Id of the condition that the code stands for."),
     Column("liquid", "text", "Id of the liquid that was presented."),
-    Column("delay_ms", "number", "Requested visual delay; n/a where a stimulus varies it.", "ms", minimum=0),
+    Column("delay_ms", "number", "Requested visual delay; n/a where a stimulus varies it.", unit="ms", minimum=0),
 )
 ACHIEVED: Final = optional(
-    "delay_achieved_ms", "number", "Visual delay that was achieved: asked for, plus the trial's mean error.", "ms"
+    "delay_achieved_ms", "number", "Visual delay that was achieved: asked for, plus the trial's mean error.", unit="ms"
 )
 
 _INTERVALS: Final = {column.name: column for column in INTERVALS}
@@ -72,7 +72,7 @@ OF_TRACKS: Final[tuple[Column, ...]] = (
     optional("response", "text", "The answer; n/a without one."),
     optional("value", "number", "The answer as a number, where it is one."),
     optional("right", "flag", "true if the answer was correct; n/a where no answer is."),
-    optional("response_s", "number", "Time from the question to the first choice of an answer.", "s", minimum=0),
+    optional("response_s", "number", "Time from the question to the first choice of an answer.", unit="s", minimum=0),
     optional(
         "reversal", "flag", "true if the up–down track changed its direction here; n/a where the method has no steps."
     ),
@@ -153,7 +153,7 @@ THRESHOLDS: Final[tuple[Column, ...]] = (
         "target_percent",
         "number",
         "Percentage of successes to which the rule of the up–down tracks converges.",
-        "%",
+        unit="%",
         minimum=0,
         maximum=100,
     ),

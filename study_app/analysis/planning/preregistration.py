@@ -40,7 +40,7 @@ CATCH: Final = "catch"
 _BLOCK: Final = re.compile(r"^```json\n(\{.*?\})\n```$", re.MULTILINE | re.DOTALL)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Commitment:
     """What was committed to: participants, precision of the group's mean, and the rules that exclude sessions."""
 
@@ -56,12 +56,12 @@ def commitment(protocol: Protocol, protocol_hash: str) -> Commitment:
     """Return what a protocol commits to."""
     decided = protocol.analysis
     return Commitment(
-        protocol.study.name,
-        protocol.study.version,
-        protocol_hash,
-        None if decided is None else decided.participants,
-        None if decided is None else decided.precision,
-        (CATCH,) if any(block.catch is not None for block in protocol.main_blocks) else (),
+        study=protocol.study.name,
+        version=protocol.study.version,
+        protocol_hash=protocol_hash,
+        participants=None if decided is None else decided.participants,
+        precision=None if decided is None else decided.precision,
+        rules=(CATCH,) if any(block.catch is not None for block in protocol.main_blocks) else (),
     )
 
 

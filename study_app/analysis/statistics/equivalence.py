@@ -263,7 +263,7 @@ def _by_t(kept: Array, sd: float, bound: float, alpha: float) -> dict[str, Any]:
         "statistic": min(lower, -upper),
         "p": max(p_lower, p_upper),
         "method": f"t({df}), bound ±{bound:g} points",
-        "interval": Interval(mean - reach, mean + reach, 1 - 2 * alpha, "t"),
+        "interval": Interval(low=mean - reach, high=mean + reach, level=1 - 2 * alpha, method="t"),
         "t_lower": lower,
         "t_upper": upper,
         "p_lower": p_lower,

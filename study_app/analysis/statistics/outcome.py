@@ -39,7 +39,7 @@ TOO_FEW: Final = f"no interval below {FEW} participants: resampling so few cover
 NO_VARIATION: Final = "no variation: every participant answered alike under all settings"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Interval:
     """An interval of confidence ``level`` (0.95) and the method that it comes from."""
 
@@ -148,7 +148,7 @@ def _excess(end: float, places: Array, weights: Array, step: float, due: float) 
 def clopper_pearson(count: int, n: int) -> Interval:
     """Return the exact 95 % interval of a share of ``count`` in ``n``."""
     ends = binomtest(count, n).proportion_ci(0.95, method="exact")
-    return Interval(float(ends.low), float(ends.high), 0.95, "Clopper-Pearson")
+    return Interval(low=float(ends.low), high=float(ends.high), level=0.95, method="Clopper-Pearson")
 
 
 def bootstrap(n: int, seed: int | None, sampled: Callable[[Whole], Array], alike: str) -> tuple[Interval | None, str]:
@@ -170,7 +170,7 @@ def bootstrap(n: int, seed: int | None, sampled: Callable[[Whole], Array], alike
         return None, alike
     low, high = np.quantile(samples, [0.025, 0.975])
     method = f"percentile bootstrap over participants, {SAMPLES} samples"
-    return Interval(float(low), float(high), 0.95, method), ""
+    return Interval(low=float(low), high=float(high), level=0.95, method=method), ""
 
 
 def drawn_p(reached: NDArray[np.bool_], seed: int, least: float) -> tuple[float, float, str]:

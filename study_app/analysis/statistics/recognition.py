@@ -51,7 +51,7 @@ MOST: Final = 8
 """All orders of more settings are too many to go through."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class HitRate:
     """How often one setting was given its own name: ``hits`` of ``n`` answers, with a Clopper-Pearson interval."""
 
@@ -176,8 +176,8 @@ def _rate(given: Whole, setting: int, label: int) -> HitRate:
     answers = given[given[:, setting] != UNANSWERED, setting]
     n, hits = len(answers), int((answers == label).sum())
     if not n:
-        return HitRate(setting, 0, 0, None, None)
-    return HitRate(setting, hits, n, hits / n, clopper_pearson(hits, n))
+        return HitRate(setting=setting, hits=0, n=0, rate=None, interval=None)
+    return HitRate(setting=setting, hits=hits, n=n, rate=hits / n, interval=clopper_pearson(hits, n))
 
 
 def _note(n: int, undecided: int, smallest: float) -> str:

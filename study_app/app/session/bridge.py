@@ -68,6 +68,7 @@ if TYPE_CHECKING:
     from study_app.devices.base import Device
     from study_app.devices.rig import Rig
     from study_app.gui.theme.theme import Theme
+    from study_app.haptics.model.ranges import Vector
     from study_app.haptics.runtime.servo import Servo
     from study_app.outlets.session_outlets import Outlets
     from study_app.session.start import NewSession
@@ -450,11 +451,14 @@ class SessionBridge(QObject):
             case "pause":
                 post(PauseRequested(self._now(), "operator"))
             case "repeat":
-                post(RepeatRequested(self._now(), *details))
+                (reason,) = details
+                post(RepeatRequested(self._now(), reason))
             case "note" | "mark":
-                post(Note(self._now(), what, *details or ("",)))
+                (text,) = details or ("",)
+                post(Note(self._now(), what, text))
             case "end":
-                post(EndRequested(self._now(), *details))
+                status, reason = details
+                post(EndRequested(self._now(), status, reason))
             case "diagnose":
                 self._diagnose()
             case "reconnect":
@@ -725,12 +729,12 @@ def _calibration(device: Device) -> tuple[tuple[str, str], ...]:
     return (("Calibration", f"of {used['measured']}" if isinstance(used, dict) else "none"),)
 
 
-def _aim(hand: HandOrders | None, servo: Servo) -> Callable[[], tuple[float, float, float]]:
+def _aim(hand: HandOrders | None, servo: Servo) -> Callable[[], Vector]:
     """Return a function that tells where the hand is; for a simulated one its aim, since its lag reveals the liquid."""
     if hand is not None:
         return lambda: hand.aim_m
 
-    def position_m() -> tuple[float, float, float]:
+    def position_m() -> Vector:
         x, y, z = servo.telemetry.position_at(servo.now_ns())[0]
         return float(x), float(y), float(z)
 

@@ -47,7 +47,7 @@ class Element:
     step: Path = ()  # its entry in the list that orders it: the session's or a questionnaire's; () without an order
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Outline:
     """The three sections of the outline; parts are sections of tables, each followed by its elements."""
 
@@ -68,7 +68,7 @@ def outline(study: Study) -> Outline:
     )
     order = [path for path in (SEQUENCE, ("sequences",)) if value_at(study.document, path)]
     session = (*(element(study, path) for path in order), *_session(study))
-    return Outline(session, tuple(parts), tuple(element(study, path) for path in tables))
+    return Outline(session=session, parts=tuple(parts), study=tuple(element(study, path) for path in tables))
 
 
 def element(study: Study, path: Path, depth: int = 0) -> Element:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import KW_ONLY, dataclass, fields, is_dataclass, replace
 from typing import Any, Literal, TypeAlias
 
 from study_app.designer.document.additions import (
@@ -58,6 +58,7 @@ class Step:
     select: Path | None = None  # what is selected after it; None stands for the same
     continues: object = None  # what it may continue: typing in one field is one step
     text: str | None = None  # the file's text that the edits are made in, None for the text that there is
+    _: KW_ONLY
     said: str = ""  # what a screen reader says of it
     fresh: Literal["", "new", "copy"] = ""  # whether what is selected after it is new: a text takes the keyboard
 

@@ -63,7 +63,9 @@ def form(study: Study, path: Path) -> Form:
         lines = [f"Line {one.line}: " if one.line else "" for one in study.problems]
         said = [_sentence(one.message, one.hint) for one in study.problems]
         why = tuple(map("".join, zip(lines, said, strict=True)))
-        return Form(FIRST, title_of({}, FIRST), icon_of(FIRST, {}), UNREADABLE, faults=why, unreadable=True)
+        return Form(
+            path=FIRST, title=title_of({}, FIRST), icon=icon_of(FIRST, {}), kind=UNREADABLE, faults=why, unreadable=True
+        )
     document, places = study.document, places_of(study.text)
     own_row = row_at(document, path) if len(path) == 1 else None
     if own_row is not None and own_row.kind == "tables":
@@ -89,15 +91,22 @@ def form(study: Study, path: Path) -> Form:
         name = ""
     title = title_of(document, path)
     return Form(
-        path, title, icon_of(path, document), kind_of(path) or KINDS.get(path, "Section of the file"),
-        None if name is None else str(name), sections, own, of_id, position_of(document, path),
-        question_lines(study, path[:-1]) if path[2:3] == ("items",) else NO_QUESTIONS,
-        tuple((path[:length], title_of(document, path[:length])) for length in (1, 2, 4) if length <= len(path)),
-        f"Feel {title}" if len(path) == 2 and path[0] in WITH_LIQUIDS else "",
-        bool(number_rows(document, path)),
-        used_by(document, path),
-        tuple(asking(document, path)),
-    )  # fmt: skip
+        path=path,
+        title=title,
+        icon=icon_of(path, document),
+        kind=kind_of(path) or KINDS.get(path, "Section of the file"),
+        id=None if name is None else str(name),
+        sections=sections,
+        faults=own,
+        id_faults=of_id,
+        position=position_of(document, path),
+        questions=question_lines(study, path[:-1]) if path[2:3] == ("items",) else NO_QUESTIONS,
+        around=tuple((path[:length], title_of(document, path[:length])) for length in (1, 2, 4) if length <= len(path)),
+        feel=f"Feel {title}" if len(path) == 2 and path[0] in WITH_LIQUIDS else "",
+        series=bool(number_rows(document, path)),
+        used=used_by(document, path),
+        asks=tuple(asking(document, path)),
+    )
 
 
 def asking(document: Mapping[str, Any], path: Path) -> Iterator[tuple[str, Request]]:

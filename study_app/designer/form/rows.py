@@ -15,7 +15,7 @@ ICONS: Final = {"rating": "scale", "slider": "slider", "number": "number", "choi
 STATEMENT: Final = "statement"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class QuestionLine:
     """One question."""
 
@@ -57,7 +57,15 @@ def _line(
     faults = sum(fault.path[: len(path)] == path for fault in study.faults)
     shown = tuple(one.strip() if isinstance(one, str) else "" for one in texts)
     number = path[-1] + 1 if isinstance(path[-1], int) else 0
-    return QuestionLine(path, number, kind, ICONS.get(kind, "scale"), shown, _note(item, numbers), faults)
+    return QuestionLine(
+        path=path,
+        number=number,
+        kind=kind,
+        icon=ICONS.get(kind, "scale"),
+        texts=shown,
+        note=_note(item, numbers),
+        faults=faults,
+    )
 
 
 def _note(item: Mapping[str, Any], numbers: Mapping[str, int]) -> str:
@@ -90,7 +98,7 @@ class Entry:
     target: Path = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FormRow(Row):
     """One row of the form."""
 
@@ -146,7 +154,7 @@ class Section:
     faults: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Form:
     """The form of one element."""
 

@@ -362,7 +362,7 @@ BOUND, RATIO = 0.5, 1.25
 NOTHING_TO_COMPARE: Final = "It compares two main blocks, two conditions of a block, or two groups: add a second one."
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Compared:
     """A block, or a condition or group in a block, with the measures that it has, each with its words."""
 
@@ -401,12 +401,12 @@ def _compared(document: Mapping[str, Any]) -> Iterator[Compared]:
             measures = tuple((str(item.get("id")), title_of(document, path)) for item, path in items)
         if not measures:
             continue
-        yield Compared("blocks", name, name, title, measures)
+        yield Compared(key="blocks", block=name, name=name, words=title, measures=measures)
         conditions = block.get("conditions") if "design" not in block else ()
         for key, inner in (("conditions", conditions), ("groups", names(document, "groups"))):
             for one in inner if isinstance(inner, tuple | list) else ():
                 words = f"{title_of(document, (key, str(one)))} in {title}"
-                yield Compared(key, name, str(one), words, measures)
+                yield Compared(key=key, block=name, name=str(one), words=words, measures=measures)
 
 
 class Hypothesis(QWidget):

@@ -32,7 +32,7 @@ READ: Final = ("pages", "blocks", "tasks", "designs")
 """Sections whose texts are read before the last answer; statements may name what is compared, as all see the same."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Revealing:
     """A text that reveals a condition: its key, the element's title, and the word that reveals it."""
 
@@ -88,7 +88,7 @@ def revealing(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:
         words_there = [word for text in texts if isinstance(text, str) for word in words.in_text(text.casefold())]
         if words_there:
             element = title_of(study.document, path[:2])
-            found.append(Revealing(path, element, label_of(path[-1]), words_there[0]))
+            found.append(Revealing(path=path, element=element, key=label_of(path[-1]), word=words_there[0]))
     return tuple(found)
 
 
@@ -268,7 +268,7 @@ def _text(document: Any) -> Any:
     return dict.fromkeys(codes, TEXT) if len(codes) > 1 else TEXT
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
     """What a study is, in numbers: those that depend on a broken element are not known."""
 

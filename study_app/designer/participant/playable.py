@@ -52,7 +52,7 @@ SIZES: Final = (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ParticipantView:
     """What the tab shows."""
 

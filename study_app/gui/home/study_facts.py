@@ -50,7 +50,7 @@ class DraftNote:
     kept_at: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class StudyFacts:
     """A protocol as a card shows it; ``source`` is the name or path it is loaded by.
 
@@ -79,7 +79,7 @@ class StudyFacts:
         return Path(self.source).stem
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class BrokenFacts:
     """A protocol file that cannot be used, and the first thing wrong with it; the rest as of `StudyFacts`."""
 
@@ -89,7 +89,7 @@ class BrokenFacts:
     draft: DraftNote | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DraftFacts:
     """A study that was never saved: the path of its file, its title, and the rest as of `StudyFacts`."""
 
@@ -177,7 +177,7 @@ def _of_draft(file: Path, draft_words: LoadWords) -> DraftFacts | None:
         return None
     title = draft_words().draft_title(draft.text, file.parent) if draft_words else ""
     note = DraftNote(f"Draft of {time_words(draft.kept_at)}, never saved", draft.kept_at)
-    return DraftFacts(str(file), title or file.stem, origin_of(str(file)), note)
+    return DraftFacts(source=str(file), title=title or file.stem, origin=origin_of(str(file)), draft=note)
 
 
 def holds_liquids_alone(source: str) -> bool:
@@ -224,7 +224,12 @@ def study_facts(source: str, draft_words: LoadWords = None) -> StudyFacts | Brok
     except ProtocolError as error:
         count = len(error.problems)
         others = f". Open it in the designer to see all {count} problems." if count > 1 else ""
-        return BrokenFacts(source, f"{error.problems[0]}{others}", origin_of(source), _draft_note(source, draft_words))
+        return BrokenFacts(
+            source=source,
+            problem=f"{error.problems[0]}{others}",
+            origin=origin_of(source),
+            draft=_draft_note(source, draft_words),
+        )
     language = operator_language(protocol)
     extent = extent_of(protocol)
     return StudyFacts(
@@ -278,7 +283,7 @@ def _seconds(moment: str) -> float:
         return 0.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Interrupted:
     """A session that can go on: who, where it stopped and what is on disk, in words; ``folder`` is the session's."""
 

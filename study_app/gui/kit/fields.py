@@ -1,7 +1,7 @@
 """Forms made from descriptions: a `Field` describes one value, an `Editor` is its label, control and line below."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -37,6 +37,7 @@ class Field:
     kind: Literal["line", "count", "choice", "radio", "switch", "check", "file", "folder"] = "line"
     options: tuple[tuple[Any, str], ...] = ()
     limits: tuple[int, int] = (0, 0)
+    _: KW_ONLY
     unit: str = ""
     hint: str = ""
     aside: str = ""
@@ -163,7 +164,8 @@ class Editor(QWidget):
             case "radio":
                 return Radios(self.field.options)
             case "count":
-                count = Number(*self.field.limits, self.field.limits[0])
+                lowest, highest = self.field.limits
+                count = Number(lowest, highest, lowest)
                 count.valueChanged.connect(lambda _value: self.edited.emit(self.field.name))
                 return count
             case "choice":

@@ -38,7 +38,7 @@ class StepRow:
     note: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TrialTime:
     """Time in the task: ``most_s`` None where the task has no end of its own."""
 
@@ -63,7 +63,7 @@ class DeviceView:
     rows: tuple[tuple[str, str], ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class OperatorView:
     """Everything on the operator's window except the two plots' points.
 
@@ -335,8 +335,8 @@ def _trial_time(session: Session, progress: Progress, now_s: float) -> TrialTime
     if elapsed is None:
         elapsed = now_s - (progress.trial_since_s if progress.trial_since_s is not None else now_s)
     if progress.of_intervals == trial.number:  # the task's limits are those of each interval
-        return TrialTime(elapsed, None, None)
-    return TrialTime(elapsed, task.least_s, task.limit_s)
+        return TrialTime(elapsed_s=elapsed, least_s=None, most_s=None)
+    return TrialTime(elapsed_s=elapsed, least_s=task.least_s, most_s=task.limit_s)
 
 
 def _step_row(stage: Stage, progress: Progress) -> StepRow:

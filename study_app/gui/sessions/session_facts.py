@@ -31,7 +31,7 @@ pilots."""
 SAMPLE = "sample-"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SessionFacts:
     """A session as a row shows it.
 
@@ -291,7 +291,7 @@ def form_title(protocol: Protocol, form: str, language: str) -> str:
     return form.replace("_", " ").capitalize() if title is None else protocol.text(title, language)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Extent:
     """Parts, settings, answers and expected duration [s] of each kind of session of a study.
 

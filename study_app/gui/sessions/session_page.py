@@ -40,7 +40,7 @@ from study_app.store.tables import session_tables
 from study_app.store.tables.study_files import row_of
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TrialRecord:
     """One presentation of a trial.
 
@@ -258,7 +258,10 @@ class SessionPage(Themed, QDialog):
         self._reader.done.connect(self._show)
         self._reader.failed.connect(self._show_unread)
         self.setWindowTitle(f"{facts.name}, {facts.study}")
-        self.status, self.validity = Chip(*status_chip(facts)), Chip(*validity_chip(facts))
+        tone, icon, word = status_chip(facts)
+        self.status = Chip(tone, icon, word)
+        tone, icon, word = validity_chip(facts)
+        self.validity = Chip(tone, icon, word)
         self.about, self.limits = label("", "body", "text2", wraps=True), label("", "body", wraps=True)
         self.model = Rows({heading: heading for heading in HEADINGS}, trial_cell)
         self.trials = Table(self.model, WIDTHS, "Trials")

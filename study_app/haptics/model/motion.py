@@ -7,7 +7,7 @@ import csv
 import difflib
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -40,6 +40,7 @@ class Motion:
 
     t_s: Floats
     position_m: Floats
+    _: KW_ONLY
     velocity_mps: Floats | None = None
 
     def __post_init__(self) -> None:
@@ -82,7 +83,7 @@ def read(path: Path) -> Motion:
     if len(lines) == 1:
         raise ProtocolError(str(path), (Problem("rows", "there are none", hint="give at least one"),))
     rows = _numbers(path, lines[1:], len(header))
-    return Motion(rows[:, 0], rows[:, 1:4], rows[:, 4:] if len(header) > len(PLACES) else None)
+    return Motion(rows[:, 0], rows[:, 1:4], velocity_mps=rows[:, 4:] if len(header) > len(PLACES) else None)
 
 
 def refuse_device(path: Path) -> None:
@@ -251,4 +252,4 @@ def _horizontal(t_s: Floats, *, x: Floats, vx: Floats, z: Floats | None = None, 
     rest = np.zeros_like(t_s)
     position_m = np.column_stack([x, rest, rest if z is None else z])
     velocity_mps = np.column_stack([vx, rest, rest if vz is None else vz])
-    return Motion(t_s, position_m, velocity_mps)
+    return Motion(t_s, position_m, velocity_mps=velocity_mps)

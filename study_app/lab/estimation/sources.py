@@ -28,7 +28,7 @@ GAP_S: Final = 0.05
 """A longer time between two rows restarts the estimation, since the motion between them is unknown."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Rows:
     """Rows of a stream in the scene frame.
 
@@ -46,17 +46,23 @@ class Rows:
         return len(self.t_s)
 
     def part(self, first: int, behind: int | None = None) -> Rows:
-        return Rows(*(getattr(self, name)[first:behind] for name in self.__slots__))
+        return Rows(**{name: getattr(self, name)[first:behind] for name in self.__slots__})
 
 
 def no_rows() -> Rows:
     """Return no rows."""
-    return Rows(np.empty(0), np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 3)), np.empty(0, bool))
+    return Rows(
+        t_s=np.empty(0),
+        position_m=np.empty((0, 3)),
+        velocity_mps=np.empty((0, 3)),
+        force_n=np.empty((0, 3)),
+        usable=np.empty(0, bool),
+    )
 
 
 def joined(*parts: Rows) -> Rows:
     """Return successive rows joined."""
-    return Rows(*(np.concatenate([getattr(it, name) for it in parts]) for name in Rows.__slots__))
+    return Rows(**{name: np.concatenate([getattr(it, name) for it in parts]) for name in Rows.__slots__})
 
 
 class CentredVelocity:
@@ -89,7 +95,13 @@ class CentredVelocity:
         lever_s = times_s - times_s.mean(axis=1, keepdims=True)
         slopes = np.einsum("nw,naw->na", lever_s, places_m) / np.sum(lever_s**2, axis=1)[:, np.newaxis]
         inner = slice(half, half + len(slopes))
-        out = Rows(self._t_s[inner], self._position_m[inner], slopes, self._force_n[inner], np.ones(len(slopes), bool))
+        out = Rows(
+            t_s=self._t_s[inner],
+            position_m=self._position_m[inner],
+            velocity_mps=slopes,
+            force_n=self._force_n[inner],
+            usable=np.ones(len(slopes), bool),
+        )
         self._drop(len(slopes))
         return out
 
@@ -145,7 +157,13 @@ class GrowingCsv:
             raise StudyError(f"{self.path}, line {numbered[falls[0]][0]}: t_s must increase, but does not here")
         self._last_s = float(rows[-1, 0])
         if self._has_velocities:
-            return Rows(rows[:, 0], rows[:, 1:4], rows[:, 7:], rows[:, 4:7], np.ones(len(rows), bool))
+            return Rows(
+                t_s=rows[:, 0],
+                position_m=rows[:, 1:4],
+                velocity_mps=rows[:, 7:],
+                force_n=rows[:, 4:7],
+                usable=np.ones(len(rows), bool),
+            )
         return self._centred.take(rows[:, 0], rows[:, 1:4], rows[:, 4:7])
 
     def _bytes(self) -> list[str]:
@@ -244,7 +262,13 @@ class LslForce:
             return no_rows()
         self._last_s = float(t_s[-1])
         if self._has_velocities:
-            return Rows(t_s, rows[:, :3], rows[:, 6:], rows[:, 3:6], np.ones(len(rows), bool))
+            return Rows(
+                t_s=t_s,
+                position_m=rows[:, :3],
+                velocity_mps=rows[:, 6:],
+                force_n=rows[:, 3:6],
+                usable=np.ones(len(rows), bool),
+            )
         return self._centred.take(t_s, rows[:, :3], rows[:, 3:6])
 
     def close(self) -> None:

@@ -99,7 +99,7 @@ def _measured(rows: Floats, names: tuple[str, ...]) -> Measured | FlowCurve:
     if names == ALONG_A_LINE:
         return along_a_line(rows[:, 0], rows[:, 1], rows[:, 2])
     velocity_mps = rows[:, 7:] if len(names) > len(PLACES + FORCES) else None
-    return Measured(Motion(rows[:, 0], rows[:, 1:4], velocity_mps), rows[:, 4:7])
+    return Measured(Motion(rows[:, 0], rows[:, 1:4], velocity_mps=velocity_mps), rows[:, 4:7])
 
 
 def vectors_x(values: Floats) -> Floats:
@@ -111,7 +111,7 @@ def vectors_x(values: Floats) -> Floats:
 def along_a_line(t_s: Floats, velocity_mps: Floats, force_n: Floats) -> Measured:
     """Return a motion along x from its velocities (n,), and the force (n,) along x."""
     way_m = np.concatenate([[0.0], np.cumsum((velocity_mps[1:] + velocity_mps[:-1]) / 2 * np.diff(t_s))])
-    return Measured(Motion(t_s, vectors_x(way_m), vectors_x(velocity_mps)), vectors_x(force_n))
+    return Measured(Motion(t_s, vectors_x(way_m), velocity_mps=vectors_x(velocity_mps)), vectors_x(force_n))
 
 
 def centred(motion: Motion) -> Motion:
@@ -134,7 +134,7 @@ def centred(motion: Motion) -> Motion:
         raise StudyError(f"{len(motion.t_s)} rows are too few to estimate velocities: measure for {SMOOTHED_S:g} s")
     slopes = savgol_filter(even.position_m, rows, 2, deriv=1, delta=step_s, axis=0)
     velocity_mps = np.column_stack([np.interp(motion.t_s, even.t_s, column) for column in slopes.T])
-    return Motion(motion.t_s, motion.position_m, velocity_mps)
+    return Motion(motion.t_s, motion.position_m, velocity_mps=velocity_mps)
 
 
 def at_rate(motion: Motion, rate_hz: float) -> Motion:
@@ -162,4 +162,4 @@ def at_rate(motion: Motion, rate_hz: float) -> Motion:
         return Motion(t_s, CubicSpline(motion.t_s, motion.position_m)(t_s))
     place = CubicHermiteSpline(motion.t_s, motion.position_m, motion.velocity_mps)
     velocity_mps = np.column_stack([np.interp(t_s, motion.t_s, column) for column in motion.velocity_mps.T])
-    return Motion(t_s, place(t_s), velocity_mps)
+    return Motion(t_s, place(t_s), velocity_mps=velocity_mps)

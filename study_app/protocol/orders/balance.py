@@ -24,7 +24,7 @@ from study_app.protocol.streams import draw_secret, group_of, stream
 Table: TypeAlias = tuple[tuple[int, ...], ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Evenness:
     """Orders of one set of codes, counted.
 

@@ -58,7 +58,7 @@ class PageStep:
     page_id: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
     """One presentation and its answers.
 
@@ -133,7 +133,18 @@ def build_schedule(protocol: Protocol | Orders, participant: str, seed: int, row
         codes = codes_of(orders.study, step, participant, seed, row_of)
         for index, code in enumerate(codes, start=1):
             items = _shuffled(step, seed, f"{participant}/{step.id}/{index}")
-            steps.append(Trial(number, step.id, step.phase, step.part, index, step.trials, code, items))
+            steps.append(
+                Trial(
+                    number=number,
+                    block=step.id,
+                    phase=step.phase,
+                    part=step.part,
+                    index=index,
+                    of=step.trials,
+                    code=code,
+                    items=items,
+                )
+            )
             number += 1
             if step.break_page and step.break_every and index < step.trials and index % step.break_every == 0:
                 steps.append(PageStep(step.break_page))
@@ -215,7 +226,7 @@ def draw_key(protocol: Protocol, draw: Draw) -> Key:
 _TOLD = ("block", "phase", "part", "index", "of", "code")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedTrial:
     """One attempt at a trial as a session recorded it; ``items`` in the order shown, None if nothing was answered.
 

@@ -49,7 +49,7 @@ STAY_S: Final = 0.2
 _SAMPLE = np.dtype([("time_ns", np.int64), ("position_m", np.float64, 3)])
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class SensedTrial:
     """What reached hand and eyes in one trial; ``scale`` is scene metres per hand metre.
 

@@ -152,7 +152,7 @@ class _Setting:
     senses: SensedTrial = field(init=False)
 
     def __post_init__(self) -> None:
-        self.senses = SensedTrial(self.scale)
+        self.senses = SensedTrial(scale=self.scale)
 
 
 class RehearsedSession(SimulatedParticipant):
@@ -255,7 +255,7 @@ class RehearsedSession(SimulatedParticipant):
         named = str(page.trial) if interval is None else f"{page.trial}/{interval.number}"
         arm, draw = self._hand, self._stream(f"{named}/behaviour")
         self._paint = self._stream(f"{named}/screen")
-        senses = SensedTrial(self._study.scene.scale, self._period_s)
+        senses = SensedTrial(scale=self._study.scene.scale, period_s=self._period_s)
         self._touch.read()
         self._next_frame_ns = self.rig.servo.now_ns()
         hand = hand_for(page.task, arm, draw, self._now_s())

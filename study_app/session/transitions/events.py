@@ -32,7 +32,7 @@ class ShowPage(Command):
     page: Page
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class StartTrial(Command):
     """Prepare a trial, or one of its intervals: what is ``presented`` is loaded with its tank's first painted frame.
 

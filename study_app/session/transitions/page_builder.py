@@ -224,7 +224,7 @@ def _coming(state: SessionState) -> Trial | None:
 def _among(protocol: Protocol, trial: Trial, label: str, index: int) -> pages.Progress:
     """Return where trial ``index`` of a trial's block is; a block with a criterion may end early."""
     at_most = protocol.blocks[trial.block].until is not None
-    return pages.Progress(trial.part, protocol.parts, label, index, trial.of, at_most)
+    return pages.Progress(part=trial.part, parts=protocol.parts, label=label, index=index, of=trial.of, at_most=at_most)
 
 
 @dataclass(frozen=True, slots=True)
@@ -315,4 +315,4 @@ def tested_condition(shown: Preview, index: int) -> str | None:
 
 def _state(shown: Preview, index: int, language: str) -> SessionState:
     plan = Plan(shown.protocol, shown.schedule, shown.codes, language, secret=shown.secret)
-    return SessionState(plan, index=index)
+    return SessionState(plan=plan, index=index)

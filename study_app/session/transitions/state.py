@@ -79,7 +79,7 @@ class Stall:
     by: Literal["operator", "program"] = "program"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SessionState:
     """The session at one moment.
 

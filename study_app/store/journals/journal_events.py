@@ -78,17 +78,17 @@ def _are_answers(value: object) -> bool:
     )
 
 
-def _matches(pattern: re.Pattern[str]) -> tuple[Callable[[object], bool], str, Mapping[str, str]]:
+def _text_like(what: str, pattern: re.Pattern[str]) -> Kind:
     def matches(value: object) -> bool:
         return isinstance(value, str) and pattern.fullmatch(value) is not None
 
-    return matches, "string", {"pattern": f"^({pattern.pattern})$"}
+    return Kind(what, matches, "string", {"pattern": f"^({pattern.pattern})$"})
 
 
 Text: TypeAlias = Annotated[str, Kind("text", lambda value: isinstance(value, str), "string")]
-StudyName: TypeAlias = Annotated[str, Kind("study's name", *_matches(STUDY_NAME))]
-ParticipantId: TypeAlias = Annotated[str, Kind("participant's id", *_matches(PARTICIPANT_ID))]
-RecordingName: TypeAlias = Annotated[str, Kind("recording's name", *_matches(RECORDING_NAME))]
+StudyName: TypeAlias = Annotated[str, _text_like("study's name", STUDY_NAME)]
+ParticipantId: TypeAlias = Annotated[str, _text_like("participant's id", PARTICIPANT_ID)]
+RecordingName: TypeAlias = Annotated[str, _text_like("recording's name", RECORDING_NAME)]
 Flag: TypeAlias = Annotated[bool, Kind("flag", lambda value: isinstance(value, bool), "boolean")]
 Integer: TypeAlias = Annotated[int, Kind("integer", _is_integer, "integer")]
 Number: TypeAlias = Annotated[float, Kind("number", _is_number, "number")]
@@ -133,7 +133,7 @@ Which: TypeAlias = tuple[int, int, int | None]
 """Trial, attempt and interval, which is None for a trial."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
     """How a question was answered so far; times are seconds on the session's clock, None before the event.
 

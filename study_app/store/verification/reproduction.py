@@ -173,7 +173,15 @@ def recorded_trials(lines: Iterable[events.Event]) -> tuple[RecordedTrial | int,
     place: dict[tuple[int, int], tuple[int, RecordedTrial]] = {}
     for line in lines:
         if isinstance(line, events.TrialStarted):
-            told = RecordedTrial(line.trial, line.block, line.phase, line.part, line.index, line.of, line.code)
+            told = RecordedTrial(
+                number=line.trial,
+                block=line.block,
+                phase=line.phase,
+                part=line.part,
+                index=line.index,
+                of=line.of,
+                code=line.code,
+            )
             place[line.trial, line.attempt] = len(attempts), told
             attempts.append(told)
         elif isinstance(line, events.Responses):

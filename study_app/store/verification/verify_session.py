@@ -105,7 +105,7 @@ class Findings:
         return path.relative_to(self.folder).as_posix() if inside else "."
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CheckedSession:
     """What the study's own files are compared with, of one session.
 
@@ -129,7 +129,7 @@ def check_session(place: Place, key: Key | None, found: Findings, *, recordings:
     Without ``recordings`` these are not read, which takes a while.
     """
     errors = Findings(found.folder)
-    checked = CheckedSession(place, running=is_open(place.folder.path))
+    checked = CheckedSession(place=place, running=is_open(place.folder.path))
     with errors.reading(place.folder.path):
         checked = _check(place, key, errors, running=checked.running, recordings=recordings)
     if errors.errors and not checked.running and is_open(place.folder.path):
@@ -152,7 +152,7 @@ def _check(place: Place, key: Key | None, found: Findings, *, running: bool, rec
     if not running:
         _receipt(folder, lines, key, found)
     if not lines:
-        return CheckedSession(place, readable=running or never_begun(folder.path), running=running)
+        return CheckedSession(place=place, readable=running or never_begun(folder.path), running=running)
     start = events.start_of(lines)
     expected = {"participant": folder.participant, "session": folder.number, "study": place.study}
     for name, value in expected.items():
@@ -178,7 +178,7 @@ def _check(place: Place, key: Key | None, found: Findings, *, running: bool, rec
             for line in read_own(folder.rebuilt, study_root(folder.rebuilt)).decode("utf-8", "replace").splitlines():
                 found.warning(folder.rebuilt, f"{events.shortened(line)}; only a copy of {FINGERPRINTS} proves more")
     return CheckedSession(
-        place,
+        place=place,
         readable=True,
         running=running,
         chained=lines[-1].previous is not None,

@@ -130,8 +130,16 @@ def test_the_measured_rate_is_that_of_the_nearest_size(participants: int, n: int
 def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() -> None:
     """One statement rises a little: alone it is significant; the others, which scatter, hide it."""
     rng = np.random.default_rng(4)
-    items = tuple(Item(name, name, name) for name in (*ITEMS, *"abcdefgh"))
-    block = Block("b", "Block", "delays", delays(DELAYS), items, tuple("1234567"), None)
+    items = tuple(Item(id=name, text=name, short=name) for name in (*ITEMS, *"abcdefgh"))
+    block = Block(
+        id="b",
+        title="Block",
+        kind="delays",
+        settings=delays(DELAYS),
+        items=items,
+        labels=tuple("1234567"),
+        cannot_judge=None,
+    )
     single = {item.id: rng.integers(1, 8, (14, 4, 1)).astype(float) for item in items}
     single[ITEMS[0]] = np.clip(np.arange(1, 5)[:, None] + rng.integers(0, 3, (14, 4, 1)), 1, 7).astype(float)
     decided = replace(DECIDED, primary=ITEMS[:1])

@@ -48,14 +48,23 @@ def test_they_are_means_over_the_sessions_that_know_them(sample: StudyFolder) ->
     record(sample, 0, BENCH)
     record(sample, 1, {**BENCH, "damping_nspm": [1.5] * 3})
     assert load_study(sample.path).own_dynamics == OwnDynamics(
-        pytest.approx(1.0), pytest.approx(0.1), pytest.approx(0.3), 2, len(sample.sessions())
+        damping_nspm=pytest.approx(1.0),
+        friction_n=pytest.approx(0.1),
+        mass_kg=pytest.approx(0.3),
+        sessions=2,
+        of=len(sample.sessions()),
     )
 
 
 def test_those_of_sites_are_weighted_by_their_sessions() -> None:
-    one, other = (replace(study(delays([0]), []), own_dynamics=own) for own in (OwnDynamics(1, 2, 3, 1, 2), None))
-    third = replace(one, own_dynamics=OwnDynamics(4, 5, 9, 2, 2))
-    assert pooled(Path("nowhere"), {"A": one, "B": other, "C": third}, 0).own_dynamics == OwnDynamics(3, 4, 7, 3, 0)
+    one, other = (
+        replace(study(delays([0]), []), own_dynamics=own)
+        for own in (OwnDynamics(damping_nspm=1, friction_n=2, mass_kg=3, sessions=1, of=2), None)
+    )
+    third = replace(one, own_dynamics=OwnDynamics(damping_nspm=4, friction_n=5, mass_kg=9, sessions=2, of=2))
+    assert pooled(Path("nowhere"), {"A": one, "B": other, "C": third}, 0).own_dynamics == OwnDynamics(
+        damping_nspm=3, friction_n=4, mass_kg=7, sessions=3, of=0
+    )
 
 
 def test_a_bench_that_lacks_a_value_is_refused_with_the_receipt(sample: StudyFolder) -> None:

@@ -125,7 +125,12 @@ def test_begin_creates_nothing_by_itself_and_gives_what_was_chosen(dialog, resul
 
 
 def test_a_session_begins_with_what_is_set_for_this_machine_unless_its_firmware_is_gone(tmp_path, monkeypatch, opened):
-    screens = tuple(ScreenShown(n, name, 1920, 1080, 60.0, 1.0, 0, 0) for n, name in ((1, "A"), (2, "B"), (3, "C")))
+    screens = tuple(
+        ScreenShown(
+            number=n, name=name, width_px=1920, height_px=1080, refresh_hz=60.0, scaling=1.0, width_mm=0, height_mm=0
+        )
+        for n, name in ((1, "A"), (2, "B"), (3, "C"))
+    )
     monkeypatch.setattr(dialogs, "screens_shown", lambda: screens)
     firmware = tmp_path / "firmware.bin"
     firmware.write_bytes(b"x")

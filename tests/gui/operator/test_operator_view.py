@@ -49,7 +49,10 @@ STORY = (
     (lambda it: it.welcome(), {}),
     (lambda it: it.tell("note", 3600.0, kind="note", text="however long it took"), {}),
     (lambda it: it.start(1), {"faults": 2, "device_ready": False}),
-    (lambda it: it.tell("pause_asked", 12.0), {"dropped": 7, "forces": ForceFigures(0.2, 0.91, (("slope", 3),), 0.07)}),
+    (
+        lambda it: it.tell("pause_asked", 12.0),
+        {"dropped": 7, "forces": ForceFigures(share=0.2, most=0.91, limiters=(("slope", 3),), withheld=0.07)},
+    ),
     (lambda it: it.end(1, **BROKEN), {"lost": {1: "No space left on device"}}),
     (lambda it: it.tell("recording_lost", 33.0, trial=1, attempt=1, reason="No space left on device"), {}),
     (lambda it: it.answer(1), {"outlets_lost": {"Serial port": "it was unplugged"}}),

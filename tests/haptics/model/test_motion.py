@@ -103,7 +103,7 @@ def test_on_error_nothing_is_written_and_what_was_there_stays(tmp_path):
 )
 def test_a_motion_checks_itself(t_s, position_m, velocity_mps, message):
     with pytest.raises(StudyError, match=message):
-        Motion(np.array(t_s), position_m, velocity_mps)
+        Motion(np.array(t_s), position_m, velocity_mps=velocity_mps)
 
 
 def test_a_device_is_not_read(tmp_path):

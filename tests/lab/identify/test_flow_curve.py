@@ -57,7 +57,7 @@ def strokes():
     angle = 2 * np.pi * (0.2 * t_s + 0.75 * t_s**2 / 6)
     place, speed = 0.045 * np.sin(angle), 0.045 * rate_per_s * np.cos(angle)
     still = np.zeros_like(t_s)
-    return Motion(t_s, np.column_stack([place, still, still]), np.column_stack([speed, still, still]))
+    return Motion(t_s, np.column_stack([place, still, still]), velocity_mps=np.column_stack([speed, still, still]))
 
 
 @pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")

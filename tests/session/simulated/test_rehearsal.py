@@ -74,7 +74,9 @@ def test_senses_measure_force_speed_of_the_hand_roughness_and_delay() -> None:
     for age_ms in (100, 110):
         painted_ns = 1_000_000_000
         shown_ns = painted_ns - age_ms * 1_000_000
-        senses.see(painted_ns, TankView(np.zeros(3), TaskView(0, 0, 1, 0.0, 0.0), shown_ns))
+        senses.see(
+            painted_ns, TankView(np.zeros(3), TaskView(lit=0, reached=0, of=1, dwell=0.0, elapsed_s=0.0), shown_ns)
+        )
     felt = senses.features()
     assert felt.force_mean_n == pytest.approx(2.5)
     assert felt.force_peak_n == pytest.approx(5)

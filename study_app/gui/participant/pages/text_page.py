@@ -127,8 +127,10 @@ class ReadingPage(PageWidget):
         self._column.setAutoFillBackground(False)
         self._content = QRectF()
         QScroller.grabGesture(self._scroll.viewport(), QScroller.ScrollerGestureType.TouchGesture)
-        self.button = GoButton(*button, parent=self) if button is not None else None
-        if self.button is not None:
+        self.button = None
+        if button is not None:
+            text, key = button
+            self.button = GoButton(text, key, parent=self)
             self.button.clicked.connect(self.go_on)
 
     def go_on(self) -> None:
