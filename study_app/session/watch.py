@@ -20,6 +20,7 @@ from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import Trial
 from study_app.protocol.streams import group_of
 from study_app.protocol.tracks import design_of
+from study_app.protocol.trials.tasks import Task
 from study_app.session.pages import Interval, TaskPage
 from study_app.session.tasks import TankView, Tracker, track
 from study_app.session.transitions.page_builder import task_page
@@ -160,7 +161,11 @@ def watched(session_folder: Path, trial: int, attempt: int = 1, interval: int = 
         samples=samples,
         times_s=times_s,
         tracker=tracker,
-        marks=tuple(sorted(_marks(own, begins[at], ended, until_s), key=lambda mark: mark.at_s)),
+        marks=tuple(
+            sorted(
+                [*_marks(own, begins[at], ended, until_s), *_target_marks(ended, page.task)], key=lambda mark: mark.at_s
+            )
+        ),
     )
     if shown is None:  # the delay between a sample and its frame is sealed
         return found
@@ -205,6 +210,12 @@ def _marks(own: Sequence[events.Event], begun: events.Event, ended: Any, until_s
             if line is ended or not isinstance(line, _ENDS):
                 kind, words = told
                 yield Mark(at_s, kind, words)
+
+
+def _target_marks(ended: events.EndOfTask | None, task: Task) -> Iterator[Mark]:
+    """Yield the targets whose times were sealed until the study was unblinded; they light up in turn."""
+    for number, at_s in enumerate((ended.reached_s if ended is not None else None) or ()):
+        yield Mark(at_s, "target", f"target {number % len(task.targets_m) + 1} reached")
 
 
 def _told(line: events.Event) -> tuple[Kind, str] | None:

@@ -318,7 +318,7 @@ def _setting_line(session: Session, progress: Progress, *, answering: bool) -> s
         doing = "paused"
     elif answering:
         doing = "answering"
-    if task.targets_m:
+    if task.targets_m and not (progress.start and progress.start.measures_sealed):  # a delay shows in their number
         doing += f"  ·  {progress.targets} {'targets' if task.wanted is None else f'of {task.wanted} targets'}"
     if trial.phase != "main":
         return doing.capitalize()

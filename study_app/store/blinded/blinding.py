@@ -36,7 +36,7 @@ from study_app.protocol.streams import draw_secret, group_of, own_code
 from study_app.protocol.table import RECORDED
 from study_app.store import receipt
 from study_app.store.atomic import append_line, create_folder, is_there, parse_json, read_own
-from study_app.store.blinded.sealing import open_text, seal
+from study_app.store.blinded.sealing import TASK_BYTES, open_text, seal
 from study_app.store.columns import SEALED
 from study_app.store.folders import SessionFolder, StudyFolder, readable
 from study_app.store.journals import journal
@@ -51,10 +51,10 @@ _OF_RECEIPT: Final = ("codes", "slots", "order", "compares")
 """Keys that a receipt adds to a block with a design."""
 _SEALED_IN: Final[Mapping[type[events.Event], frozenset[str]]] = {
     events.TrialStarted: frozenset({"level", "standard", "arrangement", "catch"}),
-    events.IntervalEnded: SEALED,
+    events.IntervalEnded: SEALED | {"reached_s"},
     events.Allocated: frozenset({"group"}),
     events.Recorded: frozenset({"samples_recorded", "frames_recorded", "opened_sha256", "opened_frames_sha256"}),
-    events.TrialEnded: SEALED,
+    events.TrialEnded: SEALED | {"reached_s"},
 }
 """The fields that each event's lines hold sealed."""
 
@@ -395,7 +395,11 @@ def sealed(start: events.SessionStarted, event: events.Event, key: Key) -> event
     if not start.measures_sealed or not measured:
         return event
     rest = {name: value for name, value in line.items() if name not in names}
-    return events.read_event({**rest, "sealed": seal(_whose(start, event), measured, key.nonce)})
+    if isinstance(event, events.EndOfTask):
+        text = seal(_whose(start, event), measured, key.nonce, TASK_BYTES)
+    else:
+        text = seal(_whose(start, event), measured, key.nonce)
+    return events.read_event({**rest, "sealed": text})
 
 
 def opened(lines: Iterable[events.Event], key: Key | None) -> list[events.Event]:

@@ -113,6 +113,15 @@ Numbers: TypeAlias = Annotated[
     ),
 ]
 Texts: TypeAlias = Annotated[Sequence[str], Kind("list of texts", _are_texts, "array", {"items": {"type": "string"}})]
+NumberList: TypeAlias = Annotated[
+    Sequence[float],
+    Kind(
+        "list of numbers",
+        lambda value: isinstance(value, list) and all(map(_is_number, value)),
+        "array",
+        {"items": {"type": "number"}},
+    ),
+]
 Answers: TypeAlias = Annotated[
     Sequence["Response"], Kind("list of answers", _are_answers, "array", {"items": {"$ref": "#/$defs/answer"}})
 ]
@@ -258,7 +267,13 @@ class OfAttempt(Event, group=True):
 
 
 class EndOfTask(OfAttempt, group=True):
-    """The end of a task, with its measures in ``others``."""
+    """The end of a task, with its measures in ``others``.
+
+    ``reached_s`` lists when the targets were reached [s, on the task's clock], if `target_reached` lines would have
+    revealed the condition while the key was sealed.
+    """
+
+    reached_s: NumberList | None = None
 
     def fields(self) -> dict[str, Any]:
         """Return the event's own fields in the order in which they are written: measures first if interrupted."""
@@ -427,7 +442,11 @@ class Stepped(OfAttempt):
 
 
 class TargetReached(Event):
-    """A target was reached, on the task's clock."""
+    """A target was reached, on the task's clock.
+
+    While measures are sealed no such line is written, since their number and times would reveal a delay: the end of
+    the task has the times in its `sealed` text, as `reached_s`.
+    """
 
     trial: Integer
     target: Integer

@@ -78,6 +78,7 @@ class SessionStore:
         self.outlets: Outlets | None = None
         self._marked: Marker | None = None  # of the line that could not be written
         self._outlets_lost: set[str] = set()  # that are journalled
+        self._reached_s: list[float] = []  # in the running task of a sealed session
 
     @property
     def folder(self) -> SessionFolder:
@@ -113,19 +114,38 @@ class SessionStore:
     def append(self, event: events.Event, *, t_s: float | None = None, waits: bool = True) -> None:
         """Add an event to the journal; with ``waits`` it is on the disk when this returns, else soon after.
 
-        ``t_s`` is its time [s since the clock's origin], by default now. Fields that reveal a condition are sealed.
+        ``t_s`` is its time [s since the clock's origin], by default now. Fields that reveal a condition are sealed;
+        while measures are sealed, a reached target sends its marker at once and is written at the end of its task.
 
         Raises
         ------
         StoreError
             It was not written, or is not on the disk; the journal is as before and can be tried again.
         """
-        if self._lines:
-            event = sealed(events.start_of(self._lines), event, self.key)
         event = replace(event, t_s=self.clock.seconds() if t_s is None else t_s)
+        if self._lines:
+            start = events.start_of(self._lines)
+            if start.measures_sealed and isinstance(event, events.TargetReached):
+                self._hold_target(event)
+                return
+            event = sealed(start, self._with_targets(event), self.key)
         self._mark(event)
         self._lines.append(self.journal.append(event, t_s=event.t_s, waits=waits))
         self._marked = None
+
+    def _hold_target(self, event: events.TargetReached) -> None:
+        """Send the marker of a reached target; its time is written, sealed, at the end of the task."""
+        self._mark(event)
+        self._marked = None
+        if event.t_task_s is not None:
+            self._reached_s.append(round(event.t_task_s, 6))
+
+    def _with_targets(self, event: events.Event) -> events.Event:
+        """Return the end of a task with the times of the targets that were held back."""
+        if isinstance(event, events.TrialStarted | events.IntervalStarted):
+            self._reached_s = []
+        ends = isinstance(event, events.TrialEnded | events.IntervalEnded)
+        return replace(event, reached_s=self._reached_s) if ends and self._reached_s else event
 
     def _mark(self, event: events.Event) -> None:
         """Send the marker of an event, before waiting for the disk; only once, even if its line is written again."""
