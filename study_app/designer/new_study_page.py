@@ -55,7 +55,7 @@ from study_app.gui.widgets.controls import ActionButton, Check, IconButton
 from study_app.gui.widgets.labels import Clamped, figures, label
 from study_app.gui.widgets.main_view import last_focused
 from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
-from study_app.number_text import capitalised, counted, duration, number_of, typed_numbers
+from study_app.number_text import capitalised, counted, duration, number_of, typed_numbers, unclear_number
 from study_app.protocol.load import read_document
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
@@ -619,9 +619,9 @@ class Questions(Themed, QWidget):
             if not text or text == question.value:
                 continue
             if not question.several:
-                number = number_of(text) if len(text.split()) == 1 else None
+                number = number_of(text)
                 if number is None:
-                    return f"{question.words}: “{text}” is not a number"
+                    return f"{question.words}: {unclear_number(text)}"
                 values.append((question.path, number))
                 continue
             try:

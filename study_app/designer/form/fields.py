@@ -27,7 +27,7 @@ from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButton, Toggle
 from study_app.gui.widgets.labels import Elided, label, set_property
-from study_app.number_text import number_of, typed_numbers
+from study_app.number_text import number_of, typed_numbers, unclear_number
 
 HAND_ON_MS = 150
 """What is typed is handed on so long after the first key [ms]: typing without a rest is kept as well."""
@@ -415,8 +415,8 @@ class LineField(Field):
         elif row.kind in {"number", "whole number"}:
             value = number_of(text)
             if value is None or (row.kind == "whole number" and isinstance(value, float)):
-                wanted = "a whole number" if row.kind == "whole number" else "a number"
-                self.refusal = f"“{text}” is not {wanted}. {kept(row.value)}"
+                why = unclear_number(text) if value is None else f"“{text}” is not a whole number"
+                self.refusal = f"{why}. {kept(row.value)}"
         elif row.kind in {"numbers", "vector"}:
             try:
                 value = [number for _, number in typed_numbers(text)]

@@ -37,7 +37,7 @@ from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hb
 from study_app.gui.widgets.cards import Chip, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import Ink, figures, label
-from study_app.number_text import capitalised, number_of
+from study_app.number_text import capitalised, number_of, unclear_number
 from study_app.protocol import questions
 from study_app.protocol.model import OF_LEVELS
 from study_app.protocol.orders.balance import block_order_words
@@ -491,7 +491,7 @@ class Hypothesis(QWidget):
 
     def _take_bound(self, text: str) -> None:
         bound = number_of(text)
-        self.refused.emit("" if bound is not None else f"“{text}” is not a number. {kept(self.value.get('bound'))}")
+        self.refused.emit("" if bound is not None else f"{unclear_number(text)}. {kept(self.value.get('bound'))}")
         if bound is not None:
             self.changed.emit({**self.value, "bound": bound})
 

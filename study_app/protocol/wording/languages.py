@@ -11,6 +11,7 @@ from pathlib import Path as File
 from typing import TYPE_CHECKING, Any, Final
 
 from study_app.errors import StudyError
+from study_app.number_text import exact_text, readings_of
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.problems import Fault, did_you_mean
 
@@ -46,6 +47,14 @@ class Words:
         if len(entries) < 2:
             return "".join(entries)
         return f"{', '.join(entries[:-1])} {self.and_} {entries[-1]}"
+
+    def unclear_number(self, text: str) -> str:
+        """Return the sentence that asks again for a number that can be read in two ways; "" if it cannot."""
+        numbers = readings_of(text, self.decimal_sign)
+        if len(numbers) < 2:
+            return ""
+        one, other = (exact_text(number).replace(".", self.decimal_sign) for number in numbers)
+        return self.number_unclear.format(text=text.strip(), one=one, other=other)
 
     def missing(self, numbers: Sequence[int]) -> str:
         """Return the sentence that names the statements (by number, at least one) still without an answer."""

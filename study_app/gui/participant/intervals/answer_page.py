@@ -222,7 +222,7 @@ LONGEST = 12
 
 
 class NumberWidget(AnswerPage):
-    """A field for a number, with point or comma; anything but a number above 0 is reported and not accepted."""
+    """A field for a number, with point or comma; anything but one number above 0 is reported and not accepted."""
 
     def __init__(self, page: NumberPage, context: PageContext) -> None:
         super().__init__(page, context)
@@ -233,7 +233,7 @@ class NumberWidget(AnswerPage):
         self.wrong = QLabel("", self)
         self.wrong.setStyleSheet(f"color: {PARTICIPANT.warn}; background: transparent;")
         self.field.textChanged.connect(lambda _text: self.wrong.clear())
-        self._pad = DigitPad(self.field, (".",), ACROSS, self._words.delete_digit, self)
+        self._pad = DigitPad(self.field, (self._words.decimal_sign,), ACROSS, self._words.delete_digit, self)
         self.keys = self._pad.keys
         self.button = GoButton(self._words.continue_, self._words.enter_key, self)
         self.button.clicked.connect(self._confirm)
@@ -262,12 +262,14 @@ class NumberWidget(AnswerPage):
 
     def _confirm(self) -> None:
         """Answer with the number in the field, or report what is wrong with it."""
-        number = read_number(self.field.text())
+        text = self.field.text()
+        number = read_number(text, self._words.decimal_sign)
         if number is not None and self._permits(number):
             self.answer(plain_number(number))
             return
-        self.wrong.setText(self._words.number_wanted)
-        say(self.field, self._words.number_wanted)
+        problem = self._words.unclear_number(text) or self._words.number_wanted
+        self.wrong.setText(problem)
+        say(self.field, problem)
         self.field.setFocus()
         self.field.selectAll()
 
