@@ -159,6 +159,12 @@ def shipped_file(name: str) -> Path:
     return _shipped_folder() / f"{name}.toml"
 
 
+def shipped_studies() -> tuple[Path, ...]:
+    """Return the files of all studies that ship with the program: protocols, and the templates of the designer."""
+    templates = (_PACKAGE / "designer" / "templates").glob("*.toml")
+    return (*(shipped_file(name) for name in shipped()), *sorted(templates))
+
+
 def at_hand() -> tuple[str, ...]:
     """Return the names of the protocols in the workspace, then of those that ship with the program."""
     return tuple(dict.fromkeys((*(path.stem for path in workspace().own_protocols()), *shipped())))
