@@ -23,7 +23,15 @@ from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
 from study_app.number_text import counted
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.document import value_at
-from study_app.protocol.source.files import file_hash, hashes_in, shipped, shipped_file, unbundled, with_liquid_files
+from study_app.protocol.source.files import (
+    file_hash,
+    hashes_in,
+    shipped,
+    shipped_file,
+    unbundled,
+    with_liquid_files,
+    without_mark,
+)
 from study_app.protocol.source.problems import did_you_mean
 from study_app.protocol.wording.languages import languages_of
 from study_app.store.atomic import cannot_write
@@ -285,7 +293,7 @@ class Document:
 
     def keep_mine(self, now_s: float) -> None:
         content = _content(self.file) if self.file.exists() else b""
-        self.saved = content.decode("utf-8", "replace")
+        self.saved = without_mark(content).decode("utf-8", "replace")
         self._rebase(content_hash(content) if self.file.exists() else "")
         self.note_edit(now_s)
 
