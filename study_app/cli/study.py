@@ -66,8 +66,7 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
     else:
         import time
 
-        from study_app.designer.document.study import read
-        from study_app.designer.measures.study_facts import to_translate
+        from study_app.protocol.checks.untranslated import describe_untranslated
         from study_app.protocol.source.files import find
         from study_app.session.simulated.paced_levels import undelivered_levels
         from study_app.store import workstation
@@ -78,7 +77,8 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
         file = find(protocol)
         missing = missing_here(study, file.parent, camera, time.monotonic_ns)
         click.echo(describe.describe(study, delay_ticks, workstation.device_without_force()))
-        for sentence in (*undelivered_levels(study), *to_translate(read(file.read_bytes(), file.parent))):
+        document, _ = load.read_document(load.source_bytes(protocol), protocol)
+        for sentence in (*undelivered_levels(study), *describe_untranslated(document, lists_places=True)):
             click.echo(f"\nNote: {sentence}.")
         if missing:
             click.echo(f"\nNote: {missing}. Sessions of this study do not start on this computer.")

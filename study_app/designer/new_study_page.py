@@ -35,7 +35,7 @@ from PySide6.QtWidgets import (
 
 from study_app.designer.document.document import Answers, Document, taken_names, template
 from study_app.designer.document.elements import study_title, title_of
-from study_app.designer.document.fields import languages_of, row_at, unit_of
+from study_app.designer.document.fields import row_at, unit_of
 from study_app.designer.document.study import Study, read
 from study_app.designer.header import HeaderState, StudyChoice, problems_chip
 from study_app.designer.outline import icon_of
@@ -63,7 +63,7 @@ from study_app.protocol.orders.durations import expected_duration_s, step_durati
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.document import names
 from study_app.protocol.source.files import find, shipped, shipped_file
-from study_app.protocol.wording.languages import LANGUAGES
+from study_app.protocol.wording.languages import LANGUAGES, languages_of
 from study_app.store.drafts import draft_of, drafted_files, unsaved_files
 from study_app.store.study_settings import kept_original
 from study_app.workspace import workspace

@@ -19,10 +19,12 @@ from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
 from study_app.number_text import counted
 from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.checks.force_limits import beyond_slope_limit, by_stimulus
+from study_app.protocol.checks.untranslated import UntranslatedText, listed_places
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import recordings_of
 from study_app.protocol.presented.presented_levels import highest_damping
 from study_app.protocol.sequences import enrolment
+from study_app.protocol.wording.languages import language_name
 from study_app.store.blinded.sealing import FRAMES_BYTES_PER_S, SAMPLE_BYTES, sealed_bytes
 from study_app.video.sources import VideosFound
 
@@ -81,7 +83,8 @@ class Measurements:
     liquid; None where it was not computed. ``velocity_errors`` are the relative error of the velocity and what it would
     be if all of the device's dynamics were known; None where all is. ``outlets`` are the streams and ports to other
     programs; ``video`` is what was found of the study's videos, None without any. ``ran_otherwise`` is a participant
-    with whom the same version of the study ran from another file.
+    with whom the same version of the study ran from another file; ``untranslated`` are texts of the pages that are
+    still in another language.
     """
 
     device: str
@@ -104,6 +107,7 @@ class Measurements:
     outlets: tuple[OutletStatus, ...] = ()
     video: VideosFound | None = None
     ran_otherwise: str = ""
+    untranslated: tuple[UntranslatedText, ...] = ()
     lateness_ns: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64), compare=False, repr=False)
 
 
@@ -310,6 +314,11 @@ def _costs(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         about = f"version {protocol.study.version} ran from another file with {facts.ran_otherwise}"
         advice = "Give the changed file another study.version; the report names the change in any case."
         yield Check("Study file", "warning", "changed", about=about, advice=advice)
+
+    if facts.untranslated:
+        about = f"still in {language_name(facts.untranslated[0].source)}"
+        advice = f"Pages mix two languages: translate {listed_places(facts.untranslated)}."
+        yield Check("Translation", "warning", counted(len(facts.untranslated), "text"), about, advice)
 
     if protocol.assigns_rows and (number := enrolment(facts.participant)) is not None:
         yield Check("Balance", "ok", f"participant number {number}", about="determines the row of the square")

@@ -15,7 +15,8 @@ from study_app.devices.registry import check_options, descriptor_of
 from study_app.devices.rig import Rig
 from study_app.errors import SessionError
 from study_app.outlets.session_outlets import Outlets, OutletStatus
-from study_app.protocol.load import parse, protocol_hash, source_bytes
+from study_app.protocol.checks.untranslated import check_translated, untranslated_on_pages
+from study_app.protocol.load import parse, protocol_hash, read_document, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule, stream
 from study_app.protocol.sequences import enrolment
@@ -206,6 +207,8 @@ def check(chosen: NewSession, study: Protocol) -> None:
     if chosen.resumes is not None:
         return
     folder = StudyFolder(chosen.results)
+    if not chosen.pilot:
+        check_translated(read_document(chosen.read_source(), chosen.source)[0])
     check_participant(chosen.participant, pilot=chosen.pilot)
     check_row(chosen.row_of, study)
     check_study(folder, study.study.name)
@@ -242,7 +245,9 @@ def measured(
         lasts_s=PLAYED_MEASURED_S if chosen.played else MEASURED_S,
         sleep=sleep,
     )
-    return replace(facts, video=looked, ran_otherwise=ran_otherwise(chosen))
+    document, _ = read_document(chosen.read_source(), chosen.source)
+    untranslated = untranslated_on_pages(document)
+    return replace(facts, video=looked, ran_otherwise=ran_otherwise(chosen), untranslated=untranslated)
 
 
 def ran_otherwise(chosen: NewSession) -> str:

@@ -1,6 +1,5 @@
 """Exclusions from the analysis: by which rule or person, and why. Data are never deleted."""
 
-import codecs
 import contextlib
 import csv
 import io
@@ -11,6 +10,7 @@ from datetime import datetime
 from pathlib import Path
 
 from study_app.errors import StoreError
+from study_app.protocol.source.files import without_mark
 from study_app.store.atomic import append_line, parse_json, read_if_there, write_file
 from study_app.store.columns import EXCLUSIONS
 from study_app.store.csv_files import MISSING, csv_bytes, header, unguarded
@@ -179,11 +179,6 @@ def _reversed(path: Path, number: int, line: bytes) -> tuple[Exclusion, str]:
         if all(isinstance(text, str) for text in texts) and isinstance(taken.session, int):
             return taken, str(record.get("at", ""))
     raise StoreError(f"{path}, line {number} is not a reversed exclusion: restore it from a copy, or remove the line")
-
-
-def without_mark(content: bytes) -> bytes:
-    """Return a file's content without the byte order mark that spreadsheets write before UTF-8."""
-    return content.removeprefix(codecs.BOM_UTF8)
 
 
 def exclusion_bytes(rows: tuple[Exclusion, ...]) -> bytes:

@@ -11,7 +11,7 @@ from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QBoxLayout, QLabel, QSizePolicy, QWidget
 
 from study_app.designer.document.elements import title_of
-from study_app.designer.document.fields import Row, languages_of
+from study_app.designer.document.fields import Row
 from study_app.designer.document.steps import AddElement, AddEntry, Do, RemoveKey, Request, SetValue, Several
 from study_app.designer.document.study import Study
 from study_app.designer.form.fields import (
@@ -44,7 +44,7 @@ from study_app.protocol.orders.balance import block_order_words
 from study_app.protocol.sequences import borders_even, row_count
 from study_app.protocol.source.document import entries, names, value_at
 from study_app.protocol.trials import designs, tasks
-from study_app.protocol.wording.languages import language_name
+from study_app.protocol.wording.languages import language_name, languages_of
 
 ROUNDS: Final = 3
 SQUARES: Final[Mapping[Any, Literal["williams", "latin"]]] = {"williams": "williams", "latin": "latin"}

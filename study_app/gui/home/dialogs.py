@@ -1,7 +1,8 @@
 """The dialogs of the home page: a new session, a rehearsal, the workspace. Nothing is created before one accepts."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +25,11 @@ from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
 from study_app.gui.widgets.cards import Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
+from study_app.protocol.checks.untranslated import check_translated
 from study_app.protocol.groups import refuse_beyond_last
+from study_app.protocol.load import read_document
 from study_app.protocol.model import Protocol
+from study_app.protocol.source.files import source_bytes
 from study_app.protocol.wording.languages import language_name
 from study_app.session.simulated.rehearsal_worker import TASK, RehearsalClient, RehearsalOrder
 from study_app.session.start import MAX_SEED, NewSession, check_row, draw_seed, study_results
@@ -373,6 +377,8 @@ class NewSessionDialog(QDialog):
         if not self._value("results"):
             raise ValueError("choose a results folder")
         participant, session, state = self._value("participant"), self._value("session"), self._state_now()
+        if not self._value("pilot"):
+            check_translated(self._document)
         check_participant(participant, pilot=self._value("pilot"))
         if state.fault:
             raise ValueError(state.fault)
@@ -380,6 +386,10 @@ class NewSessionDialog(QDialog):
         check_row(self._value("row_of"), self.facts.protocol)
         refuse_beyond_last(self.facts.protocol, session)
         self.chosen()
+
+    @cached_property
+    def _document(self) -> Mapping[str, Any]:
+        return read_document(source_bytes(self.facts.source), self.facts.source)[0]
 
     def _asked(self) -> set[str]:
         return {option.name for option in descriptor_of(self._value("device")).window_options}

@@ -24,7 +24,7 @@ from study_app.number_text import counted
 from study_app.protocol.load import is_scene_file, load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial
-from study_app.protocol.source.files import at_hand, find, shipped, shipped_file
+from study_app.protocol.source.files import at_hand, find, shipped, shipped_file, without_mark
 from study_app.protocol.wording.languages import language_name
 from study_app.session.resume import begun_schedule, find_protocol, is_rehearsal, resume_at, source_to_resume
 from study_app.store import receipt
@@ -256,7 +256,7 @@ def _draft_note(source: str, draft_words: LoadWords) -> DraftNote | None:
     """Return what is said of a draft: "Draft of today 14:02, not saved: Water"; None where all of it is saved."""
     with suppress(ProtocolError, OSError):
         file = find(source)
-        draft, content = None if is_shipped(source) else draft_of(file), file.read_bytes()
+        draft, content = None if is_shipped(source) else draft_of(file), without_mark(file.read_bytes())
         if draft is not None and draft.text.encode() != content:
             edited = (
                 draft_words().edited_words(content.decode("utf-8", "replace"), draft.text, file.parent)

@@ -37,7 +37,7 @@ from study_app.protocol.questions import (
     Value,
     plain_number,
 )
-from study_app.protocol.table import UNPRINTABLE
+from study_app.protocol.table import UNPRINTABLE, characters
 from study_app.protocol.wording.languages import Words
 
 SHORT = 12  # letters of options of which three stand side by side
@@ -566,19 +566,27 @@ class TextField(TypedField):
 
     def _edit(self) -> None:
         """Keep the text within its length, and free of what cannot be printed."""
-        text = self.entry.toPlainText()
-        kept = "".join(one for one in text if one == "\n" or unicodedata.category(one) not in UNPRINTABLE)
-        kept = kept[: self._shown.longest]
-        if self._shown.lines == 1:
-            kept = kept.replace("\n", " ")
+        text, cursor = self.entry.toPlainText(), self.entry.textCursor()
+        kept = "".join(characters(self._printable(text))[: self._shown.longest])
         if kept != text:
-            place = min(self.entry.textCursor().position(), len(kept))
+            before = _utf16(text)[: 2 * cursor.position()].decode("utf-16-le", "surrogatepass")
+            place = min(len(_utf16(self._printable(before))), len(_utf16(kept))) // 2
             with QSignalBlocker(self.entry):
                 self.entry.setPlainText(kept)
             cursor = self.entry.textCursor()
             cursor.setPosition(place)
             self.entry.setTextCursor(cursor)
         self._timer.start()
+
+    def _printable(self, text: str) -> str:
+        """Return a text without what cannot be printed; a field of one line has no line breaks."""
+        kept = "".join(one for one in text if one == "\n" or unicodedata.category(one) not in UNPRINTABLE)
+        return kept.replace("\n", " ") if self._shown.lines == 1 else kept
+
+
+def _utf16(text: str) -> bytes:
+    """Return a text as Qt counts its places, of two bytes each."""
+    return text.encode("utf-16-le", "surrogatepass")
 
 
 FIELDS: Final[dict[str, type[QuestionField]]] = {

@@ -186,7 +186,7 @@ def _alike(found: list[tuple[Path, Any]], kind: str) -> Iterator[Fault]:
     seen: set[tuple[str, str]] = set()
     for path, entry in found:
         texts = entry if isinstance(entry, Mapping) else {"": entry}
-        read = {(language, _as_read(text)) for language, text in texts.items() if isinstance(text, str)}
+        read = {(language, as_read(text)) for language, text in texts.items() if isinstance(text, str)}
         if read & seen:
             hint = "people could not tell the two apart: change one"
             yield Fault(path, f"reads as an earlier {kind} does", hint, kind="alike")
@@ -197,7 +197,7 @@ LOOKALIKES = str.maketrans("аеіјорсухѕһοαρνικ", "aeijopcyxshoap
 """Small letters of the Cyrillic and the Greek alphabet, and the Latin ones that look the same."""
 
 
-def _as_read(text: str) -> str:
+def as_read(text: str) -> str:
     """Return what a reader sees of a text: without marks of format, case, width and alphabet."""
     visible = "".join(letter for letter in text if unicodedata.category(letter) != "Cf")
     return " ".join(unicodedata.normalize("NFKC", visible).casefold().translate(LOOKALIKES).split())

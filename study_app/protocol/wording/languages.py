@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from study_app.errors import StudyError
 from study_app.number_text import exact_text, readings_of
-from study_app.protocol.source.document import Path
+from study_app.protocol.source.document import Path, entries
 from study_app.protocol.source.problems import Fault, did_you_mean
 
 RIGHT_TO_LEFT = frozenset({"ar", "dv", "fa", "he", "ks", "ps", "sd", "ug", "ur", "yi"})
@@ -78,6 +78,11 @@ LANGUAGES: Final = {
     code: Words(tomllib.loads((_FOLDER / f"{code}.toml").read_text(encoding="utf-8")))
     for code in ("en", "nl", "de", "fr", "ar")
 }
+
+
+def languages_of(document: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the languages that a study's document states; a file that states none is in English."""
+    return tuple(str(code) for _, code in entries(document, "study.languages.*")) or ("en",)
 
 
 def language_name(code: str) -> str:

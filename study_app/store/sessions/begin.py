@@ -10,6 +10,7 @@ from typing import Any
 
 import study_app
 from study_app.errors import StoreError
+from study_app.ids import read_as
 from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import own_protocol
@@ -267,7 +268,7 @@ class UsedIds:
         return f"P{max((int(match[1]) for match in matches if match), default=0) + 1:03d}"
 
     def check_unused(self, participant: str, number: int) -> None:
-        """Reject a session that exists, or an id that differs from a used one only in capitals.
+        """Reject a session that exists, or a new id that other programs change or that differs only in capitals.
 
         A session that was claimed by an ended program, and never begun, can be begun.
 
@@ -290,6 +291,11 @@ class UsedIds:
                     f"{used!r} "
                     "with a new session number, or another id"
                 )
+        if participant not in self.ids and (what := read_as(participant)):
+            raise StoreError(
+                f"participant id {participant!r} cannot be used: spreadsheets and statistics programs read it as "
+                f"{what}; use another id, such as {self.suggested()}"
+            )
         if (participant, number) in self.held:
             raise self.refusal(participant, number)
 

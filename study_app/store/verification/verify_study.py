@@ -19,6 +19,7 @@ from typing import Any, Final, TypeAlias
 from study_app.discovery import registry
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
+from study_app.protocol.source.files import without_mark
 from study_app.protocol.streams import group_of
 from study_app.store import csv_files, exclusions, receipt
 from study_app.store.atomic import is_there, read_own, read_regular, temporaries
@@ -335,7 +336,7 @@ def _exclusions(study: StudyFolder, sessions: Sessions, found: Findings) -> None
         rows = exclusions.exclusions(study.path)
         if not is_there(study.exclusions):
             return
-        for problem in csv_files.problems(exclusions.without_mark(read_regular(study.exclusions)), EXCLUSIONS):
+        for problem in csv_files.problems(without_mark(read_regular(study.exclusions)), EXCLUSIONS):
             found.error(study.exclusions, problem)
         trials = {(one.place.folder.participant, one.place.folder.number): one.trials for one in sessions}
         for row in rows:
