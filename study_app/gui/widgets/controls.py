@@ -42,11 +42,10 @@ class PressedByEnter(QPushButton):
     """A button that Enter presses as Space does, in a dialog too, where it would else press the default one."""
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Press on Enter; the keyboard's own repetition presses nothing."""
-        if event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
-            super().keyPressEvent(event)
-        elif not event.isAutoRepeat():
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self.click()
+        else:
+            super().keyPressEvent(event)
 
 
 class Cap(Themed, QWidget):
