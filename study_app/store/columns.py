@@ -50,6 +50,10 @@ PARTICIPANTS: tuple[Column, ...] = (
         "How the session ended.",
         levels=(
             ("completed", "it reached its last page"),
+            (
+                "incomplete",
+                "it reached its last page, but more trials were not delivered than the study permits",
+            ),
             ("withdrawn", "the participant stopped"),
             ("aborted", "the operator stopped it"),
             ("broken", "the operator stopped it after device, servo or program had failed"),
@@ -71,6 +75,14 @@ PARTICIPANTS: tuple[Column, ...] = (
         levels=(("valid", "all did"), ("invalid", "at least one did not")),
     ),
 )
+TRIALS_MISSING = optional(
+    "trials_missing",
+    "integer",
+    "Number of main trials that nobody answered because no presentation was delivered within the protocol's limits.",
+    minimum=0,
+    later=True,
+)
+"""A column of sessions in a study with trials of intervals."""
 GROUP = optional("group", "text", "The participant's group; n/a in a study without groups.", sealed=True, later=True)
 PARTICIPANTS_2: tuple[Column, ...] = (
     *(
@@ -367,7 +379,7 @@ def tables_of(protocol_format: int) -> dict[str, tuple[Column, ...]]:
     return {"responses": RESPONSES_2, "trials": TRIALS_2, "intervals": INTERVALS, "participants": PARTICIPANTS_2}
 
 
-LATER = frozenset(column.name for column in (*RESPONSES_2, *TRIALS_2, *INTERVALS) if column.later)
+LATER = frozenset(column.name for column in (*RESPONSES_2, *TRIALS_2, *INTERVALS, TRIALS_MISSING) if column.later)
 """Columns that earlier versions did not write."""
 
 
@@ -381,4 +393,6 @@ def every_column(protocol_format: int = 1, *, intervals: bool = False) -> tuple[
     for name, columns in tables_of(protocol_format).items():
         for column in columns if name != "intervals" or intervals else ():
             found.setdefault(column.name, column)
+    if intervals:
+        found.setdefault(TRIALS_MISSING.name, TRIALS_MISSING)
     return tuple(found.values())
