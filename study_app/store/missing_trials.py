@@ -64,6 +64,11 @@ class MissingTrials:
         """The number of missing trials that broke each limit, by its key, the most frequent first."""
         return dict(Counter(limit for one in self.missing for limit in one.broken).most_common())
 
+    @property
+    def tracks(self) -> dict[tuple[str, str], int]:
+        """The number of missing trials of each block and code, in the order of the trials."""
+        return dict(Counter((one.block, one.code) for one in self.missing))
+
     def __str__(self) -> str:
         """Return how many trials are missing, and why, as a sentence without a full stop; empty if none is."""
         return missing_words(self.count, self.asked, self.reasons, self.limits) if self.missing else ""
