@@ -50,10 +50,7 @@ PARTICIPANTS: tuple[Column, ...] = (
         "How the session ended.",
         levels=(
             ("completed", "it reached its last page"),
-            (
-                "incomplete",
-                "it reached its last page, but more trials were not delivered than the study permits",
-            ),
+            ("incomplete", "it reached its last page, but more trials were not delivered than the study permits"),
             ("withdrawn", "the participant stopped"),
             ("aborted", "the operator stopped it"),
             ("broken", "the operator stopped it after device, servo or program had failed"),

@@ -625,7 +625,9 @@ def _missing_sentence(study: Study) -> str:
     if not study.levels or not asked:
         return ""
     was = "was" if count == 1 else "were"
-    return f"{count or 'None'} of {counted(asked, 'main trial')} {was} lost because no presentation was within the limits."
+    return (
+        f"{count or 'None'} of {counted(asked, 'main trial')} {was} lost because no presentation was within the limits."
+    )
 
 
 def _first(lines: list[str]) -> list[str]:

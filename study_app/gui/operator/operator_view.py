@@ -290,7 +290,9 @@ def _part_line(session: Session, trial: Trial | None) -> str:
 
 def _heading(session: Session, progress: Progress) -> str:
     if progress.ended:
-        return {"completed": "Session complete", "incomplete": "Session incomplete"}.get(progress.ended, "Session ended")
+        return {"completed": "Session complete", "incomplete": "Session incomplete"}.get(
+            progress.ended, "Session ended"
+        )
     if progress.here < 0:
         return "Getting ready"
     trial = session.trial(progress)

@@ -356,7 +356,9 @@ class ProgrammedBall:
         self, task: Task, workspace_m: tuple[float, float, float], *, hidden_after_lead: bool = False, seed: int = 1
     ) -> None:
         self._task, self._hides = task, hidden_after_lead
-        times_s, self._positions_m = _path(task, workspace_m, min(LONGEST_PATH_S, task.limit_s - BEFORE_END_S), seed)
+        times_s, self._positions_m = task_path(
+            task, workspace_m, min(LONGEST_PATH_S, task.limit_s - BEFORE_END_S), seed
+        )
         self.duration_s = float(times_s[-1])
         self._times_ns = np.round(times_s * 1e9).astype(np.int64)
         samples = np.zeros(len(times_s), _SAMPLE)
@@ -372,7 +374,9 @@ class ProgrammedBall:
         return TankView(position_m, shown, now_ns, self._hides and shown.elapsed_s >= self._task.judged_from_s)
 
 
-def _path(task: Task, workspace_m: tuple[float, float, float], duration_s: float, seed: int) -> tuple[Floats, Floats]:
+def task_path(
+    task: Task, workspace_m: tuple[float, float, float], duration_s: float, seed: int
+) -> tuple[Floats, Floats]:
     """Return times (n,) [s] and positions (n, 3) [m, hand frame] of a path of about ``duration_s``."""
     if isinstance(task, Reach):
         return _reaches(task, duration_s)

@@ -126,7 +126,9 @@ def write_participants(folder: StudyFolder, study: str) -> None:
 
 def table_bytes(folder: StudyFolder, rows: Sequence[csv_files.Row]) -> bytes:
     """Return the table with these rows, with the columns of `columns_of`."""
-    return csv_files.csv_bytes(columns_of(folder, rows), [{"group": None, TRIALS_MISSING.name: None} | row for row in rows])
+    return csv_files.csv_bytes(
+        columns_of(folder, rows), [{"group": None, TRIALS_MISSING.name: None} | row for row in rows]
+    )
 
 
 def columns_of(folder: StudyFolder, rows: Iterable[csv_files.Row]) -> tuple[Column, ...]:
