@@ -71,8 +71,8 @@ class Screen:
 class PredictedDelivery:
     """How many main trials a simulated participant would lose because the safety layer withholds too much force.
 
-    ``missing`` of the ``asked`` trials of intervals would not be delivered, ``out`` of the ``judged`` other trials would
-    be out of limits. The limit on the force withheld is ``limit_percent`` [%].
+    ``missing`` of the ``asked`` trials of intervals would not be delivered, ``out`` of the ``judged`` other trials
+    would be out of limits. The limit on the force withheld is ``limit_percent`` [%].
     """
 
     missing: int
@@ -102,9 +102,9 @@ class Measurements:
     ``grant`` what the system lets the servo's thread do. ``dynamics`` are the device's, with its measured
     delay, ``delay_ticks`` is the delay that the servo uses now. ``withheld`` is the share of
     the force that limits and passivity controller are expected to withhold in the fastest stroke of a task, by
-    liquid; None where it was not computed. ``delivery`` is what a simulated participant would lose, None where it was not
-    computed. ``velocity_errors`` are the relative error of the velocity and what it would
-    be if all of the device's dynamics were known; None where all is. ``outlets`` are the streams and ports to other
+    liquid; None where it was not computed. ``delivery`` is what a simulated participant would lose, None where it was
+    not computed. ``velocity_errors`` are the relative error of the velocity and what it would be if all of the device's
+    dynamics were known; None where all is. ``outlets`` are the streams and ports to other
     programs; ``video`` is what was found of the study's videos, None without any. ``ran_otherwise`` is a participant
     with whom the same version of the study ran from another file.
     """

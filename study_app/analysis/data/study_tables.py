@@ -59,8 +59,8 @@ from study_app.store.blinded.blinding import Key
 from study_app.store.columns import INTERVALS, SEALED
 from study_app.store.exclusions import MISSING_RULE, Exclusion, exclusions, reversals
 from study_app.store.folder_lock import never_begun
-from study_app.store.journals.journal_events import INCOMPLETE, REACHED_END
 from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.journals.journal_events import INCOMPLETE, REACHED_END
 from study_app.store.merged import DASH, Merged, read_merged
 from study_app.store.sessions.open_session import Place
 from study_app.store.tables.study_files import has_intervals
@@ -440,7 +440,7 @@ def _load(folder: Path, *, sealed: bool = False) -> Study:
 
 
 def _undecided(place: StudyFolder, records: Sequence[Session], listed: Sequence[Exclusion]) -> Iterator[Exclusion]:
-    """Yield the exclusion of each incomplete session that the list lacks because the program ended before it wrote it."""
+    """Yield the exclusion of each incomplete session that the list lacks: the program ended before it wrote it."""
     decided = {one.what for one in (*listed, *reversals(place.path))}
     for one in records:
         what = (one.folder.participant, one.folder.number, None)

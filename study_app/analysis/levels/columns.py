@@ -212,8 +212,8 @@ RESULTS: Final = {
 def dictionary_markdown() -> str:
     """Return the columns of these tables as Markdown: a heading and a table for each."""
     added = (
-        "what `export` adds to responses, trials and intervals; `trials_missing` in studies with trials of intervals, the "
-        "last four after unblinding"
+        "what `export` adds to responses, trials and intervals; `trials_missing` in studies with trials of intervals, "
+        "the last four after unblinding"
     )
     of_tracks = (
         "one row per trial with a design, after unblinding; what it has besides IDs and condition of the trial, and "

@@ -624,10 +624,8 @@ def _missing_sentence(study: Study) -> str:
     asked, count = sum(one.asked for one in known), sum(one.count for one in known)
     if not study.levels or not asked:
         return ""
-    was = "was" if count == 1 else "were"
-    return (
-        f"{count or 'None'} of {counted(asked, 'main trial')} {was} lost because no presentation was within the limits."
-    )
+    lost = f"{count or 'None'} of {counted(asked, 'main trial')} {'was' if count == 1 else 'were'} lost"
+    return f"{lost} because no presentation was within the limits."
 
 
 def _first(lines: list[str]) -> list[str]:

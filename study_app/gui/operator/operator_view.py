@@ -13,7 +13,7 @@ from typing import Final, Literal
 from study_app.devices.descriptor import Icon
 from study_app.gui.operator.servo_health import ForceFigures, Tile, Vitals, force_rows, health_tiles
 from study_app.gui.sessions.session_facts import broken_words, operator_language, step_title
-from study_app.number_text import counted, grouped, minutes
+from study_app.number_text import grouped, minutes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import FormStep, Schedule, Step, Trial
 from study_app.protocol.tracks import design_of
@@ -72,9 +72,9 @@ class OperatorView:
     that were left behind, and all. ``trial`` is the number of the trial under way or answered.
     ``waits`` says that the trouble is a disk that takes nothing: the session goes on when it does again. ``beyond``
     says whether the device is slower than at the start, which outlets and recordings were lost, how many trials were
-    not delivered, then of each trial out of limits which it broke, the newest first. ``may_reconnect`` says that the trouble is a device that can be
-    connected again, ``reconnects`` that it is being so, ``reconnection`` how far that is, or why it failed. ``track``
-    says how the track of the latest trial with a design is doing, without a level.
+    not delivered, then of each trial out of limits which it broke, the newest first. ``may_reconnect`` says that the
+    trouble is a device that can be connected again, ``reconnects`` that it is being so, ``reconnection`` how far that
+    is, or why it failed. ``track`` says how the track of the latest trial with a design is doing, without a level.
     """
 
     study: str

@@ -16,10 +16,10 @@ from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s, variants
 from study_app.protocol.orders.schedule import FormStep, PageStep
 from study_app.store import receipt
+from study_app.store.columns import TRIALS_MISSING
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folder_lock import is_open
 from study_app.store.folders import SessionFolder, StudyFolder
-from study_app.store.columns import TRIALS_MISSING
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import REACHED_END
 from study_app.store.merged import session_in
@@ -40,8 +40,8 @@ class SessionFacts:
 
     ``status`` is the table's, or "running" where a program has the session open. ``excluded`` is why the analysis
     excludes all of it, None where it does not; ``lost`` counts recordings that could not be stored, ``reconnected`` how
-    often the device failed and was connected again, ``outlets_lost`` streams and ports that failed. ``missing`` says how
-    many trials were not delivered, and why; "" if all were.
+    often the device failed and was connected again, ``outlets_lost`` streams and ports that failed. ``missing`` says
+    how many trials were not delivered, and why; "" if all were.
     """
 
     participant: str

@@ -27,8 +27,8 @@ from study_app.protocol.trials.tasks import AnyTask
 from study_app.session.preflight import PredictedDelivery
 from study_app.session.simulated.observers import task_path
 
-MOTIONS: Final = 6
-LONGEST_S: Final = 10.0
+MOTIONS: Final = 5
+LONGEST_S: Final = 4.0
 """So much of a long task is simulated."""
 REST_S: Final = 1.0
 """Between two motions, without force, while the hand goes to where the next one begins."""
@@ -41,7 +41,8 @@ def predicted_delivery(protocol: Protocol, delay_ticks: int) -> PredictedDeliver
     Of sessions that differ, such as those of groups, it is the one that loses most trials.
     """
     with late_rig(protocol, delay_ticks) as rig:
-        shares = {block.id: _lost_share(protocol, block, rig) for block in protocol.main_blocks}
+        failing = _FailingScenes(protocol, rig)
+        shares = {block.id: _lost_share(protocol, block, failing) for block in protocol.main_blocks}
     return max(
         (_in_session(one.protocol, shares) for one in variants(protocol)), key=lambda one: (one.missing, one.out)
     )
@@ -108,13 +109,28 @@ def withheld_shares(
     return tuple(shares)
 
 
-def _lost_share(protocol: Protocol, block: Block, rig: Rig) -> float:
+class _FailingScenes:
+    """How often a simulated motion of a task in a scene breaks the limit, each simulated once."""
+
+    def __init__(self, protocol: Protocol, rig: Rig) -> None:
+        self._protocol, self._rig = protocol, rig
+        self._known: dict[tuple[Scene, str], float] = {}
+
+    def share(self, scene: Scene, task: str) -> float:
+        """Return the share of the motions of a task in which more is withheld than the limit permits."""
+        if (known := self._known.get((scene, task))) is not None:
+            return known
+        protocol, limit = self._protocol, self._protocol.limits.withheld_percent / 100
+        shares = withheld_shares(self._rig, scene, protocol.tasks[task], protocol.device.workspace_m)
+        self._known[scene, task] = mean(share > limit for share in shares)
+        return self._known[scene, task]
+
+
+def _lost_share(protocol: Protocol, block: Block, scenes: _FailingScenes) -> float:
     """Return the probability that a trial of a block is missing, or, without intervals, that it is out of limits."""
-    task, limit = protocol.tasks[block.task], protocol.limits.withheld_percent / 100
 
     def failing(scene: Scene) -> float:
-        shares = withheld_shares(rig, scene, task, protocol.device.workspace_m)
-        return sum(share > limit for share in shares) / len(shares)
+        return scenes.share(scene, block.task)
 
     if block.design is None:
         return mean(failing(protocol.scene_for(name)) for name in block.conditions)
