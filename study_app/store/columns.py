@@ -50,7 +50,6 @@ PARTICIPANTS: tuple[Column, ...] = (
         "How the session ended.",
         levels=(
             ("completed", "it reached its last page"),
-            ("incomplete", "it reached its last page, but more trials were not delivered than the study permits"),
             ("withdrawn", "the participant stopped"),
             ("aborted", "the operator stopped it"),
             ("broken", "the operator stopped it after device, servo or program had failed"),
@@ -80,6 +79,7 @@ TRIALS_MISSING = optional(
     later=True,
 )
 """A column of sessions in a study with trials of intervals."""
+_INCOMPLETE = ("incomplete", "it reached its last page, but more trials were not delivered than the study permits")
 GROUP = optional("group", "text", "The participant's group; n/a in a study without groups.", sealed=True, later=True)
 PARTICIPANTS_2: tuple[Column, ...] = (
     *(
@@ -91,6 +91,14 @@ PARTICIPANTS_2: tuple[Column, ...] = (
     GROUP,
 )
 """Columns of sessions in a study whose protocol has format 2."""
+
+
+def with_missing_trials(columns: tuple[Column, ...]) -> tuple[Column, ...]:
+    """Return the columns of sessions in a study with trials of intervals, which may be missing."""
+    with_level = (replace(one, levels=(*one.levels, _INCOMPLETE)) if one.name == "status" else one for one in columns)
+    return (*with_level, TRIALS_MISSING)
+
+
 EXCLUSIONS: tuple[Column, ...] = (
     PARTICIPANT,
     SESSION,
@@ -386,10 +394,11 @@ SEALED = frozenset(column.name for column in (*TRIALS_2, *DELIVERED) if column.s
 
 def every_column(protocol_format: int = 1, *, intervals: bool = False) -> tuple[Column, ...]:
     """Return each column of all tables once, in the order of first use; only a study with designs has ``intervals``."""
+    tables = tables_of(protocol_format)
+    if intervals:
+        tables = tables | {"participants": with_missing_trials(tables["participants"])}
     found: dict[str, Column] = {}
-    for name, columns in tables_of(protocol_format).items():
+    for name, columns in tables.items():
         for column in columns if name != "intervals" or intervals else ():
             found.setdefault(column.name, column)
-    if intervals:
-        found.setdefault(TRIALS_MISSING.name, TRIALS_MISSING)
     return tuple(found.values())

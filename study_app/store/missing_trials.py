@@ -10,7 +10,7 @@ from typing import Final
 
 MISSING_PERCENT: Final = "missing_percent"
 """The key in ``[limits]`` of the share of a session's trials that may be missing."""
-LIMIT_WORDS: Final[Mapping[str, str]] = {
+REASONS: Final[Mapping[str, str]] = {
     "lateness_ms": "the servo was late",
     "worst_gap_ms": "the servo missed ticks",
     "delay_error_ms": "the visual delay was not kept",
@@ -96,6 +96,6 @@ def missing_words(count: int, asked: int, reasons: Mapping[str, int], limits: Ma
 
 def limit_words(limit: str, limits: Mapping[str, float]) -> str:
     """Return why a presentation that broke a limit was invalid, with the limit: "frames were late (limit 250 ms)"."""
-    words = LIMIT_WORDS.get(limit, limit)
+    words = REASONS.get(limit, limit)
     unit = _UNITS.get(limit.rpartition("_")[2], "")
     return f"{words} (limit {limits[limit]:g} {unit})" if limit in limits else words

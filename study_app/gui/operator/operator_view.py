@@ -21,7 +21,7 @@ from study_app.protocol.wording.languages import words
 from study_app.store.columns import SEALED
 from study_app.store.delivered import Broken
 from study_app.store.journals.journal_events import Note
-from study_app.store.missing_trials import LIMIT_WORDS
+from study_app.store.missing_trials import REASONS
 from study_app.store.progress import Progress, TrialAnswer
 
 State = Literal["preparing", "running", "paused", "force off", "trouble", "ended"]
@@ -454,7 +454,7 @@ def track_words(progress: Progress, schedule: Schedule, trial: Trial, choices: M
         f"Track {trial.code}: {len(answers)} of at most {grouped(len(own))} answered",
         *(_of_answers(answers, choices) if answers else ()),
         *(f"repeated {count}: {reason}" for reason, count in reasons.items()),
-        *(f"not delivered {count}: {LIMIT_WORDS.get(limit, limit)}" for limit, count in limits.items()),
+        *(f"not delivered {count}: {REASONS.get(limit, limit)}" for limit, count in limits.items()),
         *([f"{len(given_up)} unanswered: no attempt was delivered"] if given_up else []),
     )
 

@@ -17,7 +17,15 @@ from study_app.protocol.table import text_in
 from study_app.store import csv_files, receipt
 from study_app.store.atomic import is_there, parse_json, read_own, write_file
 from study_app.store.blinded.blinding import Key, opened, opened_key, reveals
-from study_app.store.columns import LATER, PARTICIPANTS, PARTICIPANTS_2, SEALED, TRIALS_MISSING, every_column
+from study_app.store.columns import (
+    LATER,
+    PARTICIPANTS,
+    PARTICIPANTS_2,
+    SEALED,
+    TRIALS_MISSING,
+    every_column,
+    with_missing_trials,
+)
 from study_app.store.csv_files import Column, Row, header
 from study_app.store.folder_lock import never_begun
 from study_app.store.folders import SessionFolder, StudyFolder, check_study_name
@@ -139,7 +147,7 @@ def columns_of(folder: StudyFolder, rows: Iterable[csv_files.Row]) -> tuple[Colu
     """
     rows = list(rows)
     columns = PARTICIPANTS_2 if any("group" in row for row in rows) and reveals(folder.path) else PARTICIPANTS
-    return (*columns, TRIALS_MISSING) if any(TRIALS_MISSING.name in row for row in rows) else columns
+    return with_missing_trials(columns) if any(TRIALS_MISSING.name in row for row in rows) else columns
 
 
 def description_bytes(study: StudyHead, *, sealed: bool, protocol_format: int = 1, intervals: bool = False) -> bytes:
