@@ -69,6 +69,7 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
         from study_app.protocol.checks.untranslated import describe_untranslated
         from study_app.protocol.source.files import find
         from study_app.session.simulated.paced_levels import undelivered_levels
+        from study_app.session.simulated.predicted_delivery import predicted_delivery
         from study_app.store import workstation
         from study_app.video.sources import missing_here
 
@@ -80,6 +81,9 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
         document, _ = load.read_document(load.source_bytes(protocol), protocol)
         for sentence in (*undelivered_levels(study), *describe_untranslated(document, lists_places=True)):
             click.echo(f"\nNote: {sentence}.")
+        delivery = predicted_delivery(study, delay_ticks)
+        for sentence in delivery.sentences:
+            click.echo(f"\nNote: {sentence}, predicted for a delay of {counted(delay_ticks, 'tick')}.")
         if missing:
             click.echo(f"\nNote: {missing}. Sessions of this study do not start on this computer.")
 

@@ -252,6 +252,11 @@ class Limits(Table):
     attempts: Annotated[int, Field(ge=1, le=100)] | None = later(
         default=None, description="How often a trial of intervals is presented until it is delivered; default: 3."
     )
+    missing_percent: Annotated[float, within(0, 100, "a share of the trials; 0: none may be missing")] | None = later(
+        default=None,
+        description="Share of a session's main trials of intervals that may be missing because they were not "
+        "delivered [%]; with more, the session is incomplete; default: 5.",
+    )
 
 
 Reported = Annotated[float, within(-1e9, 1e9, "no published value is larger")]

@@ -26,6 +26,7 @@ from study_app.protocol.presented.presented_levels import highest_damping
 from study_app.protocol.sequences import enrolment
 from study_app.protocol.wording.languages import language_name
 from study_app.store.blinded.sealing import FRAMES_BYTES_PER_S, SAMPLE_BYTES, sealed_bytes
+from study_app.store.missing_trials import limit_words
 from study_app.video.sources import VideosFound
 
 if TYPE_CHECKING:
@@ -69,6 +70,29 @@ class Screen:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PredictedDelivery:
+    """How many main trials a simulated participant would lose because the safety layer withholds too much force.
+
+    ``missing`` of the ``asked`` trials of intervals would not be delivered, ``out`` of the ``judged`` other trials
+    would be out of limits. The limit on the force withheld is ``limit_percent`` [%].
+    """
+
+    missing: int
+    asked: int
+    out: int
+    judged: int
+    limit_percent: float
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What would be lost, as sentences without full stops: "26 of 40 trials would not be delivered: …"."""
+        why = limit_words("withheld_percent", {"withheld_percent": self.limit_percent})
+        missing = f"{self.missing} of {counted(self.asked, 'trial')} would not be delivered: {why}"
+        out = f"{self.out} of {counted(self.judged, 'trial')} would be out of limits: {why}"
+        return (*([missing] if self.missing else []), *([out] if self.out else []))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Measurements:
     """What was measured.
 
@@ -80,8 +104,9 @@ class Measurements:
     ``grant`` what the system lets the servo's thread do. ``dynamics`` are the device's, with its measured
     delay, ``delay_ticks`` is the delay that the servo uses now. ``withheld`` is the share of
     the force that limits and passivity controller are expected to withhold in the fastest stroke of a task, by
-    liquid; None where it was not computed. ``velocity_errors`` are the relative error of the velocity and what it would
-    be if all of the device's dynamics were known; None where all is. ``outlets`` are the streams and ports to other
+    liquid; None where it was not computed. ``delivery`` is what a simulated participant would lose, None where it was
+    not computed. ``velocity_errors`` are the relative error of the velocity and what it would be if all of the device's
+    dynamics were known; None where all is. ``outlets`` are the streams and ports to other
     programs; ``video`` is what was found of the study's videos, None without any. ``ran_otherwise`` is a participant
     with whom the same version of the study ran from another file; ``untranslated`` are texts of the pages that are
     still in another language.
@@ -103,6 +128,7 @@ class Measurements:
     dynamics: Dynamics = UNKNOWN
     delay_ticks: int = ASSUMED_TICKS
     withheld: Mapping[str, float] | None = None
+    delivery: PredictedDelivery | None = None
     velocity_errors: tuple[float, float] | None = None
     outlets: tuple[OutletStatus, ...] = ()
     video: VideosFound | None = None
@@ -309,6 +335,13 @@ def _costs(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         share, value = most_percent / limit_percent, f"at most {most_percent:.1f} %"
         advice = "Trials with such strokes would be invalid."
         yield _warned("Force withheld", value, about, advice, well=most_percent <= limit_percent, share=share)
+
+    if facts.delivery is not None and facts.delivery.asked + facts.delivery.judged:
+        lost = facts.delivery.missing + facts.delivery.out
+        value = f"{lost} of {counted(facts.delivery.asked + facts.delivery.judged, 'trial')} lost"
+        about = f"predicted for a delay of {counted(facts.delay_ticks, 'tick')}"
+        advice = "; ".join(facts.delivery.sentences)
+        yield _warned("Trials delivered", value if lost else "all", about, f"{advice}.", well=not lost)
 
     if facts.ran_otherwise:
         about = f"version {protocol.study.version} ran from another file with {facts.ran_otherwise}"

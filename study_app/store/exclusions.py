@@ -22,6 +22,8 @@ from study_app.text_tables import decoded, separator_of, wrong_length
 
 NAMED_IDS = 6
 _WHOLE = re.compile("[0-9]{1,9}")
+MISSING_RULE = "missing"
+"""The rule that excludes a session in which more trials are missing than the study permits."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,6 +92,20 @@ def exclude(
                 raise StoreError(f"{named(new)} is already excluded, since {row.excluded_at} ({row.reason})")
         write_file(study.exclusions, exclusion_bytes((*rows, new)))
     return new
+
+
+def exclude_incomplete(folder: Path, participant: str, session: int, reason: str) -> None:
+    """Exclude an incomplete session by `MISSING_RULE`, unless it is excluded or was included again.
+
+    Raises
+    ------
+    StoreError
+        The list of exclusions or of reversals cannot be read or written.
+    """
+    reversed_by_person = (row for row in reversals(folder) if row.rule_or_person == MISSING_RULE)
+    decided = {row.what for row in (*exclusions(folder), *reversed_by_person)}
+    if (participant, session, None) not in decided:
+        exclude(folder, participant, session, by=MISSING_RULE, reason=reason)
 
 
 def include(

@@ -20,7 +20,7 @@ from study_app.store.atomic import is_there, read_if_there, read_own, study_root
 from study_app.store.blinded.blinding import Codes, Key, opened, read_key, reveal, reveals, verified_key, whole_protocol
 from study_app.store.checksums import replace_checksums
 from study_app.store.csv_files import in_columns_of
-from study_app.store.exclusions import Exclusion, dated_reversals, exclude, exclusions, reversals
+from study_app.store.exclusions import MISSING_RULE, Exclusion, dated_reversals, exclude, exclusions, reversals
 from study_app.store.folder_lock import is_open, open_alone
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
@@ -32,6 +32,8 @@ from study_app.store.tables.session_tables import table_columns
 from study_app.store.tables.study_files import described_study, has_intervals, write_description, write_participants
 
 RULE: Final = "catch"
+RULES: Final = (RULE, MISSING_RULE)
+"""The rules that exclude sessions; a person decides every other exclusion."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +113,7 @@ def unblind_folder(folder: Path, by: str, reason: str) -> dict[str, Unblinded]:
 def decided_late(folder: Path, rows: Sequence[Exclusion]) -> tuple[Exclusion, ...]:
     """Return the exclusions that a person decided or reversed after the key was opened; none of a merged study."""
     opened_at = min(filter(None, (_moment(one["at"]) for one in reveals(folder))), default=None)
-    dated = (*((row, row.excluded_at) for row in rows if row.rule_or_person != RULE), *dated_reversals(folder))
+    dated = (*((row, row.excluded_at) for row in rows if row.rule_or_person not in RULES), *dated_reversals(folder))
     times = ((row, _moment(text)) for row, text in dated)  # reveals are recorded in whole seconds
     return tuple(row for row, at in times if opened_at and at and at.replace(microsecond=0) > opened_at)
 

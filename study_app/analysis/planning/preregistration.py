@@ -347,6 +347,11 @@ def _exclusions(protocol: Protocol) -> Iterator[str]:
         attempts = protocol.limits.attempts
         times = "" if attempts is None else f", up to {attempts} times"
         yield f"A trial of intervals beyond a limit is not asked about and is presented again{times}."
+        if (permitted := protocol.limits.missing_percent) is not None:
+            yield (
+                f'Rule "missing": at most {permitted:g} % of a session\'s main trials of intervals may stay unanswered '
+                "because no presentation was within the limits. A session with more is incomplete and is excluded."
+            )
     if any(block.design is None for block in protocol.main_blocks):
         yield f"{'Other trials' if has_intervals else 'Trials'} beyond a limit are counted and reported."
     yield f"Limits: {limits}."

@@ -394,7 +394,7 @@ class SessionBridge(QObject):
         if self.runner.finished and self._leaves:
             QTimer.singleShot(0, self, self._leave)
         elif self.runner.finished and self.participant.isFullScreen():
-            ended = self.parts.journal.progress.ended == "completed"
+            ended = self.parts.journal.progress.reached_end
             said = ended and isinstance(self.parts.session.schedule.steps[-1], PageStep)  # goodbye, by the study
             QTimer.singleShot(0 if said else END_SHOWN_MS, self.operator, self.operator.come_forward)
 

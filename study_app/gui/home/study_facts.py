@@ -33,7 +33,7 @@ from study_app.store.drafts import draft_files, draft_of, unsaved_files
 from study_app.store.folder_lock import is_open
 from study_app.store.folders import locate
 from study_app.store.journals import journal
-from study_app.store.journals.journal_events import start_of
+from study_app.store.journals.journal_events import COMPLETED, INCOMPLETE, start_of
 from study_app.store.study_settings import kept_original
 from study_app.store.workstation import recent_protocols
 from study_app.workspace import workspace
@@ -349,12 +349,14 @@ def place_words(protocol: Protocol, schedule: Schedule, step: int) -> str:
 
 
 def held(found: Iterable[SessionFacts], study: str) -> str:
-    """Return how many sessions of a study there are: "4 sessions, 3 complete, 1 excluded, 2 pilots"."""
+    """Return how many sessions of a study there are: "5 sessions, 3 complete, 1 incomplete, 1 excluded, 2 pilots"."""
     of_study = [session for session in found if session.study == study]
     own = [session for session in of_study if not session.kind]
     pilots = sum(session.kind == "pilot" for session in of_study)
-    complete = sum(session.status == "completed" for session in own)
+    complete = sum(session.status == COMPLETED for session in own)
+    incomplete = sum(session.status == INCOMPLETE for session in own)
     excluded = sum(session.excluded is not None for session in own)
     words = [f"{counted(len(own), 'session')}, {complete} complete" if own else "no participant yet"]
+    words += [f"{incomplete} incomplete"] * bool(incomplete)
     words += [f"{excluded} excluded"] * bool(excluded) + [counted(pilots, "pilot")] * bool(pilots)
     return ", ".join(words)

@@ -451,7 +451,8 @@ def rehearse(
         if progress is not None:
             took_s = time.perf_counter() - began
             held = f"{store.clock.seconds() / 60:.1f} min of session in {took_s:.1f} s (simulated)"
-            progress(f"{person}: {rehearsal.answers} responses, {held}, fingerprint {store.fingerprint}")
+            missing = f"; {store.missing_trials}" if store.missing_trials.count else ""
+            progress(f"{person}: {rehearsal.answers} responses, {held}, fingerprint {store.fingerprint}{missing}")
     return folder
 
 

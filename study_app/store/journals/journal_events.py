@@ -25,6 +25,9 @@ CAUSE_WITHHELD = "the session was stopped"
 
 UNDELIVERED = "invalid"
 """The outcome of a trial of which an interval was not delivered as requested."""
+COMPLETED, INCOMPLETE = "completed", "incomplete"
+REACHED_END = (COMPLETED, INCOMPLETE)
+"""The status of sessions that reached their last page: with enough trials, or with more missing than permitted."""
 
 _MOST_SECONDS = 1e9  # of a session's clock
 _MOST = 10**30  # greatest integer that the program writes

@@ -22,10 +22,13 @@ from study_app.store import csv_files, receipt
 from study_app.store.atomic import write_file
 from study_app.store.blinded.blinding import Key, as_recorded, opened, opened_key, sealed
 from study_app.store.checksums import fingerprint, note_fingerprint, write_checksums
+from study_app.store.exclusions import exclude_incomplete
 from study_app.store.folder_lock import Opening
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal_events as events
 from study_app.store.journals.journal import Journal
+from study_app.store.missing_trials import MissingTrials
+from study_app.store.progress import progress_of
 from study_app.store.recorder import LEAVING_S, Kept, Recorder
 from study_app.store.tables import session_tables
 from study_app.store.tables.study_files import write_participants
@@ -189,6 +192,9 @@ class SessionStore:
     def finish(self, status: str, reason: str = "") -> None:
         """Write the session's last line, its receipt, all tables, checksums and fingerprint, and close it.
 
+        A completed session is recorded as incomplete if more trials are missing than the study permits; then the rule
+        `exclusions.MISSING_RULE` excludes it.
+
         Raises
         ------
         StoreError
@@ -201,13 +207,16 @@ class SessionStore:
             self._ended_s = (
                 self.clock.seconds() if self._ended_s is None else self._ended_s
             )  # the same when tried again
+            missing = self.missing_trials
+            if status == events.COMPLETED and missing.exceed:
+                status, reason = events.INCOMPLETE, str(missing)
             self.append(events.SessionEnded(status=status, reason=reason), t_s=self._ended_s)
             self.journal.close()
             self._receipt |= {"status": status, "reason": reason, "ended_at": self._lines[-1].at}
         self.write_tables()
         failures = [] if self.behind is None else [self.behind]
         table = partial(write_participants, self.place.study_folder, self.place.study)
-        for write in (self._write_proofs, table):
+        for write in (self._write_proofs, table, self._exclude_if_incomplete):
             try:
                 write()
             except StoreError as error:
@@ -216,6 +225,16 @@ class SessionStore:
         if failures:
             raise failures[0]
         self._over = True
+
+    @property
+    def missing_trials(self) -> MissingTrials:
+        """The main trials of the session so far that were not delivered."""
+        return progress_of(self._lines).missing_trials
+
+    def _exclude_if_incomplete(self) -> None:
+        if self._receipt["status"] == events.INCOMPLETE:
+            of_study, session = self.place.study_folder.path, self.place.folder
+            exclude_incomplete(of_study, session.participant, session.number, str(self._receipt["reason"]))
 
     def close(self) -> None:
         """Close the session without an end; it stays unfinished.

@@ -17,7 +17,15 @@ from study_app.protocol.table import text_in
 from study_app.store import csv_files, receipt
 from study_app.store.atomic import is_there, parse_json, read_own, write_file
 from study_app.store.blinded.blinding import Key, opened, opened_key, reveals
-from study_app.store.columns import LATER, PARTICIPANTS, PARTICIPANTS_2, SEALED, every_column
+from study_app.store.columns import (
+    LATER,
+    PARTICIPANTS,
+    PARTICIPANTS_2,
+    SEALED,
+    TRIALS_MISSING,
+    every_column,
+    with_missing_trials,
+)
 from study_app.store.csv_files import Column, Row, header
 from study_app.store.folder_lock import never_begun
 from study_app.store.folders import SessionFolder, StudyFolder, check_study_name
@@ -125,14 +133,21 @@ def write_participants(folder: StudyFolder, study: str) -> None:
 
 
 def table_bytes(folder: StudyFolder, rows: Sequence[csv_files.Row]) -> bytes:
-    """Return the table with these rows, and the group of each session in a study of format 2 that was unblinded."""
-    return csv_files.csv_bytes(columns_of(folder, rows), [{"group": None} | row for row in rows])
+    """Return the table with these rows, with the columns of `columns_of`."""
+    return csv_files.csv_bytes(
+        columns_of(folder, rows), [{"group": None, TRIALS_MISSING.name: None} | row for row in rows]
+    )
 
 
 def columns_of(folder: StudyFolder, rows: Iterable[csv_files.Row]) -> tuple[Column, ...]:
-    """Return the columns of the table with these rows."""
-    second = any("group" in row for row in rows)
-    return PARTICIPANTS_2 if second and reveals(folder.path) else PARTICIPANTS
+    """Return the columns of the table with these rows.
+
+    A study of format 2 that was unblinded has the group of each session, one with trials of intervals their missing
+    trials.
+    """
+    rows = list(rows)
+    columns = PARTICIPANTS_2 if any("group" in row for row in rows) and reveals(folder.path) else PARTICIPANTS
+    return with_missing_trials(columns) if any(TRIALS_MISSING.name in row for row in rows) else columns
 
 
 def description_bytes(study: StudyHead, *, sealed: bool, protocol_format: int = 1, intervals: bool = False) -> bytes:

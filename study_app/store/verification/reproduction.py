@@ -50,7 +50,7 @@ def reproduced(session_folder: Path) -> Reproduced:
     if lacking := [name for name in receipt.FIELDS if name not in ran]:
         raise StoreError(f"{folder.receipt} lacks {', '.join(lacking)}: restore it from a copy")
     seed, participant, row_of = ran["seed"], ran["participant"], ran.get("row_of")
-    complete = ran["status"] == "completed"
+    complete = ran["status"] in events.REACHED_END
     try:
         entry = events.start_of(lines).entry
         group = None if entry is None else group_of(key.groups, key.nonce, entry)
