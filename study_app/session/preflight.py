@@ -304,7 +304,9 @@ def _costs(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         advice = "Give the changed file another study.version; the report names the change in any case."
         yield Check("Study file", "warning", "changed", about, advice)
 
-    if protocol.assigns_rows and (number := enrolment(facts.participant)) is not None:
+    if protocol.assigns_rows and protocol.groups:
+        yield Check("Balance", "ok", "place in the group", "determines the row of the square")
+    elif protocol.assigns_rows and (number := enrolment(facts.participant)) is not None:
         yield Check("Balance", "ok", f"participant number {number}", "determines the row of the square")
     elif protocol.assigns_rows:
         advice = f"{facts.participant} has no number, so its row is drawn at random; use ids such as P007."
