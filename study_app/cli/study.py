@@ -149,10 +149,9 @@ def design(protocol: str, participants: int, first: str, seed: int) -> None:
 @click.option("--language", metavar="LANG", help="Language of the pages; default: the first of the protocol.")
 @OPERATOR
 @click.option(
-    "--row-of",
-    metavar="ID",
-    help="ID of a participant who is replaced, whose row of each Williams design or Latin square is used.",
+    "--row-of", metavar="ID", help="ID of a participant who is replaced, whose order (and place in the group) is used."
 )
+@click.option("--group", metavar="GROUP", help="Group of the participant, in a study with pre-existing groups.")
 @WINDOWED
 @SCREEN
 @click.option("--pilot", is_flag=True, help="Pilot session: in a marked window, stored in results/<study>-pilot.")
@@ -187,6 +186,7 @@ def run(protocol: str, *, no_recordings: bool, results: Path | None, **chosen: A
         "the columns of measurements are n/a. Sessions are written without waiting for the disk."
     ),
 )
+@click.option("--group", metavar="GROUP", help="Pre-existing group of them all; default: dealt evenly to all groups.")
 @click.option(
     "--results",
     type=Target(),
@@ -198,8 +198,13 @@ def rehearse(
     context: click.Context, /, protocol: str, *, device: str, no_recordings: bool, answers_only: bool, **chosen: Any
 ) -> None:
     """Run complete sessions with simulated participants, faster than real time; every row is marked as simulated."""
+    from study_app.protocol.load import load
+
     if chosen["results"] is None:
         keep_offered_workspace()
+    study = load(protocol)
+    if study.asks_group and chosen["group"] is None:
+        click.echo(f"Simulated participants are dealt evenly to the pre-existing groups {', '.join(study.groups)}.")
     if answers_only:
         if context.get_parameter_source("device") is not ParameterSource.DEFAULT:
             raise click.UsageError("--answers-only uses no device: omit --device")

@@ -351,9 +351,11 @@ def _costs(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     if facts.untranslated:
         about = f"still in {language_name(facts.untranslated[0].source)}"
         advice = f"Pages mix two languages: translate {listed_places(facts.untranslated)}."
-        yield Check("Translation", "warning", counted(len(facts.untranslated), "text"), about, advice)
+        yield Check("Translation", "warning", counted(len(facts.untranslated), "text"), about=about, advice=advice)
 
-    if protocol.assigns_rows and (number := enrolment(facts.participant)) is not None:
+    if protocol.assigns_rows and protocol.groups:
+        yield Check("Balance", "ok", "place in the group", about="determines the row of the square")
+    elif protocol.assigns_rows and (number := enrolment(facts.participant)) is not None:
         yield Check("Balance", "ok", f"participant number {number}", about="determines the row of the square")
     elif protocol.assigns_rows:
         advice = f"{facts.participant} has no number, so its row is drawn at random; use ids such as P007."

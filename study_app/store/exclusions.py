@@ -10,7 +10,6 @@ from datetime import datetime
 from pathlib import Path
 
 from study_app.errors import StoreError
-from study_app.protocol.source.files import without_mark
 from study_app.store.atomic import append_line, parse_json, read_if_there, write_file
 from study_app.store.columns import EXCLUSIONS
 from study_app.store.csv_files import MISSING, csv_bytes, header, unguarded

@@ -181,7 +181,7 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
             "motors_masked": _masking(receipt.get("motors_masked")),
             "protocol_version": version,
             "key_hash": receipt["key_hash"],
-            **{name: receipt.get(name) for name in ("seed", "protocol_hash", "version")},
+            **{name: receipt.get(name) for name in ("seed", "protocol_hash", "version", "group")},
             "missing": _missing(folder) if has_intervals(protocol) else None,
         }
         own_dynamics = _own_dynamics(receipt["device"].get("bench"))

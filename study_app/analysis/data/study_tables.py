@@ -540,9 +540,19 @@ By: TypeAlias = Literal["group", "site"]
 
 
 def group_members(study: Study) -> dict[str, str]:
-    """Return the group of every participant who counts; none without groups, and while the key is sealed."""
+    """Return the group of every participant who counts; none without groups.
+
+    Randomised groups are not known while the key is sealed.
+    """
     members = _members(study, "group")
     return dict(zip(map(str, members["participant"]), map(str, members["group"]), strict=True))
+
+
+def group_assignment(study: Study) -> str | None:
+    """Return how participants came into groups, "randomised" or "pre-existing"; None in a study without groups."""
+    if not study.protocol.get("groups"):
+        return None
+    return str(study.protocol["study"].get("group_assignment", "randomised"))
 
 
 def group_counts(study: Study, by: By = "group") -> dict[str, int]:
@@ -578,6 +588,9 @@ def _members(study: Study, by: By) -> pd.DataFrame:
     if by == "site":
         people = study.people if study.sites and study.revealed else ()
         return pd.DataFrame({"participant": people, "site": [study.site_of(one) for one in people]}, dtype="string")
+    rows = study.participants[study.participants["counted"] & study.participants["group"].notna()]
+    if len(rows):  # pre-existing groups, from the receipts
+        return rows[["participant", "group"]].drop_duplicates()
     if "group" not in study.trials or not study.revealed:
         return pd.DataFrame(columns=["participant", "group"])
     rows = study.trials[study.trials["counted"] & study.trials["group"].notna()]

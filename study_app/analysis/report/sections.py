@@ -17,7 +17,7 @@ from study_app.analysis.data.motion import (
     Moved,
     Performance,
 )
-from study_app.analysis.data.study_tables import By, Study, group_counts, group_means
+from study_app.analysis.data.study_tables import By, Study, group_assignment, group_counts, group_means
 from study_app.analysis.figures.answer_figures import people_a_setting
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.finding import Answer, Finding
@@ -166,6 +166,7 @@ def methods(study: Study, results: Results) -> str:
 def _sentences(study: Study, results: Results) -> Iterator[str]:
     blocks = [found for found in results.blocks if found.n]
     yield _sample(study)
+    yield _assignment(study)
     yield _apparatus(study)
     yield from level_methods(study.levels, results.levels)
     yield _missing_sentence(study)
@@ -210,6 +211,20 @@ def _sample(study: Study) -> str:
         f"{people[:1].upper()}{people[1:]}{kind} took part in “{study.title}” (protocol {study.name}, "
         f"{version_words(study)}){under}{gone}.{late}"
     )
+
+
+def _assignment(study: Study) -> str:
+    """Return how participants came into groups; "" without groups."""
+    groups = listed([*study.protocol.get("groups", {})])
+    match group_assignment(study):
+        case "pre-existing":
+            return (
+                f"Participants were assigned to a group by an existing attribute ({groups}), recorded at the start of "
+                "the session; groups were not randomised."
+            )
+        case "randomised":
+            return f"Participants were randomised in permuted blocks to the groups {groups}."
+    return ""
 
 
 def _apparatus(study: Study) -> str:
@@ -558,9 +573,11 @@ def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
             yield _means(found, rows, by)
     if not results.blocks:
         return
+    preexisting = by == "group" and group_assignment(study) == "pre-existing"
     yield paragraph(
         "Mean and standard deviation over participants, each with the mean of their answers. Differences between "
-        f"{by}s are described, not tested.",
+        f"{by}s are described, not tested."
+        f"{' Groups were not randomised, so a difference may have other causes.' * preexisting}",
         "soft",
     )
 

@@ -31,10 +31,13 @@ from study_app.haptics.model.scene import Scene
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.tasks import Stroke
 from study_app.session.preflight import Check, Measurements, PredictedDelivery, Screen, checks
+from study_app.session.resume import begun_schedule
 from study_app.session.start import NewSession, Ready, measured
 from study_app.store.blinded.allocation import session_protocol
+from study_app.store.blinded.blinding import read_key
 from study_app.store.folders import StudyFolder, locate
 from study_app.store.journals import journal
+from study_app.store.journals.journal_events import start_of
 
 LOOK_MS = 100
 PATIENCE_S = 10.0
@@ -240,8 +243,8 @@ def _goes_on(chosen: NewSession, protocol: Protocol) -> tuple[tuple[str, str], .
     if chosen.resumes is None:
         return ()
     own = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
-    schedule = chosen.schedule(own)
-    return resumed_rows(own, schedule, journal.read(locate(chosen.resumes)[1].journal))
+    lines = journal.read(locate(chosen.resumes)[1].journal)
+    return resumed_rows(own, begun_schedule(own, start_of(lines), read_key(chosen.results)), lines)
 
 
 def _largest(errors_n: list[float | None]) -> float | None:

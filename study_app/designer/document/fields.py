@@ -376,6 +376,7 @@ LABELS: Final = {
     "design": "Trial design",  # a study has a design, too
     "designs": "Trial designs",
     "feedback_s": "Feedback duration",
+    "group_assignment": "Assignment to groups",
     "level_error_ms": "Level error of delays",
     "obrien-fleming": "O’Brien–Fleming",
     "participants": "Participants planned",

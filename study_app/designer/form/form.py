@@ -35,7 +35,7 @@ from study_app.designer.outline import icon_of
 from study_app.number_text import capitalised
 from study_app.protocol.checks.untranslated import untranslated_at
 from study_app.protocol.formats import is_second
-from study_app.protocol.groups import sequences_in
+from study_app.protocol.groups import ASSIGNMENT, sequences_in
 from study_app.protocol.source.document import Path, Places, names, places_of, value_at
 from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
 
@@ -68,6 +68,8 @@ def form(study: Study, path: Path) -> Form:
         if (path == SEQUENCE or main) and (of_blocks := rows_of_blocks(document)):
             together = tuple(_form_row(study, row, places) for row in of_blocks)
             sections = (*sections, Section(path, "The main blocks together", together))
+        if path[:1] == ("groups",) and (assignment := row_at(document, ASSIGNMENT)) is not None:
+            sections = (Section(path, "", (_form_row(study, assignment, places),)), *sections)
     shown = {row.path for section in sections for row in section.rows}
     shown |= {section.path for section in sections if section.path != path}
     within = [fault for fault in study.faults if fault.path[: len(path)] == path]

@@ -29,6 +29,7 @@ from study_app.protocol.wording.languages import language_name
 from study_app.session.resume import begun_schedule, find_protocol, is_rehearsal, resume_at, source_to_resume
 from study_app.store import receipt
 from study_app.store.blinded.allocation import session_protocol
+from study_app.store.blinded.blinding import read_key
 from study_app.store.drafts import draft_files, draft_of, unsaved_files
 from study_app.store.folder_lock import is_open
 from study_app.store.folders import locate
@@ -317,7 +318,7 @@ def interrupted(
             protocol = parse(read(source), source)
             study = locate(session.folder)[0]
             protocol = session_protocol(study, protocol, session.participant, begun.session)
-            schedule = begun_schedule(protocol, begun)
+            schedule = begun_schedule(protocol, begun, read_key(study.path))
             step = resume_at(protocol, schedule, lines).step
         except StudyError:
             continue  # what is wrong with it is said when it is asked for by its folder

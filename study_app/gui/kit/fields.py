@@ -49,9 +49,9 @@ class Field:
     write: Callable[[Any], str] = str
 
 
-def choice(name: str, label: str, options: Mapping[Any, str]) -> Field:
+def choice(name: str, label: str, options: Mapping[Any, str], aside: str = "") -> Field:
     """Return the field of a choice between values with their words."""
-    return Field(name, label, "choice", tuple(options.items()))
+    return Field(name, label, "choice", tuple(options.items()), aside=aside)
 
 
 def number(

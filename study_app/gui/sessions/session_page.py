@@ -28,7 +28,7 @@ from study_app.gui.widgets.cards import Card, Chip
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.gui.widgets.row_table import CHIP_ROLE, Rows, Table
-from study_app.number_text import counted
+from study_app.number_text import capitalised, counted
 from study_app.store.blinded.blinding import opened, opened_key
 from study_app.store.delivered import beyond_limits
 from study_app.store.exclusions import Exclusion, exclusions
@@ -200,7 +200,8 @@ def _about(lines: Sequence[Event], happened: str) -> str:
     start, row = start_of(lines), session_tables.participant(lines)
     ended = row["session_ended_at"]
     said = [
-        f"Device {start.device}",
+        f"group {start.group}" if start.group is not None else "",
+        f"device {start.device}",
         f"language {row['language']}",
         f"operator {start.operator}" if start.operator else "",
         f"seed {start.seed}",
@@ -208,7 +209,7 @@ def _about(lines: Sequence[Event], happened: str) -> str:
         counted(row["resumed"], "resume") if row["resumed"] else "",
         happened,
     ]
-    return "  ·  ".join(filter(None, said))
+    return capitalised("  ·  ".join(filter(None, said)))
 
 
 def _notes(lines: Sequence[Event]) -> list[str]:

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from study_app.protocol.groups import SEQUENCES, sequences_in
+from study_app.protocol.groups import ASSIGNMENT, SEQUENCES, sequences_in
 from study_app.protocol.questions import POINTS, Context, Question, Scale, ShowIf, Statement, question_of
 from study_app.protocol.source.document import Path, entries, names, value_at
 from study_app.protocol.source.problems import Fault, did_you_mean, unknown
@@ -236,6 +236,8 @@ def groups(document: Mapping[str, Any]) -> Iterator[Fault]:
         yield Fault(("sequences",), "give either sequence or sequences, one of the two")
     tables = [table for _, table in entries(document, "groups.*") if isinstance(table, Mapping)]
     if not tables:
+        if value_at(document, ASSIGNMENT) is not None:
+            yield Fault(ASSIGNMENT, "the study has no groups", "add groups, or leave it out", kind="surplus")
         return
     if len(names(document, "groups")) == 1:
         yield Fault(("groups",), "there is only one group", "add another group, or leave groups out")

@@ -51,6 +51,7 @@ from study_app.session.resume import (
     FIRST,
     REHEARSED_SCREENS,
     Start,
+    begun_schedule,
     find_protocol,
     is_rehearsal,
     resume_at,
@@ -62,7 +63,7 @@ from study_app.session.simulated.participant import LOOK_AT_SETTING_S, Adjusting
 from study_app.session.tasks import TankView
 from study_app.session.transitions.events import Begin, Continue, Event, ResumeRequested, Stepped, Submitted
 from study_app.store import receipt
-from study_app.store.blinded.allocation import session_protocol
+from study_app.store.blinded.allocation import session_protocol, simulated_groups
 from study_app.store.blinded.blinding import Key
 from study_app.store.folders import StudyFolder, locate, rehearsal_folder
 from study_app.store.journals import journal
@@ -399,6 +400,7 @@ def rehearse(
     device: str = "scripted",
     results: Path | None = None,
     recordings: bool = True,
+    group: str | None = None,
     progress: Callable[[str], object] | None = None,
     observer: Observer | None = None,
 ) -> Path:
@@ -418,6 +420,8 @@ def rehearse(
         Study folder; by default a new ``results/<study>-rehearsal-<n>`` of the workspace.
     recordings : bool
         Whether every tick of the servo and every frame of a trial is kept.
+    group : str, optional
+        The pre-existing group of all of them; by default they are dealt evenly to such groups.
     progress : callable, optional
         Called with a line after each session.
     observer : Observer, optional
@@ -442,17 +446,26 @@ def rehearse(
     people = [f"P{number:03d}" for number in range(1, participants + 1)]
     for person in people:
         used_ids(StudyFolder(folder)).check_unused(person, 1)
-    for person in people:
+    for person, own_group in simulated_groups(StudyFolder(folder), study, people, group).items():
         began = time.perf_counter()
         with open_session(
-            study, source, person, seed=seed, device=device, results=folder, recordings=recordings, observer=observer
+            study,
+            source,
+            person,
+            seed=seed,
+            device=device,
+            results=folder,
+            recordings=recordings,
+            group=own_group,
+            observer=observer,
         ) as (rehearsal, store):
             rehearsal.run()
         if progress is not None:
             took_s = time.perf_counter() - began
             held = f"{store.clock.seconds() / 60:.1f} min of session in {took_s:.1f} s (simulated)"
+            whose = person if own_group is None else f"{person} (group {own_group})"
             missing = f"; {store.missing_trials}" if store.missing_trials.count else ""
-            progress(f"{person}: {rehearsal.answers} responses, {held}, fingerprint {store.fingerprint}{missing}")
+            progress(f"{whose}: {rehearsal.answers} responses, {held}, fingerprint {store.fingerprint}{missing}")
     return folder
 
 
@@ -467,6 +480,8 @@ def open_session(
     session: int = 1,
     device: str = "scripted",
     recordings: bool = True,
+    group: str | None = None,
+    row_of: str | None = None,
     observer: Observer | None = None,
     answer: Answer | None = None,
 ) -> Iterator[tuple[RehearsedSession, SessionStore]]:
@@ -490,6 +505,10 @@ def open_session(
         A simulated device.
     recordings : bool
         Whether every tick and frame of a trial is kept.
+    group : str, optional
+        The participant's pre-existing group; in a later session by default the recorded one.
+    row_of : str, optional
+        The id of the participant who is replaced.
     observer : Observer, optional
         Discriminates the intervals of a trial; by default each participant is one of people drawn at random.
     answer : callable, optional
@@ -511,12 +530,14 @@ def open_session(
             screens=REHEARSED_SCREENS,
             simulated=True,
             recordings=recordings,
+            row_of=row_of,
+            group=group,
         )
         store = begin(results, study, source, start, clock=SessionClock(rig.servo.now_ns))
         own = session_protocol(StudyFolder(results), store.as_recorded(study), participant, session)
         with store:
             rehearsed = RehearsedSession(
-                own, build_schedule(own, participant, seed), rig, store, observer=observer, answer=answer
+                own, begun_schedule(own, start_of(store.lines), store.key), rig, store, observer=observer, answer=answer
             )
             with _tables_of(store):
                 yield rehearsed, store
@@ -582,7 +603,7 @@ def reopen_session(
             now=max(datetime.now().astimezone(), datetime.fromisoformat(lines[-1].at)),
         )
         own = session_protocol(locate(session_folder)[0], store.as_recorded(study), person, begun.session)
-        schedule = build_schedule(own, person, seed)
+        schedule = begun_schedule(own, begun, store.key)
         with store:
             start = resume_at(own, schedule, lines, store.key)
             known = _features_of_whole_session(own, schedule, rig.device.name, store.key.codes, store.key.nonce)

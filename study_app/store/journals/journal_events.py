@@ -294,6 +294,8 @@ class SessionStarted(Event):
 
     `receipt_hash` is the SHA-256 of the receipt without what changes later (of `session_resumed`: of its entry there);
     `measures_sealed` says whether sealed columns are encrypted, `own_codes` whether codes are the participant's own.
+    `entry` is the participant's entry in the allocation to groups, or the place in a pre-existing `group`;
+    `place_in_group` says that the place in the group assigns rows of squares.
     """
 
     format: Integer | None = None
@@ -319,6 +321,7 @@ class SessionStarted(Event):
     intervals: Flag | None = None
     entry: Integer | None = None
     group: Text | None = None
+    place_in_group: Flag | None = None
 
 
 class SessionResumed(Event):

@@ -253,7 +253,8 @@ def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, 
     if not lines:
         return
     start = events.start_of(lines)
-    compared = [name for name in (*receipt.COPIED_FIELDS, "row_of") if name in held or name == "row_of"]
+    optional = ("row_of", "group")
+    compared = [name for name in (*receipt.COPIED_FIELDS, *optional) if name in held or name in optional]
     differing = [name for name in compared if held.get(name) != getattr(start, name)]
     differing += _differing(held, lines)
     if not differing and start.receipt_hash not in (None, receipt.digest(held)):
