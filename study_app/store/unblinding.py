@@ -29,7 +29,13 @@ from study_app.store.merged import folders_of
 from study_app.store.progress import trial_results
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.tables.session_tables import table_columns
-from study_app.store.tables.study_files import described_study, has_intervals, write_description, write_participants
+from study_app.store.tables.study_files import (
+    described_study,
+    has_intervals,
+    names_sealed,
+    write_description,
+    write_participants,
+)
 
 RULE: Final = "catch"
 RULES: Final = (RULE, MISSING_RULE)
@@ -87,6 +93,17 @@ def unblind(folder: Path, by: str, reason: str) -> Unblinded:
     except (StoreError, ValueError, KeyError, TypeError) as error:
         left.append(f"the rule catch was not applied: {error}; then unblind again")
     return Unblinded(codes, tuple(left), excluded)
+
+
+def is_unblinded(folder: Path) -> bool:
+    """Return whether `unblind` was called and came to its end: its last step describes the sealed columns.
+
+    Raises
+    ------
+    StoreError
+        The list of reveals, or the description, cannot be read.
+    """
+    return all_opened(folder) and names_sealed(read_if_there(StudyFolder(folder).description) or b"")
 
 
 def unblind_folder(folder: Path, by: str, reason: str) -> dict[str, Unblinded]:

@@ -14,7 +14,7 @@ too.
 import operator
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import partial
@@ -63,17 +63,22 @@ from study_app.session.simulated.participant import LOOK_AT_SETTING_S, Adjusting
 from study_app.session.tasks import TankView
 from study_app.session.transitions.events import Begin, Continue, Event, ResumeRequested, Stepped, Submitted
 from study_app.store import receipt
+from study_app.store.atomic import is_there
 from study_app.store.blinded.allocation import session_protocol, simulated_groups
 from study_app.store.blinded.blinding import Key
+from study_app.store.checksums import listed, place_of
+from study_app.store.folder_lock import never_begun
 from study_app.store.folders import StudyFolder, locate, rehearsal_folder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import SessionClock
 from study_app.store.journals.journal_events import Event as Line
 from study_app.store.journals.journal_events import start_of
+from study_app.store.progress import progress_of
 from study_app.store.sessions.begin import SessionStart, begin, used_ids
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.recovery import reopen
+from study_app.store.sessions.recovery import rebuild, reopen
 from study_app.store.tables.study_files import check_study
+from study_app.store.withdrawals import tombstones
 from study_app.workspace import workspace
 
 LOOK_S = 0.05  # the session looks at the device so often
@@ -447,8 +452,7 @@ def rehearse(
     for person in people:
         used_ids(StudyFolder(folder)).check_unused(person, 1)
     for person, own_group in simulated_groups(StudyFolder(folder), study, people, group).items():
-        began = time.perf_counter()
-        with open_session(
+        opening = open_session(
             study,
             source,
             person,
@@ -458,15 +462,77 @@ def rehearse(
             recordings=recordings,
             group=own_group,
             observer=observer,
-        ) as (rehearsal, store):
-            rehearsal.run()
-        if progress is not None:
-            took_s = time.perf_counter() - began
-            held = f"{store.clock.seconds() / 60:.1f} min of session in {took_s:.1f} s (simulated)"
-            whose = person if own_group is None else f"{person} (group {own_group})"
-            missing = f"; {store.missing_trials}" if store.missing_trials.count else ""
-            progress(f"{whose}: {rehearsal.answers} responses, {held}, fingerprint {store.fingerprint}{missing}")
+        )
+        _run_to_end(person if own_group is None else f"{person} (group {own_group})", opening, progress)
     return folder
+
+
+def finish_session(
+    protocol: str | Path,
+    participant: str,
+    *,
+    seed: int,
+    device: str,
+    results: Path,
+    progress: Callable[[str], object] | None = None,
+) -> None:
+    """Bring a participant's first session to its end, whatever an earlier call, or a killed program, left of it.
+
+    An interrupted session is resumed with its own seed and device. One that is finished is not touched, nor is anything
+    begun for a participant who withdrew.
+
+    Parameters
+    ----------
+    protocol : str or Path
+        File or name of a protocol.
+    participant : str
+        Whose session it is.
+    seed : int
+        All randomness of a new session comes from it, the key's too.
+    device : str
+        A simulated device, for a new session.
+    results : Path
+        The study folder.
+    progress : callable, optional
+        Called with a line about what was done; not if there was nothing to do.
+
+    Raises
+    ------
+    StudyError
+        As `rehearse` and `reopen_session`; what was kept before is safe.
+    """
+    folder = StudyFolder(results)
+    session = folder.session(participant, 1)
+    is_finished = place_of(folder, session) in {place for _, place in listed(folder.fingerprints)}
+    if is_finished or participant in tombstones(folder):
+        return
+    if not is_there(session.path) or never_begun(session.path):
+        source = source_bytes(protocol)
+        study = parse(source, str(protocol))
+        opening = open_session(study, source, participant, seed=seed, device=device, results=results)
+        _run_to_end(participant, opening, progress)
+    elif progress_of(journal.read(session.journal)).ended is None:
+        _run_to_end(participant, reopen_session(session.path, protocol=protocol), progress)
+    else:  # the program was killed after the session's last line, before its proofs
+        rebuild(session.path)
+        if progress is not None:
+            progress(f"{participant}: tables and checksums of the finished session rebuilt")
+
+
+def _run_to_end(
+    participant: str,
+    opening: AbstractContextManager[tuple[RehearsedSession, SessionStore]],
+    progress: Callable[[str], object] | None,
+) -> None:
+    """Run an opened session to its last page; ``progress`` gets a line with its responses and missing trials."""
+    began = time.perf_counter()
+    with opening as (rehearsal, store):
+        rehearsal.run()
+    if progress is not None:
+        took_s = time.perf_counter() - began
+        held = f"{store.clock.seconds() / 60:.1f} min of session in {took_s:.1f} s (simulated)"
+        missing = f"; {store.missing_trials}" if store.missing_trials.count else ""
+        progress(f"{participant}: {rehearsal.answers} responses, {held}, fingerprint {store.fingerprint}{missing}")
 
 
 @contextmanager
