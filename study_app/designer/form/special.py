@@ -11,7 +11,7 @@ from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QBoxLayout, QLabel, QSizePolicy, QWidget
 
 from study_app.designer.document.elements import title_of
-from study_app.designer.document.fields import Row, label_of, languages_of
+from study_app.designer.document.fields import Row, label_of
 from study_app.designer.document.steps import AddElement, AddEntry, Do, RemoveKey, Request, SetValue, Several
 from study_app.designer.document.study import Study
 from study_app.designer.form.fields import (
