@@ -83,7 +83,9 @@ def test_a_held_digit_answers_one_statement(qtbot: Any, participant: Any, keyboa
     assert [event.value for event in of_kind(events, Chosen)] == [4, 1]
 
 
-def test_a_held_enter_leaves_one_page_and_a_new_press_the_next(qtbot: Any, participant: Any, keyboard: Keyboard) -> None:
+def test_a_held_enter_leaves_one_page_and_a_new_press_the_next(
+    qtbot: Any, participant: Any, keyboard: Keyboard
+) -> None:
     window, events = participant
     window.show_page(text_page("consent"))
     window.event.connect(lambda _event: window.show_page(text_page()))
@@ -211,9 +213,7 @@ def test_a_hold_that_the_program_was_too_busy_to_time_counts_by_its_time_stamps(
     assert told == ["tapped", "held"]
 
 
-def test_a_release_that_no_window_received_leaves_no_key_down(
-    qtbot: Any, participant: Any, keyboard: Keyboard
-) -> None:
+def test_a_release_that_no_window_received_leaves_no_key_down(qtbot: Any, participant: Any, keyboard: Keyboard) -> None:
     window, events = participant
     window.show_page(questionnaire())
     other = QWidget()
@@ -265,7 +265,12 @@ def test_a_click_within_a_quarter_of_a_second_of_a_page_is_ignored(qtbot: Any, p
     assert len(of_kind(events, Continue)) == 1
 
 
-FRENCH = {10: (KEY.Key_Ampersand, "&"), 11: (KEY.Key_Eacute, "é"), 12: (KEY.Key_QuoteDbl, '"'), 13: (KEY.Key_Apostrophe, "'")}
+FRENCH = {
+    10: (KEY.Key_Ampersand, "&"),
+    11: (KEY.Key_Eacute, "é"),
+    12: (KEY.Key_QuoteDbl, '"'),
+    13: (KEY.Key_Apostrophe, "'"),
+}
 
 
 @pytest.mark.parametrize(("scan", "digit"), [(10, 1), (11, 2), (12, 3), (13, 4)])
