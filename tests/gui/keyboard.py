@@ -60,10 +60,10 @@ class PressesReceived(QObject):
         self.times_ms: list[int] = []
         application.installEventFilter(self)
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if isinstance(watched, QWidget) and isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress:
-            if not event.isAutoRepeat() and event.timestamp() not in self.times_ms:
-                self.times_ms.append(event.timestamp())
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt calls it
+        pressed = isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress and not event.isAutoRepeat()
+        if pressed and isinstance(watched, QWidget) and event.timestamp() not in self.times_ms:
+            self.times_ms.append(event.timestamp())
         return False
 
 
