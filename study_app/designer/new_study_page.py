@@ -35,7 +35,7 @@ from PySide6.QtWidgets import (
 
 from study_app.designer.document.document import Answers, Document, taken_names, template
 from study_app.designer.document.elements import study_title, title_of
-from study_app.designer.document.fields import languages_of, row_at, unit_of
+from study_app.designer.document.fields import row_at, unit_of
 from study_app.designer.document.study import Study, read
 from study_app.designer.header import HeaderState, StudyChoice, problems_chip
 from study_app.designer.outline import icon_of
@@ -55,7 +55,7 @@ from study_app.gui.widgets.controls import ActionButton, Check, IconButton
 from study_app.gui.widgets.labels import Clamped, figures, label
 from study_app.gui.widgets.main_view import last_focused
 from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
-from study_app.number_text import capitalised, counted, duration, number_of, typed_numbers
+from study_app.number_text import capitalised, counted, duration, number_of, typed_numbers, unclear_number
 from study_app.protocol.load import read_document
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
@@ -63,7 +63,7 @@ from study_app.protocol.orders.durations import expected_duration_s, step_durati
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.document import names
 from study_app.protocol.source.files import find, shipped, shipped_file
-from study_app.protocol.wording.languages import LANGUAGES
+from study_app.protocol.wording.languages import LANGUAGES, languages_of
 from study_app.store.drafts import draft_of, drafted_files, unsaved_files
 from study_app.store.study_settings import kept_original
 from study_app.workspace import workspace
@@ -619,9 +619,9 @@ class Questions(Themed, QWidget):
             if not text or text == question.value:
                 continue
             if not question.several:
-                number = number_of(text) if len(text.split()) == 1 else None
+                number = number_of(text)
                 if number is None:
-                    return f"{question.words}: “{text}” is not a number"
+                    return f"{question.words}: {unclear_number(text)}"
                 values.append((question.path, number))
                 continue
             try:

@@ -45,7 +45,7 @@ from study_app.designer.document.elements import (
     title_of,
     words_sought,
 )
-from study_app.designer.document.fields import label_of, languages_of, node_at, rows, singular, tags
+from study_app.designer.document.fields import label_of, node_at, rows, singular, tags
 from study_app.designer.document.steps import AddElement, AddInstrument
 from study_app.designer.document.study import Study
 from study_app.designer.parts import dense
@@ -63,6 +63,7 @@ from study_app.protocol.checks.cross_references import OWN
 from study_app.protocol.formats import TABLES, is_second
 from study_app.protocol.questionnaires import instrument, instruments
 from study_app.protocol.source.document import Path, names, value_at
+from study_app.protocol.wording.languages import languages_of
 
 ICONS: Final = {
     "pages": "file", "blocks": "layers", "tasks": "route", "questionnaires": "list", "liquids": "drop",

@@ -24,9 +24,11 @@ from study_app.protocol.source.files import (
     TABLE,
     at_hand,
     is_footage,
+    is_utf16,
     protocol_hash,
     shipped,
     source_bytes,
+    without_mark,
 )
 from study_app.protocol.source.problems import Fault, did_you_mean, faults_of
 from study_app.protocol.table import Table
@@ -246,8 +248,10 @@ def _holds_study(document: Mapping[str, Any]) -> bool:
 
 def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
     """Return the tables of a text, arrays as tuples, and the lines they stand on (ProtocolError if it is no TOML)."""
+    if is_utf16(source):
+        raise ProtocolError(name, (Problem("file", "is UTF-16 text", hint="save it as UTF-8"),))
     try:
-        text = source.decode("utf-8").replace("\r\n", "\n")
+        text = without_mark(source).decode("utf-8").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         line = source.count(b"\n", 0, error.start) + 1
         raise ProtocolError(name, (Problem("file", "is not UTF-8 text", line, hint="save it as UTF-8"),)) from error

@@ -164,8 +164,8 @@ class FeedbackPage:
 class PausePage:
     """The session waits; ``force_off`` says that the force was stopped and fades in only when asked for.
 
-    ``held`` says what the operator stopped: then the operator alone resumes, and there is nothing to press. ``coming``
-    is the task that may come after it, so that it can be made ready.
+    ``held`` says what only the operator resumes, a pause or the force; then there is nothing to press. ``coming`` is
+    the task that may come after it, so that it can be made ready.
     """
 
     force_off: bool

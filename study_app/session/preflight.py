@@ -19,11 +19,14 @@ from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
 from study_app.number_text import counted
 from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.checks.force_limits import beyond_slope_limit, by_stimulus
+from study_app.protocol.checks.untranslated import UntranslatedText, listed_places
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import recordings_of
 from study_app.protocol.presented.presented_levels import highest_damping
 from study_app.protocol.sequences import enrolment
+from study_app.protocol.wording.languages import language_name
 from study_app.store.blinded.sealing import FRAMES_BYTES_PER_S, SAMPLE_BYTES, sealed_bytes
+from study_app.store.missing_trials import limit_words
 from study_app.video.sources import VideosFound
 
 if TYPE_CHECKING:
@@ -67,6 +70,29 @@ class Screen:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PredictedDelivery:
+    """How many main trials a simulated participant would lose because the safety layer withholds too much force.
+
+    ``missing`` of the ``asked`` trials of intervals would not be delivered, ``out`` of the ``judged`` other trials
+    would be out of limits. The limit on the force withheld is ``limit_percent`` [%].
+    """
+
+    missing: int
+    asked: int
+    out: int
+    judged: int
+    limit_percent: float
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What would be lost, as sentences without full stops: "26 of 40 trials would not be delivered: …"."""
+        why = limit_words("withheld_percent", {"withheld_percent": self.limit_percent})
+        missing = f"{self.missing} of {counted(self.asked, 'trial')} would not be delivered: {why}"
+        out = f"{self.out} of {counted(self.judged, 'trial')} would be out of limits: {why}"
+        return (*([missing] if self.missing else []), *([out] if self.out else []))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Measurements:
     """What was measured.
 
@@ -78,10 +104,12 @@ class Measurements:
     ``grant`` what the system lets the servo's thread do. ``dynamics`` are the device's, with its measured
     delay, ``delay_ticks`` is the delay that the servo uses now. ``withheld`` is the share of
     the force that limits and passivity controller are expected to withhold in the fastest stroke of a task, by
-    liquid; None where it was not computed. ``velocity_errors`` are the relative error of the velocity and what it would
-    be if all of the device's dynamics were known; None where all is. ``outlets`` are the streams and ports to other
+    liquid; None where it was not computed. ``delivery`` is what a simulated participant would lose, None where it was
+    not computed. ``velocity_errors`` are the relative error of the velocity and what it would be if all of the device's
+    dynamics were known; None where all is. ``outlets`` are the streams and ports to other
     programs; ``video`` is what was found of the study's videos, None without any. ``ran_otherwise`` is a participant
-    with whom the same version of the study ran from another file.
+    with whom the same version of the study ran from another file; ``untranslated`` are texts of the pages that are
+    still in another language.
     """
 
     device: str
@@ -100,10 +128,12 @@ class Measurements:
     dynamics: Dynamics = UNKNOWN
     delay_ticks: int = ASSUMED_TICKS
     withheld: Mapping[str, float] | None = None
+    delivery: PredictedDelivery | None = None
     velocity_errors: tuple[float, float] | None = None
     outlets: tuple[OutletStatus, ...] = ()
     video: VideosFound | None = None
     ran_otherwise: str = ""
+    untranslated: tuple[UntranslatedText, ...] = ()
     lateness_ns: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64), compare=False, repr=False)
 
 
@@ -306,12 +336,26 @@ def _costs(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         advice = "Trials with such strokes would be invalid."
         yield _warned("Force withheld", value, about, advice, well=most_percent <= limit_percent, share=share)
 
+    if facts.delivery is not None and facts.delivery.asked + facts.delivery.judged:
+        lost = facts.delivery.missing + facts.delivery.out
+        value = f"{lost} of {counted(facts.delivery.asked + facts.delivery.judged, 'trial')} lost"
+        about = f"predicted for a delay of {counted(facts.delay_ticks, 'tick')}"
+        advice = "; ".join(facts.delivery.sentences)
+        yield _warned("Trials delivered", value if lost else "all", about, f"{advice}.", well=not lost)
+
     if facts.ran_otherwise:
         about = f"version {protocol.study.version} ran from another file with {facts.ran_otherwise}"
         advice = "Give the changed file another study.version; the report names the change in any case."
         yield Check("Study file", "warning", "changed", about=about, advice=advice)
 
-    if protocol.assigns_rows and (number := enrolment(facts.participant)) is not None:
+    if facts.untranslated:
+        about = f"still in {language_name(facts.untranslated[0].source)}"
+        advice = f"Pages mix two languages: translate {listed_places(facts.untranslated)}."
+        yield Check("Translation", "warning", counted(len(facts.untranslated), "text"), about=about, advice=advice)
+
+    if protocol.assigns_rows and protocol.groups:
+        yield Check("Balance", "ok", "place in the group", about="determines the row of the square")
+    elif protocol.assigns_rows and (number := enrolment(facts.participant)) is not None:
         yield Check("Balance", "ok", f"participant number {number}", about="determines the row of the square")
     elif protocol.assigns_rows:
         advice = f"{facts.participant} has no number, so its row is drawn at random; use ids such as P007."

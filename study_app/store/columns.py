@@ -71,6 +71,15 @@ PARTICIPANTS: tuple[Column, ...] = (
         levels=(("valid", "all did"), ("invalid", "at least one did not")),
     ),
 )
+TRIALS_MISSING = optional(
+    "trials_missing",
+    "integer",
+    "Number of main trials that nobody answered because no presentation was delivered within the protocol's limits.",
+    minimum=0,
+    later=True,
+)
+"""A column of sessions in a study with trials of intervals."""
+_INCOMPLETE = ("incomplete", "it reached its last page, but more trials were not delivered than the study permits")
 GROUP = optional("group", "text", "The participant's group; n/a in a study without groups.", sealed=True, later=True)
 PARTICIPANTS_2: tuple[Column, ...] = (
     *(
@@ -82,6 +91,14 @@ PARTICIPANTS_2: tuple[Column, ...] = (
     GROUP,
 )
 """Columns of sessions in a study whose protocol has format 2."""
+
+
+def with_missing_trials(columns: tuple[Column, ...]) -> tuple[Column, ...]:
+    """Return the columns of sessions in a study with trials of intervals, which may be missing."""
+    with_level = (replace(one, levels=(*one.levels, _INCOMPLETE)) if one.name == "status" else one for one in columns)
+    return (*with_level, TRIALS_MISSING)
+
+
 EXCLUSIONS: tuple[Column, ...] = (
     PARTICIPANT,
     SESSION,
@@ -367,7 +384,7 @@ def tables_of(protocol_format: int) -> dict[str, tuple[Column, ...]]:
     return {"responses": RESPONSES_2, "trials": TRIALS_2, "intervals": INTERVALS, "participants": PARTICIPANTS_2}
 
 
-LATER = frozenset(column.name for column in (*RESPONSES_2, *TRIALS_2, *INTERVALS) if column.later)
+LATER = frozenset(column.name for column in (*RESPONSES_2, *TRIALS_2, *INTERVALS, TRIALS_MISSING) if column.later)
 """Columns that earlier versions did not write."""
 
 
@@ -377,8 +394,11 @@ SEALED = frozenset(column.name for column in (*TRIALS_2, *DELIVERED) if column.s
 
 def every_column(protocol_format: int = 1, *, intervals: bool = False) -> tuple[Column, ...]:
     """Return each column of all tables once, in the order of first use; only a study with designs has ``intervals``."""
+    tables = tables_of(protocol_format)
+    if intervals:
+        tables = tables | {"participants": with_missing_trials(tables["participants"])}
     found: dict[str, Column] = {}
-    for name, columns in tables_of(protocol_format).items():
+    for name, columns in tables.items():
         for column in columns if name != "intervals" or intervals else ():
             found.setdefault(column.name, column)
     return tuple(found.values())

@@ -536,7 +536,7 @@ def hypotheses(record: Record) -> None:
     record.choose(line().first, "Late in Delays")
     record.choose(line().measure, "Comfortable")
     record.choose(line().relation, "is equal to")
-    for typed in ("0.25", "x"):
+    for typed in ("0.25", "x", "2,500"):
         record.note(f"bound {typed}", lambda typed=typed: designer.fill(line().bound, typed))
     record.choose(line().relation, "is different from")
     record.play("@blocks.delays")

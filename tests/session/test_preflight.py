@@ -14,7 +14,8 @@ from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.servo import Servo
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.outlets.session_outlets import OutletStatus
-from study_app.protocol.load import load, parse, protocol_hash, source_bytes
+from study_app.protocol.checks.untranslated import untranslated_on_pages
+from study_app.protocol.load import load, parse, protocol_hash, read_document, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.session import preflight_measurements
 from study_app.session.preflight import Measurements, Screen, checks, refused
@@ -142,6 +143,17 @@ def test_another_file_of_the_same_version_is_a_warning(tmp_path: Path, recorded:
     assert ran_otherwise(chosen) == who
     found = checks(replace(small.WELL, ran_otherwise=who), study)
     assert [check.verdict for check in found if check.name == "Study file"] == ["warning"] * bool(who)
+
+
+@pytest.mark.parametrize(("language", "told"), [("fr", "4 texts; still in English"), ("en", "")])
+def test_pages_in_two_languages_are_a_warning(language: str, told: str) -> None:
+    """What participants read of it: an instruction, a title, a text and a question; the study's title they do not."""
+    text = source_bytes("delayjnd").decode()
+    assert "languages = " not in text
+    document = read_document(text.replace("[study]", f'[study]\nlanguages = ["{language}"]').encode(), "")[0]
+    facts = replace(small.WELL, untranslated=untranslated_on_pages(document))
+    warned = [check.said for check in checks(facts, load("delayjnd")) if check.name == "Translation"]
+    assert [sentence.split("; Pages")[0] for sentence in warned] == ([told] if told else [])
 
 
 def measured(results: Path) -> Measurements:

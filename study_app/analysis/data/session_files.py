@@ -1,5 +1,6 @@
 """The sessions of a results folder as typed tables, checked against their receipts, excluded rows marked."""
 
+import contextlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,14 +21,18 @@ from study_app.analysis.data.blocks import (
     other_questions,
     spoken,
 )
-from study_app.errors import AnalysisError
+from study_app.errors import AnalysisError, StoreError
 from study_app.protocol.table import text_in
 from study_app.store.atomic import parse_json, read_regular
 from study_app.store.blinded.blinding import Key
-from study_app.store.columns import tables_of
+from study_app.store.columns import TRIALS_MISSING, tables_of
 from study_app.store.csv_files import MISSING, Column, cells, header
 from study_app.store.exclusions import Exclusion, named
 from study_app.store.folders import SessionFolder, StudyFolder, check_study_name
+from study_app.store.journals import journal
+from study_app.store.missing_trials import MissingTrials
+from study_app.store.progress import progress_of
+from study_app.store.tables.study_files import has_intervals
 
 DTYPES: Final[dict[str, Any]] = {
     "text": "string",
@@ -176,7 +181,8 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
             "motors_masked": _masking(receipt.get("motors_masked")),
             "protocol_version": version,
             "key_hash": receipt["key_hash"],
-            **{name: receipt.get(name) for name in ("seed", "protocol_hash", "version")},
+            **{name: receipt.get(name) for name in ("seed", "protocol_hash", "version", "group")},
+            "missing": _missing(folder) if has_intervals(protocol) else None,
         }
         own_dynamics = _own_dynamics(receipt["device"].get("bench"))
         device_velocity = receipt["device"].get("estimator") == "device"
@@ -202,6 +208,16 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
         own_dynamics=own_dynamics,
         device_velocity=device_velocity,
     )
+
+
+def _missing(folder: SessionFolder) -> MissingTrials | None:
+    """Return the trials that were not delivered in a session with trials of intervals; None if its journal is damaged.
+
+    The tables may be sound although the journal is not; `doubts` reports it.
+    """
+    with contextlib.suppress(StoreError):
+        return progress_of(journal.read(folder.journal)).missing_trials
+    return None
 
 
 def _own_dynamics(bench: Mapping[str, Any] | None) -> Bench | None:
@@ -236,14 +252,21 @@ def _masking(answer: Mapping[str, Any] | None) -> str | None:
 
 
 def read_tables(sessions: Sequence[Session], name: str) -> pd.DataFrame:
-    """Read table ``name`` of sessions that were asked alike, with ``session_status`` added; rows in their order."""
+    """Read table ``name`` of sessions that were asked alike; rows in their order.
+
+    ``session_status`` and ``trials_missing`` of the row's session are added.
+    """
     paths = [session.folder.table(session.study, name) for session in sessions]
     table, lengths = tables(paths, tables_of(sessions[0].protocol_format)[name])
     _check_own(sessions, paths, table, lengths)
     if name == "responses":
         _check_answers(sessions, paths, table, lengths)
     status = np.repeat([session.visit["status"] for session in sessions], lengths)
-    return table.assign(session_status=pd.array(status, dtype="string"))
+    known = [session.visit["missing"] for session in sessions]
+    missing = np.repeat(np.array([None if one is None else one.count for one in known], dtype=object), lengths)
+    return table.assign(
+        session_status=pd.array(status, dtype="string"), **{TRIALS_MISSING.name: pd.array(missing, dtype="Int64")}
+    )
 
 
 def _check_own(sessions: Sequence[Session], paths: Sequence[Path], table: pd.DataFrame, lengths: Whole) -> None:

@@ -7,11 +7,11 @@ without the libraries of the analysis, which may not be installed.
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from study_app.store.columns import INTERVALS, PARTICIPANTS
+from study_app.store.columns import INTERVALS, PARTICIPANTS, TRIALS_MISSING, with_missing_trials
 from study_app.store.csv_files import Column, optional
 from study_app.store.tables.column_dictionary import table_markdown
 
-_STATUS: Final = next(column for column in PARTICIPANTS if column.name == "status")
+_STATUS: Final = next(column for column in with_missing_trials(PARTICIPANTS) if column.name == "status")
 
 JUDGED: Final = (
     Column("session_status", "text", "How the row's session ended.", levels=_STATUS.levels),
@@ -20,8 +20,8 @@ JUDGED: Final = (
     Column(
         "counted",
         "flag",
-        "true where the row is in the aggregate and the figures: main trial, completed session, last attempt, not "
-        "excluded; valid or not.",
+        "true where the row is in the aggregate and the figures: main trial, session that reached its end, "
+        "last attempt, not excluded; valid or not.",
     ),
 )
 
@@ -211,7 +211,10 @@ RESULTS: Final = {
 
 def dictionary_markdown() -> str:
     """Return the columns of these tables as Markdown: a heading and a table for each."""
-    added = "what `export` adds to responses, trials and intervals; the last four after unblinding"
+    added = (
+        "what `export` adds to responses, trials and intervals; `trials_missing` in studies with trials of intervals, "
+        "the last four after unblinding"
+    )
     of_tracks = (
         "one row per trial with a design, after unblinding; what it has besides IDs and condition of the trial, and "
         "force_mean_n and mean_speed_mps of each interval (…_1, …_2)"
@@ -219,7 +222,7 @@ def dictionary_markdown() -> str:
     tables = {"tracks": Results(of_tracks, OF_TRACKS), **RESULTS}
     return "\n".join(
         (
-            table_markdown("Added by an export", "*_data.csv", added, (*JUDGED, *OPENED, ACHIEVED)),
+            table_markdown("Added by an export", "*_data.csv", added, (*JUDGED, TRIALS_MISSING, *OPENED, ACHIEVED)),
             *(
                 table_markdown(name.capitalize(), f"study-…_description-{name}_data.csv", row, columns)
                 for name, (row, columns) in tables.items()

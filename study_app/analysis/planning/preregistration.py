@@ -24,7 +24,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import expected_of, precision_plan, precision_rows, threshold_plan
 from study_app.protocol.describe import describe, limit_rows
 from study_app.protocol.model import Analysis, Protocol
-from study_app.protocol.orders.balance import block_order_words
+from study_app.protocol.orders.balance import block_orders_by_group
 from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.table import text_in
 from study_app.protocol.tracks import condition_of, design_of, method_of, standards_of, stimulus_of
@@ -272,11 +272,16 @@ def _design(protocol: Protocol) -> Iterator[str]:
         if study.blinding == "double"
         else "Conditions are known by codes until the key is opened; the operator sees force and wake (single-blind)."
     )
-    if protocol.groups:
-        shares = ", ".join(f"{name} (share {group.share})" for name, group in protocol.groups.items())
-        yield f"Participants are allocated at random, in permuted blocks, to the groups {shares}."
-    if len(protocol.main_blocks) > 1:
-        yield f"Order of blocks {block_order_words(protocol)}."
+    shares = ", ".join(f"{name} (share {share})" for name, share in protocol.shares.items())
+    if protocol.randomises:
+        yield f"Participants are assigned at random, in permuted blocks, to the groups {shares}."
+    elif protocol.asks_group:
+        yield (
+            f"Participants belong to a group by an existing attribute ({shares}), which is recorded at the start of "
+            "their first session. Groups are not randomised, so a difference between them may have other causes."
+        )
+    for group, words in block_orders_by_group(protocol).items():
+        yield f"Order of blocks{f' in group {group}' if group else ''} {words}."
     yield "Orders are drawn for each participant from the session's seed, as described for each block below."
     for block in protocol.main_blocks:
         rows = dict(precision_rows(protocol, block))
@@ -347,6 +352,11 @@ def _exclusions(protocol: Protocol) -> Iterator[str]:
         attempts = protocol.limits.attempts
         times = "" if attempts is None else f", up to {attempts} times"
         yield f"A trial of intervals beyond a limit is not asked about and is presented again{times}."
+        if (permitted := protocol.limits.missing_percent) is not None:
+            yield (
+                f'Rule "missing": at most {permitted:g} % of a session\'s main trials of intervals may stay unanswered '
+                "because no presentation was within the limits. A session with more is incomplete and is excluded."
+            )
     if any(block.design is None for block in protocol.main_blocks):
         yield f"{'Other trials' if has_intervals else 'Trials'} beyond a limit are counted and reported."
     yield f"Limits: {limits}."

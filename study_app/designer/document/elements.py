@@ -11,7 +11,6 @@ from study_app.designer.document.fields import (
     Row,
     counted_elements,
     label_of,
-    languages_of,
     named_at,
     refused_at,
     row_at,
@@ -24,6 +23,7 @@ from study_app.number_text import counted, exact_duration
 from study_app.protocol.formats import is_second
 from study_app.protocol.groups import sequences_in
 from study_app.protocol.source.document import Path, entries, has, value_at
+from study_app.protocol.wording.languages import languages_of
 
 TITLES: Final = ("title", "short", "text")
 """Keys of texts that an element is called by, the first that it has."""

@@ -20,6 +20,7 @@ from study_app.protocol.questions import POINTS
 from study_app.protocol.source.document import Path, entries, has, names, value_at
 from study_app.protocol.source.problems import rule_of, shown
 from study_app.protocol.table import ALTERNATIVES, NOT_WITH, SECTIONS
+from study_app.protocol.wording.languages import languages_of
 
 Document = Mapping[str, Any]
 ITEMS = "items"
@@ -82,11 +83,6 @@ def renamed(document: Document, thing: Path, name: str, recorded: frozenset[str]
     if item is None:
         return (Rename(thing, name, references_to(document, thing)),)
     return (Set((*thing, "id"), name), *(Set(place, name) for place in references_to(document, thing)))
-
-
-def languages_of(document: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the languages of a study; a file that names none has English."""
-    return tuple(str(code) for _, code in entries(document, "study.languages.*")) or ("en",)
 
 
 def id_at(document: Document, thing: Path) -> str:
@@ -380,6 +376,7 @@ LABELS: Final = {
     "design": "Trial design",  # a study has a design, too
     "designs": "Trial designs",
     "feedback_s": "Feedback duration",
+    "group_assignment": "Assignment to groups",
     "level_error_ms": "Level error of delays",
     "obrien-fleming": "O’Brien–Fleming",
     "participants": "Participants planned",

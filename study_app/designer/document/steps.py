@@ -25,7 +25,6 @@ from study_app.designer.document.fields import (
     deletions,
     initial,
     label_of,
-    languages_of,
     named_at,
     references_to,
     renamed,
@@ -43,7 +42,7 @@ from study_app.number_text import counted
 from study_app.protocol.formats import is_second
 from study_app.protocol.questionnaires import written_out
 from study_app.protocol.source.document import Path, names, value_at
-from study_app.protocol.wording.languages import language_name
+from study_app.protocol.wording.languages import language_name, languages_of
 
 Recorded: TypeAlias = Callable[[Path], frozenset[str]]
 """Returns the ids beside an element under which answers are recorded: its own then stays."""

@@ -16,17 +16,7 @@ from study_app.designer.document.elements import (
     title_of,
     used_by,
 )
-from study_app.designer.document.fields import (
-    Choice,
-    Row,
-    label_of,
-    languages_of,
-    named_at,
-    refused_at,
-    row_at,
-    rows,
-    sections_of,
-)
+from study_app.designer.document.fields import Choice, Row, label_of, named_at, refused_at, row_at, rows, sections_of
 from study_app.designer.document.steps import AddToSession, Request, SetValue, index_of
 from study_app.designer.document.study import Study
 from study_app.designer.form.card import EDITORS
@@ -43,10 +33,11 @@ from study_app.designer.form.rows import (
 from study_app.designer.measures.study_facts import copied_texts, texts_by_language
 from study_app.designer.outline import icon_of
 from study_app.number_text import capitalised
+from study_app.protocol.checks.untranslated import untranslated_at
 from study_app.protocol.formats import is_second
-from study_app.protocol.groups import sequences_in
+from study_app.protocol.groups import ASSIGNMENT, sequences_in
 from study_app.protocol.source.document import Path, Places, names, places_of, value_at
-from study_app.protocol.wording.languages import LANGUAGES, language_name
+from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
 
 ENTRIES: Final = "In this order"
 DEEPEST: Final = 3
@@ -77,6 +68,8 @@ def form(study: Study, path: Path) -> Form:
         if (path == SEQUENCE or main) and (of_blocks := rows_of_blocks(document)):
             together = tuple(_form_row(study, row, places) for row in of_blocks)
             sections = (*sections, Section(path, "The main blocks together", together))
+        if path[:1] == ("groups",) and (assignment := row_at(document, ASSIGNMENT)) is not None:
+            sections = (Section(path, "", (_form_row(study, assignment, places),)), *sections)
     shown = {row.path for section in sections for row in section.rows}
     shown |= {section.path for section in sections if section.path != path}
     within = [fault for fault in study.faults if fault.path[: len(path)] == path]
@@ -219,7 +212,7 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
     faults = tuple(_sentence(fault.message, fault.hint) for fault in study.faults if fault.path[: len(path)] == path)
     if path == STUDY_LANGUAGES:
         row = replace(row, choices=tuple(Choice(code, language_name(code)) for code in LANGUAGES))
-    codes = languages_of(document)
+    codes, is_text = languages_of(document), row.kind in {"localised", "paragraphs"}
     number = None
     if row.kind == "either":
         number = next((index for index, one in enumerate(row.either) if _fits(one, row.value)), 0)
@@ -227,8 +220,8 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
         **values_of(row),
         place=place_words(path, places.line(path)),
         faults=faults,
-        languages=tuple((code, language_name(code)) for code in codes)
-        if row.kind in {"localised", "paragraphs"} else (),
+        languages=tuple((code, language_name(code)) for code in codes) if is_text else (),
+        untranslated=tuple(untranslated_at(document, row.path, row.value, codes)) if is_text else (),
         entries=tuple(_entries(study, row)),
         target=named_at(document, path) if row.kind == "reference" and isinstance(row.value, str) else None,
         notes=tuple(_notes(document, row)),

@@ -4,12 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Final
 
-from study_app.designer.document.additions import is_copied
-from study_app.designer.document.fields import Choice, Row, label_of, languages_of, singular
+from study_app.designer.document.fields import Choice, Row, label_of, singular
 from study_app.designer.document.steps import Request
 from study_app.designer.document.study import Study
+from study_app.protocol.checks.untranslated import UntranslatedText
 from study_app.protocol.source.document import Path, value_at
-from study_app.protocol.wording.languages import LANGUAGES, language_name
+from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
 
 ICONS: Final = {"rating": "scale", "slider": "slider", "number": "number", "choice": "list", "text": "letter"}
 STATEMENT: Final = "statement"
@@ -111,13 +111,8 @@ class FormRow(Row):
     number: int | None = None  # of alternatives ("either"), which one the value is
     # keys of which exactly one is given, with their labels: this row's and the other one
     keys: tuple[tuple[str, str], ...] = ()
+    untranslated: tuple[UntranslatedText, ...] = ()  # in which languages a text is not translated yet
     facts: Any = None  # what its special editor shows beyond the value; None where it has none
-
-    @property
-    def copied(self) -> tuple[str, ...]:
-        """The languages in which a text is still that of the first language."""
-        texts = self.value if isinstance(self.value, Mapping) else {}
-        return tuple(name for code, name in self.languages[1:] if is_copied(texts, code, self.languages[0][0]))
 
     @property
     def removable(self) -> bool:

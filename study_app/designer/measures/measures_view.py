@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from study_app.designer.document.elements import SEQUENCE, title_of
-from study_app.designer.document.fields import languages_of
 from study_app.designer.document.study import Study
 from study_app.designer.measures.cards import (  # fmt: skip
     NARROW_CODES,
@@ -39,7 +38,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import BlockOrder, order_of
 from study_app.protocol.source.document import Path
-from study_app.protocol.wording.languages import language_name
+from study_app.protocol.wording.languages import language_name, languages_of
 
 BELOW: Final = 4
 """So many cards stay below the other tabs."""

@@ -24,16 +24,17 @@ from study_app.number_text import counted
 from study_app.protocol.load import is_scene_file, load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial
-from study_app.protocol.source.files import at_hand, find, shipped, shipped_file
+from study_app.protocol.source.files import at_hand, find, shipped, shipped_file, without_mark
 from study_app.protocol.wording.languages import language_name
 from study_app.session.resume import begun_schedule, find_protocol, is_rehearsal, resume_at, source_to_resume
 from study_app.store import receipt
 from study_app.store.blinded.allocation import session_protocol
+from study_app.store.blinded.blinding import read_key
 from study_app.store.drafts import draft_files, draft_of, unsaved_files
 from study_app.store.folder_lock import is_open
 from study_app.store.folders import locate
 from study_app.store.journals import journal
-from study_app.store.journals.journal_events import start_of
+from study_app.store.journals.journal_events import COMPLETED, INCOMPLETE, start_of
 from study_app.store.study_settings import kept_original
 from study_app.store.workstation import recent_protocols
 from study_app.workspace import workspace
@@ -256,7 +257,7 @@ def _draft_note(source: str, draft_words: LoadWords) -> DraftNote | None:
     """Return what is said of a draft: "Draft of today 14:02, not saved: Water"; None where all of it is saved."""
     with suppress(ProtocolError, OSError):
         file = find(source)
-        draft, content = None if is_shipped(source) else draft_of(file), file.read_bytes()
+        draft, content = None if is_shipped(source) else draft_of(file), without_mark(file.read_bytes())
         if draft is not None and draft.text.encode() != content:
             edited = (
                 draft_words().edited_words(content.decode("utf-8", "replace"), draft.text, file.parent)
@@ -317,7 +318,7 @@ def interrupted(
             protocol = parse(read(source), source)
             study = locate(session.folder)[0]
             protocol = session_protocol(study, protocol, session.participant, begun.session)
-            schedule = begun_schedule(protocol, begun)
+            schedule = begun_schedule(protocol, begun, read_key(study.path))
             step = resume_at(protocol, schedule, lines).step
         except StudyError:
             continue  # what is wrong with it is said when it is asked for by its folder
@@ -349,12 +350,14 @@ def place_words(protocol: Protocol, schedule: Schedule, step: int) -> str:
 
 
 def held(found: Iterable[SessionFacts], study: str) -> str:
-    """Return how many sessions of a study there are: "4 sessions, 3 complete, 1 excluded, 2 pilots"."""
+    """Return how many sessions of a study there are: "5 sessions, 3 complete, 1 incomplete, 1 excluded, 2 pilots"."""
     of_study = [session for session in found if session.study == study]
     own = [session for session in of_study if not session.kind]
     pilots = sum(session.kind == "pilot" for session in of_study)
-    complete = sum(session.status == "completed" for session in own)
+    complete = sum(session.status == COMPLETED for session in own)
+    incomplete = sum(session.status == INCOMPLETE for session in own)
     excluded = sum(session.excluded is not None for session in own)
     words = [f"{counted(len(own), 'session')}, {complete} complete" if own else "no participant yet"]
+    words += [f"{incomplete} incomplete"] * bool(incomplete)
     words += [f"{excluded} excluded"] * bool(excluded) + [counted(pilots, "pilot")] * bool(pilots)
     return ", ".join(words)

@@ -16,11 +16,14 @@ from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s, variants
 from study_app.protocol.orders.schedule import FormStep, PageStep
 from study_app.store import receipt
+from study_app.store.columns import TRIALS_MISSING
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folder_lock import is_open
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
+from study_app.store.journals.journal_events import REACHED_END
 from study_app.store.merged import session_in
+from study_app.store.progress import progress_of
 from study_app.store.study_runs import run_of
 from study_app.store.tables.study_files import participants
 
@@ -37,7 +40,8 @@ class SessionFacts:
 
     ``status`` is the table's, or "running" where a program has the session open. ``excluded`` is why the analysis
     excludes all of it, None where it does not; ``lost`` counts recordings that could not be stored, ``reconnected`` how
-    often the device failed and was connected again, ``outlets_lost`` streams and ports that failed.
+    often the device failed and was connected again, ``outlets_lost`` streams and ports that failed. ``missing`` says
+    how many trials were not delivered, and why; "" if all were.
     """
 
     participant: str
@@ -55,6 +59,7 @@ class SessionFacts:
     lost: int = 0
     reconnected: int = 0
     outlets_lost: int = 0
+    missing: str = ""
 
     @property
     def version(self) -> str:
@@ -81,7 +86,7 @@ class SessionFacts:
 
     @property
     def counts(self) -> bool:
-        return self.status == "completed" and self.excluded is None
+        return self.status in REACHED_END and self.excluded is None
 
     @property
     def name(self) -> str:
@@ -129,9 +134,17 @@ def session_facts(
             lost=lost,
             reconnected=reconnected,
             outlets_lost=outlets_lost,
+            missing=_missing(session) if row.get(TRIALS_MISSING.name) else "",
         )
         for (row, session), (lost, reconnected, outlets_lost) in zip(placed, counts, strict=True)
     ]
+
+
+def _missing(session: SessionFolder) -> str:
+    """Return how many trials of a session were not delivered, and why; "" if its journal cannot be read."""
+    with contextlib.suppress(StoreError):
+        return str(progress_of(journal.read(session.journal)).missing_trials)
+    return ""
 
 
 def _began(row: Mapping[str, Any], session: SessionFolder) -> object:
@@ -172,6 +185,7 @@ Chipped: TypeAlias = tuple[Tone, str, str]
 
 STATUS: dict[str, Chipped] = {
     "completed": ("ok", "check", "Complete"),
+    "incomplete": ("warn", "warning", "Incomplete"),
     "running": ("accent", "play", "Running"),
     "unfinished": ("warn", "clock", "Interrupted"),
     "withdrawn": ("neutral", "cross", "Withdrawn"),

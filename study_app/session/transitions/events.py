@@ -204,7 +204,7 @@ class PauseRequested(Event):
 
 @dataclass(frozen=True, slots=True)
 class ResumeRequested(Event):
-    """The pause ends; an interrupted trial starts again. Only the operator resumes what the operator stopped."""
+    """The pause ends; an interrupted trial starts again. Only the operator ends what a person stopped."""
 
     by: Literal["participant", "operator"]
 

@@ -249,8 +249,8 @@ def preview(study: Protocol, seed: int = SEED, participant: str = PARTICIPANT) -
     draw = stream(seed, "blinding").random
     secret = draw_secret(draw)
     codes = draw_key(study, draw)
-    shares = {name: group.share for name, group in study.groups.items()}
-    own = own_protocol(study, group_of(shares, secret, 1) if shares else None, 1)
+    group = group_of(study.shares, secret, 1) if study.randomises else next(iter(study.groups), None)
+    own = own_protocol(study, group, 1)
     return Preview(own, build_schedule(own, participant, seed), codes, secret)
 
 

@@ -25,6 +25,9 @@ CAUSE_WITHHELD = "the session was stopped"
 
 UNDELIVERED = "invalid"
 """The outcome of a trial of which an interval was not delivered as requested."""
+COMPLETED, INCOMPLETE = "completed", "incomplete"
+REACHED_END = (COMPLETED, INCOMPLETE)
+"""The status of sessions that reached their last page: with enough trials, or with more missing than permitted."""
 
 _MOST_SECONDS = 1e9  # of a session's clock
 _MOST = 10**30  # greatest integer that the program writes
@@ -113,6 +116,15 @@ Numbers: TypeAlias = Annotated[
     ),
 ]
 Texts: TypeAlias = Annotated[Sequence[str], Kind("list of texts", _are_texts, "array", {"items": {"type": "string"}})]
+NumberList: TypeAlias = Annotated[
+    Sequence[float],
+    Kind(
+        "list of numbers",
+        lambda value: isinstance(value, list) and all(map(_is_number, value)),
+        "array",
+        {"items": {"type": "number"}},
+    ),
+]
 Answers: TypeAlias = Annotated[
     Sequence["Response"], Kind("list of answers", _are_answers, "array", {"items": {"$ref": "#/$defs/answer"}})
 ]
@@ -258,7 +270,13 @@ class OfAttempt(Event, group=True):
 
 
 class EndOfTask(OfAttempt, group=True):
-    """The end of a task, with its measures in ``others``."""
+    """The end of a task, with its measures in ``others``.
+
+    ``reached_s`` lists when the targets were reached [s, on the task's clock], if `target_reached` lines would have
+    revealed the condition while the key was sealed.
+    """
+
+    reached_s: NumberList | None = None
 
     def fields(self) -> dict[str, Any]:
         """Return the event's own fields in the order in which they are written: measures first if interrupted."""
@@ -276,6 +294,8 @@ class SessionStarted(Event):
 
     `receipt_hash` is the SHA-256 of the receipt without what changes later (of `session_resumed`: of its entry there);
     `measures_sealed` says whether sealed columns are encrypted, `own_codes` whether codes are the participant's own.
+    `entry` is the participant's entry in the allocation to groups, or the place in a pre-existing `group`;
+    `place_in_group` says that the place in the group assigns rows of squares.
     """
 
     format: Integer | None = None
@@ -301,6 +321,7 @@ class SessionStarted(Event):
     intervals: Flag | None = None
     entry: Integer | None = None
     group: Text | None = None
+    place_in_group: Flag | None = None
 
 
 class SessionResumed(Event):
@@ -427,7 +448,11 @@ class Stepped(OfAttempt):
 
 
 class TargetReached(Event):
-    """A target was reached, on the task's clock."""
+    """A target was reached, on the task's clock.
+
+    While measures are sealed no such line is written, since their number and times would reveal a delay: the end of
+    the task has the times in its `sealed` text, as `reached_s`.
+    """
 
     trial: Integer
     target: Integer

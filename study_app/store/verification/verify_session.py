@@ -224,6 +224,11 @@ def _journal(folder: SessionFolder, found: Findings, *, running: bool) -> Conten
     except StoreError as error:
         found.error(folder.journal, str(error))
         return nothing
+    missing = done.missing_trials
+    if missing.count:
+        found.warning(folder.path, str(missing))
+    if done.reached_end and missing.exceed != (done.ended == events.INCOMPLETE):
+        found.error(folder.journal, f"its status is {done.ended!r}, though {missing or 'no trial is missing'}")
     if done.ended is None:
         if not running:
             found.warning(folder.path, "is unfinished: resume it, or leave it unfinished")
@@ -248,7 +253,8 @@ def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, 
     if not lines:
         return
     start = events.start_of(lines)
-    compared = [name for name in (*receipt.COPIED_FIELDS, "row_of") if name in held or name == "row_of"]
+    optional = ("row_of", "group")
+    compared = [name for name in (*receipt.COPIED_FIELDS, *optional) if name in held or name in optional]
     differing = [name for name in compared if held.get(name) != getattr(start, name)]
     differing += _differing(held, lines)
     if not differing and start.receipt_hash not in (None, receipt.digest(held)):
@@ -279,7 +285,7 @@ def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, 
     tables = blocks.values() if isinstance(blocks, dict) else ()
     breaks = [block.get("break_page") for block in tables if isinstance(block, dict)]
     was_last = bool(steps) and steps[-1] not in breaks and left >= steps.count(steps[-1])
-    if isinstance(last, events.SessionEnded) and last.status != "completed" and was_last:
+    if isinstance(last, events.SessionEnded) and last.status not in events.REACHED_END and was_last:
         found.error(folder.journal, f"its status is {last.status!r}, though the last page was left: it was changed")
 
 
@@ -328,7 +334,7 @@ def _removed(lines: Sequence[events.Event]) -> Iterator[str]:
             chosen.pop(line.trial, None)
         elif isinstance(line, events.FormAnswered | events.PassedOver | events.SessionResumed):
             form = None
-        completed = isinstance(line, events.SessionEnded) and line.status == "completed"
+        completed = isinstance(line, events.SessionEnded) and line.status in events.REACHED_END
         for trial, number in list(chosen.items()):
             if completed or (isinstance(line, events.TrialStarted) and line.trial > trial):
                 del chosen[trial]
