@@ -338,7 +338,7 @@ def _costs(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
 
     if facts.delivery is not None and facts.delivery.asked + facts.delivery.judged:
         lost = facts.delivery.missing + facts.delivery.out
-        value = f"{lost} of {counted(facts.delivery.asked + facts.delivery.judged, 'trial')} lost"
+        value = f"{lost} of {counted(facts.delivery.asked + facts.delivery.judged, 'trial')} beyond the limit"
         about = f"predicted for a delay of {counted(facts.delay_ticks, 'tick')}"
         advice = "; ".join(facts.delivery.sentences)
         yield _warned("Trials delivered", value if lost else "all", about, f"{advice}.", well=not lost)

@@ -69,6 +69,11 @@ class MissingTrials:
         """The number of missing trials of each block and code, in the order of the trials."""
         return dict(Counter((one.block, one.code) for one in self.missing))
 
+    @property
+    def brief(self) -> str:
+        """How many trials are missing, for a narrow place: "26 of 40 not delivered"; empty if none is."""
+        return f"{self.count} of {self.asked} not delivered" if self.missing else ""
+
     def __str__(self) -> str:
         """Return how many trials are missing, and why, as a sentence without a full stop; empty if none is."""
         return missing_words(self.count, self.asked, self.reasons, self.limits) if self.missing else ""

@@ -18,7 +18,7 @@ from study_app.protocol.checks.untranslated import untranslated_on_pages
 from study_app.protocol.load import load, parse, protocol_hash, read_document, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.session import preflight_measurements
-from study_app.session.preflight import Measurements, Screen, checks, refused
+from study_app.session.preflight import Measurements, PredictedDelivery, Screen, checks, refused
 from study_app.session.preflight_measurements import measure
 from study_app.session.start import NewSession, ran_otherwise
 from study_app.store import receipt
@@ -81,6 +81,8 @@ FACTS: tuple[tuple[str, dict[str, Any]], ...] = (
     ),
     *((name, {"withheld": {"thin": 0.001, "thick": share}}) for name in ("small", "single-blind")
       for share in (0.032, 0.05, 0.051)),
+    *(("small", {"delivery": PredictedDelivery(missing=missing, asked=asked, out=out, judged=5, limit_percent=25)})
+      for missing, asked, out in ((0, 40, 0), (26, 40, 0), (1, 1, 2), (0, 0, 1))),
     *(("small", {"tick_s": tick_s}) for tick_s in (1e-4, 2e-4, 2.01e-4, 1e-3)),
     *(("small", {"outlets": (one,)}) for one in (
         LIVE, replace(LIVE, listens=False), OutletStatus(title="LSL samples", withheld=True),

@@ -30,7 +30,7 @@ from study_app.protocol.table import text_in
 from study_app.protocol.tracks import condition_of, design_of, method_of, standards_of, stimulus_of
 from study_app.protocol.trials.stimuli import assumed_for
 from study_app.psychophysics.people import BETWEEN_PEOPLE
-from study_app.store.exclusions import named
+from study_app.store.exclusions import MISSING_RULE, named
 from study_app.store.merged import DASH, folders_of
 
 FILE: Final = "preregistration.md"
@@ -61,7 +61,10 @@ def commitment(protocol: Protocol, protocol_hash: str) -> Commitment:
         protocol_hash=protocol_hash,
         participants=None if decided is None else decided.participants,
         precision=None if decided is None else decided.precision,
-        rules=(CATCH,) if any(block.catch is not None for block in protocol.main_blocks) else (),
+        rules=(
+            *([CATCH] if any(block.catch is not None for block in protocol.main_blocks) else []),
+            *([MISSING_RULE] if any(block.design is not None for block in protocol.main_blocks) else []),
+        ),
     )
 
 

@@ -82,14 +82,15 @@ class Appraisal:
         """Take the answers there are; return whether there is news."""
         news = False
         for number, answer in self.appraiser.answers():
-            if isinstance(answer, PredictedDelivery):
-                self.delivery, self._last, news = answer, None, True
-                continue
-            if number != self._asked or not self._waiting:
+            if number != self._asked or self.over:
                 continue
             if isinstance(answer, Costs):
                 self.tick_s = max(self.tick_s or 0.0, answer.tick_ns * 1e-9)
                 news = True
+                continue
+            if not self._waiting:
+                self.delivery = answer if isinstance(answer, PredictedDelivery) else None
+                self._last, news = None, True
                 continue
             self._errors_n.append(answer.force_n if isinstance(answer, Errors) else None)
             if isinstance(answer, Errors) and answer.velocity is not None:

@@ -23,6 +23,7 @@ from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import REACHED_END
 from study_app.store.merged import session_in
+from study_app.store.missing_trials import MissingTrials
 from study_app.store.progress import progress_of
 from study_app.store.study_runs import run_of
 from study_app.store.tables.study_files import participants
@@ -40,8 +41,8 @@ class SessionFacts:
 
     ``status`` is the table's, or "running" where a program has the session open. ``excluded`` is why the analysis
     excludes all of it, None where it does not; ``lost`` counts recordings that could not be stored, ``reconnected`` how
-    often the device failed and was connected again, ``outlets_lost`` streams and ports that failed. ``missing`` says
-    how many trials were not delivered, and why; "" if all were.
+    often the device failed and was connected again, ``outlets_lost`` streams and ports that failed. ``missing`` are
+    the trials that were not delivered, None if all were.
     """
 
     participant: str
@@ -59,7 +60,7 @@ class SessionFacts:
     lost: int = 0
     reconnected: int = 0
     outlets_lost: int = 0
-    missing: str = ""
+    missing: MissingTrials | None = None
 
     @property
     def version(self) -> str:
@@ -134,17 +135,17 @@ def session_facts(
             lost=lost,
             reconnected=reconnected,
             outlets_lost=outlets_lost,
-            missing=_missing(session) if row.get(TRIALS_MISSING.name) else "",
+            missing=_missing(session) if row.get(TRIALS_MISSING.name) else None,
         )
         for (row, session), (lost, reconnected, outlets_lost) in zip(placed, counts, strict=True)
     ]
 
 
-def _missing(session: SessionFolder) -> str:
-    """Return how many trials of a session were not delivered, and why; "" if its journal cannot be read."""
+def _missing(session: SessionFolder) -> MissingTrials | None:
+    """Return the trials of a session that were not delivered; None if its journal cannot be read."""
     with contextlib.suppress(StoreError):
-        return str(progress_of(journal.read(session.journal)).missing_trials)
-    return ""
+        return progress_of(journal.read(session.journal)).missing_trials
+    return None
 
 
 def _began(row: Mapping[str, Any], session: SessionFolder) -> object:
@@ -199,6 +200,7 @@ VALIDITY: dict[str | None, Chipped] = {
     None: ("neutral", "ring", "Open"),
 }
 LOST: Chipped = ("warn", "warning", "Recording lost")
+MISSING: Chipped = ("warn", "warning", "Trials missing")
 
 
 LIMIT_WORDS: Mapping[str, tuple[str, str]] = {
@@ -237,8 +239,8 @@ def validity_chip(facts: SessionFacts) -> Chipped:
     """Return what the chip says of a session's limits and recordings, or that it does not count at all."""
     if facts.excluded is not None:
         return "neutral", "cross", "Excluded"
-    if facts.lost and facts.validity != "invalid":
-        return LOST
+    if facts.validity != "invalid" and (facts.missing or facts.lost):
+        return MISSING if facts.missing else LOST
     return VALIDITY[None if facts.needs_care or facts.status == "running" else facts.validity]
 
 

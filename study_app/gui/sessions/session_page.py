@@ -143,7 +143,8 @@ def _judged_sentence(trials: Sequence[TrialRecord], *, sealed: bool) -> str:
     if not judged:
         return f"No trial has been measured yet.{later}"
     if not outside:
-        return f"All {counted(len(judged), 'measured trial')} met the limits of the study.{later}"
+        every = "The measured trial" if len(judged) == 1 else f"All {len(judged)} measured trials"
+        return f"{every} met the limits of the study.{later}"
     return (
         f"Out of limits: {len(outside)} of {counted(len(judged), 'measured trial')} exceeded a limit of the study. The "
         "answers are kept and still count; exclude those you do not trust in Results. The column “Limits” and the line "

@@ -16,7 +16,7 @@ from study_app.app.session import preflight_controller
 from study_app.app.session.live_session import LiveSession
 from study_app.app.session.preflight_controller import Appraisal, Preflight
 from study_app.errors import DeviceLost, DisplayError
-from study_app.evidence.appraisal import Costs, Errors, Question
+from study_app.evidence.appraisal import Costs, DeliveryQuestion, Errors, Question
 from study_app.gui.theme.theme import LIGHT
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.runtime.clocks.grants import NO_THREAD
@@ -24,7 +24,7 @@ from study_app.haptics.runtime.telemetry import Timing
 from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.load import load
 from study_app.protocol.trials.tasks import Stroke
-from study_app.session.preflight import Measurements
+from study_app.session.preflight import Measurements, PredictedDelivery
 from study_app.session.start import NewSession, Ready
 from tests.session import small
 
@@ -59,10 +59,11 @@ class Answering:
         self.works = True
         self.devices: list[Dynamics] = []
 
-    def order(self, question: Question) -> int:
-        assert question.stroke is not None
-        assert question.stroke.speed_mps > 0
-        self.devices.append(question.dynamics)
+    def order(self, question: Question | DeliveryQuestion) -> int:
+        if isinstance(question, Question):
+            assert question.stroke is not None
+            assert question.stroke.speed_mps > 0
+            self.devices.append(question.dynamics)
         self.asked += 1
         return self.asked
 
@@ -286,3 +287,18 @@ def test_the_share_withheld_is_asked_of_each_liquid_in_the_fastest_stroke_of_its
         name: pytest.approx(0.01 * (1 + max(n for n, one in enumerate(asked) if one.liquid == name)))
         for name in protocol.liquids
     }
+
+
+@pytest.mark.parametrize(
+    "answer", [PredictedDelivery(missing=26, asked=40, out=0, judged=0, limit_percent=25), "it could not be predicted"]
+)
+def test_the_trials_that_would_not_be_delivered_are_asked_last(monkeypatch: Any, answer: Any) -> None:
+    monkeypatch.setattr(preflight_controller, "start_appraisal_worker", Answering)
+    monkeypatch.setattr(Answering, "given", (Errors(0.0, 0.02, 0.0, ()), answer))
+    protocol = load("demo")
+    asked = preflight_controller.study_scenes(protocol)[:1]
+    appraisal = Appraisal(asked, UNKNOWN, DeliveryQuestion(protocol, 1))
+    while not appraisal.over:
+        appraisal.look()
+    assert appraisal.error_n == 0.02
+    assert appraisal.delivery == (answer if isinstance(answer, PredictedDelivery) else None)

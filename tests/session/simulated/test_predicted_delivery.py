@@ -33,10 +33,14 @@ scene.body = {{ diameter_m = 0.068, drag_coefficient = 0.47, density_kg_m3 = 100
 scene.motion = {{ speed_mps = 0.6, acceleration_mps2 = 6 }}
 limits = {{ withheld_percent = 25, attempts = 2 }}
 liquids.water = {{ effects = "auto", density_kg_m3 = 998.2, viscosity_pa_s = 1.0016e-3 }}
-liquids.slime = {{ effects = "auto", density_kg_m3 = 1020, non_newtonian = {{ kind = "maxwell", zero_shear_viscosity_pa_s = 20, \
-relaxation_time_s = 0.3 }} }}
-liquids.paste = {{ effects = "auto", density_kg_m3 = 1400, non_newtonian = {{ kind = "herschel-bulkley", yield_stress_pa = 120, \
-consistency_pa_sn = 60, flow_index = 0.4 }} }}
+[liquids.slime]
+effects = "auto"
+density_kg_m3 = 1020
+non_newtonian = {{ kind = "maxwell", zero_shear_viscosity_pa_s = 20, relaxation_time_s = 0.3 }}
+[liquids.paste]
+effects = "auto"
+density_kg_m3 = 1400
+non_newtonian = {{ kind = "herschel-bulkley", yield_stress_pa = 120, consistency_pa_sn = 60, flow_index = 0.4 }}
 [tasks.short]
 kind = "explore"
 min_s = 1
@@ -96,11 +100,9 @@ def test_every_surface_says_that_no_trial_was_delivered(
     assert [str(one) for one in verify(rehearsed).warnings] == [f"data/sub-P001/ses-01: {SENTENCE}"]
     assert verify(rehearsed).sound
     (facts,) = sessions(rehearsed.parent, {})
-    assert (status_chip(facts)[2], facts.missing, facts.counts) == ("Incomplete", SENTENCE, False)
+    assert (status_chip(facts)[2], str(facts.missing), facts.counts) == ("Incomplete", SENTENCE, False)
     record = read_record(facts.folder)
-    assert record.limits.startswith(
-        f"{SENTENCE}. Nobody answered them. The study permits 5 % of the trials to be missi"
-    )
+    assert record.limits.startswith(f"{SENTENCE}. Nobody answered them. The study permits 5 % of the trials to be")
     assert "answers are kept" not in record.limits
     (row,) = exclusions(rehearsed)
     assert (row.rule_or_person, row.reason) == (MISSING_RULE, SENTENCE)
@@ -139,7 +141,7 @@ def test_a_study_that_states_so_completes_a_session_without_a_single_trial(thick
     file.write_text(thick.read_text(encoding="utf-8").replace("attempts = 2", "attempts = 2, missing_percent = 100"))
     folder = rehearse(file, participants=1, seed=1, results=tmp_path / "results" / "abx")
     (facts,) = sessions(folder.parent, {})
-    assert (status_chip(facts)[2], facts.missing, exclusions(folder)) == ("Complete", SENTENCE, ())
+    assert (status_chip(facts)[2], str(facts.missing), exclusions(folder)) == ("Complete", SENTENCE, ())
 
 
 def test_the_shipped_slime_is_delivered_by_the_emulated_falcon(tmp_path: Path) -> None:
