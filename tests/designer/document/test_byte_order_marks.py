@@ -6,8 +6,7 @@ import pytest
 
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_edits import Set
-from study_app.designer.document.toml_text import Refused
-from study_app.errors import ProtocolError
+from study_app.errors import ProtocolError, StudyError
 from study_app.protocol.load import is_scene_file, load, load_scenes, protocol_hash, source_bytes
 from study_app.protocol.source.files import shipped_file
 
@@ -47,5 +46,5 @@ def test_utf_16_is_named_in_one_line(encoding: str, tmp_path: Path) -> None:
     with pytest.raises(ProtocolError) as refused:
         load(tmp_path / "wide.toml")
     assert [str(problem) for problem in refused.value.problems] == ["file: is UTF-16 text (save it as UTF-8)"]
-    with pytest.raises(Refused, match="UTF-16"):
+    with pytest.raises(StudyError, match="UTF-16"):
         read((tmp_path / "wide.toml").read_bytes())
