@@ -32,7 +32,8 @@ run() { # TITLE ROOT [NAME=VALUE...] COMMAND...
     local title="$1" code=0
     shift
     SECONDS=0
-    in_root "$@" || code=$?
+    # Before each part of a command, how long the parts before it took.
+    in_root "${@:1:$#-1}" "trap 'echo \"== after \$SECONDS s: \$BASH_COMMAND\"' DEBUG; ${*: -1}" || code=$?
     printf '== %s: exit code %d after %d s\n' "$title" "$code" "$SECONDS"
     [ "$code" = 0 ] || failed=1
 }
