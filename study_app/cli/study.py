@@ -27,7 +27,6 @@ SEED = click.IntRange(0, 2**31 - 1)
 WINDOWED = click.option("--windowed", is_flag=True, help="Show the participant's window in a frame, not full-screen.")
 SCREEN = click.option("--screen", type=click.IntRange(1), help="Number of the participant's screen.")
 OPERATOR = click.option("--operator", default="", metavar="INITIALS", help="Name or initials of the operator.")
-STARTED = 16  # letters of a time down to the minute
 
 
 @click.command()
@@ -300,9 +299,16 @@ def sessions(named: str | None, results: Path | None) -> None:
         for row in participants_of(folder):
             who, number = row["participant"], row["session"]
             name = f"{folder.name}/{who}/{number}" if inside else str(session_in(folder, who, number).path)
-            started = str(row["session_started_at"] or "")[:STARTED].replace("T", " ")
+            started = _local_time(row["session_started_at"])
             mark = "  excluded" if (who, number, None) in left_out else ""
             click.echo(f"{name}  {started}  {row['status']}{mark}")
+
+
+def _local_time(written: str | None) -> str:
+    """Return a time of a table as this computer's, to the minute with its offset; "" if it is not known."""
+    from datetime import datetime
+
+    return datetime.fromisoformat(written).astimezone().isoformat(" ", "minutes") if written else ""
 
 
 def _studies(results: Path) -> Iterator[Path]:

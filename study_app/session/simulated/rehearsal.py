@@ -111,6 +111,13 @@ Where a level is set, the answer is by how many steps, above 0 towards more; 0 c
 """
 
 
+def _plain(value: Any) -> Value:
+    """Return an answer with Python's own numbers and texts; several, in a list or an array, as a tuple."""
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    return tuple(map(_plain, value)) if isinstance(value, list | tuple) else value
+
+
 class DiscardingStore:
     """A session that is kept nowhere."""
 
@@ -335,7 +342,8 @@ class RehearsedSession(SimulatedParticipant):
         given = None if self._answer is None else self._answer(Question(page, felt))
         if given is None:
             return super()._answers_to(page)
-        answers = given if isinstance(given, Mapping) else {page.items[0].id: given}
+        named = given if isinstance(given, Mapping) else {page.items[0].id: given}
+        answers = {item: _plain(value) for item, value in named.items()}
         if unknown := answers.keys() - {item.id for item in page.items}:
             possible = ", ".join(item.id for item in page.items)
             raise SessionError(f"{', '.join(map(repr, sorted(unknown)))} is not asked on this page: answer {possible}")

@@ -10,6 +10,7 @@ keep their checksums.
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -23,13 +24,13 @@ from study_app.number_text import counted
 from study_app.store import csv_files, receipt
 from study_app.store.atomic import is_there, parse_json, read_own, read_regular, study_root, temporaries
 from study_app.store.blinded.blinding import Key, opened, opened_key, whole_protocol
-from study_app.store.checksums import files, fingerprint, hashed, read_checksums
+from study_app.store.checksums import files, fingerprint, hashed, read_checksums, system_files
 from study_app.store.csv_files import Column
 from study_app.store.folder_lock import is_open, never_begun
 from study_app.store.folders import FINGERPRINTS, SessionFolder
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
-from study_app.store.journals.journal import Contents
+from study_app.store.journals.journal import OTHER_LINE_ENDINGS, Contents
 from study_app.store.progress import Progress, named, progress_of, recordable
 from study_app.store.recorder import recording_files
 from study_app.store.sessions.open_session import Place, table_files
@@ -166,13 +167,17 @@ def _check(place: Place, key: Key | None, found: Findings, *, running: bool, rec
     ended = isinstance(lines[-1], events.SessionEnded)
     hashes = {}
     if ended or not running:
-        hashes = {name: _hash(folder, name) for name in files(folder) if recordings or not name.endswith(".parquet")}
+        names = (*files(folder), *_listed_system_files(folder))
+        hashes = {name: _hash(folder, name) for name in names if recordings or not name.endswith(".parquet")}
     if not running:
         _tables(place, lines, found, ended=ended)
         if ended:
             _checksums(folder, told, hashes, found, recordings=recordings)
         if recordings:
             _recordings(folder, told, key, hashes, found, ended=ended)
+    for name in system_files(folder):
+        if name not in hashes:
+            found.warning(folder.path / name, "is a file of an operating system or of a program that shares files")
     if is_there(folder.rebuilt):
         with found.reading(folder.rebuilt):
             for line in read_own(folder.rebuilt, study_root(folder.rebuilt)).decode("utf-8", "replace").splitlines():
@@ -424,6 +429,14 @@ def _hash(folder: SessionFolder, name: str) -> str:
         return ""
 
 
+def _listed_system_files(folder: SessionFolder) -> Iterator[str]:
+    """Yield the system's files that were there when the session ended, so that its list has them."""
+    if there := system_files(folder):
+        with contextlib.suppress(StoreError):
+            listed = read_checksums(folder)
+            yield from (name for name in there if name in listed)
+
+
 def _checksums(
     folder: SessionFolder,
     lines: Sequence[events.Event],
@@ -455,7 +468,8 @@ def _checksums(
             elif hashes[name] == opened_hashes.get(listed[name]):
                 found.warning(path, "was opened by an unblinding that did not finish: unblind again")
             elif hashes[name] != listed[name]:
-                found.error(path, CHANGED)
+                unchanged = hashlib.sha256(read_regular(path).replace(b"\r\n", b"\n")).hexdigest() == listed[name]
+                found.error(path, OTHER_LINE_ENDINGS if unchanged else CHANGED)
 
 
 def _recordings(
