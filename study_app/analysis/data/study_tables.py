@@ -447,7 +447,14 @@ def _undecided(place: StudyFolder, records: Sequence[Session], listed: Sequence[
     for one in records:
         what = (one.folder.participant, one.folder.number, None)
         if one.visit["status"] == INCOMPLETE and what not in decided:
-            yield Exclusion(*what, MISSING_RULE, str(one.visit["missing"]), str(one.visit["ended_at"]))
+            yield Exclusion(
+                participant=one.folder.participant,
+                session=one.folder.number,
+                trial=None,
+                rule_or_person=MISSING_RULE,
+                reason=str(one.visit["missing"]),
+                excluded_at=str(one.visit["ended_at"]),
+            )
 
 
 def _intervals(

@@ -44,7 +44,7 @@ from study_app.store.folders import StudyFolder
 _STEM: Final = re.compile(r"(?:[a-z0-9_]+-)?[0-9]{3,}(?:-[A-Za-z0-9]+)?")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Allocation:
     """A participant's entry and group; ``sealed`` is the group as stored in journal and file, "" if pre-existing.
 
@@ -64,7 +64,7 @@ class Allocation:
         return not self.sealed
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
     """The content of an entry's file; ``participant`` is empty if the program ended before it was written.
 
@@ -120,13 +120,13 @@ def allocate(
             entry += 1
             path = study.allocation(entry, group, participant if replaced is not None else None)
             claim = Claim(
-                path,
-                entry,
-                participant,
-                "" if group is not None else _sealed(key, entry, participant),
-                group,
-                None if replaced is None else replaced.participant,
-                counts_places(held),
+                path=path,
+                entry=entry,
+                participant=participant,
+                sealed="" if group is not None else _sealed(key, entry, participant),
+                group=group,
+                replaces=None if replaced is None else replaced.participant,
+                place_in_group=counts_places(held),
             )
             try:
                 write_through(path, json.dumps(_content(claim)).encode() + b"\n", waits=waits)
@@ -323,25 +323,31 @@ def _claim(study: StudyFolder, path: Path) -> Claim:
     try:
         held = parse_json(read_own(path, study.path))
         claim = Claim(
-            path,
-            held["entry"],
-            held["participant"],
-            held.get("sealed", ""),
-            held.get("group"),
-            held.get("replaces"),
-            held.get("place_in_group", False),
+            path=path,
+            entry=held["entry"],
+            participant=held["participant"],
+            sealed=held.get("sealed", ""),
+            group=held.get("group"),
+            replaces=held.get("replaces"),
+            place_in_group=held.get("place_in_group", False),
         )
         named = study.allocation(claim.entry, claim.group, claim.participant if claim.replaces else None)
         if named == path and _content(claim) == held:
             return claim
     except (StoreError, ValueError, KeyError, TypeError, AttributeError):
         pass
-    return Claim(path)
+    return Claim(path=path)
 
 
 def _allocation(claim: Claim, key: Key) -> Allocation:
     group = claim.group if claim.group is not None else group_of(key.groups, key.nonce, claim.entry)
-    return Allocation(claim.entry, group, claim.sealed, claim.replaces, claim.place_in_group)
+    return Allocation(
+        entry=claim.entry,
+        group=group,
+        sealed=claim.sealed,
+        replaces=claim.replaces,
+        place_in_group=claim.place_in_group,
+    )
 
 
 def _sealed(key: Key, entry: int, participant: str) -> str:

@@ -141,7 +141,19 @@ def test_a_session_is_refused_before_anything_is_made_and_a_pilot_is_warned(tmp_
     file = tmp_path / "etude.toml"
     study = copy_of(answered(template("empty"), Answers(languages=("fr",))), "etude")
     file.write_text(study.text, encoding="utf-8")
-    chosen = NewSession(str(file), "P001", 1, 7, "AK", "fr", "scripted", True, None, tmp_path / "results", pilot=pilot)
+    chosen = NewSession(
+        source=str(file),
+        participant="P001",
+        session=1,
+        seed=7,
+        operator="AK",
+        language="fr",
+        device="scripted",
+        windowed=True,
+        screen=None,
+        results=tmp_path / "results",
+        pilot=pilot,
+    )
     assert study.protocol is not None
     if pilot:
         check(chosen, study.protocol)
