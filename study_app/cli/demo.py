@@ -130,7 +130,7 @@ def _show(study: Path) -> int:
             from study_app import app
 
             click.echo("Opening the program on these results; close its window to end")
-            return app.home(then=lambda visit: visit.show_study(study))
+            return int(app.home(then=lambda visit: visit.show_study(study)))
         reason = f"QT_QPA_PLATFORM={platform} shows no window"
     except DisplayError as error:
         reason = missing_for_windows() or str(error)

@@ -600,9 +600,10 @@ def _missing(study: Study) -> Iterator[str]:
     if not study.levels:
         return
     yield heading(3, "Trials that were not delivered")
+    sessions: Iterable[Any] = study.participants.itertuples()
     rows = [
         (f"{row.participant}, session {row.session}", bool(row.counted), row.missing)
-        for row in study.participants.itertuples()
+        for row in sessions
         if row.missing is not None and row.missing.count
     ]
     if rows:

@@ -147,8 +147,9 @@ class SessionStore:
         """Return the end of a task with the times of the targets that were held back."""
         if isinstance(event, events.TrialStarted | events.IntervalStarted):
             self._reached_s = []
-        ends = isinstance(event, events.TrialEnded | events.IntervalEnded)
-        return replace(event, reached_s=self._reached_s) if ends and self._reached_s else event
+        if isinstance(event, events.EndOfTask) and self._reached_s:
+            return replace(event, reached_s=self._reached_s)
+        return event
 
     def _mark(self, event: events.Event) -> None:
         """Send the marker of an event, before waiting for the disk; only once, even if its line is written again."""
