@@ -294,7 +294,7 @@ def test_the_share_withheld_is_asked_of_each_liquid_in_the_fastest_stroke_of_its
 )
 def test_the_trials_that_would_not_be_delivered_are_asked_last(monkeypatch: Any, answer: Any) -> None:
     monkeypatch.setattr(preflight_controller, "start_appraisal_worker", Answering)
-    monkeypatch.setattr(Answering, "given", (Errors(0.0, 0.02, 0.0, ()), answer))
+    monkeypatch.setattr(Answering, "given", (Errors(wake=0.0, force_n=0.02, lag_s=0.0, left_out=()), answer))
     protocol = load("demo")
     asked = preflight_controller.study_scenes(protocol)[:1]
     appraisal = Appraisal(asked, UNKNOWN, DeliveryQuestion(protocol, 1))
