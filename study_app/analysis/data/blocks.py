@@ -395,13 +395,26 @@ class Decided:
             return f"{self.alpha:g}"
         return f"{self.planned_alpha:g} over all looks, {self.alpha:.2g} at this one"
 
-    def look_words(self) -> str:
-        """Return which planned look this is, in a sentence; nothing where one is planned."""
+    def look_words(self, n: int) -> str:
+        """Return which planned look a study of ``n`` participants is at, in sentences; nothing where none is planned.
+
+        A number that is not planned is called unplanned, with the error rate of testing at every number.
+        """
         if self.look is None:
             return ""
         planned = f"{' and '.join([', '.join(map(str, self.looks[:-1])), str(self.looks[-1])])} participants"
         if self.look == 0:
             return f"Looks are planned at {planned}, none of which is reached: everything found is exploratory."
+        if n not in self.looks:
+            from study_app.analysis.statistics.outcome import error_of_every_report  # noqa: PLC0415 - loads scipy
+
+            alpha = self.planned_alpha or self.alpha
+            return (
+                f"This look at {n} participants is unplanned: looks are planned at {planned}. An adjusted p of at "
+                f"most {self.alpha:.2g} counts, as at the last planned look. A study that is tested at every "
+                f"participant in this way claims something falsely in "
+                f"{100 * error_of_every_report(self.looks, alpha, self.spending):.1f} % instead of {100 * alpha:g} %."
+            )
         return (
             f"This is look {self.look} of {len(self.looks)}, planned at {planned}: an adjusted p of at most "
             f"{self.alpha:.2g} counts (alpha is shared by {SPENDINGS[self.spending]} spending)."

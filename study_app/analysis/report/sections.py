@@ -308,7 +308,7 @@ def _common(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
             f"decisions of the first session were used (alpha = {decided.alpha_words()})."
         )
     elif decided.made:
-        yield decided.look_words()
+        yield decided.look_words(len(results.people))
     else:
         yield f"No decisions were made beforehand: all results are exploratory, with alpha = {decided.alpha:g}."
     for finding in all_findings():
@@ -345,7 +345,7 @@ def first_page(results: Results, limits: Sequence[str]) -> Markup:
         "first_page.html",
         verdicts=verdicts if rows else "",
         sentences=[
-            *filter(None, [results.decided.look_words()]),
+            *filter(None, [results.decided.look_words(len(results.people))]),
             *(of_levels(results) or (() if rows else (none_found(results),))),
         ],
         limits=list(limits),

@@ -139,6 +139,30 @@ def alpha_of_looks(looks: tuple[int, ...], alpha: float, spending: str) -> tuple
     return tuple(found)
 
 
+MOST_REPORTS: Final = 200
+"""So many reports between the first look and the last are integrated over."""
+
+
+@lru_cache(maxsize=64)
+def error_of_every_report(looks: tuple[int, ...], alpha: float, spending: str) -> float:
+    """Return the error rate of a study that is tested at every participant from the first look on.
+
+    Each test has the alpha of the last look that is reached; for the parameters see `alpha_of_looks`.
+    """
+    levels = np.array(alpha_of_looks(looks, alpha, spending))
+    every = np.unique([*np.linspace(looks[0], looks[-1], MOST_REPORTS).round().astype(int), *looks])
+    reached = np.searchsorted(looks, every, side="right") - 1
+    nodes, of_nodes = np.polynomial.legendre.leggauss(NODES)
+    error, places, weights, before = 0.0, np.zeros(1), np.ones(1), 0.0
+    for share, level in zip(every / looks[-1], levels[reached], strict=True):
+        end, step = float(norm.isf(level / 2)) * math.sqrt(share), math.sqrt(share - before)
+        error += _excess(end, places, weights, step, 0.0)
+        inside = end * nodes
+        density = norm.pdf(inside[:, None], places, step) @ weights
+        places, weights, before = inside, density * end * of_nodes, share
+    return error
+
+
 def _excess(end: float, places: Array, weights: Array, step: float, due: float) -> float:
     """Return how much likelier than ``due`` a walk from ``places`` is beyond ± ``end`` after a ``step``."""
     return float(weights @ (norm.sf(end, places, step) + norm.cdf(-end, places, step))) - due
