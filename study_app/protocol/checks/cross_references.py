@@ -236,7 +236,7 @@ def groups(document: Mapping[str, Any]) -> Iterator[Fault]:
         yield Fault(("sequences",), "give either sequence or sequences, one of the two")
     tables = [table for _, table in entries(document, "groups.*") if isinstance(table, Mapping)]
     if not tables:
-        if value_at(document, ASSIGNMENT) is not None:
+        if value_at(document, ASSIGNMENT) == "pre-existing":
             yield Fault(ASSIGNMENT, "the study has no groups", "add groups, or leave it out", kind="surplus")
         return
     if len(names(document, "groups")) == 1:
