@@ -51,8 +51,9 @@ for name in bare libraries display; do
     if [ "$name" = display ]; then
         variables+=(DISPLAY=:71)
         # Ctrl+Q closes the window, once it stands.
-        shown='rm -rf /tmp/.X71-lock; Xvfb :71 -screen 0 1920x1080x24 -noreset & (xdotool search --sync --onlyvisible --name "Liquid Study" \
-            && sleep 5 && xdotool search --onlyvisible --name "Liquid Study" windowfocus --sync key ctrl+q) &'
+        window='xdotool search --onlyvisible --name "Liquid Study"'
+        shown="rm -f /tmp/.X71-lock; Xvfb :71 -screen 0 1920x1080x24 -noreset &
+            (until $window; do sleep 1; done; sleep 5; $window windowfocus --sync key ctrl+q) >/dev/null 2>&1 &"
     fi
     if is_chosen demo demo tests; then
         for time in first second; do

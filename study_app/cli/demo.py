@@ -7,7 +7,7 @@ from typing import Final
 
 import click
 
-from study_app.cli.options import end_if, keep_offered_workspace, progress
+from study_app.cli.options import EXIT_FOUND, end_if, keep_offered_workspace, progress
 from study_app.number_text import counted
 
 STUDY: Final = "demo"
@@ -43,7 +43,7 @@ def demo(context: click.Context, *, no_window: bool) -> None:
     if (report / "report.html").is_file():
         click.echo(f"Report with figures and tables: {report / 'report.html'}")
     if not no_window:
-        context.exit(_show(study) or bool(failed) * 3)
+        context.exit(_show(study) or (EXIT_FOUND if failed else 0))
     end_if(failed)
 
 

@@ -12,6 +12,8 @@ too.
 """
 
 import operator
+import signal
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
@@ -19,7 +21,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, Self, TypeAlias
 
 import numpy as np
 
@@ -118,6 +120,50 @@ def _plain(value: Any) -> Any:
     return tuple(map(_plain, value)) if isinstance(value, list | tuple) else value
 
 
+class HeldSignals:
+    """Holds signals that end the program, such as Ctrl+C, until `obey`, which a session calls between its writes.
+
+    An exception in the midst of a write could leave a line that the journal does not count. A second signal ends the
+    program at once. Only the main thread gets signals; elsewhere nothing is held.
+    """
+
+    def __init__(self) -> None:
+        self._before: dict[int, Any] = {}
+        self._came: int | None = None
+
+    def __enter__(self) -> Self:
+        if threading.current_thread() is threading.main_thread():
+            numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+            handlers = {number: signal.getsignal(number) for number in numbers}
+            self._before = {number: it for number, it in handlers.items() if it not in {signal.SIG_IGN, None}}
+            for number in self._before:
+                signal.signal(number, self._hold)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self._restore()
+        if kind is None:
+            self.obey()
+
+    def obey(self) -> None:
+        """Do what a signal that came would have done."""
+        if self._came is None:
+            return
+        number, self._came = self._came, None
+        handler = self._before[number]
+        if callable(handler):
+            handler(number, None)
+        raise SystemExit(128 + number)
+
+    def _hold(self, number: int, _frame: object) -> None:
+        self._came = number
+        self._restore()
+
+    def _restore(self) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+
 class DiscardingStore:
     """A session that is kept nowhere."""
 
@@ -185,6 +231,7 @@ class RehearsedSession(SimulatedParticipant):
     ) -> None:
         super().__init__(study, schedule, observer)
         self._answer = answer
+        self.signals = HeldSignals()
         self._known = known or {}
         self._tell_features = features
         self.rig = rig
@@ -258,6 +305,7 @@ class RehearsedSession(SimulatedParticipant):
 
     def _advance(self, seconds: float) -> None:
         """Let the servo take its ticks; who ends the program ends them, and without them no time passes."""
+        self.signals.obey()
         servo = self.rig.servo
         if servo.advance(max(1, round(seconds * servo.rate_hz))) == 0 and servo.fault is None:
             raise SessionError("the rehearsal was stopped from outside")
@@ -534,7 +582,8 @@ def _run_to_end(
 ) -> None:
     """Run an opened session to its last page; ``progress`` gets a line with its responses and missing trials."""
     began = time.perf_counter()
-    with opening as (rehearsal, store):
+    with HeldSignals() as signals, opening as (rehearsal, store):
+        rehearsal.signals = signals
         rehearsal.run()
     if progress is not None:
         took_s = time.perf_counter() - began
