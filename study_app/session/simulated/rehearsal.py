@@ -117,7 +117,7 @@ def _plain(value: Any) -> Any:
     """Return an answer with Python's own numbers and texts; several, in a list or an array, as a tuple."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
-    return tuple(map(_plain, value)) if isinstance(value, list | tuple) else value
+    return tuple(_plain(one) for one in value) if isinstance(value, list | tuple) else value
 
 
 class HeldSignals:
