@@ -4,7 +4,6 @@ import pytest
 
 from study_app.analysis.planning.preregistration import preregistration
 from study_app.errors import ProtocolError
-from study_app.protocol.checks.group_names import suggests_attribute
 from study_app.protocol.checks.warnings import warnings
 from study_app.protocol.describe import describe
 from study_app.protocol.groups import next_group
@@ -33,74 +32,24 @@ def experts(assignment: str = "") -> Protocol:
 PREEXISTING = 'study.group_assignment = "pre-existing"\n'
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "experts",
-        "novice",
-        "patients",
-        "healthy_controls",
-        "musicians",
-        "non_musicians",
-        "older_adults",
-        "age_60plus",
-        "young",
-        "old",
-        "amputees",
-        "men",
-        "women",
-        "students",
-        "left_handed",
-        "righthanders",
-        "dominant_hand",
-        "experienced",
-        "low_experience",
-        "surgeons",
-        "linkshandigen",
-        "ouderen",
-        "ervaren",
-        "vrouwen",
-        "frauen",
-        "laien",
-        "anfaenger",
-        "aeltere",
-        "gauchers",
-        "femmes",
-        "etudiants",
-        "debutants",
-    ],
-)
-def test_a_name_of_what_people_are_is_recognised(name: str) -> None:
-    assert suggests_attribute(name)
+ATTRIBUTES = """
+    experts novice patients healthy_controls musicians non_musicians older_adults age_60plus young old
+    amputees men women students left_handed righthanders dominant_hand experienced low_experience surgeons
+    linkshandigen ouderen ervaren vrouwen frauen laien anfaenger aeltere gauchers femmes etudiants debutants
+"""
+"""Names of what people are."""
+TREATMENTS = """
+    trained untrained control experimental training placebo thin_first left_hand short_strokes manual
+    no_feedback late long_delay old_recipe blinded group_a a image intervention hard
+"""
+"""Names of what can be randomised."""
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "trained",
-        "untrained",
-        "control",
-        "experimental",
-        "training",
-        "placebo",
-        "thin_first",
-        "left_hand",
-        "short_strokes",
-        "manual",
-        "no_feedback",
-        "late",
-        "long_delay",
-        "old_recipe",
-        "blinded",
-        "group_a",
-        "a",
-        "image",
-        "intervention",
-        "hard",
-    ],
-)
-def test_a_name_of_what_can_be_randomised_is_not(name: str) -> None:
-    assert not suggests_attribute(name)
+def test_names_that_suggest_an_attribute_are_warned_of_and_no_others() -> None:
+    names = [*ATTRIBUTES.split(), *TREATMENTS.split()]
+    tables = "".join(f'[groups.{name}]\nsequence = ["hello", "thin", "thick"]\n' for name in names)
+    said = [one for one in warnings(grouped(groups=f"\n{tables}"), simulates=False) if one.startswith("groups.")]
+    assert [one.partition(":")[0].removeprefix("groups.") for one in said] == ATTRIBUTES.split()
 
 
 def test_only_randomised_groups_are_warned_of() -> None:
