@@ -65,7 +65,7 @@ def _run_sessions(study: Path) -> None:
 
 
 def _compile(protocol: Path) -> None:
-    """Compile driver and emulator here, and meanwhile the servo in another process: 22 s in place of 34 s."""
+    """Compile driver and emulator here, the servo in another process: 36 s of processor time in a row, not 49 s."""
     from study_app.workers.executors import Workers, open_executor
 
     with open_executor(Workers(1)) as executor:
