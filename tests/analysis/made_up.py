@@ -96,7 +96,7 @@ def table(columns: Sequence[Column], rows: Sequence[dict[str, Any]]) -> pd.DataF
 def _visit(participant: str, session: int) -> dict[str, Any]:
     unknown = ("language", "ended_at", "device", "key_hash", "seed", "protocol_hash", "version", "exclusion_reason")
     return {
-        **dict.fromkeys((*unknown, "motors_masked")),
+        **dict.fromkeys((*unknown, "motors_masked", "missing")),
         "started_at": f"2026-01-{session:02d}",
         "participant": participant,
         "session": session,
