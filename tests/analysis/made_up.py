@@ -119,7 +119,7 @@ def _visit(participant: str, session: int) -> dict[str, Any]:
         "group",
     )
     return {
-        **dict.fromkeys((*unknown, "motors_masked")),
+        **dict.fromkeys((*unknown, "motors_masked", "missing")),
         "started_at": f"2026-01-{session:02d}",
         "participant": participant,
         "session": session,

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from markupsafe import Markup
 
@@ -50,7 +50,7 @@ from study_app.discovery import by_name
 from study_app.protocol.orders.balance import Evenness
 from study_app.store.delivered import broken_limits
 from study_app.store.exclusions import named
-from study_app.store.missing_trials import MISSING_PERCENT, limit_words
+from study_app.store.missing_trials import MISSING_PERCENT, MissingTrials, limit_words
 from study_app.store.unblinding import RULES
 
 WITHOUT_FORCE: Final = {"mouse", "spacemouse"}
@@ -595,6 +595,14 @@ def _means(found: BlockResult, rows: Sequence[Any], by: By) -> str:
     )
 
 
+class _LostTrials(NamedTuple):
+    """A session, whether it counts, and its missing trials."""
+
+    session: str
+    counted: bool
+    missing: MissingTrials
+
+
 def _missing(study: Study) -> Iterator[str]:
     """Yield who lost how many trials of intervals, which and why; nothing in a study without such trials."""
     if not study.levels:
@@ -602,18 +610,18 @@ def _missing(study: Study) -> Iterator[str]:
     yield heading(3, "Trials that were not delivered")
     sessions: Iterable[Any] = study.participants.itertuples()
     rows = [
-        (f"{row.participant}, session {row.session}", bool(row.counted), row.missing)
+        _LostTrials(f"{row.participant}, session {row.session}", bool(row.counted), row.missing)
         for row in sessions
         if row.missing is not None and row.missing.count
     ]
     if rows:
         yield table_of(
             rows[:SHOWN],
-            ("Session", lambda one: one[0]),
-            ("missing", lambda one: f"{one[2].count} of {one[2].asked}"),
-            ("of which", lambda one: listed([f"{_track(study, *of)}: {n}" for of, n in one[2].tracks.items()])),
-            ("because", lambda one: listed([limit_words(limit, one[2].limits) for limit in one[2].reasons])),
-            ("session", lambda one: "counted" if one[1] else "not counted"),
+            ("Session", lambda one: one.session),
+            ("missing", lambda one: f"{one.missing.count} of {one.missing.asked}"),
+            ("of which", lambda one: listed([f"{_track(study, *of)}: {n}" for of, n in one.missing.tracks.items()])),
+            ("because", lambda one: listed([limit_words(limit, one.missing.limits) for limit in one.missing.reasons])),
+            ("session", lambda one: "counted" if one.counted else "not counted"),
             words=5,
         )
     else:
