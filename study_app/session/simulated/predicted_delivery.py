@@ -84,6 +84,10 @@ def withheld_shares(
     ----------
     rig : Rig
         That of `late_rig`.
+    scene : Scene
+        The liquid.
+    task : AnyTask
+        What the simulated hand does in it.
     workspace_m : tuple of float
         Full sizes of the tank [m, hand frame].
     """
