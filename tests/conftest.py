@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import hypothesis
 import pytest
@@ -53,7 +53,7 @@ def skipping_without_qt() -> Iterator[None]:
     except Exception as error:
         cause: BaseException | None = error
         while QT_MISSING and cause is not None:
-            if isinstance(cause, ImportError) and (cause.name or "").startswith("PySide6"):
+            if isinstance(cause, ImportError) and "PySide6" in str(cause.path):
                 pytest.skip(QT_MISSING, allow_module_level=True)
             cause = cause.__cause__ or cause.__context__
         raise
@@ -61,6 +61,12 @@ def skipping_without_qt() -> Iterator[None]:
 
 class FolderWithoutQt(pytest.Dir):
     """A folder whose tests, and what they share, cannot be imported."""
+
+    @property
+    def ihook(self) -> Any:
+        """Use the hooks of the folder above: those of this one are in a conftest that cannot be imported."""
+        assert self.parent is not None
+        return self.parent.ihook
 
     def collect(self) -> NoReturn:
         pytest.skip(QT_MISSING, allow_module_level=True)
