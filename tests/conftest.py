@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import hypothesis
 import pytest
@@ -59,14 +59,8 @@ def skipping_without_qt() -> Iterator[None]:
         raise
 
 
-class FolderWithoutQt(pytest.Dir):
-    """A folder whose tests, and what they share, cannot be imported."""
-
-    @property
-    def ihook(self) -> Any:
-        """Use the hooks of the folder above: those of this one are in a conftest that cannot be imported."""
-        assert self.parent is not None
-        return self.parent.ihook
+class FolderWithoutQt(pytest.File):
+    """A folder whose tests cannot be imported; to pytest a file, since it imports the conftest of a folder."""
 
     def collect(self) -> NoReturn:
         pytest.skip(QT_MISSING, allow_module_level=True)
@@ -80,7 +74,7 @@ class ModuleWithoutQt(pytest.Module):
             return list(super().collect())
 
 
-def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Dir | None:
+def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Collector | None:
     """Do not look into the folders of windows where no window can be loaded."""
     if QT_MISSING and path.parent == Path(__file__).parent and path.name in NEED_QT:
         return FolderWithoutQt.from_parent(parent, path=path)
