@@ -53,14 +53,14 @@ def skipping_without_qt() -> Iterator[None]:
     except Exception as error:
         cause: BaseException | None = error
         while QT_MISSING and cause is not None:
-            if isinstance(cause, ImportError) and (cause.name or "").startswith("PySide6"):
+            if isinstance(cause, ImportError) and "PySide6" in str(cause.path):
                 pytest.skip(QT_MISSING, allow_module_level=True)
             cause = cause.__cause__ or cause.__context__
         raise
 
 
-class FolderWithoutQt(pytest.Dir):
-    """A folder whose tests, and what they share, cannot be imported."""
+class FolderWithoutQt(pytest.File):
+    """A folder whose tests cannot be imported; to pytest a file, since it imports the conftest of a folder."""
 
     def collect(self) -> NoReturn:
         pytest.skip(QT_MISSING, allow_module_level=True)
@@ -74,7 +74,7 @@ class ModuleWithoutQt(pytest.Module):
             return list(super().collect())
 
 
-def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Dir | None:
+def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Collector | None:
     """Do not look into the folders of windows where no window can be loaded."""
     if QT_MISSING and path.parent == Path(__file__).parent and path.name in NEED_QT:
         return FolderWithoutQt.from_parent(parent, path=path)
