@@ -752,7 +752,7 @@ def _hands(hand: HandOrders, chosen: NewSession, clock: Callable[[], float]) -> 
         elif page.interval is None or not page.interval.resting:
             return hand_for(page.task, hand, draw, clock())
         else:
-            rest(page.task, hand)
+            rest(page.task, hand, returns=True)
         return None
 
     return hand_on
