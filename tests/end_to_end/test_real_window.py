@@ -5,6 +5,7 @@ Where a click must go is read off the same widgets laid out off screen at the sa
 
 import csv
 import signal
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.app.main_controller import MainController
+from study_app.gui.key_presses import CLICK_MS
 from study_app.gui.operator.session_panels import Strip
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.preflight.window import FULL as PREFLIGHT
@@ -116,6 +118,7 @@ def answer_nine_items(program: Program, felt: str, qtbot) -> None:
     qtbot.waitExposed(plan)
     QApplication.processEvents()
     page = plan.widget
+    threading.Event().wait(2 * CLICK_MS / 1000)  # the page that has just appeared ignores clicks
     for number, value in enumerate(GIVEN):
         if number in BY_CLICK:
             program.click(felt, place_in(plan, page.fields[number].options[value - 1]))

@@ -17,11 +17,8 @@ WATER = TrialFeatures(
 
 felt_anything = st.builds(
     TrialFeatures,
-    *(st.floats(0, 8) for _ in range(2)),
-    st.floats(0, 1),
-    st.floats(0, 1),
-    st.floats(0, 1),
-    st.floats(0, 1),
+    **{name: st.floats(0, 8) for name in ("force_mean_n", "force_peak_n")},
+    **{name: st.floats(0, 1) for name in ("speed_rms_mps", "push_share", "roughness_n", "delay_s")},
 )
 seeds = st.integers(0, 2**32)
 
