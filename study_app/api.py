@@ -284,6 +284,8 @@ def open_session(
     device: str = "scripted",
     answer: Answer | None = None,
     recordings: bool = True,
+    group: str | None = None,
+    row_of: str | None = None,
 ) -> Iterator[Session]:
     """Open a session without windows, on simulated time; one that was left before its end is resumed.
 
@@ -310,19 +312,25 @@ def open_session(
         returns by how many steps the level is changed, above 0 towards more, or 0 to confirm it.
     recordings : bool
         Whether every tick of the servo is stored.
+    group : str, optional
+        The pre-existing group of a new participant; a resumed or later session keeps the recorded one.
+    row_of : str, optional
+        The id of the participant whom a new participant replaces.
 
     Raises
     ------
     StudyError
-        The study, the id or the folder cannot be used, the session was completed or is a participant's, or an answer
-        is not permitted.
+        The study, the id, the group or the folder cannot be used, the session was completed or is a participant's, or
+        an answer is not permitted.
     """
-    from study_app.protocol.load import parse, source_bytes
+    from study_app.protocol.load import load, parse, source_bytes
     from study_app.session.simulated import rehearsal
+    from study_app.store.blinded.allocation import check_choice, claims
     from study_app.store.folders import StudyFolder
 
     folder = StudyFolder(Path(results)).session(participant, session)
     if folder.journal.exists():
+        check_choice(load(study), claims(StudyFolder(Path(results))), participant, group=group, row_of=row_of)
         opening = rehearsal.reopen_session(folder.path, protocol=study, answer=answer)
     else:
         source = source_bytes(study)
@@ -335,6 +343,8 @@ def open_session(
             session=session,
             device=device,
             recordings=recordings,
+            group=group,
+            row_of=row_of,
             answer=answer,
         )
     with opening as (rehearsed, store):

@@ -10,7 +10,7 @@ import importlib
 import pkgutil
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from types import ModuleType
@@ -52,6 +52,7 @@ class PlugIn:
 
     kind: str
     name: str
+    _: KW_ONLY
     package: str
     version: str
     origin: str
@@ -74,7 +75,10 @@ def _of_kind(kind: str) -> Iterator[tuple[EntryPoint, PlugIn]]:
     """Yield the entry points of a kind, with what their packages say of them."""
     for point in _points():
         if point.group == f"liquid_study.{kind}s" and (dist := point.dist) is not None:
-            yield point, PlugIn(kind, point.name, dist.name, dist.version, str(dist.locate_file("")))
+            yield (
+                point,
+                PlugIn(kind, point.name, package=dist.name, version=dist.version, origin=str(dist.locate_file(""))),
+            )
 
 
 class Registry(Mapping[str, T], Generic[T]):

@@ -193,5 +193,9 @@ def _sections() -> tuple[Section, ...]:
             said = ", ".join(also if anchor else [*also, title_of_page]).split(", ")
             phrases = frozenset(frozenset(_stems(phrase)) for phrase in said if phrase)
             below = text[found.end() : ends]
-            made.append(Section(name, heading, shown, phrases, below, plain(below).casefold()))
+            made.append(
+                Section(
+                    page=name, heading=heading, names=shown, phrases=phrases, source=below, text=plain(below).casefold()
+                )
+            )
     return tuple(made)

@@ -20,7 +20,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Any, Final
 
 
@@ -53,6 +53,7 @@ class Problem:
     place: str
     message: str
     line: int | None = None
+    _: KW_ONLY
     hint: str = ""
 
     def __str__(self) -> str:

@@ -9,9 +9,31 @@ from typing import Final
 MAX_ID: Final = 60
 """Letters of a name that tables and windows can show whole."""
 MAX_SHORT_NAME: Final = 40
+_MONTHS: Final = (
+    "jan(uary)?|feb(ruary)?|mar(ch)?|apr(il)?|may|june?|july?|aug(ust)?|sept?(ember)?|oct(ober)?|nov(ember)?|"
+    "dec(ember)?|mrz|märz|mai|okt|dez|fev|avr|mei"
+)
+_READ_AS: Final = {
+    "a missing value": "na|nan|none|null|nil",
+    "true or false": "t|f|true|false|wahr|falsch|vrai|faux|waar|onwaar",
+    "a number": r"0[0-9]+|[0-9]{16,}|[0-9]+[ed][0-9]+|0x[0-9a-f]+|inf|infinity",
+    "a date or a time": rf"({_MONTHS})[0-9]{{1,4}}|[0-9]{{1,4}}({_MONTHS})[0-9]{{0,4}}|[0-9]{{1,2}}[ap]m",
+}
+"""What spreadsheets, R, pandas and SPSS make of a text of letters and digits, in any case."""
 MAX_FROM_TEXT: Final = 24
 """So many letters of a sentence make an id: it heads a column of tables."""
 _ANY_LENGTH: Final = 10_000
+
+
+def read_as(text: str) -> str:
+    """Return what other programs read a participant's id as, "a number" of "007"; "" where they keep it.
+
+    Examples
+    --------
+    >>> [read_as(text) for text in ("P007", "12", "007", "1E5", "NA", "MAR1")]
+    ['', '', 'a number', 'a number', 'a missing value', 'a date or a time']
+    """
+    return next((what for what, pattern in _READ_AS.items() if re.fullmatch(pattern, text, re.IGNORECASE)), "")
 
 
 def id_of(text: str, longest: int = MAX_ID) -> str:

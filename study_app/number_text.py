@@ -2,44 +2,95 @@
 
 import math
 import re
+import unicodedata
 from typing import Final
 
 MINUS: Final = "\u2212"
 THIN_SPACE: Final = "\u2009"
-_NUMBER: Final = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
-_APART: Final = re.compile(r"[\s;]+|,(?!\d)|(?<!\d),")
+_APART: Final = re.compile(r"[ \t\r\n;]+|,(?!\d)|(?<!\d),")
 """What separates numbers; a comma between two digits may also be a decimal comma."""
-_PLAIN: Final = str.maketrans({" ": None, "\u00a0": None, "\u2009": None, "\u202f": None, MINUS: "-", ",": "."})
+_THOUSANDS: Final = re.compile(r"[1-9]\d{0,2} 0\d\d")
+_SPELLINGS: Final = str.maketrans(
+    dict.fromkeys("\u00a0\u2007\u2009\u202f", " ")
+    | dict.fromkeys("\u200e\u200f\u061c")
+    | {MINUS: "-", "\u2019": "'", "\u066c": "'", "\u060c": ","}
+)
+_CONVENTIONS: Final = tuple(
+    (
+        decimal,
+        re.compile(
+            rf"(?P<sign>[-+]?) ?(?P<whole>(?:\d+|[1-9]\d{{0,2}}(?:{re.escape(group)}\d{{3}})+)?)"
+            rf"(?P<part>(?:{re.escape(decimal)}\d*)?)(?P<power>(?:[eE][-+]?\d+)?)"
+        ),
+    )
+    for decimal in (".", ",", "\u066b")
+    for group in (" ", "'", ".", ",")
+    if group != decimal
+)
 
 
-def number_of(text: str) -> int | float | None:
-    """Return the number that a text says, with comma or point, real minus or hyphen, whole where it is written so."""
-    plain = text.strip().translate(_PLAIN)
-    if _NUMBER.fullmatch(plain) is None or not math.isfinite(found := float(plain)):
-        return None
-    return int(plain) if plain.lstrip("+-").isdecimal() else found
+def number_of(text: str, decimal_sign: str = ".") -> int | float | None:
+    """Return the number that a text says, whole if it is written so; None if it says none or can say two.
+
+    The decimal sign may be a point, a comma or the Arabic one, the digits those of any script, the minus real or a
+    hyphen; groups of three digits may stand apart. ``decimal_sign`` is that of the page's language.
+    """
+    numbers = readings_of(text, decimal_sign)
+    return numbers[0] if len(numbers) == 1 else None
+
+
+def readings_of(text: str, decimal_sign: str = ".") -> tuple[int | float, ...]:
+    """Return the numbers that a text can say, none to two, the lesser first: "2,500" is 2.5 or 2500.
+
+    A single comma or point with three digits after it is decimal or separates thousands, unless it is the
+    ``decimal_sign`` of the page's language, or what stands before it cannot be thousands, as in "0,500".
+    """
+    plain = "".join(str(unicodedata.decimal(letter, letter)) for letter in text.strip().translate(_SPELLINGS))
+    numbers: dict[float, int | float] = {}
+    for decimal, convention in _CONVENTIONS:
+        if (match := convention.fullmatch(plain)) is None or not re.search(r"\d", match["whole"] + match["part"]):
+            continue
+        whole, part = re.sub(r"\D", "", match["whole"]), match["part"].replace(decimal, ".")
+        value = float(f"{match['sign']}{whole}{part}{match['power']}")
+        if not math.isfinite(value):
+            return ()
+        if decimal == decimal_sign and part:
+            return (value,)
+        numbers.setdefault(value, value if part or match["power"] else int(match["sign"] + whole))
+    return tuple(sorted(numbers.values(), key=abs))
+
+
+def unclear_number(text: str) -> str:
+    """Return why a text of an English window is refused as a number, without a full stop."""
+    if len(numbers := readings_of(text)) == 2:
+        either = " or ".join(exact_text(number) for number in numbers)
+        return f"“{text}” can be read as {either}: write {either}"
+    return f"“{text}” is not a number"
 
 
 def typed_numbers(text: str, unit: str = "") -> list[tuple[str, int | float]]:
     """Return the numbers of a list as they are typed, with their values.
 
-    They are separated by spaces, semicolons, lines, or commas with spaces; each may be followed by its unit.
+    They are separated by spaces, semicolons, lines, or commas with spaces; each may be followed by its unit. Spaces
+    that do not break, as in "45\u00a0918", separate thousands.
 
     Raises
     ------
     ValueError
-        There is no word, or one is not a number, or has a comma that may be decimal or separate two numbers.
+        There is no word, or one is not a number, or has a comma or space that may be in one number or between two.
     """
     words = [word for part in _APART.split(text) if (word := part.removesuffix(unit))]
     if not words:
         raise ValueError("Enter at least one number")
     commas = len(words) == 1 or any("," in apart for apart in _APART.findall(text.strip(" ,;\n")))
     found: list[tuple[str, int | float]] = []
-    for word in words:
+    for before, word in zip(["", *words], words, strict=False):
+        if _THOUSANDS.fullmatch(both := f"{before} {word}"):
+            raise ValueError(f"“{both}” may be one number or two: write {before}{word} or {before} {int(word)}")
         if word.count(",") > (0 if commas else 1):
             raise ValueError(f"“{word}” may be one number or several: separate numbers by spaces or semicolons")
         if (value := number_of(word)) is None:
-            raise ValueError(f"“{word}” is not a number")
+            raise ValueError(unclear_number(word))
         found.append((word, value))
     return found
 

@@ -8,8 +8,10 @@ import os
 import re
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import NoReturn
 
 import hypothesis
 import pytest
@@ -32,12 +34,56 @@ os.environ["LIQUID_STUDY_WORKSPACE"] = "."
 # The library reads its settings once in a process: those of the first test that uses it hold for all after it.
 localhost_only()
 
+NEED_QT = ("app", "designer", "gui")
+"""Folders of tests that all need Qt."""
 try:
     import PySide6.QtWidgets  # noqa: F401
-except ImportError:
-    QT_IS_HERE = False
+except ImportError as missing:
+    QT_MISSING = f"Qt cannot be loaded here: {missing}"
 else:
-    QT_IS_HERE = True
+    QT_MISSING = ""
+QT_IS_HERE = not QT_MISSING
+
+
+@contextmanager
+def skipping_without_qt() -> Iterator[None]:
+    """Skip what fails within because Qt's system libraries are missing; nothing where Qt can be loaded."""
+    try:
+        yield
+    except Exception as error:
+        cause: BaseException | None = error
+        while QT_MISSING and cause is not None:
+            if isinstance(cause, ImportError) and "PySide6" in str(cause.path):
+                pytest.skip(QT_MISSING, allow_module_level=True)
+            cause = cause.__cause__ or cause.__context__
+        raise
+
+
+class FolderWithoutQt(pytest.File):
+    """A folder whose tests cannot be imported; to pytest a file, since it imports the conftest of a folder."""
+
+    def collect(self) -> NoReturn:
+        pytest.skip(QT_MISSING, allow_module_level=True)
+
+
+class ModuleWithoutQt(pytest.Module):
+    """A module that may need Qt."""
+
+    def collect(self) -> Iterable[pytest.Item | pytest.Collector]:
+        with skipping_without_qt():
+            return list(super().collect())
+
+
+def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Collector | None:
+    """Do not look into the folders of windows where no window can be loaded."""
+    if QT_MISSING and path.parent == Path(__file__).parent and path.name in NEED_QT:
+        return FolderWithoutQt.from_parent(parent, path=path)
+    return None
+
+
+def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector) -> pytest.Module | None:
+    """Skip modules that need Qt where it cannot be loaded."""
+    return ModuleWithoutQt.from_parent(parent, path=module_path) if QT_MISSING else None
 
 
 @functools.cache
@@ -106,9 +152,17 @@ def pytest_collection_finish() -> None:
 
 
 @pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup() -> Iterator[None]:
+    """Skip a test whose fixtures need Qt where it cannot be loaded."""
+    with skipping_without_qt():
+        yield
+
+
+@pytest.hookimpl(wrapper=True)
 def pytest_runtest_call() -> Iterator[None]:
     """Fail where a window or dialog that is there after a test prints program text, in its tips and names too."""
-    yield
+    with skipping_without_qt():
+        yield
     widgets = sys.modules.get("PySide6.QtWidgets")
     if widgets is not None and isinstance(widgets.QApplication.instance(), widgets.QApplication):
         from tests.program_text import printed_in_windows

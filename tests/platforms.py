@@ -6,6 +6,9 @@ from contextlib import contextmanager
 
 import pytest
 
+from study_app.gui.display.display_check import missing_for_windows
+
+needs_window_system = pytest.mark.skipif(bool(missing_for_windows()), reason=missing_for_windows())
 needs_fork = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork")
 
 

@@ -62,7 +62,16 @@ def made_up(name: str) -> ConditionFeatures:
     """What every condition of a study feels like: conditions differ in force and delay alone."""
     study = load(name)
     return {
-        (block.id, condition): (TrialFeatures(0.5 + 0.4 * number, 4.0, 0.1, 0.02, 0.03, study.delay_s(condition)),)
+        (block.id, condition): (
+            TrialFeatures(
+                force_mean_n=0.5 + 0.4 * number,
+                force_peak_n=4.0,
+                speed_rms_mps=0.1,
+                push_share=0.02,
+                roughness_n=0.03,
+                delay_s=study.delay_s(condition),
+            ),
+        )
         for block in study.blocks.values()
         for number, condition in enumerate(block.conditions)
     }

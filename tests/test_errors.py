@@ -11,7 +11,7 @@ import pytest
 
 from study_app.errors import Problem, StudyError
 
-PROBLEMS = Problem("blocks.b", "is unknown", 3, "did you mean c?"), Problem("x", "is missing")
+PROBLEMS = Problem("blocks.b", "is unknown", 3, hint="did you mean c?"), Problem("x", "is missing")
 GIVEN = {"int": -6, "tuple[Problem, ...]": PROBLEMS}
 
 
@@ -33,7 +33,6 @@ def example(kind: type[StudyError]) -> StudyError:
 
 @pytest.mark.slow
 def test_every_error_is_the_same_after_pickling() -> None:
-    pytest.importorskip("PySide6.QtWidgets", exc_type=ImportError)
     for module in pkgutil.walk_packages(["study_app"], "study_app."):
         if not module.name.endswith("__main__"):
             importlib.import_module(module.name)

@@ -26,6 +26,16 @@ def test_the_readme_is_short_and_leads_to_every_section() -> None:
     assert max(len(line) for line in text.splitlines() if not line.startswith(("|", "python3", "!"))) <= 120
 
 
+def test_the_first_command_ends_in_the_demo_and_the_second_in_the_quick_tests() -> None:
+    """`packaging/try_readme.sh` takes them from these lines and runs them."""
+    lines = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+    first, second = (line for line in lines if line.startswith("python3 -m venv"))
+    program, command = first.rpartition("&& ")[2].split()
+    assert (program, command in commands.commands) == (".venv/bin/liquid-study", True)
+    assert command == "demo"
+    assert second.endswith('-m pytest -n 2 --dist loadfile -m "not slow and not nightly"')
+
+
 def test_the_sample_is_sound_and_described_by_this_version() -> None:
     done = CliRunner().invoke(commands, ["verify", str(ROOT / "results" / "sample-rek2024")])
     assert (done.output, done.exit_code) == ("12 sessions: sound\n", 0)

@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 from study_app.ids import MAX_ID, free_id, free_short_name, id_of, short_name_of
-from study_app.number_text import exact_text, number_of, typed_numbers
+from study_app.number_text import exact_text, number_of, readings_of, typed_numbers
 from tests.golden import compare
 from tests.transcripts import calls, played
 
-FUNCTIONS = (id_of, free_id, free_short_name, short_name_of, number_of, exact_text, typed_numbers)
+FUNCTIONS = (id_of, free_id, free_short_name, short_name_of, number_of, readings_of, exact_text, typed_numbers)
 PLAY = calls({"LONG": MAX_ID * "x", **{function.__name__: function for function in FUNCTIONS}}, ValueError)
 
 

@@ -251,7 +251,7 @@ def _tested(
             p, p_bootstrap = (float(each[0]) for each in p_differs(means, SIDES[contrast.expected]))
             statistic = float(means.t()[0])
             low, high = (math.exp(end) if ratio else end for end in (low, high))
-            ends = Interval(low, high, 0.95, f"t({means.freedom})")
+            ends = Interval(low=low, high=high, level=0.95, method=f"t({means.freedom})")
             sides = "two-sided" if contrast.expected is None else f"one-sided ({contrast.expected})"
             method = f"t({means.freedom}), {sides}; bootstrap {p_equals(p_bootstrap)}"
     return ContrastResult(

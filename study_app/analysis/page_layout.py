@@ -28,7 +28,7 @@ Style: TypeAlias = dict[str, Any]
 """How marks of a figure look, as arguments of matplotlib."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Mark:
     """What must not be overlooked, written next to a figure's title: words, their colour and the ground under them."""
 
@@ -179,14 +179,14 @@ class Look:
 def study_marks(study: Study) -> list[Mark]:
     """Return what must not be overlooked in a figure of a study."""
     marks = (
-        (study.simulated, Mark("SIMULATED participants", style.WARN, style.WARN_GROUND)),
-        (study.pilot, Mark("PILOT", style.WARN, style.WARN_GROUND)),
-        (not study.revealed, Mark("Blinded: by code", style.SEALED, style.SEALED_GROUND)),
+        (study.simulated, Mark(words="SIMULATED participants", ink=style.WARN, ground=style.WARN_GROUND)),
+        (study.pilot, Mark(words="PILOT", ink=style.WARN, ground=style.WARN_GROUND)),
+        (not study.revealed, Mark(words="Blinded: by code", ink=style.SEALED, ground=style.SEALED_GROUND)),
     )
     return [mark for applies, mark in marks if applies]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Picture:
     """One figure: the block it is of, its name as a file, its caption, and its bytes by form (png, svg, pdf)."""
 
@@ -222,7 +222,7 @@ def picture_of(
     fonts = {form: style.fonts_for(form) for form in forms}
     drawn = {one: draw(Look(title, study_marks(study), people, one)).figure for one in dict.fromkeys(fonts.values())}
     files = {form: style.file_bytes(drawn[fonts[form]], form, f"{study.name}: {title}") for form in forms}
-    return Picture(block, name, caption, files)
+    return Picture(block=block, name=name, caption=caption, files=files)
 
 
 def sample_words(study: Study, n: int) -> str:

@@ -58,12 +58,9 @@ def quartile_cells(numbers: Numbers) -> dict[str, str]:
 
 def _distribution(_asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
     values = given(answers)["value"].to_numpy(dtype=float)
-    low, middle, high = quartiles_or_none(values)
     return {
         **counts_of_missing(answers),
-        "median": middle,
-        "q1": low,
-        "q3": high,
+        **quartiles_or_none(values)._asdict(),
         "smallest": float(values.min()) if len(values) else None,
         "largest": float(values.max()) if len(values) else None,
         "values": sorted(float(value) for value in values),
@@ -108,13 +105,10 @@ OPTION_COUNTS: Final = Measure("counts", _option_counts, _option_cells)
 
 def _point_counts(asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
     chosen = given(answers)["response"].value_counts()
-    low, middle, high = quartiles_or_none(given(answers)["value"].to_numpy(dtype=float))
     return {
         **counts_of_missing(answers),
         "counts": {point: int(chosen.get(point, 0)) for point in asked.levels},
-        "median": middle,
-        "q1": low,
-        "q3": high,
+        **quartiles_or_none(given(answers)["value"].to_numpy(dtype=float))._asdict(),
     }
 
 

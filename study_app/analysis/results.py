@@ -27,7 +27,7 @@ class NotTested:
     why: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Delivered:
     """How far what was shown under one setting differed from what was asked for; ms, over trials.
 
@@ -56,7 +56,7 @@ def silent(_what: str, _share: float) -> None:
     """Report nothing."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Failure:
     """A part (``what``, of a block or of none) that could not be computed: the error, and where the program met it."""
 
@@ -99,7 +99,7 @@ class Failures:
             words, where = f"{type(error).__name__}: {error}", f"{Path(last.filename).name}, line {last.lineno}"
             if isinstance(said := explained(error), PlugInError):
                 words, where = str(said), ""
-            failure = Failure(what, words, where, block)
+            failure = Failure(what=what, error=words, where=where, block=block)
             self.found.append(failure)
             return failure
 
@@ -114,7 +114,7 @@ Verdict: TypeAlias = Literal["shown", "suggested", "not shown", "out of reach", 
 participants however they had answered, or ``not tested``. None of them says that there is nothing."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Tested:
     """A test of one statement within its family of ``members``, with p adjusted by ``correction``."""
 
@@ -172,7 +172,7 @@ class GroupAnswers:
     numbers: Mapping[str, Any]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class QuestionResult:
     """A question asked after the trials of a block, or in a form: ``where`` is its id, ``title`` what people read.
 
@@ -196,7 +196,7 @@ class QuestionResult:
         return sum(int(group.numbers["n"]) for group in self.groups)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ScoreResult:
     """A score of a questionnaire: number, mean, standard deviation and range over its answers, by setting."""
 
@@ -211,7 +211,7 @@ class ScoreResult:
 Summary: TypeAlias = Literal["share", "mean", "geometric mean", "settings"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LevelsResult:
     """A block of levels.
 

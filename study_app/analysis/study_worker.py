@@ -110,7 +110,7 @@ def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
         if len(study.answers(block)):
             picture = answer_figures.answers_picture(study, block, name, ("svg",))
             words, svg = picture.caption, picture.files["svg"]
-        send(FigureDrawn(name, answer_figures.title(block), words, svg))
+        send(FigureDrawn(name=name, title=answer_figures.title(block), caption=words, svg=svg))
         _go_on(stop)
     _draw_questions(study, send, stop)
     if study.revealed and study.n:
@@ -126,7 +126,7 @@ def _draw_questions(study: Study, send: Send, stop: Callable[[], bool]) -> None:
     titles = {(one.where, one.item): f"{one.title}: {one.short}" for one in found}
     for picture in question_pictures(study, found, ("svg",)):
         title = titles[picture.block, picture.name.removeprefix(f"question-{picture.block}-")]
-        send(FigureDrawn(picture.name, title, picture.caption, picture.files["svg"]))
+        send(FigureDrawn(name=picture.name, title=title, caption=picture.caption, svg=picture.files["svg"]))
         _go_on(stop)
 
 
@@ -181,7 +181,7 @@ def _evaluate(study: Study, send: Send, stop: Callable[[], bool]) -> None:
     for drawn, picture in enumerate(pictures(study, results, ("svg",)), start=1):
         name = picture.name
         title = titles.get(name) or titles.get(name.partition("-")[0], name.capitalize())
-        send(FigureDrawn(name, title, picture.caption, picture.files["svg"]))
+        send(FigureDrawn(name=name, title=title, caption=picture.caption, svg=picture.files["svg"]))
         going("drawing", EVALUATION + (1 - EVALUATION) * min(1.0, drawn / 4))
 
 

@@ -26,7 +26,7 @@ class ReadStudy:
     folder: Path
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LeaveOut:
     """Leave a session or a trial out (see ``store.exclusions.exclude``)."""
 
@@ -117,7 +117,7 @@ class StudyFound:
     colours: Mapping[str, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FigureDrawn:
     """A figure as SVG; one of an earlier ``name`` gives way. Without ``svg``, ``caption`` says why there is none."""
 

@@ -42,7 +42,7 @@ from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.theme.theme import LIGHT
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.protocol.load import load, load_scene, parse
-from study_app.protocol.orders.schedule import Schedule, Trial
+from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule
 from study_app.protocol.trials.tasks import Explore
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import TaskPage
@@ -176,7 +176,7 @@ class _Showing:
 
     def run(self) -> tuple[Shown, ...]:
         rig = open_rig(self._chosen.device, study_settings(self._protocol, self._chosen.tremor()))
-        schedule = self._chosen.schedule(self._protocol)
+        schedule = build_schedule(self._protocol, self._chosen.participant, self._chosen.seed)
         try:
             with open_store(self._chosen, self._protocol, self._source, rig, {}) as store:
                 operator = make_cockpit(self._chosen, self._protocol, rig, LIGHT)
@@ -362,7 +362,14 @@ class Painting(QObject):
         participant = ParticipantWindow(words("en"), clock=time.monotonic, windowed=shown_on is operated_on)
         place(operator, operated_on, corner=shown_on is operated_on)
         task = Explore(kind="explore", min_s=0.0, max_s=3600.0, instruction="The servo is being timed.")
-        self._page = TaskPage(1, "The servo is being timed.", task, protocol.device.workspace_m, 0.0034, None)
+        self._page = TaskPage(
+            trial=1,
+            instruction="The servo is being timed.",
+            task=task,
+            workspace_m=protocol.device.workspace_m,
+            body_radius_m=0.0034,
+            progress=None,
+        )
         return participant, operator
 
     def begin(self) -> None:

@@ -59,9 +59,11 @@ def error_rows(errors: Errors) -> tuple[ErrorRow, ...]:
         force = f"< {SMALLEST_N:g} N" if errors.force_n < SMALLEST_N else f"{errors.force_n:.3f} N"
     note = f"of drag and wake; no reference for {without}" if without else "along programmed paths"
     return (
-        ErrorRow("Wake, of Σ|e|/S", wake, note),
-        ErrorRow("Force, largest", force, note),
-        ErrorRow("Lag of the velocity filter", f"{1e3 * errors.lag_s:z.1f} ms", "at constant acceleration"),
+        ErrorRow(measure="Wake, of Σ|e|/S", value=wake, note=note),
+        ErrorRow(measure="Force, largest", value=force, note=note),
+        ErrorRow(
+            measure="Lag of the velocity filter", value=f"{1e3 * errors.lag_s:z.1f} ms", note="at constant acceleration"
+        ),
     )
 
 
@@ -269,8 +271,8 @@ class LabSaving(QObject):
         self.liquids = tuple(dict.fromkeys((*self.liquids, *written)))
 
 
-INITIAL_A: Final = Choice("rek2024", "water", "Water")
-INITIAL_B: Final = Choice("rek2024", "light_oil", "Light oil")
+INITIAL_A: Final = Choice(source="rek2024", liquid="water", title="Water")
+INITIAL_B: Final = Choice(source="rek2024", liquid="light_oil", title="Light oil")
 FRAME_MS: Final = 33
 APPRAISE_AFTER_MS: Final = 300
 COMPILING: Final = "Compiling the force model, once after an installation or an update; this takes about a minute"
@@ -448,7 +450,7 @@ class LabController(QObject):
                 "trace": live.trace(),
                 "tail_a": live.tail("A"),
                 "tail_b": live.tail("B"),
-                "now": Now(reading.position_m, reading.force_n, reading.wake_mps),
+                "now": Now(position_m=reading.position_m, force_n=reading.force_n, wake_mps=reading.wake_mps),
                 "limiters": live.limiters(),
             }
         if not bench.blind:  # the ball's size would tell one from the other
@@ -458,9 +460,9 @@ class LabController(QObject):
             workbench=bench,
             liquids=self.liquids,
             device=DeviceShown(
-                device_choices(),
-                self.device,
-                state,
+                choices=device_choices(),
+                chosen=self.device,
+                state=state,
                 ready=live is not None and not fault,
                 pointer=described.pointer,
                 diagnosable=described.doctor is not None,

@@ -338,7 +338,7 @@ class MainController(QObject):
     def _home(self) -> HomePlace:
         made = HomePlace(self.results, _draft_words)
         made.session_asked.connect(self._start)
-        made.results_asked.connect(self._show_study)
+        made.results_asked.connect(self.show_study)
         made.protocol_opened.connect(self.machine.remember_protocol)
         made.edit_asked.connect(self.open_designer)
         made.new_asked.connect(self.begin_study)
@@ -377,7 +377,8 @@ class MainController(QObject):
         if self.machine.place is not None:
             self.machine.place.open_test()
 
-    def _show_study(self, folder: Path) -> None:
+    def show_study(self, folder: Path) -> None:
+        """Go to the results of a study."""
         self.window.place("results")
         assert self.results_place is not None  # noqa: S101 - just made
         self.results_place.choose(folder)

@@ -16,7 +16,7 @@ import sys
 import click
 
 from study_app import __version__
-from study_app.cli import data, evidence, model, power, study
+from study_app.cli import data, demo, evidence, model, power, study
 from study_app.cli.devices import devices, outlets, plugins
 from study_app.cli.options import EXIT_USER_ERROR, GroupedCommands, example_of
 from study_app.discovery import explained
@@ -46,7 +46,7 @@ def commands(context: click.Context) -> None:
         context.exit(app.home())
 
 
-for module in (study, data, power, model, evidence):
+for module in (demo, study, data, power, model, evidence):
     for command in vars(module).values():
         if isinstance(command, click.Command):
             commands.add_command(command)

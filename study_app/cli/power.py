@@ -159,7 +159,7 @@ def _of_thresholds(
 
     show("simulating observers")
     for done, found in sweep(planned, sizes, studies, seed, executor):
-        yield Precisions(study, sizes, done, studies, seed, found)
+        yield Precisions(protocol=study, sizes=sizes, studies=done, asked=studies, seed=seed, found=found)
 
 
 def _write(found: Powers | Precisions, to: Path | None) -> None:

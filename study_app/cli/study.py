@@ -27,7 +27,6 @@ SEED = click.IntRange(0, 2**31 - 1)
 WINDOWED = click.option("--windowed", is_flag=True, help="Show the participant's window in a frame, not full-screen.")
 SCREEN = click.option("--screen", type=click.IntRange(1), help="Number of the participant's screen.")
 OPERATOR = click.option("--operator", default="", metavar="INITIALS", help="Name or initials of the operator.")
-STARTED = 16  # letters of a time down to the minute
 
 
 @click.command()
@@ -66,10 +65,10 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
     else:
         import time
 
-        from study_app.designer.document.study import read
-        from study_app.designer.measures.study_facts import to_translate
+        from study_app.protocol.checks.untranslated import describe_untranslated
         from study_app.protocol.source.files import find
         from study_app.session.simulated.paced_levels import undelivered_levels
+        from study_app.session.simulated.predicted_delivery import predicted_delivery
         from study_app.store import workstation
         from study_app.video.sources import missing_here
 
@@ -78,8 +77,12 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
         file = find(protocol)
         missing = missing_here(study, file.parent, camera, time.monotonic_ns)
         click.echo(describe.describe(study, delay_ticks, workstation.device_without_force()))
-        for sentence in (*undelivered_levels(study), *to_translate(read(file.read_bytes(), file.parent))):
+        document, _ = load.read_document(load.source_bytes(protocol), protocol)
+        for sentence in (*undelivered_levels(study), *describe_untranslated(document, lists_places=True)):
             click.echo(f"\nNote: {sentence}.")
+        delivery = predicted_delivery(study, delay_ticks)
+        for sentence in delivery.sentences:
+            click.echo(f"\nNote: {sentence}, predicted for a delay of {counted(delay_ticks, 'tick')}.")
         if missing:
             click.echo(f"\nNote: {missing}. Sessions of this study do not start on this computer.")
 
@@ -145,10 +148,9 @@ def design(protocol: str, participants: int, first: str, seed: int) -> None:
 @click.option("--language", metavar="LANG", help="Language of the pages; default: the first of the protocol.")
 @OPERATOR
 @click.option(
-    "--row-of",
-    metavar="ID",
-    help="ID of a participant who is replaced, whose row of each Williams design or Latin square is used.",
+    "--row-of", metavar="ID", help="ID of a participant who is replaced, whose order (and place in the group) is used."
 )
+@click.option("--group", metavar="GROUP", help="Group of the participant, in a study with pre-existing groups.")
 @WINDOWED
 @SCREEN
 @click.option("--pilot", is_flag=True, help="Pilot session: in a marked window, stored in results/<study>-pilot.")
@@ -183,6 +185,7 @@ def run(protocol: str, *, no_recordings: bool, results: Path | None, **chosen: A
         "the columns of measurements are n/a. Sessions are written without waiting for the disk."
     ),
 )
+@click.option("--group", metavar="GROUP", help="Pre-existing group of them all; default: dealt evenly to all groups.")
 @click.option(
     "--results",
     type=Target(),
@@ -194,8 +197,13 @@ def rehearse(
     context: click.Context, /, protocol: str, *, device: str, no_recordings: bool, answers_only: bool, **chosen: Any
 ) -> None:
     """Run complete sessions with simulated participants, faster than real time; every row is marked as simulated."""
+    from study_app.protocol.load import load
+
     if chosen["results"] is None:
         keep_offered_workspace()
+    study = load(protocol)
+    if study.asks_group and chosen["group"] is None:
+        click.echo(f"Simulated participants are dealt evenly to the pre-existing groups {', '.join(study.groups)}.")
     if answers_only:
         if context.get_parameter_source("device") is not ParameterSource.DEFAULT:
             raise click.UsageError("--answers-only uses no device: omit --device")
@@ -291,9 +299,16 @@ def sessions(named: str | None, results: Path | None) -> None:
         for row in participants_of(folder):
             who, number = row["participant"], row["session"]
             name = f"{folder.name}/{who}/{number}" if inside else str(session_in(folder, who, number).path)
-            started = str(row["session_started_at"] or "")[:STARTED].replace("T", " ")
+            started = _local_time(row["session_started_at"])
             mark = "  excluded" if (who, number, None) in left_out else ""
             click.echo(f"{name}  {started}  {row['status']}{mark}")
+
+
+def _local_time(written: str | None) -> str:
+    """Return a time of a table as this computer's, to the minute with its offset; "" if it is not known."""
+    from datetime import datetime
+
+    return datetime.fromisoformat(written).astimezone().isoformat(" ", "minutes") if written else ""
 
 
 def _studies(results: Path) -> Iterator[Path]:

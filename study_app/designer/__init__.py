@@ -1,5 +1,5 @@
 """The study designer: one open study, its document, and the rooms that edit and show it.
 
 ``document.document`` holds the text and the list of undos (without Qt), ``form.card`` shows the form of an element, and
-``place.controller`` connects the rooms; read these first. The text is authoritative: an edit changes only its bytes.
+``controller`` connects the rooms; read these first. The text is authoritative: an edit changes only its bytes.
 """

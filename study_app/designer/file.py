@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from PySide6.QtCore import QEvent, QRect, QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
@@ -36,15 +37,23 @@ from study_app.gui.widgets.labels import label
 from study_app.protocol.source.document import Path
 
 
-def visible_lines(text: QPlainTextEdit) -> list[tuple[int, float, float]]:
-    """Return the visible lines: the number of each from 0, how far down it is, and its height [px]."""
+class VisibleLine(NamedTuple):
+    """The number of a line from 0, how far down it is, and its height [px]."""
+
+    number: int
+    top: float
+    height: float
+
+
+def visible_lines(text: QPlainTextEdit) -> list[VisibleLine]:
+    """Return the visible lines."""
     found = []
     block, offset = text.firstVisibleBlock(), text.contentOffset()
     while block.isValid():
         place = text.blockBoundingGeometry(block).translated(offset)
         if place.top() > text.viewport().height():
             break
-        found.append((block.blockNumber(), place.top(), place.height()))
+        found.append(VisibleLine(number=block.blockNumber(), top=place.top(), height=place.height()))
         block = block.next()
     return found
 

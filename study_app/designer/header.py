@@ -209,7 +209,7 @@ NO_FILE: Final = FileText()
 NO_VERSION: Final = VersionChip()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class StudyChoice:
     """A study that can be opened."""
 
@@ -226,7 +226,7 @@ class StudyChoice:
         return f"{self.title}  ·  {self.file}" + (f"  ({origin})" if origin else "")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class HeaderState:
     """The header."""
 

@@ -134,11 +134,17 @@ class MeasuresController(QObject):
         participants = participants_of(study) if self._participants is None else self._participants
         planned = planned_of(study)
         if focus.plan is None or focus.block is None:
-            return Controls(participants, lapses=self._lapses, planned=planned)
+            return Controls(participants=participants, lapses=self._lapses, planned=planned)
         asked = self._thresholds.get(focus.block.id)
         low, high = focus.plan.stimulus.levels
         threshold = asked if asked is not None and low <= asked <= high else threshold_of(focus.plan)
-        return Controls(participants, threshold, self._lapses, precision_of(protocol), planned)
+        return Controls(
+            participants=participants,
+            threshold=threshold,
+            lapses=self._lapses,
+            precision=precision_of(protocol),
+            planned=planned,
+        )
 
     # simulations
 

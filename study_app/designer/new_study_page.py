@@ -35,7 +35,7 @@ from PySide6.QtWidgets import (
 
 from study_app.designer.document.document import Answers, Document, taken_names, template
 from study_app.designer.document.elements import study_title, title_of
-from study_app.designer.document.fields import languages_of, row_at, unit_of
+from study_app.designer.document.fields import row_at, unit_of
 from study_app.designer.document.study import Study, read
 from study_app.designer.header import HeaderState, StudyChoice, problems_chip
 from study_app.designer.outline import icon_of
@@ -55,7 +55,7 @@ from study_app.gui.widgets.controls import ActionButton, Check, IconButton
 from study_app.gui.widgets.labels import Clamped, figures, label
 from study_app.gui.widgets.main_view import last_focused
 from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
-from study_app.number_text import capitalised, counted, duration, number_of, typed_numbers
+from study_app.number_text import capitalised, counted, duration, number_of, typed_numbers, unclear_number
 from study_app.protocol.load import read_document
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
@@ -63,7 +63,7 @@ from study_app.protocol.orders.durations import expected_duration_s, step_durati
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.document import names
 from study_app.protocol.source.files import find, shipped, shipped_file
-from study_app.protocol.wording.languages import LANGUAGES
+from study_app.protocol.wording.languages import LANGUAGES, languages_of
 from study_app.store.drafts import draft_of, drafted_files, unsaved_files
 from study_app.store.study_settings import kept_original
 from study_app.workspace import workspace
@@ -71,7 +71,7 @@ from study_app.workspace import workspace
 FILE: Final = FOLDER / "known_answers.json"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class KnownAnswer:
     """A planted threshold (mean of ``people``), and what simulated studies find of it, in ``unit``.
 
@@ -142,7 +142,7 @@ STEPS: Final = ("pages", "blocks", "questionnaires")
 """Sections whose tables are steps of a session."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class OwnQuestion:
     """A question of a template: its key, words, unit, what is permitted, and the value that the template has."""
 
@@ -154,7 +154,7 @@ class OwnQuestion:
     several: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TemplateChoice:
     """What a new study can begin as."""
 
@@ -184,7 +184,7 @@ def template_choice(name: str, study: Study) -> TemplateChoice:
     shown, question = TEMPLATES.get(name, (name, words))
     protocol = study.protocol
     found = TemplateChoice(
-        f"template:{name}", shown, question, recovery=known_answers().get(name),
+        source=f"template:{name}", title=shown, description=question, recovery=known_answers().get(name),
         study_title=title, languages=languages_of(study.document), questions=tuple(_questions(name, study)),
     )  # fmt: skip
     if protocol is None:
@@ -209,7 +209,7 @@ def copy_choice(source: str, document: Mapping[str, Any], note: str, name: str) 
     """Return what is shown of a study that can be copied."""
     title, words = _described(document)
     return TemplateChoice(
-        source, title or source, words, copy=True, note=note, name=name, study_title=title,
+        source=source, title=title or source, description=words, copy=True, note=note, name=name, study_title=title,
         languages=languages_of(document),
     )  # fmt: skip
 
@@ -238,7 +238,9 @@ def _questions(name: str, study: Study) -> Iterator[OwnQuestion]:
             parts = there if isinstance(there, tuple) else (there,)
             value = ", ".join(f"{part:g}" for part in parts if isinstance(part, int | float))
             unit = row.unit or _unit_of(study, path)
-            yield OwnQuestion(path, words, unit, ", ".join(row.bounds), value, several)
+            yield OwnQuestion(
+                path=path, words=words, unit=unit, bounds=", ".join(row.bounds), value=value, several=several
+            )
 
 
 def _unit_of(study: Study, path: Place) -> str:
@@ -267,7 +269,9 @@ def studies(opened: Document | None) -> tuple[StudyChoice, ...]:
         title = _title(file, drafted=file in drafted) if opened is None or source != own else opened.title
         stem = Path(source).stem
         ships, original = is_shipped(source), "" if file is None else kept_original(file)
-        choices.append(StudyChoice(title or stem, f"{stem}.toml", source, ships, original))
+        choices.append(
+            StudyChoice(title=title or stem, file=f"{stem}.toml", source=source, shipped=ships, original=original)
+        )
     return tuple(sorted(choices, key=lambda choice: (choice.shipped, choice.title.casefold(), choice.source)))
 
 
@@ -296,20 +300,20 @@ def header_state(
 ) -> HeaderState:
     """Return the header's state of the open study; ``warnings`` is how many it has."""
     if opened is None:
-        return HeaderState(choices)
+        return HeaderState(studies=choices)
     draft = "Saved" if not opened.edited and opened.base else "Not saved yet"
     if opened.kept is not None and (opened.edited or not opened.base):
         draft = f"Draft kept {opened.kept:%H:%M}"
     return HeaderState(
-        choices,
-        source_of(opened.file),
-        problems_chip(len(opened.study.faults), warnings),
-        "" if opened.read_only else draft,
-        opened.done[-1].words if opened.done else "",
-        opened.undone[-1].words if opened.undone else "",
-        not opened.read_only and (opened.edited or not opened.base),
-        bool(opened.read_only),
-        version,
+        studies=choices,
+        chosen=source_of(opened.file),
+        problems=problems_chip(len(opened.study.faults), warnings),
+        draft="" if opened.read_only else draft,
+        undo=opened.done[-1].words if opened.done else "",
+        redo=opened.undone[-1].words if opened.undone else "",
+        can_save=not opened.read_only and (opened.edited or not opened.base),
+        read_only=bool(opened.read_only),
+        version=version,
     )
 
 
@@ -615,9 +619,9 @@ class Questions(Themed, QWidget):
             if not text or text == question.value:
                 continue
             if not question.several:
-                number = number_of(text) if len(text.split()) == 1 else None
+                number = number_of(text)
                 if number is None:
-                    return f"{question.words}: “{text}” is not a number"
+                    return f"{question.words}: {unclear_number(text)}"
                 values.append((question.path, number))
                 continue
             try:
@@ -686,8 +690,8 @@ class ChosenCard(Card):
             column.addWidget(Rule())
         if choice.recovery is not None:
             good = choice.recovery.recovered
-            state = ("ok", "check", "recovered") if good else ("warn", "warning", "not recovered")
-            chip = Chip(*state, small=True)  # type: ignore[arg-type]  # a tone
+            recovered = Chip("ok", "check", "recovered", small=True)
+            chip = recovered if good else Chip("warn", "warning", "not recovered", small=True)
             head = hbox(label("Known answer", "strong"), STRETCH, chip)
             add_parts(
                 column,

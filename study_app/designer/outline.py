@@ -45,7 +45,7 @@ from study_app.designer.document.elements import (
     title_of,
     words_sought,
 )
-from study_app.designer.document.fields import label_of, languages_of, node_at, rows, singular, tags
+from study_app.designer.document.fields import label_of, node_at, rows, singular, tags
 from study_app.designer.document.steps import AddElement, AddInstrument
 from study_app.designer.document.study import Study
 from study_app.designer.parts import dense
@@ -63,6 +63,7 @@ from study_app.protocol.checks.cross_references import OWN
 from study_app.protocol.formats import TABLES, is_second
 from study_app.protocol.questionnaires import instrument, instruments
 from study_app.protocol.source.document import Path, names, value_at
+from study_app.protocol.wording.languages import languages_of
 
 ICONS: Final = {
     "pages": "file", "blocks": "layers", "tasks": "route", "questionnaires": "list", "liquids": "drop",
@@ -83,7 +84,7 @@ ElementPath: TypeAlias = Path
 """The path of an element, as windows hand it on."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class OutlineRow:
     """One row of the outline."""
 
@@ -122,7 +123,7 @@ def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> 
             inner = [kept for row in inner if (kept := _found(study, row, words, fields.get(row.path))) is not None]
         total = duration(sum(times_s.values())) if times_s and heading == SESSION else ""
         if inner:
-            rows += [*([OutlineRow((), heading, note=total, name=heading)] if heading else []), *inner]
+            rows += [*([OutlineRow(path=(), title=heading, note=total, name=heading)] if heading else []), *inner]
     return tuple(rows)
 
 
@@ -177,7 +178,16 @@ def _row(study: Study, element: Element, times_s: Mapping[str, float], *, in_ses
         sort = "" if "items" in path else sort
     name = ", ".join(filter(None, (element.title, sort, note, at, faults)))
     title, step = element.title, element.step
-    return OutlineRow(path, title, icon_of(path, study.document), note, element.depth + 1, element.faults, name, step)
+    return OutlineRow(
+        path=path,
+        title=title,
+        icon=icon_of(path, study.document),
+        note=note,
+        depth=element.depth + 1,
+        faults=element.faults,
+        name=name,
+        step=step,
+    )
 
 
 SECTIONS_OF_TABLES: Final = frozenset(ICONS) - {*OWN, "study", "device", "scene", "limits", "analysis"}
@@ -187,7 +197,7 @@ HELP: Final = {"designs": "2IFC and other trial designs"}
 """What a section is for, where its name does not say it."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Addable:
     """One thing that can be added: its words and icon, what is asked for, and a line of help."""
 
@@ -210,10 +220,10 @@ def addable(study: Study, selected: Path) -> tuple[Addable, ...]:
     found = [_of_list(study, path) for path in lists]
     found += [
         Addable(
-            label_of(singular(path[0])),
-            icon_of(path, study.document),
-            AddElement(path),
-            HELP.get(str(path[0]), f"To {label_of(path[0]).lower()}"),
+            words=label_of(singular(path[0])),
+            icon=icon_of(path, study.document),
+            asks=AddElement(path),
+            help=HELP.get(str(path[0]), f"To {label_of(path[0]).lower()}"),
         )
         for path in sections
     ]
@@ -245,7 +255,7 @@ def _instruments() -> tuple[Addable, ...]:
         texts = "" if source["languages"] else ". Its texts are not included: write them in the study"
         help_ = f"{source['source']}. Licence: {source['licence']}{texts}"
         words = f"Instrument: {name.upper()}, {len(source['items'])} questions"
-        found.append(Addable(words, "list", AddInstrument(name), help_))
+        found.append(Addable(words=words, icon="list", asks=AddInstrument(name), help=help_))
     return tuple(found)
 
 
@@ -254,7 +264,9 @@ def _of_list(study: Study, path: Path) -> Addable:
     known = tags(node_at(study.document, (*path, 0)))[1] if is_second(study.document) else ()
     kinds = ", ".join(label_of(kind).lower() for kind in known if kind)
     to = f"To {title_of(study.document, path[:2])}{kinds and f'; kinds: {kinds}'}"
-    return Addable(label_of(singular(path[-1])), icon_of(path, study.document), AddElement(path), to)
+    return Addable(
+        words=label_of(singular(path[-1])), icon=icon_of(path, study.document), asks=AddElement(path), help=to
+    )
 
 
 WIDTH, HIGHEST, ADD_ROW_PX, HELP_PX = 360, 520, 34, 78

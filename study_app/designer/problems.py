@@ -31,7 +31,7 @@ _PLACE: Final = re.compile(r"([a-z]\w*(?:\.\w+)+): (.+)", re.DOTALL)
 """The place in the file that a warning begins with."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ProblemRow:
     """One problem."""
 
@@ -62,7 +62,15 @@ def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
     """Return the problems of a study, in the order of their lines."""
     if not study.is_toml:
         return tuple(
-            ProblemRow(fault, (), "The file", "file", problem.message, problem.hint, problem.line)
+            ProblemRow(
+                fault=fault,
+                element=(),
+                name="The file",
+                icon="file",
+                message=problem.message,
+                hint=problem.hint,
+                line=problem.line,
+            )
             for fault, problem in zip(study.faults, study.problems, strict=True)
         )
     places = places_of(study.text)
@@ -97,7 +105,15 @@ def _row(study: Study, fault: Fault, line: int | None) -> ProblemRow:
     inside = fault.path[len(element) :]
     message = capitalised(fault.message)
     name = ", ".join((kind_and_title(study.document, element), *map(label_of, inside)))
-    return ProblemRow(fault, element, name, icon_of(element, study.document), message, fault.hint, line)
+    return ProblemRow(
+        fault=fault,
+        element=element,
+        name=name,
+        icon=icon_of(element, study.document),
+        message=message,
+        hint=fault.hint,
+        line=line,
+    )
 
 
 REST_MS: Final = 500

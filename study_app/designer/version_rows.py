@@ -25,7 +25,7 @@ MOST_KEPT: Final = 40
 _STATED: Final = re.compile(r"""^\s*version\s*=\s*["']([^"']+)""", re.MULTILINE)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class VersionChip:
     """The chip of the version: tone, icon, words, what its tip says; and what the button that saves says."""
 
@@ -51,11 +51,13 @@ def version_chip(standing: Standing, known: Iterable[Run]) -> VersionChip:
     save = f"Save {standing.version} …" if standing.asks else "Save"
     if not standing.was:
         words = "Piloted" if any(run.pilots for run in known) else "Rehearsed" if known else "Not run yet"
-        return VersionChip("neutral", "ring", words, tip or "No session was run with this study", save)
+        return VersionChip(
+            tone="neutral", icon="ring", words=words, tip=tip or "No session was run with this study", save=save
+        )
     if standing.sessions:
         words = f"{standing.version}, run by {standing.sessions}"
-        return VersionChip("ok", "check", words, tip, save)
-    return VersionChip("accent", "pen", f"{standing.version}, was {standing.was}", tip, save)
+        return VersionChip(tone="ok", icon="check", words=words, tip=tip, save=save)
+    return VersionChip(tone="accent", icon="pen", words=f"{standing.version}, was {standing.was}", tip=tip, save=save)
 
 
 def counts(run: Run) -> str:

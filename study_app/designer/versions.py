@@ -307,7 +307,7 @@ class Changes(Card):
         self.setFocusProxy(self.version)
         for part in (self.top, self.note, self.difference):
             part.hide()
-        place.pane.add_page(PanePage(TAB, "Changes", self, with_facts=False))
+        place.pane.add_page(PanePage(name=TAB, words="Changes", body=self, with_facts=False))
         self._resting = delayed(self, REST_MS, self.compare_now)
         place.pane.tab_shown.connect(lambda _tab: self.compare_now())
         place.header.version.clicked.connect(lambda: self.compare_with(""))

@@ -49,7 +49,7 @@ FACTS_FROM, FACTS_FROM_OWN, FACTS_LEAST = 740, 560, 110
 ASIDE_GAP = 24
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class PanePage:
     """A page of the pane."""
 
@@ -436,8 +436,12 @@ class DesignerPlace(Place):
         self.outline, self.new_page = OutlineCard(), NewStudyPage()
         self.pane = RightPane()
         self.measures = MeasuresPage()
-        self.pane.add_page(PanePage("measures", "Measures", self.measures, self.measures.controls, with_facts=False))
-        self.pane.add_page(PanePage("file", "File", self.file, self.file.aside, tip=tip("file")))
+        self.pane.add_page(
+            PanePage(
+                name="measures", words="Measures", body=self.measures, aside=self.measures.controls, with_facts=False
+            )
+        )
+        self.pane.add_page(PanePage(name="file", words="File", body=self.file, aside=self.file.aside, tip=tip("file")))
         self.parts = Arrangement(self.header, self.outline, self.form, self.pane, self.file, self.problems)
         self.sides = self.parts.sides
         self.adding, self.nothing = AddList(self), NoStudyCard()

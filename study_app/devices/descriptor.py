@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from functools import partial
 from pathlib import Path
 from pkgutil import resolve_name
@@ -47,6 +47,7 @@ class Backend:
 
     name: str
     by: str
+    _: KW_ONLY
     state: str
     can: str
     why: str = ""

@@ -68,7 +68,7 @@ def _felt_and_emulated(
             failures,
             icon="fast_forward",
             kind="simulated",
-            probe=lambda: [Backend(twin, "the program", READY, can)],
+            probe=lambda: [Backend(twin, "the program", state=READY, can=can)],
             moves_by_itself=True,
             stop_button=stop_button,
             options=emulated_options,
@@ -117,7 +117,12 @@ DEVICES: Final = (
         degrees_of_freedom=3,
         open=lambda request: opened(resolve_name("study_app.devices.simulated:MouseDevice")(**request.limits)),
         probe=lambda: [
-            Backend("mouse", "the window", READY, "visual only, no force: the ball moves as it would in the liquid")
+            Backend(
+                "mouse",
+                "the window",
+                state=READY,
+                can="visual only, no force: the ball moves as it would in the liquid",
+            )
         ],
         pointer=True,
     ),
@@ -131,7 +136,9 @@ DEVICES: Final = (
             resolve_name("study_app.devices.simulated:ScriptedDevice")(request.random, **request.limits)
         ),
         probe=lambda: [
-            Backend("scripted", "the program", READY, "simulated hand, no force; every row is marked as simulated")
+            Backend(
+                "scripted", "the program", state=READY, can="simulated hand, no force; every row is marked as simulated"
+            )
         ],
         moves_by_itself=True,
     ),

@@ -16,7 +16,7 @@ WIDTH: Final = 100
 NOTHING_WRONG: Final = "No problem was found."
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
     """One failure mode: its ``number`` in the list, and whether it is present.
 
@@ -97,7 +97,7 @@ def _indented(words: str, by: int) -> str:
     return fill(words, WIDTH, initial_indent=space, subsequent_indent=space, break_long_words=False)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FailureMode:
     """A failure mode: the state without it, its symptom for the user, cause, cure, and how it is detected.
 
@@ -156,8 +156,17 @@ class FailureTable:
 
         def finding(number: int, mode: FailureMode) -> Finding:
             state: State = "found" if mode.id in found else "ok" if mode.id in passed else "not checked"
-            texts = mode.cause, mode.cure, mode.known_by, mode.paste
-            return Finding(number, mode.id, mode.tested, mode.symptom, state, *texts)
+            return Finding(
+                number=number,
+                id=mode.id,
+                tested=mode.tested,
+                symptom=mode.symptom,
+                state=state,
+                cause=mode.cause,
+                cure=mode.cure,
+                known_by=mode.known_by,
+                paste=mode.paste,
+            )
 
         return tuple(finding(number, mode) for number, mode in enumerate(self.modes, start=1))
 

@@ -282,7 +282,9 @@ def dynamics_of(
                 count_m = count_m or bench.get("count_m")
                 mass_kg = mass_kg or max(min(bench["mass_kg"]), 0.0)
     assumed = tuple(word for word, value in (("count_m", count_m), ("mass_kg", mass_kg)) if not value)
-    return Dynamics(delay_s, count_m or UNKNOWN.count_m, mass_kg or UNKNOWN.mass_kg, assumed=assumed)
+    return Dynamics(
+        delay_s=delay_s, count_m=count_m or UNKNOWN.count_m, mass_kg=mass_kg or UNKNOWN.mass_kg, assumed=assumed
+    )
 
 
 def examine(

@@ -19,6 +19,7 @@ from study_app.haptics.kernels.c_functions import fence, record_at
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.plant import move
 from study_app.haptics.model.layout import records
+from study_app.haptics.model.ranges import Vector
 
 STAY, POINT, HOLD, REACH, FOLLOW = range(5)
 
@@ -215,7 +216,7 @@ class HandOrders:
         self.state.handle.held = int(held)
 
     @property
-    def force_n(self) -> tuple[float, float, float]:
+    def force_n(self) -> Vector:
         """The force of the motors on the handle [N, hand frame]."""
         x, y, z = self.state.handle.force_n
         return float(x), float(y), float(z)
@@ -276,7 +277,7 @@ class HandOrders:
         self._post(STAY)
 
     @property
-    def aim_m(self) -> tuple[float, float, float]:
+    def aim_m(self) -> Vector:
         """The present target of the hand or pointer [m, hand frame]."""
         x, y, z = self.state.hand.aim_m
         return float(x), float(y), float(z)
@@ -295,7 +296,7 @@ class HandOrders:
         hand.tremor_hz = [[lowest + (highest - lowest) * draw() for _ in range(WAVES)] for _ in range(3)]
         hand.tremor_turn = [[draw() for _ in range(WAVES)] for _ in range(3)]
 
-    def _inside(self, x_m: float, y_m: float, z_m: float) -> tuple[float, float, float]:
+    def _inside(self, x_m: float, y_m: float, z_m: float) -> Vector:
         """Return the nearest place the handle can reach."""
         x, y, z = (min(max(v, -half), half) for v, half in zip((x_m, y_m, z_m), self.workspace_m, strict=True))
         return x, y, z

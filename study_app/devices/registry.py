@@ -133,9 +133,9 @@ def backends() -> list[Backend]:
         Backend(
             f"{one.name} ({one.package})",
             "entry point",
-            NOT_AVAILABLE,
-            f"a device of the plug-in {one.package}",
-            f"it cannot be used ({one.fault}): update or uninstall the package {one.package}",
+            state=NOT_AVAILABLE,
+            can=f"a device of the plug-in {one.package}",
+            why=f"it cannot be used ({one.fault}): update or uninstall the package {one.package}",
         )
         for one in DEVICES.plug_ins
         if one.fault
@@ -147,4 +147,6 @@ def _probed(device: DeviceDescriptor) -> list[Backend]:
         return list(device.probe())
     except Exception as error:  # noqa: BLE001 - shown: one device must not hide the others
         reason = " ".join(str(error).split()) or type(error).__name__
-        return [Backend(device.usage, device.title, NOT_AVAILABLE, "", f"it cannot be looked for: {reason}")]
+        return [
+            Backend(device.usage, device.title, state=NOT_AVAILABLE, can="", why=f"it cannot be looked for: {reason}")
+        ]

@@ -66,7 +66,12 @@ class SimulatedDevice(HandOrders, Device):
     def dynamics(self) -> Dynamics:
         handle = self.state.handle
         lag_s = 0.0 if self.state.measures_velocity else None
-        return Dynamics(1e-3 * float(handle.delay), float(handle.quantum_m), float(handle.mass_kg), lag_s)
+        return Dynamics(
+            delay_s=1e-3 * float(handle.delay),
+            count_m=float(handle.quantum_m),
+            mass_kg=float(handle.mass_kg),
+            velocity_lag_s=lag_s,
+        )
 
     def measure_velocity(self) -> None:
         """Report the handle's velocity with every sample, like devices with tachometers."""

@@ -8,7 +8,9 @@ from typing import TypeAlias
 
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.scene import Scene
+from study_app.protocol.model import Protocol
 from study_app.protocol.trials.tasks import Stroke
+from study_app.session.preflight import PredictedDelivery
 from study_app.workers.client import WorkerClient
 
 
@@ -30,7 +32,7 @@ class Costs:
     effects: tuple[EffectCost, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Errors:
     """The errors of a scene against the exact definition (``evidence.reference_model``), along programmed paths.
 
@@ -58,7 +60,15 @@ class Question:
     dynamics: Dynamics = UNKNOWN
 
 
-AppraisalClient: TypeAlias = WorkerClient[Question, Costs | Errors | None]
+@dataclass(frozen=True, slots=True)
+class DeliveryQuestion:
+    """A study of which the trials that would not be delivered are predicted, for a delay [ticks]."""
+
+    protocol: Protocol
+    delay_ticks: int
+
+
+AppraisalClient: TypeAlias = WorkerClient[Question | DeliveryQuestion, Costs | Errors | PredictedDelivery | None]
 
 
 def start_appraisal_worker() -> AppraisalClient:

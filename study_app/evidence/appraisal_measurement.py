@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from study_app.evidence import reference_model
-from study_app.evidence.appraisal import Costs, EffectCost, Errors, Question
+from study_app.evidence.appraisal import Costs, DeliveryQuestion, EffectCost, Errors, Question
 from study_app.evidence.cost import measure
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, Dynamics
 from study_app.haptics.model.effects import NAMED
@@ -16,6 +16,8 @@ from study_app.haptics.model.motion import Motion, path
 from study_app.haptics.model.scene import Effect, Everywhere, Knee, Scene
 from study_app.haptics.runtime.offline import samples_along, simulate
 from study_app.protocol.trials.tasks import Stroke
+from study_app.session.preflight import PredictedDelivery
+from study_app.session.simulated.predicted_delivery import predicted_delivery
 from study_app.workers.server import Send, Stop
 
 BATCHES: Final = 60
@@ -64,7 +66,7 @@ def errors(scene: Scene) -> Errors:
         force_n = max(newtons for _, newtons in found)
         wake = max(share for share, _ in found) if "wake" in kept else None
     left_out = tuple(effect for effect in liquid.effects if effect not in kept)
-    return Errors(wake, force_n, lag_s(scene), left_out)
+    return Errors(wake=wake, force_n=force_n, lag_s=lag_s(scene), left_out=left_out)
 
 
 def lag_s(scene: Scene) -> float:
@@ -131,10 +133,15 @@ def withheld_share(scene: Scene, stroke: Stroke, dynamics: Dynamics) -> float:
     return float(samples["withheld_n"].sum()) / permitted_n if permitted_n > 0.0 else 0.0
 
 
-def appraise(question: Question, send: Send, stop: Stop) -> Errors | None:
-    """Send the `Costs` of a scene, then return its `Errors`; None if another question waits."""
+def appraise(question: Question | DeliveryQuestion, send: Send, stop: Stop) -> Errors | PredictedDelivery | None:
+    """Send the `Costs` of a scene, then return its `Errors`; None if another question waits.
+
+    Of a study return the trials that would not be delivered.
+    """
     if stop():
         return None
+    if isinstance(question, DeliveryQuestion):
+        return predicted_delivery(question.protocol, question.delay_ticks)
     send(costs(question.scene))
     if stop():
         return None

@@ -73,7 +73,9 @@ class Expected(NamedTuple):
 
 def expected(scene: Scene, delay_ticks: int = ASSUMED_TICKS) -> Expected:
     """Measure a scene's cost and predict its error; of several liquids that with the greatest one."""
-    return Expected(measure(scene).scene_ns, *_errors(resolve(scene), delay_ticks))
+    share, error_n, causes, against = _errors(resolve(scene), delay_ticks)
+    cost_ns = measure(scene).scene_ns
+    return Expected(cost_ns=cost_ns, error_share=share, error_n=error_n, causes=causes, against=against)
 
 
 def error_report(scene: Scene, delay_ticks: int = ASSUMED_TICKS) -> str:
@@ -120,13 +122,13 @@ def _of_one(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, C
         against = f"the definition of {' and '.join(kept).replace('_', ' ') or 'nothing'}"
     if not true_n.any():
         return 0.0, 0.0, Causes(), against
-    truth = Truth("", "", (Case(motion, true_n, motion.t_s >= SETTLED * motion.t_s[-1]),))
+    truth = Truth(name="", source="", cases=(Case(motion, true_n, motion.t_s >= SETTLED * motion.t_s[-1]),))
     steps_n = [true_n, *_forces(alone, motion, Dynamics(delay_ticks / alone.rate_hz, COUNT_M))]
     law, acceleration, velocity, limits = (
         error_of([true_n + after_n - before_n], truth).rms for before_n, after_n in itertools.pairwise(steps_n)
     )
     whole = error_of(steps_n[-1:], truth)
-    return whole.rms, whole.rms_n, Causes(velocity, acceleration, limits, law), against
+    return whole.rms, whole.rms_n, Causes(velocity=velocity, acceleration=acceleration, limits=limits, law=law), against
 
 
 def _forces(scene: Scene, motion: Motion, dynamics: Dynamics) -> Iterator[Floats]:

@@ -47,7 +47,7 @@ def respond(scene: Scene, motion: Motion) -> Response:
     relative_mps = velocity_mps - wake_mps
     slopes_nspm = [resistance_nspm(scene, speed) for speed in np.linalg.norm(relative_mps, axis=1).tolist()]
     force_n = -np.array(slopes_nspm)[:, np.newaxis] * relative_mps
-    return Response(velocity_mps, wake_mps, force_n, size_mps)
+    return Response(velocity_mps=velocity_mps, wake_mps=wake_mps, force_n=force_n, size_mps=size_mps)
 
 
 def resistance_nspm(scene: Scene, speed_mps: float) -> float:

@@ -58,7 +58,7 @@ def stir(scale: float, rate_hz: float) -> Motion:
     radius_m = scale * RADIUS_M
     position_m = radius_m * np.column_stack([np.cos(angle), 0.1 * np.cos(2 * angle), np.sin(angle)])
     along = radius_m * np.column_stack([-np.sin(angle), -0.2 * np.sin(2 * angle), np.cos(angle)])
-    return Motion(t_s, position_m, along * angular_per_s[:, np.newaxis])
+    return Motion(t_s, position_m, velocity_mps=along * angular_per_s[:, np.newaxis])
 
 
 def stroke(speed_mps: float, rate_per_s: float, cycles: int, rate_hz: float) -> Motion:
@@ -72,12 +72,12 @@ def with_velocity(motion: Motion) -> Motion:
     """Return the motion with its velocities; without any, with those of central differences."""
     if motion.velocity_mps is not None or len(motion.t_s) < 2:
         return motion
-    return Motion(motion.t_s, motion.position_m, np.gradient(motion.position_m, motion.t_s, axis=0))
+    return Motion(motion.t_s, motion.position_m, velocity_mps=np.gradient(motion.position_m, motion.t_s, axis=0))
 
 
 def along_x(t_s: Floats, way_m: Floats, velocity_mps: Floats) -> Motion:
     """Return a motion along x."""
-    return Motion(t_s, vectors_x(way_m), vectors_x(velocity_mps))
+    return Motion(t_s, vectors_x(way_m), velocity_mps=vectors_x(velocity_mps))
 
 
 COUNT_M: Final = 38e-6
@@ -129,7 +129,7 @@ class Case:
     counted: NDArray[np.bool_]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Truth:
     """A reference by its name on tables and figures, with its ``source``.
 
@@ -149,7 +149,7 @@ def definition(scene: Scene, motion: Motion) -> Truth:
     """Return drag and wake of the scene's liquid by the literal definition, for a motion with its velocities."""
     force_n = respond(scene, motion).force_n
     source = "exact definition of the wake: full length, full rate, float64, exact sums"
-    return Truth("definition", source, (Case(motion, force_n, np.ones(len(force_n), bool)),))
+    return Truth(name="definition", source=source, cases=(Case(motion, force_n, np.ones(len(force_n), bool)),))
 
 
 def measured_drag_n(liquid: Liquid, diameter_m: float, speed_mps: Floats) -> Floats:
@@ -189,7 +189,7 @@ def steady(scene: Scene) -> Truth | None:
     above = max(drag * reynolds / 24 / (1 + 3 / 16 * reynolds) - 1 for reynolds, drag in slow)  # C_d of Oseen 1910
     scatter = f", which lie up to {100 * above:.0f} % above Oseen's law of slow flow"
     low = scatter if known[0] * per_mps < OSEEN_REYNOLDS else ""
-    return Truth("steady drag", f"experiments with spheres, {between}{low}", tuple(cases))
+    return Truth(name="steady drag", source=f"experiments with spheres, {between}{low}", cases=tuple(cases))
 
 
 def oscillation(scene: Scene) -> Truth:
@@ -210,7 +210,7 @@ def oscillation(scene: Scene) -> Truth:
     force_n = -damping_nspm * velocity_mps - inertia_kg * acceleration_mps2
     counted = motion.t_s >= motion.t_s[-1] * (CYCLES - 2) / CYCLES
     source = f"exact for creeping flow (Landau & Lifshitz §24), {rate_per_s / (2 * math.pi):.2g} Hz"
-    return Truth("oscillation", source, (Case(motion, vectors_x(force_n), counted),))
+    return Truth(name="oscillation", source=source, cases=(Case(motion, vectors_x(force_n), counted),))
 
 
 def start(scene: Scene) -> Truth:
@@ -228,7 +228,7 @@ def start(scene: Scene) -> Truth:
     force_n = -6 * math.pi * mu * radius_m * speed_mps * (1 + history)
     motion = along_x(t_s, speed_mps * np.maximum(t_s - tick_s / 2, 0.0), velocity_mps)
     source = "exact for creeping flow (Basset 1888), from 10 ms after the start on"
-    return Truth("start", source, (Case(motion, vectors_x(force_n), t_s >= UNCOUNTED_S),))
+    return Truth(name="start", source=source, cases=(Case(motion, vectors_x(force_n), t_s >= UNCOUNTED_S),))
 
 
 def creeping_mps(scene: Scene) -> float:
@@ -277,7 +277,14 @@ def error_of(forces_n: Sequence[Floats], truth: Truth) -> Error:
     angles = np.degrees(np.arctan2(cross, (felt_n[counts] * true_n[counts]).sum(axis=1)))
     target = max(RELATIVE, PERCEPTIBLE_N / true_rms_n)
     direction_deg = _rms(angles) if len(angles) else math.nan
-    return Error(rms_n, most_n, rms_n / true_rms_n, most_n / true_most_n, direction_deg, target)
+    return Error(
+        rms_n=rms_n,
+        most_n=most_n,
+        rms=rms_n / true_rms_n,
+        most=most_n / true_most_n,
+        direction_deg=direction_deg,
+        target=target,
+    )
 
 
 def _rms(values: Floats) -> float:

@@ -9,6 +9,7 @@ from PySide6.QtGui import QDesktopServices, QGuiApplication
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.display.display_check import check_display
+from study_app.gui.key_presses import key_presses
 from study_app.gui.theme.icons import logo
 from study_app.gui.theme.theme import LIGHT
 
@@ -30,6 +31,7 @@ def application_here() -> QApplication:
     application.setStyle("Fusion")
     application.setWindowIcon(logo(32, LIGHT.accent, LIGHT.on_accent))
     application.setQuitOnLastWindowClosed(False)
+    key_presses()
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     return application
 

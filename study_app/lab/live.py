@@ -79,7 +79,7 @@ SPACING_NS: Final = 50_000_000  # duration of a fade: with faster changes by a s
 _LONGEST_GAP_NS: Final = 200_000_000
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
     """Place of the hand [m, hand frame], the force on it [N], the wake at the body [m/s, scene], and the servo's state.
 

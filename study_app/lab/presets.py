@@ -15,7 +15,7 @@ from study_app.store.atomic import write_file
 from study_app.workspace import workspace
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Choice:
     """A liquid for a side: its file or shipped name, its id there, and its displayed name."""
 
@@ -66,7 +66,10 @@ def liquids_of(source: str) -> tuple[Choice, ...]:
     ProtocolError
         Every problem of the file.
     """
-    return tuple(Choice(source, name, f"{spoken(name)} ({Path(source).stem})") for name in load_scenes(source))
+    return tuple(
+        Choice(source=source, liquid=name, title=f"{spoken(name)} ({Path(source).stem})")
+        for name in load_scenes(source)
+    )
 
 
 def preset_text(setting: Setting) -> str:

@@ -27,7 +27,7 @@ Floats: TypeAlias = NDArray[np.float64]
 MOST_POINTS: Final = 400
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Tail:
     """The moving elements of a wake as places, from the oldest to the newest, thinned to at most 400.
 
@@ -93,7 +93,7 @@ _ROW: Final = np.dtype(
 )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Trace:
     """The last 2.5 s of one motion for A and for B; ``t_s`` (n,) ends at 0, the newest sample.
 

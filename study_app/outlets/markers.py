@@ -11,7 +11,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from time import monotonic
 from typing import Any, Final, Protocol
 
@@ -141,6 +141,7 @@ class SinkKind:
 
     name: str
     title: str
+    _: KW_ONLY
     example: str
     open: Callable[[str, Callable[[], int]], Sink]
 

@@ -27,7 +27,7 @@ class SampledServo(Protocol):
     def now_ns(self) -> int: ...
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class OutletStatus:
     """The state of an outlet, for the pre-flight.
 
@@ -119,16 +119,16 @@ class Outlets:
         lost = self.lost
         found = [
             OutletStatus(
-                one.title,
+                title=one.title,
                 listens=one.listens,
                 lost=lost.get(one.title, ""),
                 shows_force=self._double and one is self._samples,
             )
             for one in self._open()
         ]
-        found += [OutletStatus(title, lost=reason) for title, reason in self._failed.items()]
+        found += [OutletStatus(title=title, lost=reason) for title, reason in self._failed.items()]
         if self._withheld:
-            found.append(OutletStatus(SampleStream.title, withheld=True))
+            found.append(OutletStatus(title=SampleStream.title, withheld=True))
         return tuple(found)
 
     def mark(self, marker: Marker) -> None:

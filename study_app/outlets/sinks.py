@@ -160,8 +160,8 @@ def _port(kind: Callable[[str], TriggerPort]) -> Callable[[str, Callable[[], int
 
 
 SINKS: Final = (
-    SinkKind("lsl", MarkerStream.title, "lsl", lambda _place, now_ns: MarkerStream(now_ns)),
-    SinkKind("parallel", ParallelPort.title, "parallel:/dev/parport0", _port(ParallelPort)),
-    SinkKind("serial", SerialPort.title, "serial:/dev/ttyUSB0", _port(SerialPort)),
+    SinkKind("lsl", MarkerStream.title, example="lsl", open=lambda _place, now_ns: MarkerStream(now_ns)),
+    SinkKind("parallel", ParallelPort.title, example="parallel:/dev/parport0", open=_port(ParallelPort)),
+    SinkKind("serial", SerialPort.title, example="serial:/dev/ttyUSB0", open=_port(SerialPort)),
 )
 """The kinds of sinks."""

@@ -16,7 +16,7 @@ from study_app.protocol.checks.expected_precision import precision_rows
 from study_app.protocol.checks.warnings import warnings
 from study_app.protocol.groups import sessions_differ
 from study_app.protocol.model import Block, Condition, Limits, Protocol
-from study_app.protocol.orders.balance import block_order_words
+from study_app.protocol.orders.balance import block_order_words, planned_participants
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
 from study_app.protocol.orders.durations import Variant, block_duration_s, expected_duration_s, variants
 from study_app.protocol.presented.presentation import link_words
@@ -44,6 +44,10 @@ BLINDINGS = {
     "double": "double-blind: the operator sees no force",
     "single": "single-blind: the operator sees force and wake",
 }
+GROUP_WORDS = {
+    "randomised": "randomised in permuted blocks",
+    "pre-existing": "pre-existing: entered for each participant, not randomised",
+}
 
 
 def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force: str = "") -> str:
@@ -65,7 +69,7 @@ def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force
         decided = list(protocol.analysis.described(named))
     sections = (
         _head(protocol, language),
-        *(_session(one, language) for one in variants(protocol)),
+        *(_session(one, planned_participants(protocol, one.group), language) for one in variants(protocol)),
         *(_block(protocol, block, language, delay_ticks) for block in protocol.blocks_in_order),
         _titled("Liquids", _liquids(protocol)),
         ("Effects in each liquid", *(f"  {line}".rstrip() for line in effects[:-1])),
@@ -114,6 +118,7 @@ def _head(protocol: Protocol, language: str) -> Iterable[str]:
     rows = [
         ("Languages", ", ".join(study.languages)),
         ("Parts", f"{protocol.parts}"),
+        *([("Groups", GROUP_WORDS[study.group_assignment])] if protocol.groups else ()),
         *(("Group", f"{name}, share {group.share}") for name, group in protocol.groups.items()),
         ("Answers", f"{spread(counts)} per {'session' if sessions_differ(protocol) else 'participant'}"),
         ("Blinding", BLINDINGS[study.blinding]),
@@ -132,7 +137,7 @@ def spread(numbers: Sequence[int]) -> str:
     return f"{least}" if least == largest else f"{least} to {largest}"
 
 
-def _session(one: Variant, language: str) -> Iterable[str]:
+def _session(one: Variant, planned: int | None, language: str) -> Iterable[str]:
     protocol, title = one.protocol, "Session"
     if one.name:
         minutes = f"about {expected_duration_s(protocol) / 60:.0f} min"
@@ -149,8 +154,10 @@ def _session(one: Variant, language: str) -> Iterable[str]:
             kind, trials = f"{block.phase} trials", counted(order_of(protocol, block).trials, "trial")
             words = f"{protocol.text(block.title, language)}: {trials}"
         rows.append((f"{number:>2}", kind, words))
-    several = len(protocol.main_blocks) > 1
-    return (*_titled(title, rows), *((f"  Order of blocks: {block_order_words(protocol)}",) if several else ()))
+    if len(protocol.main_blocks) < 2:
+        return _titled(title, rows)
+    order = block_order_words(protocol, planned, in_group=one.group is not None)
+    return (*_titled(title, rows), f"  Order of blocks: {order}")
 
 
 def _block(protocol: Protocol, block: Block, language: str, delay_ticks: int) -> Iterable[str]:
@@ -256,7 +263,8 @@ def _order(block: Block) -> str:
 def _beside_the_trials(protocol: Protocol, block: Block, language: str) -> Iterator[tuple[str, str]]:
     """Yield how rows are assigned, and when there are breaks."""
     if block.order in ("williams", "latin") and len(block.conditions) > 1:
-        yield "Rows", "assigned by the number in the participant's id (P007 is number 7), not by the seed"
+        of_id = "assigned by the number in the participant's id (P007 is number 7), not by the seed"
+        yield "Rows", "assigned by the participant's place in the group, not by the seed" if protocol.groups else of_id
     if block.break_page is not None:
         title = protocol.text(protocol.pages[block.break_page].title, language)
         yield (

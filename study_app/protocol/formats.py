@@ -20,8 +20,14 @@ from study_app.protocol.wording.languages import LANGUAGES, words
 
 LATEST: Final = 2
 TABLES: Final = ("stimuli", "designs", "methods", "groups", "sequences")
-LEVEL_LIMITS: Final = {"level_error_percent": 2, "level_error_ms": 2, "pace_error_percent": 40, "attempts": 3}
-"""Limits of what an interval delivers, with their defaults."""
+LEVEL_LIMITS: Final = {
+    "level_error_percent": 2,
+    "level_error_ms": 2,
+    "pace_error_percent": 40,
+    "attempts": 3,
+    "missing_percent": 5,
+}
+"""Limits of what an interval delivers, and of how many trials may be missing, with their defaults."""
 
 
 def _later(table: type[Table]) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Mapping
-from typing import Annotated, Any, Final, Protocol, Self, TypeAlias
+from typing import Annotated, Any, Final, Literal, Protocol, Self, TypeAlias
 
 from pydantic import Field, model_validator
 
@@ -12,6 +12,8 @@ from study_app.haptics.model.ranges import later, within
 from study_app.protocol.source.document import Path, entries
 from study_app.protocol.table import Id, Table, invalid
 
+GroupAssignment: TypeAlias = Literal["randomised", "pre-existing"]
+ASSIGNMENT: Final = ("study", "group_assignment")
 MOST_SHARE: Final = 20
 SEQUENCES: Final = ("sequence", "sequences.*", "groups.*.sequence", "groups.*.sequences.*")
 """Places of lists of steps in a document, as patterns."""
@@ -24,7 +26,8 @@ class Group(Table):
     """A group of participants; a group without a sequence has that of the study."""
 
     share: Annotated[int, within(1, MOST_SHARE, "a share is a small whole number")] = Field(
-        default=1, description="How many participants of each round of allocations come into this group."
+        default=1,
+        description="Its participants per round of randomisation; of a pre-existing group, its part of the plan.",
     )
     sequence: Steps = later(default=(), min_length=1, description="Its pages, blocks and forms, in every session.")
     sequences: Sequences = later(default=(), min_length=1, description="Its steps of session 1, 2 …")
@@ -43,6 +46,11 @@ def sequences_in(document: Any) -> Iterator[tuple[Path, tuple[Any, ...]]]:
         for path, steps in entries(document, pattern):
             if isinstance(steps, tuple):
                 yield path, steps
+
+
+def next_group(shares: Mapping[str, int], sizes: Mapping[str, int]) -> str:
+    """Return the group that is furthest behind its share, the first of several; `sizes` may lack empty groups."""
+    return min(shares, key=lambda name: sizes.get(name, 0) / shares[name])
 
 
 class HasSteps(Protocol):

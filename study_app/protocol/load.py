@@ -24,9 +24,11 @@ from study_app.protocol.source.files import (
     TABLE,
     at_hand,
     is_footage,
+    is_utf16,
     protocol_hash,
     shipped,
     source_bytes,
+    without_mark,
 )
 from study_app.protocol.source.problems import Fault, did_you_mean, faults_of
 from study_app.protocol.table import Table
@@ -184,12 +186,13 @@ def _with_liquids_of_files(document: dict[str, Any]) -> tuple[dict[str, Any], li
     resolved: dict[str, Any] = dict(liquids)
     faults: list[Fault] = []
     for name in named:
-        table, alone = liquids[name], ("belongs into the liquid file", "give file alone")
-        faults += [Fault(("liquids", name, key), *alone, kind="surplus") for key in table if key != "file"]
+        table, alone = liquids[name], Fault((), "belongs into the liquid file", "give file alone", kind="surplus")
+        faults += [alone._replace(path=("liquids", name, key)) for key in table if key != "file"]
         try:
             resolved[name] = _liquid_of_file(table["file"], texts)
         except _LiquidFileFault as fault:
-            faults.append(Fault(("liquids", name, "file"), *fault.args))
+            message, hint = fault.args
+            faults.append(Fault(("liquids", name, "file"), message, hint))
             resolved[name] = {"density_kg_m3": 1000.0}  # stands in, so that nothing but the file is reported
     return {key: value for key, value in document.items() if key != TABLE} | {"liquids": resolved}, faults
 
@@ -245,18 +248,20 @@ def _holds_study(document: Mapping[str, Any]) -> bool:
 
 def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
     """Return the tables of a text, arrays as tuples, and the lines they stand on (ProtocolError if it is no TOML)."""
+    if is_utf16(source):
+        raise ProtocolError(name, (Problem("file", "is UTF-16 text", hint="save it as UTF-8"),))
     try:
-        text = source.decode("utf-8").replace("\r\n", "\n")
+        text = without_mark(source).decode("utf-8").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         line = source.count(b"\n", 0, error.start) + 1
-        raise ProtocolError(name, (Problem("file", "is not UTF-8 text", line, "save it as UTF-8"),)) from error
+        raise ProtocolError(name, (Problem("file", "is not UTF-8 text", line, hint="save it as UTF-8"),)) from error
     try:
         document: dict[str, Any] = frozen(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:  # which names the place in its message
         sentence = re.sub(r" \(at .*\)$", "", str(error))
         place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
         line, column = (int(place[1]), int(place[2])) if place else (text.count("\n") + 1, 1)
-        broken = Problem("file", f"not TOML at column {column}: {sentence}", line, "see toml.io for the notation")
+        broken = Problem("file", f"not TOML at column {column}: {sentence}", line, hint="see toml.io for the notation")
         raise ProtocolError(name, (broken,)) from error
     except RecursionError as error:
         broken = Problem("file", "is nested too deeply", hint="use fewer brackets within brackets")
@@ -278,7 +283,8 @@ def _validated(model: type[M], document: Mapping[str, Any]) -> tuple[M | None, l
     except ValidationError as error:
         return None, faults + faults_of(error, document, schema(model))
     if isinstance(velocity := getattr(getattr(found, "scene", None), "velocity", None), Withdrawn):
-        return None, [*faults, Fault(("scene", "velocity", "kind"), *velocity.refusal)]
+        message, hint = velocity.refusal
+        return None, [*faults, Fault(("scene", "velocity", "kind"), message, hint)]
     return found, faults
 
 
@@ -289,7 +295,7 @@ def located(faults: Iterable[Fault], places: Places) -> tuple[Problem, ...]:
         return _LONG.sub(lambda found: f"{found[0][:SHOWN]}…", words)
 
     problems = (fault.located(places) for fault in faults)
-    short = [Problem(shortened(it.place), shortened(it.message), it.line, shortened(it.hint)) for it in problems]
+    short = [Problem(shortened(it.place), shortened(it.message), it.line, hint=shortened(it.hint)) for it in problems]
     return tuple(sorted(short, key=lambda problem: problem.line or 0))
 
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
-from study_app.haptics.model.ranges import DensityKgM3, DiameterM, DragCoefficient, FadeS, Metres, later, within
+from study_app.haptics.model.ranges import DensityKgM3, DiameterM, DragCoefficient, FadeS, Metres, Vector, later, within
 from study_app.haptics.model.scene import (
     FADE_S,
     Accuracy,
@@ -25,7 +25,7 @@ from study_app.haptics.model.scene import (
     SceneScale,
 )
 from study_app.protocol.blocks import Block, Compared, Kind, OrderOfBlocks
-from study_app.protocol.groups import Group, Sequences, Steps, every_step
+from study_app.protocol.groups import Group, GroupAssignment, Sequences, Steps, every_step
 from study_app.protocol.questionnaires import Questionnaire
 from study_app.protocol.questions import Scale
 from study_app.protocol.table import Body as PageBody
@@ -109,7 +109,12 @@ class StudyHead(Table):
         default="fixed",
         description="Order of blocks, of the main ones, which take each other's places; pages, forms and practice "
         "stay. fixed: as written; balanced: counterbalanced, in rows of a Williams design by the number in the "
-        "participant's id; random: drawn in each session.",
+        "participant's id, or by the place in the participant's group; random: drawn in each session.",
+    )
+    group_assignment: GroupAssignment = later(
+        default="randomised",
+        description="randomised: the program assigns participants to groups at random; pre-existing: groups describe "
+        "who participants are, such as experts and novices, and the operator enters the group in each session.",
     )
     credits: Credits | None = later(default=None, description="Authors, licence and citation that exports state.")
 
@@ -126,7 +131,7 @@ class DeviceNeeds(Table):
     )
 
     @property
-    def workspace_m(self) -> tuple[float, float, float]:
+    def workspace_m(self) -> Vector:
         """Full sizes of the tank, hand frame [m]."""
         x, y, z = self.workspace_mm
         return (x / 1000, y / 1000, z / 1000)
@@ -251,6 +256,11 @@ class Limits(Table):
     )
     attempts: Annotated[int, Field(ge=1, le=100)] | None = later(
         default=None, description="How often a trial of intervals is presented until it is delivered; default: 3."
+    )
+    missing_percent: Annotated[float, within(0, 100, "a share of the trials; 0: none may be missing")] | None = later(
+        default=None,
+        description="Share of a session's main trials of intervals that may be missing because they were not "
+        "delivered [%]; with more, the session is incomplete; default: 5.",
     )
 
 
@@ -490,6 +500,21 @@ class Protocol(Table):
     def blocks_in_order(self) -> tuple[Block, ...]:
         """All blocks in the order of the session."""
         return tuple(self.blocks[step] for step in self.steps if step in self.blocks)
+
+    @property
+    def shares(self) -> dict[str, int]:
+        """The share of each group, by name; empty without groups."""
+        return {name: group.share for name, group in self.groups.items()}
+
+    @property
+    def randomises(self) -> bool:
+        """Whether participants are assigned to groups at random."""
+        return bool(self.groups) and self.study.group_assignment == "randomised"
+
+    @property
+    def asks_group(self) -> bool:
+        """Whether groups are pre-existing, so that the operator enters each participant's group."""
+        return bool(self.groups) and not self.randomises
 
     @property
     def assigns_rows(self) -> bool:

@@ -13,7 +13,18 @@ from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
 from study_app.discovery import Registry
 from study_app.haptics.model.ranges import later, within
-from study_app.protocol.table import DIRECTIONS, Id, Localised, OfKinds, Printable, Table, invalid, text_in, unprintable
+from study_app.protocol.table import (
+    DIRECTIONS,
+    Id,
+    Localised,
+    OfKinds,
+    Printable,
+    Table,
+    characters,
+    invalid,
+    text_in,
+    unprintable,
+)
 
 POINTS = 7
 """Of the scale of statements."""
@@ -529,8 +540,8 @@ class Text(Question):
     def problem(self, answer: Value, context: Context) -> str | None:
         if not isinstance(answer, str) or not answer.strip():
             return "the text is empty: write one, or leave the question open"
-        if len(answer) > self.longest:
-            return f"the text has {len(answer)} characters: write at most {self.longest}"
+        if (length := len(characters(answer))) > self.longest:
+            return f"the text has {length} characters: write at most {self.longest}"
         if unprintable(answer, f"\n{DIRECTIONS}") is not None:
             return "the text holds a character that cannot be printed: take it out"
         return None

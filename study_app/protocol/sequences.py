@@ -15,8 +15,8 @@ first round, the next as many the second; each round assigns all rows in an orde
 stream of the *study*, not of the session, because sessions have seeds of their own and would not fill a round. So a
 session's row depends on the study's name, the block's name and the id alone. It is predictable, which does no harm:
 rows are rows of codes, and what a code stands for is sealed. An id without a number takes a row drawn from the id
-itself: even on average only. Who replaces a participant can be given that participant's rows: the session then takes
-the rows of that id.
+itself: even on average only. Who replaces a participant can be given that participant's rows. In a study with groups
+the number is the participant's place in the group, so that orders are even within each group.
 
 **Constrained orders.** All trials of a block are shuffled together: n codes, each r times. With ``max_repeats`` m a
 code comes at most m times in a row. With ``min_distance`` d two of its presentations are at least d trials apart: 2 is
@@ -130,9 +130,12 @@ def enrolment(participant: str) -> int | None:
     return int(numbers[-1]) if numbers else None
 
 
-def assigned_row(study: str, block: str, rows: int, participant: str) -> int:
-    """Return the row (from 0) that a participant takes in a block of a study."""
-    number = enrolment(participant)
+def assigned_row(study: str, block: str, rows: int, participant: str, place: int | None = None) -> int:
+    """Return the row (from 0) that a participant takes in a block of a study.
+
+    ``place`` is the number that assigns it (from 1); None: the number in the participant's id.
+    """
+    number = enrolment(participant) if place is None else place
     if number is None:
         return int(study_stream(study, f"row/{block}/{participant}").random() * rows)
     rounds, place = divmod(number - 1, rows)

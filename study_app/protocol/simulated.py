@@ -46,7 +46,7 @@ MODULUS: Final = 10.0
 _Z_75: Final = 0.6745
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TrialFeatures:
     """What reached the senses in one trial; all of it at the hand.
 
@@ -76,10 +76,12 @@ class TrialFeatures:
     force_delay_s: float = 0.0
 
 
-NO_FEATURES: Final = TrialFeatures(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_FEATURES: Final = TrialFeatures(
+    force_mean_n=0.0, force_peak_n=0.0, speed_rms_mps=0.0, push_share=0.0, roughness_n=0.0, delay_s=0.0
+)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Rater:
     """How one simulated person differs from the next.
 
@@ -122,7 +124,7 @@ def opinions(items: Iterable[str], trial: TrialFeatures, person: Rater) -> list[
     return [OPINIONS[item](impression) if item in OPINIONS else NO_OPINION for item in items]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Impression:
     """The trial in the rater's own terms, each from 0 to 1."""
 
@@ -449,6 +451,15 @@ def simulate_study(
             what = (trial.number, trial.code, due.level, due.arrangement, str(given))
             answered.append(trial_result(protocol, block, *what, catch=due.catch))
             yield SimulatedTrial(
-                person, block.id, trial.code, key.codes[block.id][trial.code], trial.number, due.catch,
-                arrangement_text(design, due.arrangement), due.standard, due.level, given, answered[-1].success,
-            )  # fmt: skip
+                participant=person,
+                block=block.id,
+                code=trial.code,
+                track=key.codes[block.id][trial.code],
+                trial=trial.number,
+                catch=due.catch,
+                arrangement=arrangement_text(design, due.arrangement),
+                standard=due.standard,
+                level=due.level,
+                answer=given,
+                success=answered[-1].success,
+            )

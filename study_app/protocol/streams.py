@@ -9,7 +9,7 @@ HMAC-SHA256 under a sub-key of the key's nonce, so that neither seed nor protoco
 **Groups** are allocated in permuted blocks. The participant with entry k of a folder is in the group at place k of
 permuted blocks. A permuted block holds every group as often as its share says, shuffled by a stream of the secret. So
 groups of share 1 never differ by more than one participant, and without the secret the next allocation cannot be
-predicted.
+predicted. The place of an entry in its group counts the entries of that group from 1; it assigns rows of squares.
 """
 
 from __future__ import annotations
@@ -92,6 +92,12 @@ def group_of(shares: Mapping[str, int], secret: bytes, entry: int) -> str:
     ``shares`` say how often each group comes in a permuted block, in any order; ``secret`` is the nonce of the sealed
     key.
     """
+    return place_in_group(shares, secret, entry)[0]
+
+
+def place_in_group(shares: Mapping[str, int], secret: bytes, entry: int) -> tuple[str, int]:
+    """Return the group of participant ``entry``, as `group_of`, and which participant of that group it is, from 1."""
     groups = [name for name in sorted(shares) for _ in range(shares[name])]
-    block, place = divmod(entry - 1, len(groups))
-    return shuffle(groups, secret_stream(secret, f"groups/{block + 1}").random)[place]
+    block, at = divmod(entry - 1, len(groups))
+    drawn = shuffle(groups, secret_stream(secret, f"groups/{block + 1}").random)
+    return drawn[at], block * shares[drawn[at]] + drawn[: at + 1].count(drawn[at])

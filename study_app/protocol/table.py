@@ -42,6 +42,37 @@ DIRECTIONS: Final = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
 """Characters that change the direction of what follows, and so can make a text read as another one."""
 
 
+_JOINER: Final = "\u200d"
+_MOST_JOINED: Final = 32  # code points; no letter of any script has as many
+_ATTACHED: Final = ("Mn", "Mc", "Me")
+_REGIONS: Final = range(0x1F1E6, 0x1F200)  # of which two are a flag
+_TONES: Final = range(0x1F3FB, 0x1F400)  # of skin
+_TAGS: Final = range(0xE0020, 0xE0080)  # that follow a flag
+
+
+def characters(text: str) -> list[str]:
+    """Return a text's characters as a person sees them: with accents, an emoji with all that belongs to it.
+
+    This is Unicode's rule for extended grapheme clusters without Korean letters written in parts.
+
+    Examples
+    --------
+    >>> [len(characters(text)) for text in ("e\u0301t", "👨‍👩‍👧", "🇫🇷🇩🇪")]
+    [2, 1, 2]
+    """
+    found: list[str] = []
+    for letter in text:
+        code = ord(letter)
+        before = found[-1] if found else ""
+        attached = unicodedata.category(letter) in _ATTACHED or letter == _JOINER or code in _TONES or code in _TAGS
+        joins = before.endswith(_JOINER) or (code in _REGIONS and len(before) == 1 and ord(before) in _REGIONS)
+        if before not in {"", "\n"} and (attached or joins) and len(before) < _MOST_JOINED:
+            found[-1] += letter
+        else:
+            found.append(letter)
+    return found
+
+
 _APART: Final = re.compile(r"\n[ \t]*\n")
 
 

@@ -35,7 +35,7 @@ DROPPED: Final = 2
 """Number of first reversals left out, which depend on the start of the track."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Staircase:
     """A rule.
 
@@ -199,21 +199,23 @@ class Answers(NamedTuple):
 
     def first(self, trials: int | None) -> Answers:
         """Return the answers to the first trials of each track; None: to all."""
-        levels, successes, *others = self
-        return Answers(levels[:, :trials], successes[:, :trials], *(one[:, :trials] for one in others))
+        return Answers(**{name: of_tracks[:, :trials] for name, of_tracks in self._asdict().items()})
 
     def given(self, places: Floats) -> list[Given]:
         """Return the answers of each track, at the nearest of ``places``: levels in u, ascending."""
         nearest, known = np.searchsorted((places[1:] + places[:-1]) / 2, self.levels), ~np.isnan(self.levels)
-        every = zip(nearest, self.successes, self.towards, self.before, self.done, known, strict=True)
-        return [Given(places, *(one[own] for one in track)) for *track, own in every]
+        of_tracks = {**self._asdict(), "places": nearest}
+        return [
+            Given(**{**{name: values[track][own] for name, values in of_tracks.items()}, "levels": places})
+            for track, own in enumerate(known)
+        ]
 
 
 # The level of the next trial of each track, and whether the track goes on; followed by whether answers are successes.
 Choice: TypeAlias = Generator[tuple[Floats, NDArray[np.bool_]], NDArray[np.bool_], None]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Observers:
     """The observers: one for each track.
 
@@ -273,7 +275,7 @@ class Observers:
             said = np.where(right, towards[:, trial], -towards[:, trial])
             if trial + 1 < trials:
                 now, running = chosen.send(right)
-        return Answers(levels, successes, towards, before, done)
+        return Answers(levels=levels, successes=successes, towards=towards, before=before, done=done)
 
 
 def constant_tracks(levels: Sequence[float], repetitions: int, observers: Observers, draws: Floats) -> Answers:

@@ -31,7 +31,7 @@ MOST: Final = 20.0
 TOLERANCE: Final = 1e-10
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Sensitivity:
     """Sensitivity d′ and bias, from the answers of one observer.
 
@@ -96,7 +96,7 @@ def yes_no(hits: float, signals: float, false_alarms: float, noises: float) -> S
         share * (1 - share) / (n * NORMAL.pdf(z) ** 2)
         for share, n, z in ((high, signals, z_high), (low, noises, z_low))
     )
-    return Sensitivity(z_high - z_low, -0.5 * (z_high + z_low), variance)
+    return Sensitivity(d_prime=z_high - z_low, criterion=-0.5 * (z_high + z_low), variance=variance)
 
 
 def two_intervals(first_of_first: float, firsts: float, first_of_second: float, seconds: float) -> Sensitivity | None:
@@ -112,12 +112,12 @@ def two_intervals(first_of_first: float, firsts: float, first_of_second: float, 
     found = yes_no(first_of_first, firsts, first_of_second, seconds)
     if found is None or found.variance is None:
         return None
-    return Sensitivity(found.d_prime / math.sqrt(2.0), found.criterion, found.variance / 2.0)
+    return Sensitivity(d_prime=found.d_prime / math.sqrt(2.0), criterion=found.criterion, variance=found.variance / 2.0)
 
 
 def from_correct(task: str, correct: float, n: float) -> Sensitivity | None:
     """Return d′ from the number of correct answers; None without answers."""
-    return Sensitivity(d_prime_at(task, rate(correct, n))) if n else None
+    return Sensitivity(d_prime=d_prime_at(task, rate(correct, n))) if n else None
 
 
 def abx(correct: float, n: float, model: Model) -> Sensitivity | None:
@@ -126,7 +126,7 @@ def abx(correct: float, n: float, model: Model) -> Sensitivity | None:
         return None
     found = {name: d_prime_at(f"abx {name}", rate(correct, n)) for name in ("differencing", "independent")}
     other = found["independent" if model == "differencing" else "differencing"]
-    return Sensitivity(found[model], model=model, other=other)
+    return Sensitivity(d_prime=found[model], model=model, other=other)
 
 
 def same_different(hits: float, differents: float, false_alarms: float, sames: float, model: Model) -> (
@@ -151,8 +151,8 @@ def same_different(hits: float, differents: float, false_alarms: float, sames: f
     unbiased = NORMAL.cdf(0.5 * (NORMAL.inv_cdf(high) - NORMAL.inv_cdf(low)))
     independent = d_prime_at("samedifferent independent", unbiased)
     if model == "differencing":
-        return Sensitivity(differencing, k, model=model, other=independent)
-    return Sensitivity(independent, model=model, other=differencing)
+        return Sensitivity(d_prime=differencing, criterion=k, model=model, other=independent)
+    return Sensitivity(d_prime=independent, model=model, other=differencing)
 
 
 def different_rate(d_prime: float, k: float) -> float:
@@ -175,7 +175,7 @@ def rating(noise: ArrayLike, signal: ArrayLike) -> Sensitivity | None:
         return None
     below, not_above = np.searchsorted(low, high, "left"), np.searchsorted(low, high, "right")
     wins = float((below + not_above).sum()) / 2.0
-    return Sensitivity(math.sqrt(2.0) * NORMAL.inv_cdf(rate(wins, low.size * high.size)))
+    return Sensitivity(d_prime=math.sqrt(2.0) * NORMAL.inv_cdf(rate(wins, low.size * high.size)))
 
 
 def _inverse(proportion_of: Callable[[float], float], proportion: float) -> float:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,7 +26,7 @@ FREE_GUESSES: Final[Values] = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3)
 """Guess rates if the answers to noise trials determine it."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Grid:
     """The cells of a posterior, and their prior.
 
@@ -62,7 +62,7 @@ class Grid:
     log: bool = True
 
     @property
-    def shape(self) -> tuple[int, int, int, int]:
+    def shape(self) -> tuple[int, ...]:
         """The number of thresholds, widths, lapse rates and guess rates."""
         return len(self.thresholds), len(self.widths), len(self.lapses), len(self.guesses or (0.0,))
 
@@ -86,6 +86,14 @@ class Grid:
             guesses, lapses,
         )  # fmt: skip
         return np.clip(np.broadcast_to(found, (u.shape[0], *self.shape)), CLIP, 1.0 - CLIP)
+
+
+class Others(NamedTuple):
+    """The parameters of a psychometric function beside its threshold."""
+
+    width: float
+    guess: float
+    lapse: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,16 +150,17 @@ class Posterior:
         return float(self.marginal @ (thresholds - float(self.marginal @ thresholds)) ** 2) + self.session_sd**2
 
     @property
-    def others(self) -> tuple[float, float, float]:
-        """The medians of width, guess rate and lapse rate, as `families.success` takes them."""
+    def others(self) -> Others:
+        """The medians of the other parameters, as `families.success` takes them."""
         width = _median(self.grid.widths, np.einsum("abcd->b", self.weights))
         lapse = _median(self.grid.lapses, np.einsum("abcd->c", self.weights))
         guesses = self.grid.guesses
-        return width, lapse if guesses is None else _median(guesses, np.einsum("abcd->d", self.weights)), lapse
+        guess = lapse if guesses is None else _median(guesses, np.einsum("abcd->d", self.weights))
+        return Others(width=width, guess=guess, lapse=lapse)
 
     def success(self, levels: ArrayLike) -> NDArray[np.float64]:
         """Return ψ at ``levels`` [u] of the function through all medians, clipped."""
-        found = success(self.grid.family, levels, self.threshold, *self.others)
+        found = success(self.grid.family, levels, self.threshold, **self.others._asdict())
         return np.asarray(np.clip(found, CLIP, 1.0 - CLIP), float)
 
     def band(self, levels: ArrayLike) -> NDArray[np.float64]:

@@ -122,7 +122,7 @@ class Estimates(NamedTuple):
     shared: Floats
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Expected:
     """The expected precision of one participant's threshold at one standard, d′, d_a or exponent.
 

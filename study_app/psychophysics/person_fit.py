@@ -59,8 +59,8 @@ class Given(NamedTuple):
 
     def first(self, n: int) -> Given:
         """Return the first n answers."""
-        levels, places, successes, *others = self
-        return Given(levels, places[:n], successes[:n], *(one[:n] for one in others))
+        of_trials = {name: values[:n] for name, values in self._asdict().items()}
+        return Given(**{**of_trials, "levels": self.levels})
 
     def fit(self, grid: Grid, *, two_intervals: bool) -> PersonFit:
         """Return the fit to the answers.
@@ -117,8 +117,8 @@ class PersonFit:
 
     def expected(self, found: Posterior) -> Floats:
         """Return the share of successes that the function through all medians expects in each trial, (n,)."""
-        psi, rates = found.success(self.given.levels), found.others
-        return preferred(psi[self.given.places], rates[2], self.shifts)
+        psi = found.success(self.given.levels)
+        return preferred(psi[self.given.places], found.others.lapse, self.shifts)
 
     def after(self, n: int) -> Posterior:
         """Return what the first n answers say, where preferences and change are those of all, as ``flat``."""
@@ -160,12 +160,12 @@ def change_score(given: Given, found: Posterior, shifts: Floats) -> tuple[float,
 
     ``found`` is of these answers, as if the threshold were constant, ``shifts`` (n,) are of the decisions [SD].
     """
-    y, u, (width, *rates) = given.successes.astype(float), given.levels, found.others
+    y, u, others = given.successes.astype(float), given.levels, found.others
     below, above, psi = (
-        preferred(success(found.grid.family, u, at, width, *rates)[given.places], rates[1], shifts)
-        for at in (found.threshold - STEP * width, found.threshold + STEP * width, found.threshold)
+        preferred(success(found.grid.family, u, at, **others._asdict())[given.places], others.lapse, shifts)
+        for at in (found.threshold - STEP * others.width, found.threshold + STEP * others.width, found.threshold)
     )
-    psi, slope = np.clip(psi, CLIP, 1.0 - CLIP), (above - below) / (2 * STEP * width)
+    psi, slope = np.clip(psi, CLIP, 1.0 - CLIP), (above - below) / (2 * STEP * others.width)
     information = slope**2 / (psi * (1.0 - psi))
     if not information.any():
         return 0.0, 0.0
@@ -194,7 +194,7 @@ def preferences(given: Given, found: Posterior) -> Floats:
     and that for the answer before as coefficients; those within `BEYOND_CHANCE` standard errors count as none.
     ``found`` is the posterior of these answers.
     """
-    (z, of_z), first, lapse = _normal_table(), given.towards, found.others[2]
+    (z, of_z), first, lapse = _normal_table(), given.towards, found.others.lapse
     unbiased = ((found.success(given.levels) - lapse) / (1.0 - 2.0 * lapse))[given.places]
     sensed, said = first * np.interp(np.clip(unbiased, 0.5, 0.999), of_z, z), np.where(given.successes, first, -first)
     causes, weights = np.column_stack([np.abs(first), given.before]), np.zeros(2)

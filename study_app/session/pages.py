@@ -10,7 +10,7 @@ from study_app.protocol.questions import ChoiceView, ItemView, NumberView, Value
 from study_app.protocol.trials.tasks import AnyTask
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Progress:
     """Where we are: part ``part`` of ``parts``; within it setting ``index`` of ``of`` under a neutral label.
 
@@ -40,7 +40,7 @@ class Interval:
     announced: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TaskPage:
     """The tank: move the ball. Nothing of the condition is here: how late the tank is drawn is the runner's to know.
 
@@ -69,7 +69,7 @@ class TaskPage:
         return self.question if self.adjusts else self.instruction
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TextPage:
     """A text to read and a button to go on: consent, instructions, announcements, breaks, the debrief.
 
@@ -90,7 +90,7 @@ class TextPage:
     coming: TaskPage | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class QuestionnairePage:
     """The questions about one setting, or a form on its own.
 
@@ -164,8 +164,8 @@ class FeedbackPage:
 class PausePage:
     """The session waits; ``force_off`` says that the force was stopped and fades in only when asked for.
 
-    ``held`` says what the operator stopped: then the operator alone resumes, and there is nothing to press. ``coming``
-    is the task that may come after it, so that it can be made ready.
+    ``held`` says what only the operator resumes, a pause or the force; then there is nothing to press. ``coming`` is
+    the task that may come after it, so that it can be made ready.
     """
 
     force_off: bool

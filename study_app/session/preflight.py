@@ -6,7 +6,7 @@ A failure refuses the session; a warning is something that would make trials inv
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
 import numpy as np
@@ -19,11 +19,14 @@ from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
 from study_app.number_text import counted
 from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.checks.force_limits import beyond_slope_limit, by_stimulus
+from study_app.protocol.checks.untranslated import UntranslatedText, listed_places
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import recordings_of
 from study_app.protocol.presented.presented_levels import highest_damping
 from study_app.protocol.sequences import enrolment
+from study_app.protocol.wording.languages import language_name
 from study_app.store.blinded.sealing import FRAMES_BYTES_PER_S, SAMPLE_BYTES, sealed_bytes
+from study_app.store.missing_trials import limit_words
 from study_app.video.sources import VideosFound
 
 if TYPE_CHECKING:
@@ -66,7 +69,30 @@ class Screen:
     scaling: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PredictedDelivery:
+    """How many main trials a simulated participant would lose because the safety layer withholds too much force.
+
+    ``missing`` of the ``asked`` trials of intervals would not be delivered, ``out`` of the ``judged`` other trials
+    would be out of limits. The limit on the force withheld is ``limit_percent`` [%].
+    """
+
+    missing: int
+    asked: int
+    out: int
+    judged: int
+    limit_percent: float
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What would be lost, as sentences without full stops: "26 of 40 trials would not be delivered: …"."""
+        why = limit_words("withheld_percent", {"withheld_percent": self.limit_percent})
+        missing = f"{self.missing} of {counted(self.asked, 'trial')} would not be delivered: {why}"
+        out = f"{self.out} of {counted(self.judged, 'trial')} would be out of limits: {why}"
+        return (*([missing] if self.missing else []), *([out] if self.out else []))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Measurements:
     """What was measured.
 
@@ -78,10 +104,12 @@ class Measurements:
     ``grant`` what the system lets the servo's thread do. ``dynamics`` are the device's, with its measured
     delay, ``delay_ticks`` is the delay that the servo uses now. ``withheld`` is the share of
     the force that limits and passivity controller are expected to withhold in the fastest stroke of a task, by
-    liquid; None where it was not computed. ``velocity_errors`` are the relative error of the velocity and what it would
-    be if all of the device's dynamics were known; None where all is. ``outlets`` are the streams and ports to other
+    liquid; None where it was not computed. ``delivery`` is what a simulated participant would lose, None where it was
+    not computed. ``velocity_errors`` are the relative error of the velocity and what it would be if all of the device's
+    dynamics were known; None where all is. ``outlets`` are the streams and ports to other
     programs; ``video`` is what was found of the study's videos, None without any. ``ran_otherwise`` is a participant
-    with whom the same version of the study ran from another file.
+    with whom the same version of the study ran from another file; ``untranslated`` are texts of the pages that are
+    still in another language.
     """
 
     device: str
@@ -100,10 +128,12 @@ class Measurements:
     dynamics: Dynamics = UNKNOWN
     delay_ticks: int = ASSUMED_TICKS
     withheld: Mapping[str, float] | None = None
+    delivery: PredictedDelivery | None = None
     velocity_errors: tuple[float, float] | None = None
     outlets: tuple[OutletStatus, ...] = ()
     video: VideosFound | None = None
     ran_otherwise: str = ""
+    untranslated: tuple[UntranslatedText, ...] = ()
     lateness_ns: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64), compare=False, repr=False)
 
 
@@ -118,6 +148,7 @@ class Check:
     name: str
     verdict: Verdict
     value: str
+    _: KW_ONLY
     about: str
     advice: str = ""
     share: float | None = None
@@ -147,7 +178,7 @@ def refused(found: Iterable[Check]) -> str:
 
 def _warned(name: str, value: str, about: str, advice: str, *, well: bool, share: float | None = None) -> Check:
     """Return a check that is a warning, with its advice, unless all is well."""
-    return Check(name, "ok" if well else "warning", value, about, "" if well else advice, share)
+    return Check(name, "ok" if well else "warning", value, about=about, advice="" if well else advice, share=share)
 
 
 def _servo(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
@@ -156,9 +187,9 @@ def _servo(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     about = f"{facts.device}, a new sample on {share} of ticks"
     if facts.timing.ticks == 0 or facts.fresh_share < LEAST_FRESH:
         advice = f"{facts.device} sends a new sample on only {share} of ticks: check its cable and power"
-        yield Check("Device", "failure", "not responding", about, advice)
+        yield Check("Device", "failure", "not responding", about=about, advice=advice)
     else:
-        yield Check("Device", "ok", "responding", about)
+        yield Check("Device", "ok", "responding", about=about)
 
     about, requested_hz = "assumed: the device does not measure its delay", protocol.device.rate_hz
     if facts.dynamics.delay_s is not None:
@@ -173,7 +204,7 @@ def _servo(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     error = abs(facts.timing.rate_hz / requested_hz - 1)
     refusal = refuses(requested_hz) or (f"{value}, {about}: close other programs" if error > RATE_FAILURE else None)
     if refusal is not None:
-        yield Check("Servo rate", "failure", value, about, refusal)
+        yield Check("Servo rate", "failure", value, about=about, advice=refusal)
     else:
         yield _warned("Servo rate", value, about, "Close other programs.", well=error <= RATE_WARNING)
 
@@ -191,7 +222,7 @@ def _servo(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     memory = {None: "", True: ", memory locked", False: ", memory not locked"}[grant.locked]
     advice = "; ".join(f"{it[0].upper()}{it[1:]}" for it in grant.advice)
     verdict: Verdict = "ok" if grant.level in {"real-time", "none"} else "warning"
-    yield Check("Priority", verdict, grant.level, f"{grant.how}{memory}", f"{advice}." if advice else "")
+    yield Check("Priority", verdict, grant.level, about=f"{grant.how}{memory}", advice=f"{advice}." if advice else "")
 
 
 def _levels(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
@@ -204,7 +235,7 @@ def _levels(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     found = (beyond_slope_limit(protocol, alike, facts.delay_ticks) for alike in by_stimulus(protocol))
     beyond = next(filter(None, found), None)
     advice = "" if beyond is None else f"{beyond.message}: {beyond.hint}"
-    yield Check("Levels", "ok" if beyond is None else "failure", value, about, advice)
+    yield Check("Levels", "ok" if beyond is None else "failure", value, about=about, advice=advice)
 
 
 def _surroundings(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
@@ -222,7 +253,9 @@ def _surroundings(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     yield _warned("Screen", value, f"{about}participant's screen", advice, well=well)
 
     if facts.probe_s is None:
-        yield Check("Results folder", "failure", "not usable", "no file could be written", facts.probe_fault)
+        yield Check(
+            "Results folder", "failure", "not usable", about="no file could be written", advice=facts.probe_fault
+        )
     else:
         value, well = f"{facts.probe_s * 1e3:.1f} ms", facts.probe_s <= SLOW_PROBE_S
         yield _warned("Results folder", value, "time to write a file", "Use a local disk.", well=well)
@@ -233,40 +266,44 @@ def _surroundings(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     needed = SPARE * (TABLES_BYTES + recorded)
     about = f"a session needs about {_megabytes(needed)} MB"
     if facts.free_bytes is None:
-        yield Check("Free space", "warning", "not known", about, "The system does not report the free space.")
+        yield Check(
+            "Free space", "warning", "not known", about=about, advice="The system does not report the free space."
+        )
     else:
         value, well = f"{_megabytes(facts.free_bytes)} MB free", facts.free_bytes >= needed
         advice = "" if well else f"{value}, {about}: free disk space"
-        yield Check("Free space", "ok" if well else "failure", value, about, advice)
+        yield Check("Free space", "ok" if well else "failure", value, about=about, advice=advice)
 
     about = "the key is drawn and sealed when the first session begins"
     if facts.key_hash is not None:
         about = f"the key is sealed; its hash begins with {facts.key_hash[:8]}"
-    yield Check("Blinding", "ok", f"{protocol.study.blinding}-blind", about)
+    yield Check("Blinding", "ok", f"{protocol.study.blinding}-blind", about=about)
 
     if facts.video is not None:  # nothing tells which condition shows one
         fault = facts.video.fault
         value = "not usable" if fault else "ready"
-        yield Check("Video", "failure" if fault else "ok", value, facts.video.about, fault)
+        yield Check("Video", "failure" if fault else "ok", value, about=facts.video.about, advice=fault)
 
 
 def _outlets(facts: Measurements, _protocol: Protocol) -> Iterator[Check]:
     """Say of each outlet who listens, why it does not work, or why a double-blind study has none."""
     for one in facts.outlets:
         if one.withheld:
-            yield Check(one.title, "ok", "off", "in a double-blind study: whoever sees the force can tell the liquid")
+            yield Check(
+                one.title, "ok", "off", about="in a double-blind study: whoever sees the force can tell the liquid"
+            )
         elif one.lost:
-            yield Check(one.title, "warning", "not available", one.lost, "The session can run without it.")
+            yield Check(one.title, "warning", "not available", about=one.lost, advice="The session can run without it.")
         elif one.shows_force:
             advice = "A viewer of the force can tell the liquid: show the stream to no one."
             who = "listener" if one.listens else "no listener"
-            yield Check(one.title, "warning", who, "the study is double-blind", advice)
+            yield Check(one.title, "warning", who, about="the study is double-blind", advice=advice)
         elif one.listens is False:
             advice = "Start the program that records it, such as LabRecorder, and select this stream."
-            yield Check(one.title, "warning", "no listener", "no program receives the stream", advice)
+            yield Check(one.title, "warning", "no listener", about="no program receives the stream", advice=advice)
         else:
             about = "open" if one.listens is None else "a program receives the stream"
-            yield Check(one.title, "ok", "ready" if one.listens is None else "listener", about)
+            yield Check(one.title, "ok", "ready" if one.listens is None else "listener", about=about)
 
 
 def _costs(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
@@ -299,16 +336,30 @@ def _costs(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         advice = "Trials with such strokes would be invalid."
         yield _warned("Force withheld", value, about, advice, well=most_percent <= limit_percent, share=share)
 
+    if facts.delivery is not None and facts.delivery.asked + facts.delivery.judged:
+        lost = facts.delivery.missing + facts.delivery.out
+        value = f"{lost} of {counted(facts.delivery.asked + facts.delivery.judged, 'trial')} beyond the limit"
+        about = f"predicted for a delay of {counted(facts.delay_ticks, 'tick')}"
+        advice = "; ".join(facts.delivery.sentences)
+        yield _warned("Trials delivered", value if lost else "all", about, f"{advice}.", well=not lost)
+
     if facts.ran_otherwise:
         about = f"version {protocol.study.version} ran from another file with {facts.ran_otherwise}"
         advice = "Give the changed file another study.version; the report names the change in any case."
-        yield Check("Study file", "warning", "changed", about, advice)
+        yield Check("Study file", "warning", "changed", about=about, advice=advice)
 
-    if protocol.assigns_rows and (number := enrolment(facts.participant)) is not None:
-        yield Check("Balance", "ok", f"participant number {number}", "determines the row of the square")
+    if facts.untranslated:
+        about = f"still in {language_name(facts.untranslated[0].source)}"
+        advice = f"Pages mix two languages: translate {listed_places(facts.untranslated)}."
+        yield Check("Translation", "warning", counted(len(facts.untranslated), "text"), about=about, advice=advice)
+
+    if protocol.assigns_rows and protocol.groups:
+        yield Check("Balance", "ok", "place in the group", about="determines the row of the square")
+    elif protocol.assigns_rows and (number := enrolment(facts.participant)) is not None:
+        yield Check("Balance", "ok", f"participant number {number}", about="determines the row of the square")
     elif protocol.assigns_rows:
         advice = f"{facts.participant} has no number, so its row is drawn at random; use ids such as P007."
-        yield Check("Balance", "warning", "drawn", "the row of the square", advice)
+        yield Check("Balance", "warning", "drawn", about="the row of the square", advice=advice)
 
 
 def _megabytes(count: float) -> str:

@@ -160,7 +160,7 @@ _ROUNDING = 1e-9
 _FLOAT32 = 2.0**-23  # of the greater ones, a column's own precision
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class Replayed:
     """The result of a replay.
 
@@ -265,7 +265,7 @@ class _Device(NamedTuple):
     rules: ForceRules
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class _Before:
     """A recording computed again, and the models in the state it left them in: what the next one may go on from.
 
@@ -298,14 +298,16 @@ def _again(
         first = shared
         _copy_forces(before.samples[len(before.samples) - first :], out[:first])
         _run_steps((rest, before.model, model), (before.serial, serial), before.safety[0], out, first, steps, device)
-        return _Before(serial, model, before.safety, out, before.knows_its_start)
+        return _Before(
+            serial=serial, model=model, safety=before.safety, samples=out, knows_its_start=before.knows_its_start
+        )
     safety = new_safety(limit_n)
     if len(out) and out.tick[0] != 0:
         _assume(safety[0], out)
         first = 1
     knows_its_start = not out.force_n[out.scene != serial].any()
     _run_steps((rest, rest, model), (0, serial), safety[0], out, first, steps, device)
-    return _Before(serial, model, safety, out, knows_its_start)
+    return _Before(serial=serial, model=model, safety=safety, samples=out, knows_its_start=knows_its_start)
 
 
 def _shared(before: _Before | None, out: Any) -> int | None:

@@ -12,7 +12,7 @@ from study_app.protocol.load import at_hand, parse, protocol_hash, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial, build_schedule
 from study_app.protocol.trials.methods import TrialResult
-from study_app.store.blinded.blinding import Key, opened
+from study_app.store.blinded.blinding import Key, opened, own_place
 from study_app.store.journals.journal_events import Event, SessionStarted
 from study_app.store.progress import Progress, progress_of, trial_results
 from study_app.store.sessions.recovery import sealed_source
@@ -68,9 +68,9 @@ def resume_at(
     return Start(step, progress.presented, heard, progress.invalid if step == progress.step == reached else 0)
 
 
-def begun_schedule(protocol: Protocol, start: SessionStarted) -> Schedule:
-    """Return the steps of the session whose journal begins with the line ``start``."""
-    return build_schedule(protocol, start.participant, start.seed, start.row_of)
+def begun_schedule(protocol: Protocol, start: SessionStarted, key: Key) -> Schedule:
+    """Return the steps of the session whose journal begins with the line ``start``; ``key`` is the study's."""
+    return build_schedule(protocol, start.participant, start.seed, own_place(start, key))
 
 
 def is_rehearsal(session_receipt: Mapping[str, Any]) -> bool:

@@ -15,9 +15,10 @@ from study_app.devices.registry import check_options, descriptor_of
 from study_app.devices.rig import Rig
 from study_app.errors import SessionError
 from study_app.outlets.session_outlets import Outlets, OutletStatus
-from study_app.protocol.load import parse, protocol_hash, source_bytes
+from study_app.protocol.checks.untranslated import check_translated, untranslated_on_pages
+from study_app.protocol.load import parse, protocol_hash, read_document, source_bytes
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import Schedule, build_schedule, stream
+from study_app.protocol.orders.schedule import stream
 from study_app.protocol.sequences import enrolment
 from study_app.protocol.source.files import find
 from study_app.session.preflight import Masking, Measurements, Screen
@@ -47,12 +48,13 @@ MEASURED_S = 2.0  # so long the servo is looked at before a session
 PLAYED_MEASURED_S = 0.5  # and before one that is played from the designer
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class NewSession:
     """What the operator chose; ``results`` is the study's folder, ``screen`` counts from 1 (None: the last).
 
     ``resumes`` is the folder of the session that goes on, None for a new one; ``device_options`` are the values
-    of the device's options, by name. ``row_of`` is the id whose rows of squares the session takes, None: its own.
+    of the device's options, by name. ``row_of`` is the id of the participant who is replaced, ``group`` the
+    participant's pre-existing group; None: nobody, or as the participant's first session says.
     ``played`` says that it is played from the designer: exactly from where it was left, without an operator's window.
     ``footage`` is the folder of the study's footage, None: that of its file.
     """
@@ -72,6 +74,7 @@ class NewSession:
     resumes: Path | None = None
     device_options: Mapping[str, str | Path] = field(default_factory=dict)
     row_of: str | None = None
+    group: str | None = None
     played: bool = False
     footage: Path | None = None
 
@@ -83,10 +86,6 @@ class NewSession:
         """Return the protocol of `read_source`."""
         return parse(self.read_source(), self.source)
 
-    def schedule(self, protocol: Protocol) -> Schedule:
-        """Return the steps of the session, in the participant's own protocol."""
-        return build_schedule(protocol, self.participant, self.seed, self.row_of)
-
     def tremor(self) -> Random:
         """Return the random numbers of a hand that moves by itself."""
         return stream(self.seed, f"run/{self.participant}/tremor")
@@ -94,8 +93,9 @@ class NewSession:
     @property
     def who(self) -> str:
         """Whose session it is, in the operator's words."""
+        group = "" if self.group is None else f"  ·  group {self.group}"
         kind = "  ·  pilot" if self.pilot else ""
-        return f"Participant {self.participant}  ·  session {self.session}  ·  seed {self.seed}{kind}"
+        return f"Participant {self.participant}{group}  ·  session {self.session}  ·  seed {self.seed}{kind}"
 
 
 def resumed(
@@ -139,12 +139,16 @@ def resumed(
         resumes=session_folder,
         device_options=device_options or {},
         row_of=start.row_of,
+        group=start.group,
     )
 
 
 def check_row(row_of: str | None, study: Protocol) -> None:
-    """Refuse (SessionError) an id whose rows of squares a session is to take where that decides nothing."""
-    if row_of is None:
+    """Refuse (SessionError) an id of a participant who is replaced where that decides nothing.
+
+    With groups the replaced participant's entry is looked up (`allocation.check_choice`), not the number in the id.
+    """
+    if row_of is None or study.groups:
         return
     if not study.assigns_rows:
         raise SessionError(
@@ -206,11 +210,13 @@ def check(chosen: NewSession, study: Protocol) -> None:
     if chosen.resumes is not None:
         return
     folder = StudyFolder(chosen.results)
+    if not chosen.pilot:
+        check_translated(read_document(chosen.read_source(), chosen.source)[0])
     check_participant(chosen.participant, pilot=chosen.pilot)
     check_row(chosen.row_of, study)
     check_study(folder, study.study.name)
     used_ids(folder).check_unused(chosen.participant, chosen.session)
-    check_session(folder, study, chosen.participant, chosen.session)
+    check_session(folder, study, chosen.participant, chosen.session, group=chosen.group, row_of=chosen.row_of)
     check_conditions(folder.path, study)
 
 
@@ -242,7 +248,9 @@ def measured(
         lasts_s=PLAYED_MEASURED_S if chosen.played else MEASURED_S,
         sleep=sleep,
     )
-    return replace(facts, video=looked, ran_otherwise=ran_otherwise(chosen))
+    document, _ = read_document(chosen.read_source(), chosen.source)
+    untranslated = untranslated_on_pages(document)
+    return replace(facts, video=looked, ran_otherwise=ran_otherwise(chosen), untranslated=untranslated)
 
 
 def ran_otherwise(chosen: NewSession) -> str:
@@ -296,6 +304,7 @@ def open_store(
             pilot=chosen.pilot,
             recordings=chosen.recordings,
             row_of=chosen.row_of,
+            group=chosen.group,
             **here,
         )
         store = begin(chosen.results, protocol, source, start, clock=SessionClock(rig.servo.now_ns))

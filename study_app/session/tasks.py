@@ -26,7 +26,7 @@ Outcome: TypeAlias = Literal["complete", "timeout"]
 _NS = 1_000_000_000
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TaskView:
     """What is to be drawn of a task at one moment.
 
@@ -151,10 +151,12 @@ class TimedTracker(Tracker):
     def _view(self, _time_ns: int, elapsed_ns: int) -> TaskView:
         elapsed_s = elapsed_ns / _NS
         target_m = self._task.target_m(elapsed_s)
-        return TaskView(None if target_m is None else 0, 0, None, 0.0, elapsed_s, target_m)
+        return TaskView(
+            lit=None if target_m is None else 0, reached=0, of=None, dwell=0.0, elapsed_s=elapsed_s, target_m=target_m
+        )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Mark:
     """From one moment on: how many were reached, which target is lit, since when the proxy is inside it [ns]."""
 
@@ -186,7 +188,7 @@ class ReachTracker(Tracker):
         dwell = 0.0
         if mark.entered_ns is not None and self._dwell_ns:
             dwell = min((time_ns - mark.entered_ns) / self._dwell_ns, 1.0)
-        return TaskView(mark.lit, mark.reached, self._count, dwell, elapsed_ns / _NS)
+        return TaskView(lit=mark.lit, reached=mark.reached, of=self._count, dwell=dwell, elapsed_s=elapsed_ns / _NS)
 
     def _follow(self, times: NDArray[np.int64], positions: NDArray[np.float64]) -> list[TargetReached]:
         reached: list[TargetReached] = []
@@ -214,13 +216,13 @@ class ReachTracker(Tracker):
     def _mark(self, time_ns: int, entered_ns: int | None) -> None:
         before = self._marks[-1]
         self._mark_times.append(time_ns)
-        self._marks.append(_Mark(before.reached, before.lit, entered_ns))
+        self._marks.append(_Mark(reached=before.reached, lit=before.lit, entered_ns=entered_ns))
 
     def _reach(self, time_ns: int, lit: int) -> TargetReached:
         reached = self._marks[-1].reached + 1
         enough = reached == self._count
         self._mark_times.append(time_ns)
-        self._marks.append(_Mark(reached, None if enough else reached % len(self._targets_m)))
+        self._marks.append(_Mark(reached=reached, lit=None if enough else reached % len(self._targets_m)))
         if enough:
             self._finish("complete", time_ns)
         return TargetReached(lit, (time_ns - (self._start_ns or 0)) / _NS)

@@ -320,7 +320,7 @@ def resting_view(servo: ServoPort, task: AnyTask, now_ns: int) -> TankView:
     position_m, shown_ns = servo.telemetry.position_at(now_ns - round(SETTLED_S * 1e9))
     lit = None if task.start_m is None else 0
     return TankView(
-        position_m, TaskView(lit, reached=0, of=None, dwell=0.0, elapsed_s=0.0, target_m=task.start_m), shown_ns
+        position_m, TaskView(lit=lit, reached=0, of=None, dwell=0.0, elapsed_s=0.0, target_m=task.start_m), shown_ns
     )
 
 

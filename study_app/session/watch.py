@@ -18,13 +18,21 @@ from study_app.errors import StoreError
 from study_app.haptics.model.layout import LIMITER_GLITCH
 from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import Trial
-from study_app.protocol.streams import group_of
 from study_app.protocol.tracks import design_of
+from study_app.protocol.trials.tasks import Task
 from study_app.session.pages import Interval, TaskPage
 from study_app.session.tasks import TankView, Tracker, track
 from study_app.session.transitions.page_builder import task_page
 from study_app.store import receipt
-from study_app.store.blinded.blinding import Key, opened, opened_key, read_key, reading_what_ran, whole_protocol
+from study_app.store.blinded.blinding import (
+    Key,
+    opened,
+    opened_key,
+    own_group,
+    read_key,
+    reading_what_ran,
+    whole_protocol,
+)
 from study_app.store.folders import StudyFolder, locate
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
@@ -46,7 +54,7 @@ class Mark:
     words: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Watched:
     """A recorded trial, or one of its ``intervals`` (0: it has none); times are since its task began [s].
 
@@ -160,7 +168,11 @@ def watched(session_folder: Path, trial: int, attempt: int = 1, interval: int = 
         samples=samples,
         times_s=times_s,
         tracker=tracker,
-        marks=tuple(sorted(_marks(own, begins[at], ended, until_s), key=lambda mark: mark.at_s)),
+        marks=tuple(
+            sorted(
+                [*_marks(own, begins[at], ended, until_s), *_target_marks(ended, page.task)], key=lambda mark: mark.at_s
+            )
+        ),
     )
     if shown is None:  # the delay between a sample and its frame is sealed
         return found
@@ -203,7 +215,14 @@ def _marks(own: Sequence[events.Event], begun: events.Event, ended: Any, until_s
             if isinstance(line, events.TargetReached) and line.t_task_s is not None:
                 at_s = line.t_task_s
             if line is ended or not isinstance(line, _ENDS):
-                yield Mark(at_s, *told)
+                kind, words = told
+                yield Mark(at_s, kind, words)
+
+
+def _target_marks(ended: events.EndOfTask | None, task: Task) -> Iterator[Mark]:
+    """Yield the targets whose times were sealed until the study was unblinded; they light up in turn."""
+    for number, at_s in enumerate((ended.reached_s if ended is not None else None) or ()):
+        yield Mark(at_s, "target", f"target {number % len(task.targets_m) + 1} reached")
 
 
 def _told(line: events.Event) -> tuple[Kind, str] | None:
@@ -233,7 +252,7 @@ def _page(
 ) -> TaskPage:
     """Return the tank of a trial, or of its interval; while the study is sealed the ball has the scene's own size."""
     start, key = events.start_of(lines), read_key(study.path)
-    group = None if start.entry is None else group_of(key.groups, key.nonce, start.entry)
+    group = own_group(start, key)
     with reading_what_ran(path):
         protocol = own_protocol(whole_protocol(receipt.read(path)["protocol"], key), group, start.session)
     body = protocol.scene.body
@@ -241,7 +260,7 @@ def _page(
         named = key.condition(started.block, started.code) if interval is None else None
         body = protocol.scene_for(named or protocol.conditions_in(started.block)[0]).body
     about = {name: getattr(started, name) for name in ("block", "phase", "part", "index", "of", "code")}
-    trial = Trial(started.trial, **about, items=())
+    trial = Trial(number=started.trial, **about, items=())
     page = task_page(protocol, progress_of(lines).language, trial, body)
     if interval is None:
         return page

@@ -1,6 +1,6 @@
 """The files of a study: journals, receipts, tables, recordings, sealed conditions, and their verification.
 
 ``folders`` knows where each file is, ``journals.journal_events`` what a line of the journal may hold, and
-``tables.columns`` what a table has; read these first. ``sessions`` begins, reopens and rebuilds a session, ``progress``
+``columns`` what a table has; read these first. ``sessions`` begins, reopens and rebuilds a session, ``progress``
 computes how far one is, ``verification`` proves that files were not changed, ``blinded`` controls the conditions.
 """

@@ -30,6 +30,13 @@ from study_app.store.folders import REBUILT, SessionFolder, StudyFolder
 from study_app.store.journals.journal_events import Event, Recorded
 
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
+_SYSTEM = re.compile(
+    r"desktop\.ini|(?:eh)?thumbs(?:_vista)?\.db|icon\r|~\$.*|~syncthing~.*|.*\.sync-conflict-\d{8}-\d{6}-\w+(?:\..*)?|"
+    r".*\(.*conflicted copy.*\).*|.*(?-i:-(?:DESKTOP|LAPTOP)-[A-Z0-9]{4,12})(?:-\d+)?\..*|@eaDir|__MACOSX|"
+    r"\$RECYCLE\.BIN|System Volume Information",
+    re.IGNORECASE,
+)
+"""Files and folders of Windows, macOS, Office, Dropbox, Syncthing, OneDrive and Synology, besides hidden ones."""
 _FINGERPRINT = re.compile(
     r"([a-z2-7]{4}-[a-z2-7]{4}-[a-z2-7]{4})(?:-([a-z2-7]{2}))?\s+(data/sub-[A-Za-z0-9]{1,32}/ses-[0-9]{2}|"
     r"(?:withdrawals\.jsonl|exclusions\.csv)/sub-[A-Za-z0-9]{1,32}|reveals\.jsonl)\s*"
@@ -111,16 +118,29 @@ def read_checksums(session: SessionFolder) -> dict[str, str]:
 
 
 def files(session: SessionFolder) -> tuple[str, ...]:
-    """Return the session's files, by path in its folder; not the list itself, a crash's trace, hidden or half ones."""
+    """Return the session's files, by path in its folder; not the list itself, a crash's trace, or a system's files."""
     left_out = {session.checksums.name, session.crash.name}
-    found = (path.relative_to(session.path) for path in paths_in(session.path) if path.is_file())
     return tuple(
-        sorted(
-            name.as_posix()
-            for name in found
-            if name.name not in left_out and not any(part.startswith(".") for part in name.parts)
-        )
+        name.as_posix() for name in _paths(session) if name.name not in left_out and not _is_of_the_system(name)
     )
+
+
+def system_files(session: SessionFolder) -> tuple[str, ...]:
+    """Return the files of operating systems and of programs that share files, by path; without hidden ones."""
+    return tuple(name.as_posix() for name in _paths(session) if _is_of_the_system(name) and not _is_hidden(name))
+
+
+def _paths(session: SessionFolder) -> list[Path]:
+    found = (path.relative_to(session.path) for path in paths_in(session.path) if path.is_file())
+    return sorted(found, key=Path.as_posix)
+
+
+def _is_hidden(name: Path) -> bool:
+    return any(part.startswith(".") for part in name.parts)
+
+
+def _is_of_the_system(name: Path) -> bool:
+    return _is_hidden(name) or any(_SYSTEM.fullmatch(part) for part in name.parts)
 
 
 def sha256(path: Path) -> str:

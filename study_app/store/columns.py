@@ -71,6 +71,15 @@ PARTICIPANTS: tuple[Column, ...] = (
         levels=(("valid", "all did"), ("invalid", "at least one did not")),
     ),
 )
+TRIALS_MISSING = optional(
+    "trials_missing",
+    "integer",
+    "Number of main trials that nobody answered because no presentation was delivered within the protocol's limits.",
+    minimum=0,
+    later=True,
+)
+"""A column of sessions in a study with trials of intervals."""
+_INCOMPLETE = ("incomplete", "it reached its last page, but more trials were not delivered than the study permits")
 GROUP = optional("group", "text", "The participant's group; n/a in a study without groups.", sealed=True, later=True)
 PARTICIPANTS_2: tuple[Column, ...] = (
     *(
@@ -82,6 +91,14 @@ PARTICIPANTS_2: tuple[Column, ...] = (
     GROUP,
 )
 """Columns of sessions in a study whose protocol has format 2."""
+
+
+def with_missing_trials(columns: tuple[Column, ...]) -> tuple[Column, ...]:
+    """Return the columns of sessions in a study with trials of intervals, which may be missing."""
+    with_level = (replace(one, levels=(*one.levels, _INCOMPLETE)) if one.name == "status" else one for one in columns)
+    return (*with_level, TRIALS_MISSING)
+
+
 EXCLUSIONS: tuple[Column, ...] = (
     PARTICIPANT,
     SESSION,
@@ -93,11 +110,11 @@ EXCLUSIONS: tuple[Column, ...] = (
 
 
 def _measure(name: str, description: str, unit: str = "", **more: Any) -> Column:
-    return optional(name, "number", description, unit, minimum=0, **more)
+    return optional(name, "number", description, unit=unit, minimum=0, **more)
 
 
 def _signed(name: str, description: str, unit: str = "", **more: Any) -> Column:
-    return optional(name, "number", description, unit, sealed=True, later=True, **more)
+    return optional(name, "number", description, unit=unit, sealed=True, later=True, **more)
 
 
 def _count(name: str, description: str, **more: Any) -> Column:
@@ -106,7 +123,7 @@ def _count(name: str, description: str, **more: Any) -> Column:
 
 def _delay_error(name: str, which: str, of_trial: Literal["sum", "max", "mean"]) -> Column:
     description = f"Visual delay, achieved minus requested: {which}."
-    return optional(name, "number", description, "ms", sealed=True, of_trial=of_trial)
+    return optional(name, "number", description, unit="ms", sealed=True, of_trial=of_trial)
 
 
 RESPONSES: tuple[Column, ...] = (
@@ -162,7 +179,7 @@ TRIALS: tuple[Column, ...] = (
     Column("of", "integer", "Number of trials in the block.", minimum=1),
     CODE,
     Column("trial_started_at", "time", "Time when the trial began."),
-    Column("trial_started_s", "number", "Time when the trial began, on the session's clock.", "s", minimum=0),
+    Column("trial_started_s", "number", "Time when the trial began, on the session's clock.", unit="s", minimum=0),
     optional(
         "outcome",
         "text",
@@ -322,7 +339,7 @@ VIDEO: tuple[Column, ...] = (
 INTERVALS: tuple[Column, ...] = (
     *(column for column in TRIALS[: TRIALS.index(CODE) + 1] if column.name not in _NOT_OF_INTERVALS),
     Column("interval", "integer", "Which interval of the trial, from 1.", minimum=1),
-    Column("interval_started_s", "number", "When the interval began, on the session's clock.", "s", minimum=0),
+    Column("interval_started_s", "number", "When the interval began, on the session's clock.", unit="s", minimum=0),
     _measure("gap_s", "From the end of the interval before to the beginning of this one; n/a for the first.", "s"),
     optional(
         "presented",
@@ -367,7 +384,7 @@ def tables_of(protocol_format: int) -> dict[str, tuple[Column, ...]]:
     return {"responses": RESPONSES_2, "trials": TRIALS_2, "intervals": INTERVALS, "participants": PARTICIPANTS_2}
 
 
-LATER = frozenset(column.name for column in (*RESPONSES_2, *TRIALS_2, *INTERVALS) if column.later)
+LATER = frozenset(column.name for column in (*RESPONSES_2, *TRIALS_2, *INTERVALS, TRIALS_MISSING) if column.later)
 """Columns that earlier versions did not write."""
 
 
@@ -377,8 +394,11 @@ SEALED = frozenset(column.name for column in (*TRIALS_2, *DELIVERED) if column.s
 
 def every_column(protocol_format: int = 1, *, intervals: bool = False) -> tuple[Column, ...]:
     """Return each column of all tables once, in the order of first use; only a study with designs has ``intervals``."""
+    tables = tables_of(protocol_format)
+    if intervals:
+        tables = tables | {"participants": with_missing_trials(tables["participants"])}
     found: dict[str, Column] = {}
-    for name, columns in tables_of(protocol_format).items():
+    for name, columns in tables.items():
         for column in columns if name != "intervals" or intervals else ():
             found.setdefault(column.name, column)
     return tuple(found.values())

@@ -10,7 +10,7 @@ import io
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple, TypeAlias
@@ -73,6 +73,7 @@ class Column:
     name: str
     kind: Kind
     description: str
+    _: KW_ONLY
     unit: str = ""
     levels: tuple[tuple[str, str], ...] = ()
     minimum: float | None = None

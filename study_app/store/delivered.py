@@ -56,7 +56,7 @@ def judged(samples: Any) -> Any:
     return found
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, slots=True, repr=False, kw_only=True)
 class Delivered:
     """What an interval delivered; names and meanings are those of the columns of ``intervals``.
 

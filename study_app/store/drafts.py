@@ -21,7 +21,7 @@ REST_S: Final = 0.25
 Selection: TypeAlias = tuple[str | int, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Draft:
     """A study's text that is not saved.
 
@@ -66,7 +66,7 @@ class Keeper:
         """Note an edit at a time of a monotonic clock [s]."""
         if self._pending is None:
             self._due_s = now_s + REST_S
-        self._pending = Draft(text, self.base, selected)
+        self._pending = Draft(text=text, base=self.base, selected=selected)
 
     def write_if_due(self, now_s: float) -> bool:
         """Write the draft if it is due, or delete one that could not be deleted; return whether it was written.
@@ -138,7 +138,7 @@ def draft_of(file: Path) -> Draft | None:
     try:
         kept: Any = parse_json(_draft_file(file).read_bytes())
         selected = tuple(step for step in kept["selected"] if isinstance(step, str | int))
-        draft = Draft(kept["text"], kept["base"], selected, kept["kept_at"])
+        draft = Draft(text=kept["text"], base=kept["base"], selected=selected, kept_at=kept["kept_at"])
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return draft if all(isinstance(one, str) for one in (draft.text, draft.base, draft.kept_at)) else None

@@ -1,10 +1,10 @@
 """Exclusions from the analysis: by which rule or person, and why. Data are never deleted."""
 
-import codecs
 import contextlib
 import csv
 import io
 import json
+import re
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
@@ -17,11 +17,15 @@ from study_app.store.folder_lock import open_alone
 from study_app.store.folders import StudyFolder, readable
 from study_app.store.journals import journal
 from study_app.store.progress import progress_of
+from study_app.text_tables import decoded, separator_of, wrong_length
 
 NAMED_IDS = 6
+_WHOLE = re.compile("[0-9]{1,9}")
+MISSING_RULE = "missing"
+"""The rule that excludes a session in which more trials are missing than the study permits."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Exclusion:
     """One session, or one trial of it, that is left out; a row of ``exclusions.csv``."""
 
@@ -77,7 +81,9 @@ def exclude(
     study = StudyFolder(folder)
     _check_there(study, participant, session, trial)
     at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
-    new = Exclusion(participant, session, trial, by, reason, at)
+    new = Exclusion(
+        participant=participant, session=session, trial=trial, rule_or_person=by, reason=reason, excluded_at=at
+    )
     with open_alone(folder):
         rows = exclusions(folder)
         for row in rows:
@@ -85,6 +91,20 @@ def exclude(
                 raise StoreError(f"{named(new)} is already excluded, since {row.excluded_at} ({row.reason})")
         write_file(study.exclusions, exclusion_bytes((*rows, new)))
     return new
+
+
+def exclude_incomplete(folder: Path, participant: str, session: int, reason: str) -> None:
+    """Exclude an incomplete session by `MISSING_RULE`, unless it is excluded or was included again.
+
+    Raises
+    ------
+    StoreError
+        The list of exclusions or of reversals cannot be read or written.
+    """
+    reversed_by_person = (row for row in reversals(folder) if row.rule_or_person == MISSING_RULE)
+    decided = {row.what for row in (*exclusions(folder), *reversed_by_person)}
+    if (participant, session, None) not in decided:
+        exclude(folder, participant, session, by=MISSING_RULE, reason=reason)
 
 
 def include(
@@ -112,7 +132,11 @@ def include(
         rows = exclusions(folder)
         taken = next((row for row in rows if row.what == (participant, session, trial)), None)
         if taken is None:
-            name = named(Exclusion(participant, session, trial, "", "", ""))
+            name = named(
+                Exclusion(
+                    participant=participant, session=session, trial=trial, rule_or_person="", reason="", excluded_at=""
+                )
+            )
             listed = "; ".join(named(row) for row in rows) or "nothing"
             raise StoreError(f"{name} is not excluded; excluded: {listed}")
         at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
@@ -134,16 +158,20 @@ def exclusions(folder: Path) -> tuple[Exclusion, ...]:
     content = read_if_there(path)
     if content is None:
         return ()
+    columns = header(EXCLUSIONS)
     try:
-        text = without_mark(content).decode("utf-8")
-        names, *rows = list(csv.reader(io.StringIO(text, newline=""))) or [[]]
-    except UnicodeDecodeError as error:
-        raise StoreError(f"{path} is not UTF-8: save it as CSV in UTF-8") from error
+        text = decoded(content)
+        reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+        names, *rows = [(reader.line_num, row) for row in reader] or [(1, [])]
+    except ValueError as error:
+        raise StoreError(f"{path}: {error}") from error
     except csv.Error as error:
         raise StoreError(f"{path} is not CSV ({error}): save it as CSV in UTF-8, with commas") from error
-    if tuple(names) != header(EXCLUSIONS):
-        raise StoreError(f"{path}: its columns must be {', '.join(header(EXCLUSIONS))}, but are {', '.join(names)}")
-    return tuple(_exclusion(path, number, row) for number, row in enumerate(rows, start=2))
+    if (separator := separator_of(text.partition("\n")[0], columns)) != ",":
+        raise StoreError(f"{path} separates its columns by {separator!r}: save it as CSV with commas")
+    if tuple(names[1]) != columns:
+        raise StoreError(f"{path}: its columns must be {', '.join(columns)}, but are {', '.join(names[1])}")
+    return tuple(_exclusion(path, line, row) for line, row in rows)
 
 
 def reversals(folder: Path) -> tuple[Exclusion, ...]:
@@ -168,26 +196,28 @@ def _reversed(path: Path, number: int, line: bytes) -> tuple[Exclusion, str]:
     raise StoreError(f"{path}, line {number} is not a reversed exclusion: restore it from a copy, or remove the line")
 
 
-def without_mark(content: bytes) -> bytes:
-    """Return a file's content without the byte order mark that spreadsheets write before UTF-8."""
-    return content.removeprefix(codecs.BOM_UTF8)
-
-
 def exclusion_bytes(rows: tuple[Exclusion, ...]) -> bytes:
     """Return ``exclusions.csv``."""
     return csv_bytes(EXCLUSIONS, [{name: getattr(row, name) for name in header(EXCLUSIONS)} for row in rows])
 
 
-def _exclusion(path: Path, number: int, row: list[str]) -> Exclusion:
-    try:
-        participant, session, trial, by, reason, at = row
-        by, reason = unguarded(by), unguarded(reason)
-        return Exclusion(participant, int(session), None if trial == MISSING else int(trial), by, reason, at)
-    except ValueError as error:
+def _exclusion(path: Path, line: int, row: list[str]) -> Exclusion:
+    if wrong := wrong_length(row, len(header(EXCLUSIONS))):
+        raise StoreError(f"{path}, line {line}: {wrong}")
+    participant, session, trial, by, reason, at, *_ = row
+    if not (_WHOLE.fullmatch(session) and (trial == MISSING or _WHOLE.fullmatch(trial))):
         raise StoreError(
-            f"{path}, row {number}: {','.join(row)!r} is not an exclusion (participant, session, trial or {MISSING}, "
+            f"{path}, line {line}: {','.join(row)!r} is not an exclusion (participant, session, trial or {MISSING}, "
             "name, reason, time): correct or remove the row"
-        ) from error
+        )
+    return Exclusion(
+        participant=participant,
+        session=int(session),
+        trial=None if trial == MISSING else int(trial),
+        rule_or_person=unguarded(by),
+        reason=unguarded(reason),
+        excluded_at=at,
+    )
 
 
 def _check_there(study: StudyFolder, participant: str, session: int, trial: int | None) -> None:

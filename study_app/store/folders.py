@@ -99,9 +99,10 @@ class StudyFolder:
     allocated = _Within("blinding", "allocated")
     """The folder of the participants' entries in the allocation to groups."""
 
-    def allocation(self, entry: int) -> Path:
-        """Return the file of an entry in the allocation."""
-        return self.allocated / f"{entry:03d}.json"
+    def allocation(self, entry: int, group: str | None = None, replacement: str | None = None) -> Path:
+        """Return the file of an entry: in the allocation or a pre-existing ``group``, of a ``replacement`` (an ID)."""
+        parts = (group, f"{entry:03d}", replacement)
+        return self.allocated / f"{'-'.join(part for part in parts if part is not None)}.json"
 
     reveals = _Within("blinding", "reveals.jsonl")
     """Who opened the key, when and why."""

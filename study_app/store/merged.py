@@ -31,7 +31,7 @@ FORMAT: Final = 1
 DASH: Final = "-"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Site:
     """A site of a merged study, as ``sites.json`` lists it."""
 
@@ -179,7 +179,14 @@ def all_exclusions(folder: Path) -> tuple[Exclusion, ...]:
         A list cannot be read.
     """
     return tuple(
-        Exclusion(f"{prefix}{row.participant}", row.session, row.trial, row.rule_or_person, row.reason, row.excluded_at)
+        Exclusion(
+            participant=f"{prefix}{row.participant}",
+            session=row.session,
+            trial=row.trial,
+            rule_or_person=row.rule_or_person,
+            reason=row.reason,
+            excluded_at=row.excluded_at,
+        )
         for prefix, place in folders_of(folder).items()
         for row in exclusions(place)
     )

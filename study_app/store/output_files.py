@@ -134,7 +134,7 @@ def write_output(study: Path, to: Path, files: Mapping[str, bytes | FileCopy]) -
     line = {"study": str(study.resolve()), "to": str(to.resolve()), "at": at, "files": [*files]}
     with contextlib.suppress(StoreError, OSError):  # the files are there; a list that cannot be written stops nobody
         data_folder().mkdir(parents=True, exist_ok=True)
-        append_line(data_folder() / NAME, json.dumps(line, ensure_ascii=False).encode() + b"\n", waits=False)
+        append_line(data_folder() / NAME, json.dumps(line).encode() + b"\n", waits=False)
     return written
 
 

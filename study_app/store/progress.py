@@ -13,6 +13,7 @@ from study_app.protocol.tracks import design_of
 from study_app.protocol.trials.methods import TrialResult
 from study_app.store.delivered import Broken, beyond_limits
 from study_app.store.journals import journal_events as events
+from study_app.store.missing_trials import MissingTrial, MissingTrials
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +24,7 @@ class TrialAnswer:
     seconds: float | None
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class Progress:
     """The progress of a session and its events, from the lines of its journal given to `take`.
 
@@ -83,6 +84,8 @@ class Progress:
     trial_answers: dict[int, TrialAnswer] = field(default_factory=dict)
     repeated: dict[int, tuple[str, ...]] = field(default_factory=dict)
     undelivered: dict[int, tuple[str, ...]] = field(default_factory=dict)
+    _main: dict[int, events.TrialStarted] = field(default_factory=dict)
+    _failed: set[int] = field(default_factory=set)
     _reason: str = ""
     _left_open: dict[tuple[int, int], dict[str, events.Answer]] = field(default_factory=dict)
 
@@ -94,6 +97,28 @@ class Progress:
         if self.trial is not None and chosen:
             found[self.trial, self.attempt] = chosen
         return found
+
+    @property
+    def missing_trials(self) -> MissingTrials:
+        """The main trials of intervals that were not delivered, and how many are over."""
+        limits = {} if self.start is None else self.start.limits
+        here = self.trial if self.invalid < limits.get("attempts", 1) else None  # it is presented again
+        missing = tuple(
+            MissingTrial(
+                trial=number,
+                block=self._main[number].block,
+                code=self._main[number].code,
+                broken=tuple(dict.fromkeys(self.undelivered.get(number, ()))),
+            )
+            for number in sorted(self._failed & self._main.keys() - {here})
+        )
+        answered = sum(number in self.trial_answers for number in self._main)
+        return MissingTrials(missing=missing, asked=answered + len(missing), limits=limits)
+
+    @property
+    def reached_end(self) -> bool:
+        """Whether the session reached its last page, with all trials delivered or not."""
+        return self.ended in events.REACHED_END
 
     def take(self, line: events.Event) -> None:
         """Process one more line."""
@@ -198,6 +223,8 @@ class Progress:
         self._enter(line.t_s)
         self.trial_since_s, self.trial_lasted_s, self.targets, self.paused = line.t_s, None, 0, False
         self.of_intervals = trial if line.has_intervals else None
+        if line.has_intervals and line.phase == "main":
+            self._main[trial] = line
         if line.has_intervals and line.attempt > 1 and self._reason != events.UNDELIVERED:
             self.repeated[trial] = (*self.repeated.get(trial, ()), self._reason or "interrupted")
         self._reason = ""
@@ -205,7 +232,9 @@ class Progress:
     def _end_trial(self, line: events.TrialEnded) -> None:
         self.trial_lasted_s = None if self.trial_since_s is None else line.t_s - self.trial_since_s
         self.task_done = line.outcome in ("complete", "timeout")
-        self.invalid += line.outcome == events.UNDELIVERED
+        if line.outcome == events.UNDELIVERED:
+            self.invalid += 1
+            self._failed.add(line.trial)
         if self.task_done:
             self.broken[line.trial] = beyond_limits(line.others, {} if self.start is None else self.start.limits)
         else:
@@ -216,6 +245,7 @@ class Progress:
         self.answered.pop(trial, None)
         self.trial_answers.pop(trial, None)
         self.broken.pop(trial, None)
+        self._failed.discard(trial)
 
     def _resume(self, gap_s: float) -> None:
         """Continue after a gap, which the session's clock counts as a pause."""

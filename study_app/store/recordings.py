@@ -33,23 +33,23 @@ from study_app.store.csv_files import Column, Kind
 from study_app.store.journals.journal_events import plain
 
 FRAMES: tuple[Column, ...] = (
-    Column("painted_ns", "integer", "Time when the frame was shown, on the servo's clock.", "ns"),
-    Column("sample_ns", "integer", "Time of the hand position that was shown.", "ns"),
-    Column("age_ns", "integer", "Achieved visual delay: painted_ns - sample_ns.", "ns"),
+    Column("painted_ns", "integer", "Time when the frame was shown, on the servo's clock.", unit="ns"),
+    Column("sample_ns", "integer", "Time of the hand position that was shown.", unit="ns"),
+    Column("age_ns", "integer", "Achieved visual delay: painted_ns - sample_ns.", unit="ns"),
     Column("video_frame", "integer", "Number of the video's frame in it, from 0; -1 without one.", minimum=-1),
     Column(
         "video_ns",
         "integer",
         "Time when that was due without a delay, on the servo's clock: when the camera's picture was ready, or by the "
         "time in the file; 0 without one.",
-        "ns",
+        unit="ns",
     ),
     Column(
         "video_age_ns",
         "integer",
         "Age of the camera's picture when it was ready, by the source's time stamps: it was taken at video_ns - "
         "video_age_ns; -1 if unknown or without one.",
-        "ns",
+        unit="ns",
         minimum=-1,
     ),
 )
@@ -72,7 +72,7 @@ def _columns(field: SampleField) -> list[Column]:
     kind: Kind = "flag" if field.stored is np.bool_ else "integer" if issubclass(field.stored, np.integer) else "number"
     meanings = [field.words.replace("*", words) for words in field.parts.values()] or [field.words]
     return [
-        Column(name, kind, meaning, field.unit, field.levels, field.minimum, field.maximum)
+        Column(name, kind, meaning, unit=field.unit, levels=field.levels, minimum=field.minimum, maximum=field.maximum)
         for name, meaning in zip(field.named(), meanings, strict=True)
     ]
 

@@ -16,7 +16,7 @@ from study_app.store.study_versions import content_hash, keep_content, kept_cont
 _NAME: Final = re.compile(r"[a-z][a-z0-9]*")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
     """The sessions that were run with one content of a study's file, counted by what they were.
 
@@ -97,8 +97,15 @@ def _run(path: Path, _changed_ns: int) -> Run:
     held = receipt.read(path)
     version = str(held.get("protocol", {}).get("study", {}).get("version", ""))
     simulated, pilot = bool(held.get("simulated")), bool(held.get("pilot"))
-    counted = (int(not simulated and not pilot), int(pilot), int(simulated and not pilot))
-    return Run(str(held.get("protocol_hash")), version, *counted, str(receipt.began_at(held) or ""), path)
+    return Run(
+        hash=str(held.get("protocol_hash")),
+        version=version,
+        sessions=int(not simulated and not pilot),
+        pilots=int(pilot),
+        rehearsals=int(simulated and not pilot),
+        last=str(receipt.began_at(held) or ""),
+        receipt=path,
+    )
 
 
 def recorded_items(known: Iterable[Run]) -> dict[tuple[str, str], int]:

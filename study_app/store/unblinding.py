@@ -20,7 +20,7 @@ from study_app.store.atomic import is_there, read_if_there, read_own, study_root
 from study_app.store.blinded.blinding import Codes, Key, opened, read_key, reveal, reveals, verified_key, whole_protocol
 from study_app.store.checksums import replace_checksums
 from study_app.store.csv_files import in_columns_of
-from study_app.store.exclusions import Exclusion, dated_reversals, exclude, exclusions, reversals
+from study_app.store.exclusions import MISSING_RULE, Exclusion, dated_reversals, exclude, exclusions, reversals
 from study_app.store.folder_lock import is_open, open_alone
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
@@ -29,9 +29,17 @@ from study_app.store.merged import folders_of
 from study_app.store.progress import trial_results
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.tables.session_tables import table_columns
-from study_app.store.tables.study_files import described_study, has_intervals, write_description, write_participants
+from study_app.store.tables.study_files import (
+    described_study,
+    has_intervals,
+    names_sealed,
+    write_description,
+    write_participants,
+)
 
 RULE: Final = "catch"
+RULES: Final = (RULE, MISSING_RULE)
+"""The rules that exclude sessions; a person decides every other exclusion."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +95,17 @@ def unblind(folder: Path, by: str, reason: str) -> Unblinded:
     return Unblinded(codes, tuple(left), excluded)
 
 
+def is_unblinded(folder: Path) -> bool:
+    """Return whether `unblind` was called and came to its end: its last step describes the sealed columns.
+
+    Raises
+    ------
+    StoreError
+        The list of reveals, or the description, cannot be read.
+    """
+    return all_opened(folder) and names_sealed(read_if_there(StudyFolder(folder).description) or b"")
+
+
 def unblind_folder(folder: Path, by: str, reason: str) -> dict[str, Unblinded]:
     """Open the key of a study, or of each site of a merged one, by what precedes the site's participants ("A-" or "").
 
@@ -111,7 +130,7 @@ def unblind_folder(folder: Path, by: str, reason: str) -> dict[str, Unblinded]:
 def decided_late(folder: Path, rows: Sequence[Exclusion]) -> tuple[Exclusion, ...]:
     """Return the exclusions that a person decided or reversed after the key was opened; none of a merged study."""
     opened_at = min(filter(None, (_moment(one["at"]) for one in reveals(folder))), default=None)
-    dated = (*((row, row.excluded_at) for row in rows if row.rule_or_person != RULE), *dated_reversals(folder))
+    dated = (*((row, row.excluded_at) for row in rows if row.rule_or_person not in RULES), *dated_reversals(folder))
     times = ((row, _moment(text)) for row, text in dated)  # reveals are recorded in whole seconds
     return tuple(row for row, at in times if opened_at and at and at.replace(microsecond=0) > opened_at)
 

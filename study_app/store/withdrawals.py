@@ -46,7 +46,7 @@ DATASET: Final = "dataset_description.json"
 RESULTS: Final = "results"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ErasedSession:
     """What proves which session was erased."""
 
@@ -56,7 +56,7 @@ class ErasedSession:
     fingerprint: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Tombstone:
     """One withdrawal; a line of ``withdrawals.jsonl``. ``at`` is when the data were erased from that folder."""
 
@@ -191,7 +191,7 @@ def describe_session(session: SessionFolder) -> ErasedSession:
         proof, checksums = fingerprint(read_checksums(session), lines), sha256(session.checksums)
     except StoreError:
         proof = checksums = ""
-    return ErasedSession(session.number, begun, checksums, proof)
+    return ErasedSession(session=session.number, begun=begun, checksums=checksums, fingerprint=proof)
 
 
 def add_tombstone(study: StudyFolder, tombstone: Tombstone) -> None:
@@ -252,7 +252,9 @@ def _tombstone(study: StudyFolder, participant: str, at: str, by: str, reason: s
     if not sessions:
         held = ", ".join(study.ids()) or "none"
         raise StoreError(f"{study.path} has no participant {participant!r}; participants: {held}")
-    return Tombstone(participant, at, by, reason, tuple(map(describe_session, sessions)))
+    return Tombstone(
+        participant=participant, at=at, by=by, reason=reason, sessions=tuple(map(describe_session, sessions))
+    )
 
 
 def _sessions(study: StudyFolder, participant: str) -> list[SessionFolder]:

@@ -91,7 +91,7 @@ class Scaler:
         width, height = max(2, round(share * frame.width)), max(2, round(share * frame.height))
         scaled = self._reformatter.reformat(frame, width, height, "bgra", interpolation="BILINEAR")
         plane = scaled.planes[0]  # keeps its frame
-        return Pixels(width, height, plane.line_size, plane)
+        return Pixels(width=width, height=height, stride=plane.line_size, content=plane)
 
 
 def make_less_urgent() -> None:

@@ -11,7 +11,7 @@ def stopped(why: str) -> VideoError:
     return VideoError(f"a video of the study stopped ({why}): check camera and files")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class VideoFrame:
     """A decoded frame.
 

@@ -164,7 +164,16 @@ class Camera:
         number = numbers.of(frame.time)
         width, height, stride, pixels = scaler.pixels(frame)
         ready_ns, age_ns = self._now_ns(), _age_ns(frame.time)
-        made = VideoFrame(number, width, height, stride, pixels, ready_ns, age_ns, numbers.period_ns)
+        made = VideoFrame(
+            number=number,
+            width=width,
+            height=height,
+            stride=stride,
+            pixels=pixels,
+            due_ns=ready_ns,
+            age_ns=age_ns,
+            period_ns=numbers.period_ns,
+        )
         with self._changed:
             self._frames.append(made)
             while self._frames[0].due_ns < ready_ns - self._holds_ns:
@@ -319,7 +328,16 @@ class Footage:
                     return
                 if number == 0 or offset_ns + end_ns >= self._media_ns:
                     width, height, stride, pixels = self._scaler.pixels(frame)
-                    yield VideoFrame(number, width, height, stride, pixels, offset_ns + media_ns, 0, self._period_ns)
+                    yield VideoFrame(
+                        number=number,
+                        width=width,
+                        height=height,
+                        stride=stride,
+                        pixels=pixels,
+                        due_ns=offset_ns + media_ns,
+                        age_ns=0,
+                        period_ns=self._period_ns,
+                    )
                 number += 1
             if end_ns == 0:
                 raise VideoError("it holds no frame")

@@ -86,7 +86,14 @@ class Results:
 
     def exclude(self, participant: str, *, session: int = 1, trial: int | None = None, reason: str = "tired") -> None:
         """Leave a session, or one trial of it, out of the analysis."""
-        new = Exclusion(participant, session, trial, "AB", reason, "2026-01-06T10:00:00.000+01:00")
+        new = Exclusion(
+            participant=participant,
+            session=session,
+            trial=trial,
+            rule_or_person="AB",
+            reason=reason,
+            excluded_at="2026-01-06T10:00:00.000+01:00",
+        )
         listed = (*exclusions(self.folder), new)
         StudyFolder(self.folder).exclusions.write_bytes(exclusion_bytes(listed))
 

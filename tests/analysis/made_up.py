@@ -24,7 +24,10 @@ Presented = tuple[str, int, str, Sequence[int | None]]
 
 def delays(delays_ms: Sequence[float]) -> tuple[Setting, ...]:
     """Return settings of one liquid, D1, D2 …, sorted as a study has them."""
-    made = [Setting(f"D{place}", f"delay_{place}", "water", float(ms)) for place, ms in enumerate(delays_ms, start=1)]
+    made = [
+        Setting(code=f"D{place}", condition=f"delay_{place}", liquid="water", delay_ms=float(ms))
+        for place, ms in enumerate(delays_ms, start=1)
+    ]
     return tuple(sorted(made, key=lambda setting: setting.delay_ms or 0.0))
 
 
@@ -32,7 +35,8 @@ def liquids(count: int) -> tuple[Setting, ...]:
     """Return settings of so many liquids, L1, L2 …, the first two of which the first two items name."""
     names = [*ITEMS, *[None] * count]
     return tuple(
-        Setting(f"L{place}", f"c{place}", f"liquid{place}", 0.0, names[place - 1]) for place in range(1, count + 1)
+        Setting(code=f"L{place}", condition=f"c{place}", liquid=f"liquid{place}", delay_ms=0.0, label=names[place - 1])
+        for place in range(1, count + 1)
     )
 
 
@@ -41,8 +45,16 @@ def study(settings: Sequence[Setting], trials: Sequence[Presented], decided: Dec
     kind = "delays" if settings[0].code.startswith("D") else "liquids"
     if kind == "liquids":
         decided = replace(decided, names=ITEMS)
-    items = tuple(Item(item, item, item.capitalize()) for item in ITEMS)
-    block = Block("b", "Block", kind, tuple(settings), items, tuple("1234567"), None)
+    items = tuple(Item(id=item, text=item, short=item.capitalize()) for item in ITEMS)
+    block = Block(
+        id="b",
+        title="Block",
+        kind=kind,
+        settings=tuple(settings),
+        items=items,
+        labels=tuple("1234567"),
+        cannot_judge=None,
+    )
     presented, answers = [], []
     for number, (participant, session, code, given) in enumerate(trials, start=1):
         place = {
@@ -94,9 +106,20 @@ def table(columns: Sequence[Column], rows: Sequence[dict[str, Any]]) -> pd.DataF
 
 
 def _visit(participant: str, session: int) -> dict[str, Any]:
-    unknown = ("language", "ended_at", "device", "key_hash", "seed", "protocol_hash", "version", "exclusion_reason")
+    unknown = (
+        "language",
+        "ended_at",
+        "device",
+        "key_hash",
+        "seed",
+        "protocol_hash",
+        "version",
+        "exclusion_reason",
+        "missing",
+        "group",
+    )
     return {
-        **dict.fromkeys((*unknown, "motors_masked")),
+        **dict.fromkeys((*unknown, "motors_masked", "missing")),
         "started_at": f"2026-01-{session:02d}",
         "participant": participant,
         "session": session,

@@ -194,7 +194,7 @@ def test_power_tells_the_smallest_difference_between_groups() -> None:
     text = "\n".join(line for line in DELAYED.splitlines() if not line.startswith("contrasts"))
     protocol = grouped(text, "threshold", "late", '["late", "prompt"]')
     found = {("late", 20): PrecisionResult([np.log([[1.3], [1 / 1.3]])], [np.full(2, 0.2)])}
-    told = threshold_markdown(Precisions(protocol, (3, 18), 10, 10, 1, found))
+    told = threshold_markdown(Precisions(protocol=protocol, sizes=(3, 18), studies=10, asked=10, seed=1, found=found))
     spread = math.hypot(math.log(1.2), math.log(1.3))
     assert f"| 20 | 3 | {spread:.0%} | – | – |" in told
     half, smallest = (math.exp(spread * end) for end in detectable(12, 6, tail=0.025))
@@ -205,7 +205,7 @@ def test_power_tells_the_smallest_difference_between_groups() -> None:
     sequence, _, rest = rest.partition("]")
     protocol = grouped(text + rest, "different", "delays", f"{sequence}]")
     planned = plan(protocol, felt_in(protocol))
-    told = power_markdown(Powers(planned, (18,), 1, 1, 1, ()))
+    told = power_markdown(Powers(plan=planned, sizes=(18,), studies=1, asked=1, seed=1, curves=()))
     _, _, _, spread, _, smallest, _ = (cell.strip(" ±") for cell in told.splitlines()[-1].split("|"))
     draw = np.random.default_rng(1).normal(size=(4000, 18)) * float(spread)
     t = ttest_ind(draw[:, :12] + float(smallest), draw[:, 12:], axis=1, equal_var=False).statistic
@@ -265,7 +265,11 @@ def test_power_plans_differences_and_equality_within_people(
         (block, 20): PrecisionResult([np.array([[errors], [-errors]])], [np.full(2, 0.2)])
         for block in ("late", "prompt")
     }
-    told = threshold_markdown(Precisions(parse(text.encode(), "delayed.toml"), (40,), 10, 10, 1, found))
+    told = threshold_markdown(
+        Precisions(
+            protocol=parse(text.encode(), "delayed.toml"), sizes=(40,), studies=10, asked=10, seed=1, found=found
+        )
+    )
     half, least = (spread * end for end in detectable(40, tail=0.05))
     ends = f"±{half:.2f} | ±{least:.2f}" if edits else f"×/÷ {math.exp(half):.2f} | ×/÷ {math.exp(least):.2f}"
     assert ("SD, as a share of a mean d′ of 1: of one" if edits else "SD: of one") in told

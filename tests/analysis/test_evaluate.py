@@ -28,10 +28,22 @@ from tests.analysis.conftest import Results as Folder
 
 pytestmark = pytest.mark.slow
 
-DECIDED = Decided(True, False, 0.05, 1.0, ("a", "b"), (), (), (), None)
+DECIDED = Decided(
+    made=True,
+    changed=False,
+    alpha=0.05,
+    equivalence_bound=1.0,
+    primary=("a", "b"),
+    names=(),
+    rising=(),
+    falling=(),
+    noticed=None,
+)
 
 
-NOBODY = of_tables(Block("b", "Block", "liquids", (), (), (), None), DECIDED, (), {})
+NOBODY = of_tables(
+    Block(id="b", title="Block", kind="liquids", settings=(), items=(), labels=(), cannot_judge=None), DECIDED, (), {}
+)
 
 
 def found(folder: Folder) -> Results:
@@ -158,13 +170,35 @@ def _omnibus(folder: Folder) -> tuple:  # type: ignore[type-arg]
 def test_where_one_liquid_differs_the_others_are_seldom_told_apart(n: int) -> None:
     """Honey differs in all nine statements; water and light oil are answered alike."""
     rng = np.random.default_rng(n)
-    settings = tuple(Setting(code, code, code, 0.0) for code in ("water", "honey", "oil"))
-    items = tuple(Item(f"s{number}", "?", "?") for number in range(9))
-    block = Block("liquids", "Liquids", "liquids", settings, items, tuple("1234567"), None)
+    settings = tuple(
+        Setting(code=code, condition=code, liquid=code, delay_ms=0.0) for code in ("water", "honey", "oil")
+    )
+    items = tuple(Item(id=f"s{number}", text="?", short="?") for number in range(9))
+    block = Block(
+        id="liquids",
+        title="Liquids",
+        kind="liquids",
+        settings=settings,
+        items=items,
+        labels=tuple("1234567"),
+        cannot_judge=None,
+    )
     decided = replace(DECIDED, primary=())
     wrong = right = 0
     opened_ = paired([1.0, 2.0], [2.0, 1.0])
-    omnibus = tuple(results.Tested(item.id, opened_, "f", 9, "Holm", 0.001, True, "shown") for item in items)
+    omnibus = tuple(
+        results.Tested(
+            item=item.id,
+            outcome=opened_,
+            family="f",
+            members=9,
+            correction="Holm",
+            p_adjusted=0.001,
+            primary=True,
+            verdict="shown",
+        )
+        for item in items
+    )
     for _ in range(100):
         latent = 3.5 + np.array([[0.0], [2.0], [0.0]]) + rng.normal(0, 1, (9, n, 3, 1))
         values = {item.id: np.clip(np.rint(rows), 1, 7) for item, rows in zip(items, latent, strict=True)}
@@ -179,9 +213,19 @@ def test_where_one_liquid_differs_the_others_are_seldom_told_apart(n: int) -> No
 @pytest.mark.parametrize(("statements", "alpha"), [(5, 0.05), (40, 0.05), (9, 0.001), (100, 0.01)])
 @pytest.mark.parametrize("people", [20, MANY + 1])
 def test_draws_are_so_many_that_they_decide_nothing(statements: int, alpha: float, people: int) -> None:
-    items = tuple(Item(f"s{number}", f"Statement {number}.", f"S{number}") for number in range(statements))
-    settings = tuple(Setting(f"L{number}") for number in range(1, 4))
-    block = Block("liquids", "Liquids", "liquids", settings, items, tuple("1234567"), None)
+    items = tuple(
+        Item(id=f"s{number}", text=f"Statement {number}.", short=f"S{number}") for number in range(statements)
+    )
+    settings = tuple(Setting(code=f"L{number}") for number in range(1, 4))
+    block = Block(
+        id="liquids",
+        title="Liquids",
+        kind="liquids",
+        settings=settings,
+        items=items,
+        labels=tuple("1234567"),
+        cannot_judge=None,
+    )
     rng = np.random.default_rng(3)
     values = {item.id: rng.integers(1, 8, (people, 3, 1)).astype(float) for item in items}
     names = tuple(f"P{number:04d}" for number in range(people))

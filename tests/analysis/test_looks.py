@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 from scipy.stats import norm, ttest_rel
 
-from study_app.analysis.data.blocks import Spending
+from study_app.analysis.data.blocks import Decided, Spending
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.findings.statement_tests import DelayTrend, MixedModel
@@ -17,7 +17,7 @@ from study_app.analysis.planning.preregistration import preregistration
 from study_app.analysis.planning.simulated_studies import FULL, count, people, plan
 from study_app.analysis.report.sections import first_page, methods
 from study_app.analysis.statistics.mixed_model import mixed
-from study_app.analysis.statistics.outcome import alpha_of_looks, holm
+from study_app.analysis.statistics.outcome import alpha_of_looks, error_of_every_report, holm
 from study_app.cli import commands
 from study_app.errors import ProtocolError
 from study_app.protocol.load import parse
@@ -51,6 +51,31 @@ def test_bounds_are_those_of_the_program_ld98(spending: Spending, bounds: tuple[
     found = norm.isf(np.array(alpha_of_looks((5, 10, 15, 20, 25), 0.05, spending)) / 2)
     assert found == pytest.approx(bounds, abs=3e-4)
     assert alpha_of_looks((7, 12), 0.05, spending)[0] < alpha_of_looks((9, 12), 0.05, spending)[0] < 0.05
+
+
+@pytest.mark.parametrize("spending", ["obrien-fleming", "pocock"])
+def test_the_cost_of_a_test_at_every_participant_is_that_of_simulated_studies(spending: Spending) -> None:
+    looks, studies = (12, 18, 24), 40_000
+    walks = np.random.default_rng(4).normal(size=(studies, 24)).cumsum(axis=1)[:, 11:] / np.sqrt(np.arange(12, 25))
+    ends = norm.isf(np.repeat(alpha_of_looks(looks, 0.05, spending), (6, 6, 1)) / 2)
+    claimed = float((np.abs(walks) >= ends).any(axis=1).mean())
+    assert error_of_every_report(looks, 0.05, spending) == pytest.approx(claimed, abs=0.004)
+    made = Decided(
+        made=True,
+        changed=False,
+        alpha=0.05,
+        equivalence_bound=None,
+        primary=(),
+        names=(),
+        rising=(),
+        falling=(),
+        noticed=None,
+        looks=looks,
+        spending=spending,
+    )
+    assert f"claims something falsely in {100 * error_of_every_report(looks, 0.05, spending):.1f} % instead of 5 %" in (
+        made.at(13).look_words(13)
+    )
 
 
 @pytest.mark.parametrize(
@@ -114,14 +139,23 @@ def test_slopes_are_tested_and_planned_where_the_study_says_so() -> None:
     assert f"Trends over the delay were tested by {told}, which" in methods(made, results)
 
 
-@pytest.mark.parametrize(("n", "said"), [(5, "none of which is reached"), (6, "look 1 of 2"), (13, "look 2 of 2")])
+@pytest.mark.parametrize(
+    ("n", "said"),
+    [
+        (5, "none of which is reached"),
+        (6, "look 1 of 2"),
+        (12, "look 2 of 2"),
+        (9, "This look at 9 participants is unplanned: looks are planned at 6 and 12 participants."),
+        (13, "This look at 13 participants is unplanned"),
+    ],
+)
 def test_the_first_page_says_which_look_it_is(n: int, said: str) -> None:
     made = study(liquids(3), list(everybody(liquids(3), n, lambda person, _s, code, _i: 1 + int(code[1]) + person % 2)))
     decided = replace(made.decided, made=True, changed=False, looks=(6, 12))
     results = evaluate(replace(made, decided=decided.at(made.n)))
     assert said in first_page(results, ())
     assert results.decided.binding == (n >= 6)
-    assert results.decided.alpha == pytest.approx(alpha_of_looks((6, 12), 0.05, "obrien-fleming")[int(n > 12)])
+    assert results.decided.alpha == pytest.approx(alpha_of_looks((6, 12), 0.05, "obrien-fleming")[int(n >= 12)])
 
 
 @pytest.mark.slow

@@ -112,8 +112,8 @@ def test_trials_can_be_named_for_leaving_out_and_then_do_not_count(study: Path) 
     (found,) = of_kind(StudyFound, told(ReadStudy(study)))
     number, words = found.trials["P001", 1][0]
     assert words.split(", ")[-1][:1] in "LD"
-    told(LeaveOut(study, "P001", 1, number, "AK", "phone rang"))
-    told(LeaveOut(study, "P002", 1, None, "AK", "asleep"))
+    told(LeaveOut(folder=study, participant="P001", session=1, trial=number, by="AK", reason="phone rang"))
+    told(LeaveOut(folder=study, participant="P002", session=1, trial=None, by="AK", reason="asleep"))
     answers = told(ReadStudy(study))
     assert [one.what for one in of_kind(SessionsFound, answers)[0].exclusions] == [
         ("P001", 1, number),
@@ -124,7 +124,7 @@ def test_trials_can_be_named_for_leaving_out_and_then_do_not_count(study: Path) 
 
 def test_what_the_store_refuses_changes_nothing(study: Path) -> None:
     with pytest.raises(StoreError, match="no session 1 of participant P009"):
-        told(LeaveOut(study, "P009", 1, None, "AK", "x"))
+        told(LeaveOut(folder=study, participant="P009", session=1, trial=None, by="AK", reason="x"))
     with pytest.raises(StoreError, match="reason"):
         told(OpenKey(study, "AK", " "))
     assert exclusions(study) == ()
@@ -178,7 +178,15 @@ def test_the_process_answers_stops_and_is_gone_when_closed(study: Path, tmp_path
         assert isinstance(stopped, Refused)
         assert stopped.stopped
         assert not (tmp_path / "to").exists()
-        assert last_of(worker, worker.order(LeaveOut(study, "P001", 1, None, "AK", "asleep"))) == Done()
+        assert (
+            last_of(
+                worker,
+                worker.order(
+                    LeaveOut(folder=study, participant="P001", session=1, trial=None, by="AK", reason="asleep")
+                ),
+            )
+            == Done()
+        )
     finally:
         worker.close()
     end_s = time.monotonic() + SOON_S
@@ -198,7 +206,7 @@ def test_a_merged_study_is_found_read_decided_on_and_opened(whole: Path, tmp_pat
     assert listed.reveal is None
     facts = session_facts(pooled, listed.rows, (), {})
     assert [one.folder.is_dir() for one in facts] == [True] * 5
-    told(LeaveOut(pooled, "B-P002", 1, None, "AK", "coughed"))
+    told(LeaveOut(folder=pooled, participant="B-P002", session=1, trial=None, by="AK", reason="coughed"))
     assert [row.participant for row in exclusions(pooled / "sites/B")] == ["P002"]
     assert told(OpenKey(pooled, "AK", "closed"))[-1] == Done()
     again = told(ReadStudy(pooled))
@@ -207,5 +215,5 @@ def test_a_merged_study_is_found_read_decided_on_and_opened(whole: Path, tmp_pat
     assert [row.participant for row in listed.exclusions] == ["B-P002"]
     (study_found,) = of_kind(StudyFound, again)
     assert (study_found.revealed, study_found.n) == (True, 4)
-    told(TakeBack(pooled, "B-P002", 1, None, "AK", "a mistake"))
+    told(TakeBack(folder=pooled, participant="B-P002", session=1, trial=None, by="AK", reason="a mistake"))
     assert exclusions(pooled / "sites/B") == ()

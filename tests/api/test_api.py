@@ -20,6 +20,7 @@ from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 from tests.documented import ROOT, blocks
 from tests.golden import compare
+from tests.protocol.forms.mixed import mixed_file
 from tests.protocol.trials import level_studies, matching
 
 HERE = Path(__file__).parent
@@ -163,6 +164,24 @@ def test_an_own_observer_answers_and_a_session_left_is_resumed(short: Path, tmp_
     assert verify(parted).errors == ()
     with pytest.raises(StudyError, match="completed"), api.open_session(short, "P001", results=whole, seed=5):
         pass
+
+
+@pytest.mark.slow
+@needs_servo
+def test_an_own_observer_answers_with_lists_and_numbers_of_numpy(tmp_path: Path) -> None:
+    given = {"age": np.int64(30), "used": ["falcon", "mouse"], "pleasant": np.float64(25.0), "thickness": np.int32(2)}
+    others = {"hand": "left", "since": 1.5, "feels_liquid": 4, "comment": "Fine."}
+
+    def observer(question: Any) -> dict[str, Any] | None:
+        asked = {item.id for item in getattr(question.page, "items", ())}
+        return {item: value for item, value in (given | others).items() if item in asked} or None
+
+    with api.open_session(mixed_file(tmp_path), "P001", results=tmp_path / "r", seed=2, answer=observer) as session:
+        session.run()
+    assert verify(tmp_path / "r").errors == ()
+    rows = api.read(tmp_path / "r")["responses"]
+    told = {item: set(rows.loc[rows["item"] == item, "response"].astype(str)) for item in given}
+    assert told == {"age": {"30"}, "used": {"falcon mouse"}, "pleasant": {"25.0"}, "thickness": {"2"}}
 
 
 def to_twice_the_standard(question: Any) -> np.int64:

@@ -8,9 +8,6 @@ from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication
 
 from study_app.app.main_controller import MainController
-from tests.gui.conftest import pytest_pycollect_makemodule
-
-__all__ = ["pytest_pycollect_makemodule"]
 
 
 @pytest.fixture

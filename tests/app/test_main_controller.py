@@ -22,7 +22,18 @@ from study_app.session.start import NewSession
 pytestmark = pytest.mark.slow
 
 ALT = Qt.KeyboardModifier.AltModifier
-CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "mouse", True, None, Path("nowhere"))
+CHOSEN = NewSession(
+    source="demo",
+    participant="P001",
+    session=1,
+    seed=7,
+    operator="AK",
+    language="en",
+    device="mouse",
+    windowed=True,
+    screen=None,
+    results=Path("nowhere"),
+)
 
 
 class Machine:

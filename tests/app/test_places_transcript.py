@@ -59,12 +59,19 @@ class Worker:
 
 
 def figure(name: str, title: str = "Agreement") -> Any:
-    return of.FigureDrawn(name, title, "n = 1", b"")
+    return of.FigureDrawn(name=name, title=title, caption="n = 1", svg=b"")
 
 
 FOUND = of.StudiesFound((of.StudyAt(STUDY, True, False, 5.0), of.StudyAt(OTHER, False, True, 3.0)))
 WHOLE = of.StudyFound("one", "One", 1, 2, False, {("P001", 1): ((1, "L1"),)}, ("a file",), {"L1": "#000000"})
-OUT = Exclusion("P001", 1, 2, "AK", "asleep", "2026-11-20T11:00:00+00:00")
+OUT = Exclusion(
+    participant="P001",
+    session=1,
+    trial=2,
+    rule_or_person="AK",
+    reason="asleep",
+    excluded_at="2026-11-20T11:00:00+00:00",
+)
 SESSIONS = of.SessionsFound(STUDY, (ROW, ROW | {"participant_id": "P002", "status": "unfinished"}), (OUT,), None)
 RESULTS: list[tuple[str, Any]] = [
     ("entered", ()), ("answer", of.Progress("looking", 0.5)), ("answer", FOUND), ("late", of.Done()),
@@ -90,6 +97,10 @@ RESULTS: list[tuple[str, Any]] = [
 ]  # fmt: skip
 
 
+def exclusion(asked: tuple[Any, ...]) -> dict[str, Any]:
+    return dict(zip(("participant", "session", "trial", "by", "reason"), asked, strict=True))
+
+
 def test_results(qtbot: Any, pytestconfig: pytest.Config) -> None:
     done: list[str] = []
     workers: list[Worker] = []
@@ -103,9 +114,9 @@ def test_results(qtbot: Any, pytestconfig: pytest.Config) -> None:
     qtbot.addWidget(place)
     asks: dict[str, Any] = {
         "entered": place.enter, "left": place.leave, "study_asked": place._choose, "remedy_asked": place._mend,
-        "leave_out_asked": lambda asked: place._decide("leaving out", of.LeaveOut, *asked),
-        "take_back_asked": lambda asked: place._decide("taking the exclusion back", of.TakeBack, *asked),
-        "unblind_asked": lambda *asked: place._decide("opening the key", of.OpenKey, *asked),
+        "leave_out_asked": lambda asked: place._decide("leaving out", of.LeaveOut, **exclusion(asked)),
+        "take_back_asked": lambda asked: place._decide("taking the exclusion back", of.TakeBack, **exclusion(asked)),
+        "unblind_asked": lambda by, reason: place._decide("opening the key", of.OpenKey, by=by, reason=reason),
         "tables_asked": lambda *asked: place._write(of.WriteTables, *asked),
         "report_asked": lambda to, _extras: place._write(of.WriteReport, to), "stop_asked": place._stop_writing,
         "open_asked": place._opener, "choose": place.choose, "others": place.show_results,
@@ -169,7 +180,10 @@ def test_settings(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: py
     compare(GOLDEN / "settings.txt", lines, pytestconfig)
 
 
-MOUSE, FALCON = Backend("mouse", "the program", READY, "moves the ball"), Backend("falcon", "libusb", NONE, "no")
+MOUSE, FALCON = (
+    Backend("mouse", "the program", state=READY, can="moves the ball"),
+    Backend("falcon", "libusb", state=NONE, can="no"),
+)
 
 
 def test_devices(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: pytest.Config) -> None:
@@ -263,7 +277,18 @@ def go(name: str) -> Any:
     return lambda visit: visit.window.go(name)
 
 
-CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "mouse", True, None, Path("nowhere"))
+CHOSEN = NewSession(
+    source="demo",
+    participant="P001",
+    session=1,
+    seed=7,
+    operator="AK",
+    language="en",
+    device="mouse",
+    windowed=True,
+    screen=None,
+    results=Path("nowhere"),
+)
 STAY: dict[str, Any] = {
     "home": go("home"), "begin": home("session_asked", CHOSEN), "begin twice": home("session_asked", CHOSEN),
     "bug meanwhile": lambda visit: visit.show_bug(ValueError("x")), "called off": ends(),

@@ -18,7 +18,7 @@ from study_app.user_folder import settings_file
 
 pytestmark = pytest.mark.slow
 
-MOUSE = Backend("mouse", "the window", READY, "seen, not felt")
+MOUSE = Backend("mouse", "the window", state=READY, can="seen, not felt")
 
 
 @pytest.fixture
@@ -90,7 +90,21 @@ def test_from_the_cockpit_a_falcon_is_examined_and_of_what_is_none_it_is_said(qa
         return SimpleNamespace(show=lambda: None)
 
     monkeypatch.setattr("study_app.gui.devices.diagnosis_dialog.diagnosis", diagnosis)
-    live = LiveSession(NewSession("demo", "P001", 1, 7, "", "en", device, True, None, Path("nowhere")), LIGHT)
+    live = LiveSession(
+        NewSession(
+            source="demo",
+            participant="P001",
+            session=1,
+            seed=7,
+            operator="",
+            language="en",
+            device=device,
+            windowed=True,
+            screen=None,
+            results=Path("nowhere"),
+        ),
+        LIGHT,
+    )
     live.bridge = SimpleNamespace(operator=SimpleNamespace(theme=DARK, show_message=lambda *said: told.append(said)))
     live.diagnose()
     assert asked == ([] if held is None else [(device, held)])

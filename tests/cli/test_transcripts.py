@@ -17,11 +17,13 @@ from study_app.cli import main
 from study_app.session.simulated.answers_only import rehearse_answers
 from tests.compiled import needs_servo
 from tests.golden import CHANGING, compare
+from tests.platforms import needs_window_system
 from tests.studies import made_up, once
 from tests.transcripts import Files, every, value_of
 
 GOLDEN = every(Path(__file__).parent / "golden", "data model outputs refusals sites study withdrawals")
 LATER = {
+    "model": [needs_window_system],
     "outputs": [pytest.mark.slow],
     "refusals": [pytest.mark.slow, needs_servo],
     "sites": [pytest.mark.slow],

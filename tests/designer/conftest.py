@@ -10,9 +10,6 @@ import pytest
 
 from tests.designer.support.designer import Designer
 from tests.designer.support.record import NEVER_MS, Record
-from tests.gui.conftest import pytest_pycollect_makemodule
-
-__all__ = ["pytest_pycollect_makemodule"]
 
 
 @pytest.fixture

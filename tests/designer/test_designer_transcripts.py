@@ -177,7 +177,7 @@ def test_each_field_of_a_form_used_once(record: Any, name: str, section: str, py
             made.lines.append(f"== {path}, {key}")
             use(named[key])
             settle(designer)
-            made.lines += [*made.said(), *(row.message for row in designer.window.problems)]
+            made.lines += [*made.said(), *(row.message for row in designer.place.view.problems)]
             made.lines += told(popup) if (popup := QApplication.activePopupWidget()) else ()
             if popup is not None:
                 popup.close()

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.slow
 
 def test_every_key_of_the_place_is_one_shortcut(designer: Any) -> None:
     made = [keys.toString() for action in designer.place.actions() for keys in action.shortcuts()]
-    made.append(designer.header.play.play.shortcut().toString())
+    made.append(designer.place.header.play.play.shortcut().toString())
     wanted = [keys for one in COMMANDS if not one.within for keys in one.keys]
     assert sorted({"Ins": "Insert"}.get(keys, keys) for keys in made) == sorted(wanted)
 

@@ -95,7 +95,7 @@ def test_a_list_that_is_clicked_after_an_id_was_typed_stays_open(qtbot: Any, des
     assert "[conditions.thick]" in designer.text
     liquids.hidePopup()
     qtbot.waitUntil(lambda: "[conditions.honey]" in designer.text)
-    assert designer.window.form.path == ("conditions", "honey")
+    assert designer.place.view.form.path == ("conditions", "honey")
 
 
 def test_a_field_that_is_clicked_thrice_after_an_id_was_typed_takes_what_is_typed(qtbot: Any, designer: Any) -> None:
@@ -117,7 +117,7 @@ def test_a_field_that_is_clicked_thrice_after_an_id_was_typed_takes_what_is_type
 
 
 def listed(designer: Any) -> list[str]:
-    box = designer.header.study
+    box = designer.place.header.study
     return [box.itemText(at) for at in range(box.count())]
 
 
@@ -148,7 +148,7 @@ def test_studies_are_listed_by_title_with_their_files_whatever_was_opened_last(d
     designer.place.ask("save")
     designer.controller.enter()
     assert listed(designer) == before
-    box = designer.header.study
+    box = designer.place.header.study
     assert box.currentText() == "Melons  ·  beta.toml  (copy of alpha)"
     assert (
         box.itemData(box.currentIndex(), Qt.ItemDataRole.AccessibleTextRole)

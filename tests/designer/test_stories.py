@@ -48,7 +48,7 @@ def drafts(record: Record) -> None:
     record.play("ctrl+z ctrl+y")
     act("open the open one", lambda: designer.open(str(designer.file)))
     act("to the file", lambda: designer.place.show_tab("file"))
-    act("type into it", lambda: designer.file.editor.insertPlainText("# mine\n"))
+    act("type into it", lambda: designer.place.file.editor.insertPlainText("# mine\n"))
     act("open a shipped one", lambda: designer.open("demo"))
     record.ask(SetValue(VERSION, "9"))
     record.ask(RetypeFile("format = 1\n"))
@@ -70,7 +70,7 @@ def banner(record: Record) -> None:
     for end, acts in ends.items():
         record.note("open another", lambda: designer.open("demo"))
         text = designer.file.read_text()
-        keep(designer.file, Draft(f"{text}# {end}\n", content_hash(text.encode())))
+        keep(designer.file, Draft(text=f"{text}# {end}\n", base=content_hash(text.encode())))
         record.note("open a draft", designer.open)
         record.ask(SetText(TITLE, "en", end))
         if end == "close":
@@ -216,7 +216,7 @@ def versions(record: Record) -> None:
     record.play("ctrl+a '1.0' Return ctrl+a '1.1' Return")
     record.ask(SetValue(REPETITIONS, 4))
     record.play("ctrl+s")
-    record.note("chip", designer.header.version.click)
+    record.note("chip", designer.place.header.version.click)
     record.note("compare", lambda: card.compare_with(card.version.itemData(1)))
     record.note("restore", card.restore.click)
     record.play("ctrl+z")
@@ -330,9 +330,9 @@ def adaptive(record: Record) -> None:
 
 def header(record: Record) -> None:
     """A disabled button of the header gives the keyboard back; keys in the list of studies open no other one."""
-    designer, box = record.designer, record.designer.header.study
+    designer, box = record.designer, record.designer.place.header.study
     record.play("@blocks.liquids :blocks.liquids.repetitions ctrl+a '3'")
-    for button in (designer.header.undo, designer.header.redo, designer.header.save):
+    for button in (designer.place.header.undo, designer.place.header.redo, designer.place.header.save):
         name, at = button.accessibleName(), button.mapToGlobal(QPoint(9, 9))
         record.note(f"click {name}", lambda at=at: designer.hand.click(at))
         record.note(f"click {name}, disabled", lambda at=at: designer.hand.click(at))
@@ -364,7 +364,7 @@ def keys_without_a_field(record: Record) -> None:
 
 def typed_into_the_file(record: Record) -> None:
     """What is typed into the file stays there where the form is made anew; a fault reaches its field."""
-    editor = record.designer.file.editor
+    editor = record.designer.place.file.editor
 
     def go_to(line: str, end: bool) -> None:
         cursor = editor.textCursor()
@@ -417,7 +417,7 @@ def warnings(record: Record) -> None:
     """The chip of warnings opens a list of them, of the study or of the selected element alone."""
     problems = record.designer.place.problems
     record.ask(SetValue(("liquids", "thick", "density_kg_m3"), 1001))
-    record.note("chip", record.designer.header.problems.click)
+    record.note("chip", record.designer.place.header.problems.click)
     record.note("next", problems.next.click)
     record.note("of this element", lambda: problems.limit.chosen.emit(True))
     record.play("@pages.welcome")
@@ -536,7 +536,7 @@ def hypotheses(record: Record) -> None:
     record.choose(line().first, "Late in Delays")
     record.choose(line().measure, "Comfortable")
     record.choose(line().relation, "is equal to")
-    for typed in ("0.25", "x"):
+    for typed in ("0.25", "x", "2,500"):
         record.note(f"bound {typed}", lambda typed=typed: designer.fill(line().bound, typed))
     record.choose(line().relation, "is different from")
     record.play("@blocks.delays")
@@ -597,7 +597,7 @@ def two_conditions(record: Record) -> None:
 
 BROKEN = DEMO.replace("[study]", "[study")
 STORIES: tuple[tuple[Callable[[Record], None], str, str], ...] = (
-    (drafts, DEMO, "header"),
+    (drafts, DEMO, "place.header"),
     (banner, DEMO, "place.banner"),
     (never_saved, DEMO, "place"),
     (others, DEMO, "place.banner"),
@@ -609,8 +609,8 @@ STORIES: tuple[tuple[Callable[[Record], None], str, str], ...] = (
     (questions, DEMO, "place.form"),
     (fields, FORMAT_2, "place.form"),
     (adaptive, DEMO, "place.form"),
-    (header, DEMO, "header"),
-    (keys_without_a_field, DEMO, "header"),
+    (header, DEMO, "place.header"),
+    (keys_without_a_field, DEMO, "place.header"),
     (typed_into_the_file, DEMO, "place.form"),
     (unreadable, BROKEN, "place"),
     (repairs, DEMO, "place.problems"),

@@ -152,7 +152,17 @@ def test_the_version_of_a_session_in_results_leads_to_what_changed(
     assert visit.results_place is not None
     card = visit.results_place.sessions
     facts = SessionFacts(
-        "P001", 1, "kitchen", datetime.now().astimezone(), "completed", "valid", 8, 8, False, False, folder
+        participant="P001",
+        session=1,
+        study="kitchen",
+        started=datetime.now().astimezone(),
+        status="completed",
+        validity="valid",
+        answers=8,
+        answers_of=8,
+        simulated=False,
+        pilot=False,
+        folder=folder,
     )
     card.show_sessions([facts, replace(facts, participant="P002", folder=folder.parent)])
     table = card.rows.table

@@ -94,7 +94,7 @@ def test_report_and_settings_hold_what_was_found(found_of, tmp_path, monkeypatch
     assert len(settings.benches) == 1
     assert settings.bench_of(found.device) == own
     kept_of = dynamics_of(1e-3, None, None, name="falcon-emulated", serial="EMULATED")
-    assert kept_of == Dynamics(1e-3, own.count_m, min(own.mass_kg))
+    assert kept_of == Dynamics(delay_s=1e-3, count_m=own.count_m, mass_kg=min(own.mass_kg))
     assert dynamics_of(None, 1e-5, None, name="falcon-emulated", serial="ANOTHER").unknown == ("delay_s", "mass_kg")
     assert settings.bench_of({"name": "falcon-emulated", "serial": "ANOTHER"}) is None
     from study_app.session.start import with_bench

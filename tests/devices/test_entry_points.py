@@ -27,7 +27,16 @@ DESCRIPTOR = """
 
 
     def findings(state="not looked at"):
-        loose = Finding(1, "loose", "its string is tight", "its string is loose", state, "wear", "tighten it", "a look")
+        loose = Finding(
+            number=1,
+            id="loose",
+            tested="its string is tight",
+            symptom="its string is loose",
+            state=state,
+            cause="wear",
+            cure="tighten it",
+            known_by="a look",
+        )
         return (loose,)
 
 
@@ -43,7 +52,7 @@ DESCRIPTOR = """
         kind="simulated",
         degrees_of_freedom=2,
         open=open_toy,
-        probe=lambda: [Backend("toy-hand", "a string", READY, "moves by itself, as a toy does")],
+        probe=lambda: [Backend("toy-hand", "a string", state=READY, can="moves by itself, as a toy does")],
         moves_by_itself=True,
         options=(DeviceOption(name="toy-mass", title="Mass of the toy", help="Its mass in grams."),),
         doctor=Doctor(findings=findings, examine=examine),
@@ -151,7 +160,7 @@ def test_a_device_that_cannot_be_looked_for_hides_no_other(site):
         "device",
         {"toy": "toy_blind:TOY"},
         toy_blind=DESCRIPTOR.replace(
-            '[Backend("toy-hand", "a string", READY, "moves by itself, as a toy does")]', "1 / 0"
+            '[Backend("toy-hand", "a string", state=READY, can="moves by itself, as a toy does")]', "1 / 0"
         ),
     )
     found = {one.name: one for one in backends()}

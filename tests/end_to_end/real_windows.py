@@ -61,15 +61,13 @@ def new_session(window: QWidget) -> Any:
 class Program:
     """The program as a person meets it: windows, keys, a mouse, and files that appear."""
 
-    def __init__(self, display: str, folder: Path, *arguments: str) -> None:
+    def __init__(
+        self, display: str, folder: Path, *arguments: str, program: tuple[str, str] = ("-m", "study_app")
+    ) -> None:
         self.folder = folder
         self.environment = os.environ | {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb"}
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "study_app", *arguments],
-            cwd=folder,
-            env=self.environment,
-            stderr=subprocess.PIPE,
-            text=True,
+            [sys.executable, *program, *arguments], cwd=folder, env=self.environment, stderr=subprocess.PIPE, text=True
         )
 
     def close(self) -> None:

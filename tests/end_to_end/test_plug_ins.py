@@ -169,7 +169,18 @@ class TestTemplate:
         window.event.connect(told.append)
         window.resize(1366, 768)
         window.show()
-        window.show_page(QuestionnairePage(None, "Mood", "Choose.", items, (), None, None, form="mood"))
+        window.show_page(
+            QuestionnairePage(
+                trial=None,
+                title="Mood",
+                intro="Choose.",
+                items=items,
+                labels=(),
+                cannot_judge=None,
+                progress=None,
+                form="mood",
+            )
+        )
         QApplication.processEvents()
         cells = window.widget.fields[0].cells  # type: ignore[union-attr]
         square = cells.place()

@@ -9,9 +9,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-pytest.importorskip("PySide6.QtWidgets", reason="Qt's system libraries are missing", exc_type=ImportError)
-
 from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QApplication, QWidget
 

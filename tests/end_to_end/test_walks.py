@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("PySide6.QtWidgets", reason="Qt's system libraries are missing", exc_type=ImportError)
-
 from study_app.app.main_controller import MainController
 from study_app.gui.home.dialogs import NewSessionDialog
 from study_app.gui.home.main_window import FULL as HOME

@@ -9,7 +9,7 @@ import pytest
 
 from study_app.errors import StudyError
 from study_app.evidence import appraisal_measurement, cost
-from study_app.evidence.appraisal import Costs, Question, start_appraisal_worker
+from study_app.evidence.appraisal import Costs, DeliveryQuestion, Question, start_appraisal_worker
 from study_app.evidence.appraisal_measurement import appraise, withheld_share
 from study_app.evidence.cost import measure, report
 from study_app.evidence.expected_error import error_report, expected
@@ -22,6 +22,8 @@ from study_app.haptics.model.scene import Box, Liquid, MotionBox, Scene
 from study_app.haptics.runtime.offline import samples_along
 from study_app.protocol.load import load, load_scenes
 from study_app.protocol.trials.tasks import Explore, Reach, Stroke
+from study_app.session.preflight import PredictedDelivery
+from tests.compiled import needs_servo
 from tests.haptics.materials import PRESETS, tank
 
 if numba.config.DISABLE_JIT:
@@ -201,3 +203,18 @@ def test_a_report_has_the_gates_table_with_costs_and_the_whole(monkeypatch):
     assert lines[0].startswith("river: effects named")
     assert [line.split()[3] for line in lines[2:4]] == ["2", "40"]
     assert lines[-1] == "one tick: 62 ns, 0.01 % of the tick period; 20 ns of it without liquids"
+
+
+@needs_servo
+@pytest.mark.slow
+def test_the_worker_predicts_the_trials_out_of_limits_on_a_slow_device() -> None:
+    """On a loop of two ticks half the force of slime is withheld, which is one of the study's five liquids."""
+    sent: list[object] = []
+    found = appraise(DeliveryQuestion(load("slime"), 2), sent.append, lambda: False)
+    assert isinstance(found, PredictedDelivery)
+    assert (found.missing, found.asked, found.judged, found.limit_percent) == (0, 0, 5, 25)
+    assert found.out >= 1
+    at_one_tick = appraise(DeliveryQuestion(load("slime"), 1), sent.append, lambda: False)
+    assert isinstance(at_one_tick, PredictedDelivery)
+    assert at_one_tick.out == 0
+    assert sent == []

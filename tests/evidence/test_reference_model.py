@@ -59,7 +59,7 @@ def test_wakes_are_those_worked_out_by_hand(velocities, changes, wake):
 def test_the_force_is_the_drag_of_the_relative_velocity():
     wake = Wake(length=2, scaling=4, decay=1, breaking_span_m=0)
     liquid = Liquid(id="water", density_kg_m3=1000, effects=("drag", "wake"), wake=wake)
-    motion = Motion(np.arange(3) / 1000, np.zeros((3, 3)), np.tile(X, (3, 1)))
+    motion = Motion(np.arange(3) / 1000, np.zeros((3, 3)), velocity_mps=np.tile(X, (3, 1)))
     felt = respond(Scene(liquids=(liquid,), velocity=Given()), motion)
     factor = 0.5 * 1000 * 0.47 * np.pi * 0.034**2
     assert felt.wake_mps[:, 0] == pytest.approx([0, 0.25, 0.5])

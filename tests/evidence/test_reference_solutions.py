@@ -37,7 +37,7 @@ def test_the_exact_sums_are_those_of_fractions():
 
 
 def test_the_definition_knows_every_law_of_drag():
-    motion = Motion(np.arange(2) / 1000, np.zeros((2, 3)), np.tile([0.5, 0.0, 0.0], (2, 1)))
+    motion = Motion(np.arange(2) / 1000, np.zeros((2, 3)), velocity_mps=np.tile([0.5, 0.0, 0.0], (2, 1)))
     reynolds = 1420 * 0.5 * 0.068 / 10
     stokes_n = 6 * math.pi * 10 * RADIUS_M * 0.5
     for law, over_stokes in (

@@ -54,8 +54,8 @@ def soaked(to: Path) -> tuple[Path, ...]:
             for field in record.dtype.names if share else ():
                 record[field] = rng.integers(0, share + 1, record.dtype[field].shape)
         drift, rests = (
-            soak.Drift(7, 1e-12 * 10**share, 30.0),
-            soak.Rests(share, 0.1 * share, 1e-5 * share, 0.001 * share),
+            soak.Drift(comparisons=7, worst=1e-12 * 10**share, longest_s=30.0),
+            soak.Rests(count=share, pushed_s=0.1 * share, wake_mps=1e-5 * share, force_n=0.001 * share),
         )
         made = filled(
             soak.SoakResult, rng, drift=drift, rests=rests, counts=counts, device=device, rate_hz=1000.0, seed=share,

@@ -30,10 +30,32 @@ SEED = int(os.environ.get("LIQUID_STUDY_DAMAGE_SEED", "5"))
 CASES = 4 * int(os.environ.get("LIQUID_STUDY_DAMAGE_CASES", "5"))
 AT = "2026-03-02T09:30:00.000+01:00"
 HASH = "0123456789abcdef" * 4
-LINE = json.dumps({"at": AT, "by": "AB", "reason": "x", "exclusion": asdict(Exclusion("P1", 1, None, "CD", "y", AT))})
-TOMBSTONE = Tombstone("P1", AT, "AB", "asked", (ErasedSession(1, HASH, HASH, "k3vq-7m2p-xw4d"),))
-MERGED = Merged(Path(), "demo", HASH, (Site("A", AT, HASH, 3), Site("B", AT, HASH, 4)))
-COMMITMENT = preregistration.Commitment("demo", "1", HASH, 24, 0.1, ("catch",))
+LINE = json.dumps(
+    {
+        "at": AT,
+        "by": "AB",
+        "reason": "x",
+        "exclusion": asdict(
+            Exclusion(participant="P1", session=1, trial=None, rule_or_person="CD", reason="y", excluded_at=AT)
+        ),
+    }
+)
+TOMBSTONE = Tombstone(
+    participant="P1",
+    at=AT,
+    by="AB",
+    reason="asked",
+    sessions=(ErasedSession(session=1, begun=HASH, checksums=HASH, fingerprint="k3vq-7m2p-xw4d"),),
+)
+MERGED = Merged(
+    Path(),
+    "demo",
+    HASH,
+    (Site(name="A", merged_at=AT, key_hash=HASH, sessions=3), Site(name="B", merged_at=AT, key_hash=HASH, sessions=4)),
+)
+COMMITMENT = preregistration.Commitment(
+    study="demo", version="1", protocol_hash=HASH, participants=24, precision=0.1, rules=("catch",)
+)
 
 
 def read_workspace(_folder: Path) -> object:
@@ -79,7 +101,7 @@ KINDS: dict[str, tuple[Callable[[Path], Path], str, Callable[[Path], object]]] =
     ),
     "calibration": (
         lambda _: calibration.calibration_file("1"),
-        json.dumps(asdict(calibration.Calibration("libnifalcon", 6616.0))),
+        json.dumps(asdict(calibration.Calibration(geometry="libnifalcon", units_per_nm=6616.0))),
         lambda _: calibration.load("1"),
     ),
 }

@@ -62,13 +62,13 @@ def questionnaire(statements: tuple[str, ...] = STATEMENTS, **changed: Any) -> Q
         "items": tuple(ItemView(f"item{n}", n, text, required=True) for n, text in enumerate(statements, 1)),
         "labels": LABELS,
         "cannot_judge": None,
-        "progress": Progress(1, 2, "Liquid setting 1", 1, 3),
+        "progress": Progress(part=1, parts=2, label="Liquid setting 1", index=1, of=3),
     }
     return QuestionnairePage(**(fields | changed))
 
 
 ORDINALS = ("first", "second", "third", "fourth")
-SOME = Progress(1, 1, "Pair 57", 57, 220, at_most=True)
+SOME = Progress(part=1, parts=1, label="Pair 57", index=57, of=220, at_most=True)
 
 
 def choice(count: int = 2, language: str = "en") -> ChoicePage:
@@ -111,7 +111,7 @@ def task_page(task: AnyTask | None = None, **changed: Any) -> TaskPage:
         "task": task,
         "workspace_m": (0.1, 0.06, 0.06),
         "body_radius_m": 0.0034,
-        "progress": Progress(2, 2, "Delay setting 3", 3, 7),
+        "progress": Progress(part=2, parts=2, label="Delay setting 3", index=3, of=7),
     }
     return TaskPage(**(fields | changed))
 

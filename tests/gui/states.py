@@ -107,8 +107,10 @@ def of_devices(*found: Backend, preferred: str = "falcon") -> Callable[[Any], No
 
 
 DEVICES: Actions = {
-    "connected": of_devices(Backend("falcon", "other", "connected: FT1", "felt, up to 8 N")),
-    "to be checked": of_devices(Backend("falcon", "other", "connected: FT1", "felt, up to 8 N", "home it")),
+    "connected": of_devices(Backend("falcon", "other", state="connected: FT1", can="felt, up to 8 N")),
+    "to be checked": of_devices(
+        Backend("falcon", "other", state="connected: FT1", can="felt, up to 8 N", why="home it")
+    ),
     "another preferred": of_devices(preferred="falcon-emulated"),
     "looking": lambda place: place.show_looking(True),
     "firmware": lambda place: (
@@ -210,7 +212,7 @@ def of_computer(found: list[Backend], cache: Path | None, compiled: int, **facts
 COMPUTER: Actions = {
     "measuring": lambda window: window.show_measuring(),
     "compiling": lambda window: window.show_compiled(0.4),
-    "well": of_computer([Backend("falcon", "libusb", "connected: 1", "force")], Path("cache"), 0),
+    "well": of_computer([Backend("falcon", "libusb", state="connected: 1", can="force")], Path("cache"), 0),
     "not well": of_computer(FOUND, None, 194, screen=replace(WELL.screen, refresh_hz=30.0), free_bytes=10**6),
     "asked again": lambda window: window.back.click(),
     "error": lambda window: window.show_sentence("The servo cannot start."),
@@ -250,7 +252,13 @@ def of_home(act: Callable[[Any], object]) -> Callable[[Any], object]:
     return lambda window: act(window.place("home"))
 
 
-STOPPED = Interrupted(STUDY / "P007", "demo", "P007", "P007 was interrupted in trial 3", "31 of 62 answers are on disk")
+STOPPED = Interrupted(
+    folder=STUDY / "P007",
+    source="demo",
+    participant="P007",
+    heading="P007 was interrupted in trial 3",
+    line="31 of 62 answers are on disk",
+)
 HOME: Actions = {
     "sessions": of_home(lambda home: home.sessions.show_sessions(PEOPLE, "results", NOW)),
     "all kinds": of_home(lambda home: home.sessions.kind.setCurrentIndex(4)),

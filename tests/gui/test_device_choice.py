@@ -13,7 +13,18 @@ from study_app.gui.home.startup_window import OpeningWindow
 from study_app.protocol.load import load
 from study_app.session.start import NewSession, check, study_results
 
-CHOSEN = NewSession("demo", "P001", 1, 7, "", "en", "mouse", True, None, Path("nowhere"))
+CHOSEN = NewSession(
+    source="demo",
+    participant="P001",
+    session=1,
+    seed=7,
+    operator="",
+    language="en",
+    device="mouse",
+    windowed=True,
+    screen=None,
+    results=Path("nowhere"),
+)
 
 
 @pytest.mark.parametrize(

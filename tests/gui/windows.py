@@ -39,20 +39,38 @@ from tests.gui.lab.sample import still_view
 from tests.gui.results.sample import LEFT_OUT, view
 
 FOUND = [
-    Backend("mouse", "the window", READY, "seen, not felt"),
-    Backend("falcon", "libusb 1.0", NONE, "felt, up to 8 N", "plug it in"),
-    Backend("falcon", "ftd2xx", NOT_AVAILABLE, "the same", "for Windows alone"),
-    Backend("falcon-emulated", "the program", READY, "moves by itself"),
-    Backend("falcon-emulated", "the program", READY, "another program's"),
+    Backend("mouse", "the window", state=READY, can="seen, not felt"),
+    Backend("falcon", "libusb 1.0", state=NONE, can="felt, up to 8 N", why="plug it in"),
+    Backend("falcon", "ftd2xx", state=NOT_AVAILABLE, can="the same", why="for Windows alone"),
+    Backend("falcon-emulated", "the program", state=READY, can="moves by itself"),
+    Backend("falcon-emulated", "the program", state=READY, can="another program's"),
 ]
 SCREENS = (
-    ScreenShown(1, "eDP-1", 1366, 768, 60.0, 1.0, 344.0, 194.0),
-    ScreenShown(2, "DP-1", 1920, 1080, 144.0, 1.0, 527.0, 296.0),
+    ScreenShown(
+        number=1,
+        name="eDP-1",
+        width_px=1366,
+        height_px=768,
+        refresh_hz=60.0,
+        scaling=1.0,
+        width_mm=344.0,
+        height_mm=194.0,
+    ),
+    ScreenShown(
+        number=2,
+        name="DP-1",
+        width_px=1920,
+        height_px=1080,
+        refresh_hz=144.0,
+        scaling=1.0,
+        width_mm=527.0,
+        height_mm=296.0,
+    ),
 )
 WELL = Measurements(
     device="mouse",
     fresh_share=1.0,
-    timing=Timing(2000, 1000.0, 6.2e-5, 2e-3, 0),
+    timing=Timing(ticks=2000, rate_hz=1000.0, lateness_p99_s=6.2e-5, worst_gap_s=2e-3, overruns=0),
     sample_age_s=0.001,
     screen=Screen(60.0, 1.0),
     probe_s=0.002,

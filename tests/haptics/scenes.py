@@ -99,7 +99,7 @@ def moving(velocity_mps: Any, interval_s: Any = 1e-3) -> Motion:
     velocity_mps = np.asarray(velocity_mps, float)
     interval_s = np.broadcast_to(interval_s, len(velocity_mps))
     t_s = np.cumsum(interval_s)
-    return Motion(t_s, np.cumsum(velocity_mps * interval_s[:, None], axis=0), velocity_mps)
+    return Motion(t_s, np.cumsum(velocity_mps * interval_s[:, None], axis=0), velocity_mps=velocity_mps)
 
 
 def columns(table: Any, *names: str) -> Any:

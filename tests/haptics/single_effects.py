@@ -51,7 +51,7 @@ def wandering(ticks: int = 1500, rate_hz: float = 1000.0) -> Motion:
     reach_m = np.array([0.05, 0.06, 0.04])
     place = reach_m * np.sin(turns) * swell[:, None] - [0.0, 0.02, 0.0]
     velocity = reach_m * ([4.0, 5.0, 3.0] * np.cos(turns) * swell[:, None] + np.sin(turns) * growth[:, None])
-    return Motion(t_s, place, velocity)
+    return Motion(t_s, place, velocity_mps=velocity)
 
 
 def force_n(scene: Scene, motion: Motion) -> Any:

@@ -58,8 +58,8 @@ def test_the_shipped_liquids_are_at_hand_with_those_of_a_folder_and_without_brok
     save(tmp_path / "mine.toml", preset_text(Setting("Honey", origin, origin)))
     (tmp_path / "broken.toml").write_text("format = ")
     at_hand = liquids_at_hand((tmp_path,))
-    assert Choice("rek2024", "light_oil", "Light oil (rek2024)") in at_hand
-    assert Choice(str(tmp_path / "mine.toml"), "honey", "Honey (mine)") in at_hand
+    assert Choice(source="rek2024", liquid="light_oil", title="Light oil (rek2024)") in at_hand
+    assert Choice(source=str(tmp_path / "mine.toml"), liquid="honey", title="Honey (mine)") in at_hand
     assert {it.source for it in at_hand} == {*shipped(), str(tmp_path / "mine.toml")}
     assert len({it.title for it in at_hand}) == len(at_hand)
     water = next(it for it in at_hand if (it.source, it.liquid) == ("rek2024", "water"))

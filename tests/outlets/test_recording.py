@@ -86,6 +86,16 @@ def test_what_a_recording_lacks_is_found(
     assert "sub-P002" not in done.output
 
 
+def test_an_empty_stream_beside_the_session_is_no_error(streamed: Any, tmp_path: Path) -> None:
+    study, ((first, texts), _) = streamed
+    for streams in ([(first, [], ()), (first, texts, OFFSETS)], [(first, texts, OFFSETS), (first, [], OFFSETS)]):
+        file = write_xdf(tmp_path / "own.xdf", streams)
+        done = CliRunner().invoke(commands, ["verify", str(study), "--xdf", str(file)])
+        assert done.exit_code == 0
+        assert "markers: none recorded\n" in done.output
+        assert "no marker of this study's sessions" not in done.output
+
+
 def test_a_reset_clock_is_told(streamed: Any, tmp_path: Path) -> None:
     study, ((first, texts), _) = streamed
     offsets = [*OFFSETS, *((time_s - 99, offset_s + 60) for time_s, offset_s in OFFSETS)]

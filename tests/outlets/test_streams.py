@@ -183,7 +183,7 @@ def test_an_unexpected_error_of_a_driver_stops_no_session(monkeypatch: pytest.Mo
     def fail(_place: str, _now_ns: Any) -> Any:
         raise RuntimeError("could not create the stream outlet")
 
-    kinds = {"lsl": SinkKind("lsl", "LSL markers", "lsl", fail)}
+    kinds = {"lsl": SinkKind("lsl", "LSL markers", example="lsl", open=fail)}
     monkeypatch.setattr("study_app.outlets.session_outlets.SINKS", kinds)
     outlets = Outlets(("lsl",), "off", Servo(), "double")
     assert outlets.lost == {"LSL markers": "RuntimeError: could not create the stream outlet"}

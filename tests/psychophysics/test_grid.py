@@ -144,7 +144,15 @@ KILLED = np.array([6, 13, 18, 28, 52, 53, 61, 60])
 
 
 def test_the_published_threshold_of_beetles():
-    plain = Grid("logistic", evenly(1.7, 1.85, 301), geometric(0.02, 1.0, 40), None, (0.0,), (1.0,), (0.0,))
+    plain = Grid(
+        family="logistic",
+        thresholds=evenly(1.7, 1.85, 301),
+        widths=geometric(0.02, 1.0, 40),
+        width_prior=None,
+        lapses=(0.0,),
+        lapse_prior=(1.0,),
+        guesses=(0.0,),
+    )
     found = fit(DOSES, KILLED, BEETLES - KILLED, plain)
     assert found.threshold == pytest.approx(1.77172, abs=3e-4)
     assert 2 * math.log(19) / found.others[0] == pytest.approx(34.2703, rel=0.03)
@@ -165,12 +173,14 @@ def log10_of(percent):
     ("participants", "trials", "percent"), [(10, 60, 27), (20, 60, 17), (20, 100, 15)]
 )  # thresholds of people who differ by a factor of 1.2, with a standard deviation of 28 % at 60 trials
 def test_a_groups_interval_is_students_over_errors_and_people(participants, trials, percent):
-    one = Expected("log", 60, 1, log10_of(90), 0.28 / math.log(10), 0.2)
+    one = Expected(
+        spacing="log", trials=60, standards=1, halves=log10_of(90), spread=0.28 / math.log(10), threshold=0.2
+    )
     assert 100 * one.of_group(participants, trials) == pytest.approx(percent, abs=1.5)
 
 
 def test_the_fewest_participants_and_trials_for_a_precision():
-    one = Expected("log", 20, 1, (0.5,), 0.2, 0.2)
+    one = Expected(spacing="log", trials=20, standards=1, halves=(0.5,), spread=0.2, threshold=0.2)
     people = one.participants_for(0.15)
     assert one.of_group(people) <= 0.15 < one.of_group(people - 1)
     trials = one.trials_for(0.15, 20)
@@ -202,7 +212,7 @@ def test_percent_correct_at_the_mean_of_reversals_in_the_long_run(down_after, ra
     """By the step up in standard deviations of the observer: equal steps depend on it, weighted ones hardly."""
     draw = np.random.default_rng(down_after)
     for step_up, percent in zip((0.25, 0.5, 1.0, 2.0), reached, strict=True):
-        one = Staircase(down_after, step_up, ratio, -50.0, 50.0, 0.5)
+        one = Staircase(down_after=down_after, step_up=step_up, ratio=ratio, low=-50.0, high=50.0, begin=0.5)
         u, run, before, reversals = 0.5, 0, 0, []
         for chance in draw.random(40_000):  # the rule itself, since `next` looks at all answers each time
             success = chance < 0.5 + 0.5 * ndtr(u)

@@ -12,16 +12,22 @@ from study_app.psychophysics.grid import Grid, evenly, fit, geometric
 LOW, HIGH = math.log10(0.02), math.log10(0.6)
 LEVELS = evenly(LOW, HIGH, 31)
 RUNNING = Grid(
-    "weibull", evenly(LOW, HIGH, 41), geometric(0.5, 4.0, 9), (1.4, 1.5), (0.0, 0.02, 0.04), (0.4, 0.4, 0.2), (0.5,)
+    family="weibull",
+    thresholds=evenly(LOW, HIGH, 41),
+    widths=geometric(0.5, 4.0, 9),
+    width_prior=(1.4, 1.5),
+    lapses=(0.0, 0.02, 0.04),
+    lapse_prior=(0.4, 0.4, 0.2),
+    guesses=(0.5,),
 )
 ANALYSIS = Grid(
-    "weibull",
-    evenly(LOW - 0.2, HIGH + 0.2, 81),
-    geometric(0.4, 4.0, 15),
-    (1.4, 1.5),
-    (0.0, 0.01, 0.02, 0.03, 0.05),
-    (0.25, 0.3, 0.2, 0.15, 0.1),
-    (0.5,),
+    family="weibull",
+    thresholds=evenly(LOW - 0.2, HIGH + 0.2, 81),
+    widths=geometric(0.4, 4.0, 15),
+    width_prior=(1.4, 1.5),
+    lapses=(0.0, 0.01, 0.02, 0.03, 0.05),
+    lapse_prior=(0.25, 0.3, 0.2, 0.15, 0.1),
+    guesses=(0.5,),
 )
 
 
@@ -49,7 +55,15 @@ def test_the_expected_entropy_is_that_of_both_posteriors_weighted_by_their_proba
 
 
 def test_of_levels_that_promise_the_same_the_lowest_is_taken():
-    flat = Grid("normal", (-1.0, -0.5), (1e-3,), None, (0.0,), (1.0,), (0.0,))
+    flat = Grid(
+        family="normal",
+        thresholds=(-1.0, -0.5),
+        widths=(1e-3,),
+        width_prior=None,
+        lapses=(0.0,),
+        lapse_prior=(1.0,),
+        guesses=(0.0,),
+    )
     between = (-0.9, -0.8, -0.7, -0.6)
     assert Search(flat, between, "threshold").next((0, 0, 0, 0), (0, 0, 0, 0)) == 0
 
@@ -94,7 +108,19 @@ def test_posterior_and_levels_are_those_of_the_questplus_package():
         stim_selection_method="min_entropy",
         param_estimation_method="mean",
     )
-    ours = Search(Grid("normal", thresholds, widths, None, lapses, (1, 1, 1), (0.5,)), levels, "all")
+    ours = Search(
+        Grid(
+            family="normal",
+            thresholds=thresholds,
+            widths=widths,
+            width_prior=None,
+            lapses=lapses,
+            lapse_prior=(1, 1, 1),
+            guesses=(0.5,),
+        ),
+        levels,
+        "all",
+    )
     successes, failures = np.zeros(16), np.zeros(16)
     draw = np.random.default_rng(3)
     for _ in range(40):

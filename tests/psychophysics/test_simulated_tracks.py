@@ -20,7 +20,7 @@ LEVELS = evenly(LOW, HIGH, 15)
 
 
 def observers(count=6, guess=0.5):
-    return Observers("weibull", np.linspace(-1.2, -0.6, count), 1.4, guess, 0.02)
+    return Observers(family="weibull", thresholds=np.linspace(-1.2, -0.6, count), width=1.4, guess=guess, lapse=0.02)
 
 
 def draws(trials, count=6, seed=1):
@@ -28,7 +28,15 @@ def draws(trials, count=6, seed=1):
 
 
 def search(learn="threshold", guesses=(0.5,), noise=False):
-    grid = Grid("weibull", evenly(LOW, HIGH, 21), geometric(0.5, 4.0, 5), (1.4, 1.5), (0.0, 0.02), (0.5, 0.5), guesses)
+    grid = Grid(
+        family="weibull",
+        thresholds=evenly(LOW, HIGH, 21),
+        widths=geometric(0.5, 4.0, 5),
+        width_prior=(1.4, 1.5),
+        lapses=(0.0, 0.02),
+        lapse_prior=(0.5, 0.5),
+        guesses=guesses,
+    )
     return Search(grid, (-math.inf, *LEVELS) if noise else LEVELS, learn, noise)
 
 
@@ -70,7 +78,7 @@ def test_search_tracks_end_when_the_interval_is_narrow_enough():
 @pytest.mark.parametrize("down_after", [1, 2, 3])
 @pytest.mark.parametrize("stop", [None, (6, 20)])
 def test_staircase_tracks_present_the_levels_of_the_rule(down_after, stop):
-    one = Staircase(down_after, 0.2, 0.55, LOW, HIGH, HIGH)
+    one = Staircase(down_after=down_after, step_up=0.2, ratio=0.55, low=LOW, high=HIGH, begin=HIGH)
     found = staircase_tracks(one, observers(), draws(60), stop)
     for levels, successes in zip(found.levels, found.successes, strict=True):
         answers = []

@@ -13,9 +13,18 @@ from study_app.psychophysics import adaptive, delivery, detection, families, gri
 from tests.golden import compare
 from tests.golden_values import one_line as told
 
-AXES = grid.evenly(-2, 0, 9), grid.geometric(0.3, 2, 3)
-SMALL = grid.Grid("weibull", *AXES, (0.8, 1.5), (0.0, 0.05), (0.7, 0.3), (0.5,))
-FREE = grid.Grid("logistic", *AXES, None, (0.0, 0.1), (0.5, 0.5), (0.1, 0.2, 0.3))
+SMALL = grid.Grid(
+    family="weibull",
+    thresholds=grid.evenly(-2, 0, 9),
+    widths=grid.geometric(0.3, 2, 3),
+    width_prior=(0.8, 1.5),
+    lapses=(0.0, 0.05),
+    lapse_prior=(0.7, 0.3),
+    guesses=(0.5,),
+)
+FREE = replace(
+    SMALL, family="logistic", width_prior=None, lapses=(0.0, 0.1), lapse_prior=(0.5, 0.5), guesses=(0.1, 0.2, 0.3)
+)
 LEVELS = (-1.8, -1.2, -0.8, -0.3)
 RIGHT, WRONG = (0, 3, 6, 8), (2, 3, 1, 0)
 MODELS = ("differencing", "independent")
@@ -46,7 +55,7 @@ def lines() -> Iterator[str]:
         ends = [found.threshold, *found.interval]
         yield f"{right}: {told(found.marginal)} {told(ends)} {told(free.weights[::3, 1, 1])}"
         for one in (found, free):
-            yield f"  {told(one.others)} {one.variance:.7g} {told(one.success(LEVELS))} {told(one.band(LEVELS))}"
+            yield f"  {told(tuple(one.others))} {one.variance:.7g} {told(one.success(LEVELS))} {told(one.band(LEVELS))}"
         for learn, noise in product(("threshold", "all"), (False, True)):
             search = adaptive.Search(SMALL, LEVELS, learn, noise)
             counts = [(*one, 0) if noise else one for one in (right, wrong)]
@@ -56,11 +65,20 @@ def lines() -> Iterator[str]:
             except ValueError as error:
                 told_ = str(error)
             yield f"  {learn} {noise}: {told_}"
-    observers = adaptive.Observers("weibull", np.array([-1.5, -0.5]), 0.8, 0.5, 0.02)
-    later = adaptive.Observers("normal", np.array([-1.5, -0.5]), 0.8, 0.5, 0.02, lambda u: u + 0.3)
+    observers = adaptive.Observers(
+        family="weibull", thresholds=np.array([-1.5, -0.5]), width=0.8, guess=0.5, lapse=0.02
+    )
+    later = adaptive.Observers(
+        family="normal",
+        thresholds=np.array([-1.5, -0.5]),
+        width=0.8,
+        guess=0.5,
+        lapse=0.02,
+        presented=lambda u: u + 0.3,
+    )
     draws = np.random.default_rng(4).random((2, 12))
     for down, ratio, begin in ((1, 1.0, -0.3), (2, 0.5488, -1.0), (3, 0.7393, 0.0)):
-        rule = adaptive.Staircase(down, 0.4, ratio, -2.0, 0.0, begin)
+        rule = adaptive.Staircase(down_after=down, step_up=0.4, ratio=ratio, low=-2.0, high=0.0, begin=begin)
         found = [adaptive.staircase_tracks(rule, one, draws) for one in (observers, later)]
         counted = [one[1:3] for one in found[0].first(5).given(np.array(LEVELS))]
         yield f"{rule}: {rule.converges_to:.7g} {told([one[:2] for one in found])} {told(counted)}"
@@ -99,7 +117,15 @@ def of_delivery() -> Iterator[str]:
     for errors in ([0.1, 0.3], [None, 0.2], [None, None], [0.1, 0.2, 0.5, None]):
         yield f"difference {errors} {told(delivery.difference(errors, [bool(one % 2) for one in range(len(errors))]))}"
     for spacing, half in product(("log", "linear"), (0.2, math.inf)):
-        one = people.Expected(spacing, 40, 2, {"": half}, half / 2, 0.3, half**2 / 9)
+        one = people.Expected(
+            spacing=spacing,
+            trials=40,
+            standards=2,
+            halves={"": half},
+            spread=half / 2,
+            threshold=0.3,
+            shared=half**2 / 9,
+        )
         groups = [one.of_group(people, trials) for people in (1, 2, 8) for trials in (None, 80.0)]
         yield f"{told(one)}: {one.measured} {told(groups)}"
         for within in (0.05, 0.3):

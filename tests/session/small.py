@@ -19,7 +19,7 @@ from tests.protocol.edited_studies import text_of
 WELL = Measurements(
     device="mouse",
     fresh_share=1.0,
-    timing=Timing(2000, 1000.0, 1e-4, 2e-3, 0),
+    timing=Timing(ticks=2000, rate_hz=1000.0, lateness_p99_s=1e-4, worst_gap_s=2e-3, overruns=0),
     sample_age_s=0.001,
     screen=Screen(60.0, 1.0),
     probe_s=0.002,

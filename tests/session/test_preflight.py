@@ -14,10 +14,11 @@ from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.servo import Servo
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.outlets.session_outlets import OutletStatus
-from study_app.protocol.load import load, parse, protocol_hash, source_bytes
+from study_app.protocol.checks.untranslated import untranslated_on_pages
+from study_app.protocol.load import load, parse, protocol_hash, read_document, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.session import preflight_measurements
-from study_app.session.preflight import Measurements, Screen, checks, refused
+from study_app.session.preflight import Measurements, PredictedDelivery, Screen, checks, refused
 from study_app.session.preflight_measurements import measure
 from study_app.session.start import NewSession, ran_otherwise
 from study_app.store import receipt
@@ -54,10 +55,10 @@ def studies() -> dict[str, Protocol]:
 def timing(
     rate_hz: float, p99_s: float = 1e-4, gap_s: float = 2e-3, late: int = 0, ticks: int = 2000
 ) -> dict[str, Any]:
-    return {"timing": Timing(ticks, rate_hz, p99_s, gap_s, late)}
+    return {"timing": Timing(ticks=ticks, rate_hz=rate_hz, lateness_p99_s=p99_s, worst_gap_s=gap_s, overruns=late)}
 
 
-LIVE = OutletStatus("LSL markers", listens=True)
+LIVE = OutletStatus(title="LSL markers", listens=True)
 FACTS: tuple[tuple[str, dict[str, Any]], ...] = (
     *(("small", {"fresh_share": share}) for share in (0.49, 0.5)),
     ("small", timing(0.0, ticks=0)),
@@ -80,12 +81,14 @@ FACTS: tuple[tuple[str, dict[str, Any]], ...] = (
     ),
     *((name, {"withheld": {"thin": 0.001, "thick": share}}) for name in ("small", "single-blind")
       for share in (0.032, 0.05, 0.051)),
+    *(("small", {"delivery": PredictedDelivery(missing=missing, asked=asked, out=out, judged=5, limit_percent=25)})
+      for missing, asked, out in ((0, 40, 0), (26, 40, 0), (1, 1, 2), (0, 0, 1))),
     *(("small", {"tick_s": tick_s}) for tick_s in (1e-4, 2e-4, 2.01e-4, 1e-3)),
     *(("small", {"outlets": (one,)}) for one in (
-        LIVE, replace(LIVE, listens=False), OutletStatus("LSL samples", withheld=True),
-        OutletStatus("LSL samples", listens=True, shows_force=True),
-        OutletStatus("LSL samples", listens=False, shows_force=True), OutletStatus("Serial port"),
-        OutletStatus("Serial port", lost="it is gone"))),
+        LIVE, replace(LIVE, listens=False), OutletStatus(title="LSL samples", withheld=True),
+        OutletStatus(title="LSL samples", listens=True, shows_force=True),
+        OutletStatus(title="LSL samples", listens=False, shows_force=True), OutletStatus(title="Serial port"),
+        OutletStatus(title="Serial port", lost="it is gone"))),
     *(("small", {"key_hash": key, "participant": who}) for key, who in (("0" * 64, "P001"), (None, "Anna"))),
     *((
         "small", {"device": device, "dynamics": dynamics, "velocity_errors": errors})
@@ -127,10 +130,32 @@ def test_another_file_of_the_same_version_is_a_warning(tmp_path: Path, recorded:
     place.path.mkdir(parents=True)
     ran = {"key_hash": "", "protocol_hash": recorded, "protocol": {"study": {"version": study.study.version}}}
     receipt.write(place.receipt, ran)
-    chosen = NewSession("rek2024", "P002", 1, 7, "AK", "en", "scripted", True, None, tmp_path)
+    chosen = NewSession(
+        source="rek2024",
+        participant="P002",
+        session=1,
+        seed=7,
+        operator="AK",
+        language="en",
+        device="scripted",
+        windowed=True,
+        screen=None,
+        results=tmp_path,
+    )
     assert ran_otherwise(chosen) == who
     found = checks(replace(small.WELL, ran_otherwise=who), study)
     assert [check.verdict for check in found if check.name == "Study file"] == ["warning"] * bool(who)
+
+
+@pytest.mark.parametrize(("language", "told"), [("fr", "4 texts; still in English"), ("en", "")])
+def test_pages_in_two_languages_are_a_warning(language: str, told: str) -> None:
+    """What participants read of it: an instruction, a title, a text and a question; the study's title they do not."""
+    text = source_bytes("delayjnd").decode()
+    assert "languages = " not in text
+    document = read_document(text.replace("[study]", f'[study]\nlanguages = ["{language}"]').encode(), "")[0]
+    facts = replace(small.WELL, untranslated=untranslated_on_pages(document))
+    warned = [check.said for check in checks(facts, load("delayjnd")) if check.name == "Translation"]
+    assert [sentence.split("; Pages")[0] for sentence in warned] == ([told] if told else [])
 
 
 def measured(results: Path) -> Measurements:

@@ -35,10 +35,10 @@ def test_pages_between_the_trials_say_which_part_it_is_and_how_far() -> None:
     assert told == {
         "consent": None,
         "instructions": None,
-        "part_1": Progress(1, 2, "", 1, 3),
-        "rest": Progress(1, 2, "", 4, 3),
-        "part_2": Progress(2, 2, "", 1, 1),
-        "delays_intro": Progress(2, 2, "", 1, 7),
+        "part_1": Progress(part=1, parts=2, label="", index=1, of=3),
+        "rest": Progress(part=1, parts=2, label="", index=4, of=3),
+        "part_2": Progress(part=2, parts=2, label="", index=1, of=1),
+        "delays_intro": Progress(part=2, parts=2, label="", index=1, of=7),
         "debrief": None,
     }
 

@@ -23,6 +23,7 @@ from study_app.session.transitions.events import Begin, ResumeRequested, ShowPag
 from study_app.session.transitions.state import Phase
 from study_app.session.transitions.table import advance, open_session
 from study_app.store.journals import journal
+from study_app.store.journals.journal_events import start_of
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
@@ -153,7 +154,18 @@ def square(tmp_path: Path) -> Path:
 def chosen_for(path: Path, participant: str, row_of: str | None) -> NewSession:
     results = path.parent / "results"
     return NewSession(
-        str(path), participant, 1, SEED, "AK", "en", "mouse", True, None, results, recordings=False, row_of=row_of
+        source=str(path),
+        participant=participant,
+        session=1,
+        seed=SEED,
+        operator="AK",
+        language="en",
+        device="mouse",
+        windowed=True,
+        screen=None,
+        results=results,
+        recordings=False,
+        row_of=row_of,
     )
 
 
@@ -182,15 +194,14 @@ def test_row_of_another_participant_gives_that_participants_order(square: Path) 
     protocol = parse(square.read_bytes(), "square.toml")
     rows = {who: codes(build_schedule(protocol, who, SEED)) for who in ("P001", "P002")}
     assert rows["P001"] != rows["P002"]
-    for who, row in rows.items():
-        assert codes(build_schedule(protocol, "P025", SEED, who)) == row
-    assert codes(build_schedule(protocol, "P025", SEED, "2")) == rows["P002"]
+    for place, row in enumerate(rows.values(), start=1):
+        assert codes(build_schedule(protocol, "P025", SEED, place)) == row
 
 
-@pytest.mark.parametrize("row_of", ["P001", "P002"])
-def test_receipt_keeps_the_row_and_reproduce_uses_it(square: Path, row_of: str) -> None:
+@pytest.mark.parametrize(("row_of", "place"), [("P001", 1), ("P002", 2)])
+def test_receipt_keeps_the_row_and_reproduce_uses_it(square: Path, row_of: str, place: int) -> None:
     protocol, store = run_one(square, "P025", row_of)
-    present(store, build_schedule(protocol, "P025", SEED, row_of))
+    present(store, build_schedule(protocol, "P025", SEED, place))
     path = store.folder.receipt
     held = json.loads(path.read_text())
     assert held["row_of"] == row_of
@@ -206,8 +217,8 @@ def test_resumed_session_keeps_the_row(square: Path) -> None:
     store.close()
     chosen = resumed(store.folder.path, protocol=str(square))
     assert (chosen.participant, chosen.row_of) == ("P025", "P002")
-    planned = build_schedule(protocol, "P025", SEED, "P002")
-    assert chosen.schedule(protocol) == begun_schedule(protocol, journal.read(store.folder.journal)[0]) == planned
+    planned = build_schedule(protocol, "P025", SEED, 2)
+    assert begun_schedule(protocol, start_of(journal.read(store.folder.journal)), store.key) == planned
     assert planned != build_schedule(protocol, "P025", SEED)
 
 

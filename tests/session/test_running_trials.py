@@ -25,7 +25,9 @@ def begun(task: Any, recorder: Any = None, **more: Any) -> tuple[RunningTrial, F
     servo = FakeServo([])
     servo.run(0.5)
     reader = servo.telemetry.reader()
-    command = StartTrial(1, 1, task, Stimulated("presented"), DELAY_S, DELAY_S)
+    command = StartTrial(
+        trial=1, attempt=1, task=task, presented=Stimulated("presented"), delay_s=DELAY_S, linger_s=DELAY_S
+    )
     recording = Recording(recorder, servo.rate_hz)
     trial = RunningTrial(
         command, Scene(), late_s=0.05, servo=servo, reader=reader, recording=recording, paints=False, **more
@@ -76,7 +78,9 @@ def test_the_target_is_drawn_where_it_was() -> None:
 
 
 def frame(number: int, due_ns: int, age_ns: int | None = None) -> VideoFrame:
-    return VideoFrame(number, 2, 2, 8, bytes(16), due_ns, age_ns, PERIOD_NS)
+    return VideoFrame(
+        number=number, width=2, height=2, stride=8, pixels=bytes(16), due_ns=due_ns, age_ns=age_ns, period_ns=PERIOD_NS
+    )
 
 
 class FakeVideo:

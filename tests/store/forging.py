@@ -3,6 +3,7 @@
 import hashlib
 import io
 import json
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -87,4 +88,5 @@ def cut(session: Path, size: int) -> None:
     (session.parents[2] / "fingerprints.txt").unlink(missing_ok=True)
     shutil.rmtree(session / "recordings")
     receipt = session / "receipt.json"
-    receipt.write_text(receipt.read_text().replace('"status": "completed"', '"status": "unfinished"'))
+    ended = re.compile('"status": "(completed|incomplete)"')
+    receipt.write_text(ended.sub('"status": "unfinished"', receipt.read_text()))

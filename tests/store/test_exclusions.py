@@ -31,8 +31,22 @@ def test_a_session_and_a_trial_are_left_out_with_their_reasons(folder: Path) -> 
     assert exclusions(folder) == ()
     first = exclude(folder, "P008", 1, by="rule 3", reason="withdrew", now=NOW)
     second = exclude(folder, "P007", 1, trial=2, by=" AB ", reason=" =1+1, it rang ", now=NOW)
-    assert first == Exclusion("P008", 1, None, "rule 3", "withdrew", "2026-03-02T09:30:00.000+01:00")
-    assert second == Exclusion("P007", 1, 2, "AB", "=1+1, it rang", "2026-03-02T09:30:00.000+01:00")
+    assert first == Exclusion(
+        participant="P008",
+        session=1,
+        trial=None,
+        rule_or_person="rule 3",
+        reason="withdrew",
+        excluded_at="2026-03-02T09:30:00.000+01:00",
+    )
+    assert second == Exclusion(
+        participant="P007",
+        session=1,
+        trial=2,
+        rule_or_person="AB",
+        reason="=1+1, it rang",
+        excluded_at="2026-03-02T09:30:00.000+01:00",
+    )
     assert exclusions(folder) == (first, second)
     assert (folder / "exclusions.csv").read_text(encoding="utf-8") == (
         "participant,session,trial,rule_or_person,reason,excluded_at\n"

@@ -22,7 +22,7 @@ ALL = {"n": 1, "t_s": 0.0, "at": "2026-03-01T10:00:00.000+01:00"}
 COLUMNS = (
     Column("name", "text", "A name."),
     Column("count", "integer", "How many.", minimum=1, maximum=99),
-    Column("speed", "number", "How fast.", "m/s", minimum=0, may_miss=True),
+    Column("speed", "number", "How fast.", unit="m/s", minimum=0, may_miss=True),
     Column("real", "flag", "Whether."),
     Column("level", "text", "Which.", levels=(("low", "little"), ("high", "much")), may_miss=True),
     Column("at", "time", "When."),

@@ -40,7 +40,9 @@ class FakeCamera:
         self.works = True
         assert self.opens.wait(10)
         self.source, self.size, self.closed = source, (640, 480), False
-        self.newest = VideoFrame(0, 2, 2, 8, bytes(16), 0, None, 33_333_333)
+        self.newest = VideoFrame(
+            number=0, width=2, height=2, stride=8, pixels=bytes(16), due_ns=0, age_ns=None, period_ns=33_333_333
+        )
 
     def close(self) -> None:
         self.closed = True
@@ -206,7 +208,16 @@ def test_footage_that_was_replaced_is_refused(tmp_path: Path) -> None:
 def test_the_row_of_a_trial_counts_frames_that_were_late_or_lost_and_says_their_age() -> None:
     def frame(number: int, age_ms: float | None) -> VideoFrame:
         age_ns = None if age_ms is None else round(1e6 * age_ms)
-        return VideoFrame(number, 2, 2, 8, bytes(16), 30_000_000 * number, age_ns, 30_000_000)
+        return VideoFrame(
+            number=number,
+            width=2,
+            height=2,
+            stride=8,
+            pixels=bytes(16),
+            due_ns=30_000_000 * number,
+            age_ns=age_ns,
+            period_ns=30_000_000,
+        )
 
     statistics = VideoStatistics()
     assert set(statistics.columns().values()) == {None}
@@ -242,7 +253,10 @@ def test_a_camera_shows_the_newest_frame_that_was_ready_and_says_what_ended_it()
     camera = Camera.__new__(Camera)
     now_ns = [40]
     camera._now_ns, camera._changed, camera._failure = lambda: now_ns[0], threading.Condition(), ""
-    camera._frames = deque(VideoFrame(due_ns, 2, 2, 8, b"", due_ns, None, 10) for due_ns in (10, 20, 30))
+    camera._frames = deque(
+        VideoFrame(number=due_ns, width=2, height=2, stride=8, pixels=b"", due_ns=due_ns, age_ns=None, period_ns=10)
+        for due_ns in (10, 20, 30)
+    )
     shown = [camera.frame_at(moment_ns) for moment_ns in (9, 10, 29, 30, 99)]
     assert [one and one.due_ns for one in shown] == [None, 10, 20, 30, 30]
     now_ns[0] = 30 + round(sources.STALLS_S * 1e9)

@@ -44,7 +44,7 @@ def test_results_are_those_of_the_seeds_in_their_order_and_an_error_is_that_of_i
         assert [future.result() for future in futures[:3]] == [0, 1, 2]
         with pytest.raises(ProtocolError, match=r"a\.toml: 1 problem\n  line 7: blocks\.b: is unknown") as refused:
             executor.submit(refuse_file, 7).result()
-        assert refused.value.problems == (Problem("blocks.b", "is unknown", 7, "did you mean c?"),)
+        assert refused.value.problems == (Problem("blocks.b", "is unknown", 7, hint="did you mean c?"),)
         assert executor.submit(draw, 1).result() == draw(1)
     with pytest.raises(Exception if workers.cluster else RuntimeError, match=r"shutdown|Client is closed"):
         executor.submit(draw, 1)

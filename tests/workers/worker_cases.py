@@ -27,7 +27,7 @@ def killed_once(folder: Path, seed: int) -> float:
 
 def refuse_file(line: int) -> None:
     """Raise the error of a protocol file with a problem in this line."""
-    raise ProtocolError("a.toml", (Problem("blocks.b", "is unknown", line, "did you mean c?"),))
+    raise ProtocolError("a.toml", (Problem("blocks.b", "is unknown", line, hint="did you mean c?"),))
 
 
 def die(_case: int) -> None:

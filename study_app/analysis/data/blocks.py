@@ -31,7 +31,7 @@ DELAY_PREFIX: Final = "D"
 """Codes of delay settings are D1, D2 …: what tells a block of delays in sealed receipts of earlier versions."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Item:
     """One statement: its id, its words, and a few words for figures."""
 
@@ -40,7 +40,7 @@ class Item:
     short: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Setting:
     """What was presented under a code; all but the code is None until the key is opened.
 
@@ -65,7 +65,7 @@ class Setting:
         return standard or None if is_track else None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Block:
     """A main block with a questionnaire: ``settings`` in code order, once known in the order of the conditions.
 
@@ -130,7 +130,7 @@ def _setting(key: Key, block: str, code: str, presented: str) -> Setting:
     stimulus = key.tables["stimuli"][key.tables["blocks"][block]["stimulus"]]
     name = stimulus["condition"] or next(iter(conditions))
     of = _of_condition(conditions[name], name, name)
-    return Setting(code, presented, of=replace(of, delay_ms=None) if stimulus["vary"] == DELAY else of)
+    return Setting(code=code, condition=presented, of=replace(of, delay_ms=None) if stimulus["vary"] == DELAY else of)
 
 
 def _of_condition(condition: Mapping[str, Any], code: str, name: str) -> Setting:
@@ -138,7 +138,15 @@ def _of_condition(condition: Mapping[str, Any], code: str, name: str) -> Setting
     link = ", ".join(link_words(*(condition.get(key, 0.0) for key in OF_LINK)))
     view = condition.get("view", "tank") + (" alone" if condition.get("overlay") == "hidden" else "")
     view = "" if view == "tank" else view
-    return Setting(code, name, liquids, float(condition["delay_ms"]), condition.get("label"), link, view)
+    return Setting(
+        code=code,
+        condition=name,
+        liquid=liquids,
+        delay_ms=float(condition["delay_ms"]),
+        label=condition.get("label"),
+        link=link,
+        view=view,
+    )
 
 
 def main_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[Block, ...]:
@@ -176,7 +184,7 @@ def _block(protocol: Mapping[str, Any], block: Mapping[str, Any], language: str,
         kind=kind,
         settings=settings,
         items=tuple(
-            Item(item["id"], text_in(item["text"], language), text_in(item["short"], language))
+            Item(id=item["id"], text=text_in(item["text"], language), short=text_in(item["short"], language))
             for item in _statements(protocol, block)
         ),
         labels=tuple(scale["labels"][language]),
@@ -188,7 +196,7 @@ def settings_in(protocol: Mapping[str, Any], block: str, key: Key | None) -> tup
     """Return the settings of a block: in code order, once known in the order of the conditions."""
     table = protocol["blocks"][block]
     if key is None:
-        return tuple(Setting(code) for code in table["codes"])
+        return tuple(Setting(code=code) for code in table["codes"])
     return _opened(key, block, table["codes"], table.get("compares"))[0]
 
 
@@ -239,7 +247,7 @@ def compared_percent(published: Iterable[Published]) -> float | None:
     return percents.pop() if len(percents) == 1 else None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class OwnDynamics:
     """The device's own damping [N·s/m], friction [N] and mass [kg], as ``devices bench`` measured them.
 
@@ -337,7 +345,7 @@ Direction: TypeAlias = Literal["increasing", "decreasing"]
 Spending: TypeAlias = Literal["obrien-fleming", "pocock"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Decided:
     """The protocol's table ``analysis``.
 
@@ -387,13 +395,26 @@ class Decided:
             return f"{self.alpha:g}"
         return f"{self.planned_alpha:g} over all looks, {self.alpha:.2g} at this one"
 
-    def look_words(self) -> str:
-        """Return which planned look this is, in a sentence; nothing where one is planned."""
+    def look_words(self, n: int) -> str:
+        """Return which planned look a study of ``n`` participants is at, in sentences; nothing where none is planned.
+
+        A number that is not planned is called unplanned, with the error rate of testing at every number.
+        """
         if self.look is None:
             return ""
         planned = f"{' and '.join([', '.join(map(str, self.looks[:-1])), str(self.looks[-1])])} participants"
         if self.look == 0:
             return f"Looks are planned at {planned}, none of which is reached: everything found is exploratory."
+        if n not in self.looks:
+            from study_app.analysis.statistics.outcome import error_of_every_report  # noqa: PLC0415 - loads scipy
+
+            alpha = self.planned_alpha or self.alpha
+            return (
+                f"This look at {n} participants is unplanned: looks are planned at {planned}. An adjusted p of at "
+                f"most {self.alpha:.2g} counts, as at the last planned look. A study that is tested at every "
+                f"participant in this way claims something falsely in "
+                f"{100 * error_of_every_report(self.looks, alpha, self.spending):.1f} % instead of {100 * alpha:g} %."
+            )
         return (
             f"This is look {self.look} of {len(self.looks)}, planned at {planned}: an adjusted p of at most "
             f"{self.alpha:.2g} counts (alpha is shared by {SPENDINGS[self.spending]} spending)."
@@ -415,7 +436,17 @@ TRENDS: Final = {
 """How a trend over the delay is tested, in words."""
 
 SPENDINGS: Final[Mapping[Spending, str]] = {"obrien-fleming": "O'Brien–Fleming", "pocock": "Pocock"}
-NOTHING_DECIDED: Final = Decided(False, False, 0.05, None, (), (), (), (), None)
+NOTHING_DECIDED: Final = Decided(
+    made=False,
+    changed=False,
+    alpha=0.05,
+    equivalence_bound=None,
+    primary=(),
+    names=(),
+    rising=(),
+    falling=(),
+    noticed=None,
+)
 
 
 def decisions(protocol: Protocol) -> Decided:
@@ -568,7 +599,7 @@ def _questionnaires(protocol: Mapping[str, Any], key: Key | None) -> Iterator[tu
             after = follows_in(protocol, step)
             titles = {name: text_in(block["title"], language) for name, block in protocol["blocks"].items()}
             labels = ((START, "At the start") if name is None else (name, f"After {titles[name]}") for name in after)
-            settings = tuple(Setting(name, condition=name, label=label) for name, label in labels)
+            settings = tuple(Setting(code=name, condition=name, label=label) for name, label in labels)
             yield QuestionPlace(step, title, True, settings), table
 
 

@@ -4,9 +4,10 @@ One statement is ordinal, so there are no means. Quartiles are linear (Hyndman &
 All seven levels are always there, chosen or not.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -55,7 +56,6 @@ def aggregate(
 def _measures(responses: Array, people: NDArray[Any], cannot_judge: int, presented: int) -> dict[str, float]:
     there = ~np.isnan(responses)
     values = responses[there]
-    q1, median, q3 = quartiles(values)
     return {
         "participants": len(set(people[there])),
         "presented": presented,
@@ -63,26 +63,42 @@ def _measures(responses: Array, people: NDArray[Any], cannot_judge: int, present
         "cannot_judge": cannot_judge,
         "missing": presented - len(values) - cannot_judge,
         **{column: int((values == level).sum()) for column, level in zip(COUNT_COLUMNS, LEVELS, strict=True)},
-        "median": median,
-        "q1": q1,
-        "q3": q3,
+        **quartiles(values)._asdict(),
         "agree_percent": 100 * float(np.isin(values, AGREEMENT).mean()) if len(values) else float("nan"),
     }
 
 
-def quartiles(values: Array) -> tuple[float, float, float]:
-    """Return the lower quartile, median and upper quartile of ``values`` (n,), leaving out NaN; NaN without any."""
+class Quartiles(NamedTuple):
+    """Median, lower and upper quartile."""
+
+    median: float
+    q1: float
+    q3: float
+
+
+class QuartilesOrNone(NamedTuple):
+    """`Quartiles` with None for NaN."""
+
+    median: float | None
+    q1: float | None
+    q3: float | None
+
+
+def quartiles(values: Array) -> Quartiles:
+    """Return the quartiles of ``values`` (n,), leaving out NaN; NaN without any."""
     valid = values[~np.isnan(values)]
     if not len(valid):
-        return (float("nan"),) * 3
-    q1, median, q3 = np.quantile(valid, (0.25, 0.5, 0.75), method="linear")
-    return float(q1), float(median), float(q3)
+        return Quartiles(median=math.nan, q1=math.nan, q3=math.nan)
+    q1, median, q3 = np.quantile(valid, (0.25, 0.5, 0.75), method="linear").tolist()
+    return Quartiles(median=median, q1=q1, q3=q3)
 
 
-def quartiles_or_none(values: Array) -> tuple[float | None, float | None, float | None]:
+def quartiles_or_none(values: Array) -> QuartilesOrNone:
     """Return what `quartiles` does, with None in the place of NaN."""
-    low, middle, high = quartiles(values)
-    return (None, None, None) if np.isnan(middle) else (low, middle, high)
+    found = quartiles(values)
+    if math.isnan(found.median):
+        return QuartilesOrNone(median=None, q1=None, q3=None)
+    return QuartilesOrNone(median=found.median, q1=found.q1, q3=found.q3)
 
 
 def number_or_none(value: Any) -> float | None:

@@ -9,7 +9,7 @@ first reach of a trial begins wherever the hand was and is left out.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -51,7 +51,7 @@ class Targets:
     dwell_s: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Reach:
     """One reach: its ``target``, when it was lit and when it was reached [s, from the trial's first sample]."""
 
@@ -68,7 +68,8 @@ def reaches(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -
     """Return the completed reaches of a trial from times (n,) and places of the hand (n, 3), first sample to last."""
     seconds = (times_ns - times_ns[0]) / 1e9 if len(times_ns) else np.zeros(0)
     found = []
-    for number, (lit, entered, reached) in enumerate(_held(times_ns, positions_m, targets)):
+    for number, held in enumerate(_held(times_ns, positions_m, targets)):
+        lit, entered, reached = held.lit, held.entered, held.reached
         target = number % len(targets.centres_m)
         way = positions_m[lit : entered + 1]
         found.append(
@@ -85,8 +86,16 @@ def reaches(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -
     return tuple(found)
 
 
-def _held(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -> Iterator[tuple[int, int, int]]:
-    """Yield, as samples, when each target was lit, entered for good, and reached."""
+class _Held(NamedTuple):
+    """The samples at which a target was lit, entered for good, and reached."""
+
+    lit: int
+    entered: int
+    reached: int
+
+
+def _held(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -> Iterator[_Held]:
+    """Yield the samples of each target that was reached, in order."""
     dwell_ns = round(targets.dwell_s * 1e9)
     lit = number = 0
     while lit < len(times_ns):
@@ -97,7 +106,7 @@ def _held(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -> 
         for entered, left in zip(edges[::2], edges[1::2], strict=True):
             reached = int(np.searchsorted(times_ns, times_ns[entered] + dwell_ns))
             if reached < left:
-                yield lit, int(entered), reached
+                yield _Held(lit=lit, entered=int(entered), reached=reached)
                 lit, number = reached, number + 1
                 break
         else:
@@ -143,7 +152,7 @@ TRIAL_DEFINITIONS: Final = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Moved:
     """One measure under one setting: over ``n`` participants, each of whom counts by his or her median."""
 
@@ -156,7 +165,7 @@ class Moved:
     q3: float | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Reached:
     """The reaches of one counted trial, the first left out."""
 
@@ -169,7 +178,7 @@ class Reached:
     found: tuple[Reach, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Performance:
     """All measures. ``reaching`` are the blocks whose task is one of reaching: only there are there reaches.
 
@@ -296,4 +305,6 @@ def _quartiles(block: Block, rows: pd.DataFrame, measures: Sequence[str]) -> Ite
     for measure in measures:
         for code in block.codes:
             values = medians[measure][medians.index.get_level_values("code") == code].dropna().to_numpy(dtype=float)
-            yield Moved(block.id, code, measure, len(values), *quartiles_or_none(values))
+            yield Moved(
+                block=block.id, code=code, measure=measure, n=len(values), **quartiles_or_none(values)._asdict()
+            )

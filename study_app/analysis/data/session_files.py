@@ -1,9 +1,10 @@
 """The sessions of a results folder as typed tables, checked against their receipts, excluded rows marked."""
 
+import contextlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -20,14 +21,18 @@ from study_app.analysis.data.blocks import (
     other_questions,
     spoken,
 )
-from study_app.errors import AnalysisError
+from study_app.errors import AnalysisError, StoreError
 from study_app.protocol.table import text_in
 from study_app.store.atomic import parse_json, read_regular
 from study_app.store.blinded.blinding import Key
-from study_app.store.columns import tables_of
+from study_app.store.columns import TRIALS_MISSING, tables_of
 from study_app.store.csv_files import MISSING, Column, cells, header
 from study_app.store.exclusions import Exclusion, named
 from study_app.store.folders import SessionFolder, StudyFolder, check_study_name
+from study_app.store.journals import journal
+from study_app.store.missing_trials import MissingTrials
+from study_app.store.progress import progress_of
+from study_app.store.tables.study_files import has_intervals
 
 DTYPES: Final[dict[str, Any]] = {
     "text": "string",
@@ -111,7 +116,15 @@ def unreadable(path: Path, error: OSError, remedy: str = "restore it from a copy
     )
 
 
-@dataclass(frozen=True)
+class Bench(NamedTuple):
+    """Damping, friction and mass in a receipt's bench, each the mean over its axes."""
+
+    damping_nspm: float
+    friction_n: float
+    mass_kg: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Session:
     """What was asked, what was answered, and the facts of the visit (``visit``: one row of ``Study.participants``).
 
@@ -128,7 +141,7 @@ class Session:
     visit: Mapping[str, Any]
     others: OtherQuestions = NO_QUESTIONS
     levels: tuple[LevelBlock, ...] = ()
-    own_dynamics: tuple[float, float, float] | None = None
+    own_dynamics: Bench | None = None
     device_velocity: bool = False
 
     @property
@@ -168,7 +181,8 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
             "motors_masked": _masking(receipt.get("motors_masked")),
             "protocol_version": version,
             "key_hash": receipt["key_hash"],
-            **{name: receipt.get(name) for name in ("seed", "protocol_hash", "version")},
+            **{name: receipt.get(name) for name in ("seed", "protocol_hash", "version", "group")},
+            "missing": _missing(folder) if has_intervals(protocol) else None,
         }
         own_dynamics = _own_dynamics(receipt["device"].get("bench"))
         device_velocity = receipt["device"].get("estimator") == "device"
@@ -182,18 +196,34 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
             "written by another version of the program; restore it from a copy"
         ) from error
     return Session(
-        folder, study, title, version, protocol, blocks, visit, others, levels, own_dynamics, device_velocity
+        folder=folder,
+        study=study,
+        title=title,
+        version=version,
+        protocol=protocol,
+        blocks=blocks,
+        visit=visit,
+        others=others,
+        levels=levels,
+        own_dynamics=own_dynamics,
+        device_velocity=device_velocity,
     )
 
 
-def _own_dynamics(bench: Mapping[str, Any] | None) -> tuple[float, float, float] | None:
-    """Return damping, friction and mass of a receipt's bench, each the mean over its axes."""
+def _missing(folder: SessionFolder) -> MissingTrials | None:
+    """Return the trials that were not delivered in a session with trials of intervals; None if its journal is damaged.
+
+    The tables may be sound although the journal is not; `doubts` reports it.
+    """
+    with contextlib.suppress(StoreError):
+        return progress_of(journal.read(folder.journal)).missing_trials
+    return None
+
+
+def _own_dynamics(bench: Mapping[str, Any] | None) -> Bench | None:
     if bench is None:
         return None
-    damping_nspm, friction_n, mass_kg = (
-        float(np.mean([float(value) for value in bench[name]])) for name in ("damping_nspm", "friction_n", "mass_kg")
-    )
-    return damping_nspm, friction_n, mass_kg
+    return Bench(**{name: float(np.mean([float(value) for value in bench[name]])) for name in Bench._fields})
 
 
 def estimators_of(records: Sequence[Session]) -> str | None:
@@ -209,8 +239,8 @@ def mean_dynamics(records: Sequence[Session]) -> OwnDynamics | None:
     known = [one.own_dynamics for one in records if one.own_dynamics is not None]
     if not known:
         return None
-    damping_nspm, friction_n, mass_kg = np.mean(known, axis=0).tolist()
-    return OwnDynamics(damping_nspm, friction_n, mass_kg, len(known), len(records))
+    means = Bench._make(np.mean(known, axis=0).tolist())
+    return OwnDynamics(**means._asdict(), sessions=len(known), of=len(records))
 
 
 def _masking(answer: Mapping[str, Any] | None) -> str | None:
@@ -222,14 +252,21 @@ def _masking(answer: Mapping[str, Any] | None) -> str | None:
 
 
 def read_tables(sessions: Sequence[Session], name: str) -> pd.DataFrame:
-    """Read table ``name`` of sessions that were asked alike, with ``session_status`` added; rows in their order."""
+    """Read table ``name`` of sessions that were asked alike; rows in their order.
+
+    ``session_status`` and ``trials_missing`` of the row's session are added.
+    """
     paths = [session.folder.table(session.study, name) for session in sessions]
     table, lengths = tables(paths, tables_of(sessions[0].protocol_format)[name])
     _check_own(sessions, paths, table, lengths)
     if name == "responses":
         _check_answers(sessions, paths, table, lengths)
     status = np.repeat([session.visit["status"] for session in sessions], lengths)
-    return table.assign(session_status=pd.array(status, dtype="string"))
+    known = [session.visit["missing"] for session in sessions]
+    missing = np.repeat(np.array([None if one is None else one.count for one in known], dtype=object), lengths)
+    return table.assign(
+        session_status=pd.array(status, dtype="string"), **{TRIALS_MISSING.name: pd.array(missing, dtype="Int64")}
+    )
 
 
 def _check_own(sessions: Sequence[Session], paths: Sequence[Path], table: pd.DataFrame, lengths: Whole) -> None:

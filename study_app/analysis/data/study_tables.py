@@ -3,8 +3,9 @@
 Each site has a key of its own, so that L1 of one is not L1 of another. Until all keys are open a code is SITE-CODE, and
 each site has settings of its own; then a code is the id of its condition, and the sites have the same settings.
 
-Everything recorded is kept; the column ``counted`` says what enters measures and figures: main trials of completed
-sessions, of a repeated trial the last attempt, without what ``exclusions.csv`` leaves out. Practice and baseline stay
+Everything recorded is kept; the column ``counted`` says what enters measures and figures: main trials of sessions that
+reached their end, of a repeated trial the last attempt, without what ``exclusions.csv`` leaves out; it leaves out
+sessions with too many missing trials, unless a person included them again. Practice and baseline stay
 apart by their ``phase``.
 
 Without groups or sites, and until the study is unblinded, there is nothing.
@@ -13,7 +14,7 @@ Without groups or sites, and until the study is unblinded, there is nothing.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -56,9 +57,10 @@ from study_app.protocol.questions import STATEMENT
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import Key
 from study_app.store.columns import INTERVALS, SEALED
-from study_app.store.exclusions import Exclusion, exclusions
+from study_app.store.exclusions import MISSING_RULE, Exclusion, exclusions, reversals
 from study_app.store.folder_lock import never_begun
 from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.journals.journal_events import INCOMPLETE, REACHED_END
 from study_app.store.merged import DASH, Merged, read_merged
 from study_app.store.sessions.open_session import Place
 from study_app.store.tables.study_files import has_intervals
@@ -122,7 +124,7 @@ def _of_site(site: str, settings: Settings, table: pd.DataFrame) -> pd.DataFrame
     if "code" not in table:
         return table
     codes = [
-        None if pd.isna(code) else renamed(site, settings.get((block, code), Setting(code))).code
+        None if pd.isna(code) else renamed(site, settings.get((block, code), Setting(code=code))).code
         for block, code in zip(table["block"], table["code"], strict=True)
     ]
     return table.assign(code=pd.array(codes, dtype="string"))
@@ -138,19 +140,21 @@ def pooled_dynamics(sites: Iterable[OwnDynamics | None], sessions: int) -> OwnDy
         float(np.average([getattr(one, name) for one in known], weights=weights))
         for name in ("damping_nspm", "friction_n", "mass_kg")
     )
-    return OwnDynamics(damping_nspm, friction_n, mass_kg, sum(weights), sessions)
+    return OwnDynamics(
+        damping_nspm=damping_nspm, friction_n=friction_n, mass_kg=mass_kg, sessions=sum(weights), of=sessions
+    )
 
 
-COMPLETED: Final = "completed"
 _TRIAL: Final = ["participant", "session", "trial"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Study:
     """All sessions of one study.
 
     ``responses`` and ``trials`` have the columns of ``store.columns``, with ``session_status``, ``excluded``,
-    ``exclusion_reason`` and ``counted`` added; ``participants`` has a row a session, with the last three. ``blocks``
+    ``exclusion_reason`` and ``counted`` added; ``participants`` has a row a session, with the last three
+    and its `MissingTrials`. ``blocks``
     are the main blocks that ask something; ``settings`` says what every (block, code) stands for, and is empty while
     the key is sealed; ``exclusions`` is what was decided to leave out, ``late`` what of it a person decided or
     reversed after the key was opened; ``doubts`` are files that are not as they were
@@ -395,6 +399,7 @@ def _load(folder: Path, *, sealed: bool = False) -> Study:
     listed = exclusions(place.path)
     records = [read_session(sessions[0], key)]
     records += [read_session(session, key, like=records[0]) for session in sessions[1:]]
+    listed += tuple(_undecided(place, records, listed))
     for session in records[1:]:
         _check_alike(records[0], session)
     responses, trials = read_tables(records, "responses"), read_tables(records, "trials")
@@ -406,7 +411,7 @@ def _load(folder: Path, *, sealed: bool = False) -> Study:
     last = both.groupby(_TRIAL)["attempt"].max().rename("last_attempt")
     counted = _with_counted(with_excluded(after_trials, listed), last)
     of_forms = with_excluded(responses[responses["trial"].isna()], listed)
-    answers_count = (of_forms["session_status"] == COMPLETED) & ~of_forms["excluded"]
+    answers_count = of_forms["session_status"].isin(REACHED_END) & ~of_forms["excluded"]
     of_forms = of_forms.assign(counted=answers_count.astype(bool))
     answered = pd.concat([counted, of_forms]).sort_index() if len(of_forms) else counted
     participants = with_excluded(pd.DataFrame([session.visit for session in records]), listed)
@@ -422,7 +427,7 @@ def _load(folder: Path, *, sealed: bool = False) -> Study:
         levels=records[0].levels,
         intervals=_intervals(records, listed, last, opened=key is not None),
         trials=_with_counted(with_excluded(trials, listed), last),
-        participants=participants.assign(counted=(participants["status"] == COMPLETED) & ~participants["excluded"]),
+        participants=participants.assign(counted=participants["status"].isin(REACHED_END) & ~participants["excluded"]),
         exclusions=listed,
         late=decided_late(place.path, listed),
         doubts=tuple(doubt for one in records for doubt in doubts(Place(place, one.folder, one.study))),
@@ -434,6 +439,22 @@ def _load(folder: Path, *, sealed: bool = False) -> Study:
         estimator=estimators_of(records),
         withdrawn=len(tombstones(place)),
     )
+
+
+def _undecided(place: StudyFolder, records: Sequence[Session], listed: Sequence[Exclusion]) -> Iterator[Exclusion]:
+    """Yield the exclusion of each incomplete session that the list lacks: the program ended before it wrote it."""
+    decided = {one.what for one in (*listed, *reversals(place.path))}
+    for one in records:
+        what = (one.folder.participant, one.folder.number, None)
+        if one.visit["status"] == INCOMPLETE and what not in decided:
+            yield Exclusion(
+                participant=one.folder.participant,
+                session=one.folder.number,
+                trial=None,
+                rule_or_person=MISSING_RULE,
+                reason=str(one.visit["missing"]),
+                excluded_at=str(one.visit["ended_at"]),
+            )
 
 
 def _intervals(
@@ -507,7 +528,7 @@ def _with_counted(table: pd.DataFrame, last: pd.Series[int]) -> pd.DataFrame:
     joined = table.join(last, on=_TRIAL)
     counted = (
         (joined["phase"] == "main")
-        & (joined["session_status"] == COMPLETED)
+        & joined["session_status"].isin(REACHED_END)
         & (joined["attempt"] == joined["last_attempt"])
         & ~joined["excluded"]
     )
@@ -526,9 +547,19 @@ By: TypeAlias = Literal["group", "site"]
 
 
 def group_members(study: Study) -> dict[str, str]:
-    """Return the group of every participant who counts; none without groups, and while the key is sealed."""
+    """Return the group of every participant who counts; none without groups.
+
+    Randomised groups are not known while the key is sealed.
+    """
     members = _members(study, "group")
     return dict(zip(map(str, members["participant"]), map(str, members["group"]), strict=True))
+
+
+def group_assignment(study: Study) -> str | None:
+    """Return how participants came into groups, "randomised" or "pre-existing"; None in a study without groups."""
+    if not study.protocol.get("groups"):
+        return None
+    return str(study.protocol["study"].get("group_assignment", "randomised"))
 
 
 def group_counts(study: Study, by: By = "group") -> dict[str, int]:
@@ -564,6 +595,9 @@ def _members(study: Study, by: By) -> pd.DataFrame:
     if by == "site":
         people = study.people if study.sites and study.revealed else ()
         return pd.DataFrame({"participant": people, "site": [study.site_of(one) for one in people]}, dtype="string")
+    rows = study.participants[study.participants["counted"] & study.participants["group"].notna()]
+    if len(rows):  # pre-existing groups, from the receipts
+        return rows[["participant", "group"]].drop_duplicates()
     if "group" not in study.trials or not study.revealed:
         return pd.DataFrame(columns=["participant", "group"])
     rows = study.trials[study.trials["counted"] & study.trials["group"].notna()]

@@ -12,7 +12,16 @@ from study_app.analysis.data.blocks import spoken
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export.table_files import codebook_bytes, credit_lines, stated_credits
 from study_app.errors import ProtocolError
-from study_app.protocol.source.files import at_hand, bundled, file_hash, find, protocol_hash, source_bytes, unbundled
+from study_app.protocol.source.files import (
+    at_hand,
+    bundled,
+    file_hash,
+    find,
+    protocol_hash,
+    source_bytes,
+    unbundled,
+    without_mark,
+)
 from study_app.protocol.table import text_in
 from study_app.store.atomic import cause, open_regular
 from study_app.store.blinded.blinding import revealed_key
@@ -85,7 +94,7 @@ def _is_inside(name: str) -> bool:
 def _is_of(study: str, file: Path) -> bool:
     """Return whether a protocol file is of the study of that name."""
     try:
-        head = tomllib.loads(file.read_bytes().decode()).get("study")
+        head = tomllib.loads(without_mark(file.read_bytes()).decode()).get("study")
     except (OSError, ValueError, RecursionError):
         return False
     return isinstance(head, dict) and head.get("name") == study

@@ -1,15 +1,15 @@
 """Tables as SPSS files (.sav), which jamovi, JASP and R read too: labels, levels and codes of missing answers included.
 
-Answers are numbers with labels and an ordinal measure. An excluded answer is 97 in the wide table, one off the scale 98
-and one that was not given 99, all declared as missing; of any other number what is missing is SPSS's own. SPSS has no
-missing text: it is empty.
+Answers are numbers with labels: options are nominal, points of a scale ordinal. An excluded answer is 97 in the wide
+table, one off the scale 98 and one that was not given 99, all declared as missing; of any other number what is missing
+is SPSS's own. SPSS has no missing text: it is empty.
 """
 
 from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.data.blocks import PlacedScore
+from study_app.analysis.data.blocks import PlacedQuestion, PlacedScore
 from study_app.analysis.data.measures import LEVELS
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export.tables import Cells, Delivered, QuestionCells
@@ -63,7 +63,13 @@ def wide_sav(study: Study, table: Delivered, cells: Mapping[str, Cells | Questio
         coded[name] = _levels(dict(zip(LEVELS, one.block.labels, strict=True)), one.block.cannot_judge or "")
     numbered = {name for name, found in coded.items() if found}
     columns = tuple(replace(one, kind="number") if one.name in numbered else one for one in table.columns)
-    return sav(study, Delivered(table.name, columns, frame), {name: coded[name] for name in numbered})
+    options = {name for name, one in cells.items() if isinstance(one, QuestionCells) and _names_options(one.asked)}
+    return sav(study, Delivered(table.name, columns, frame), {name: coded[name] for name in numbered}, options)
+
+
+def _names_options(asked: PlacedQuestion | PlacedScore) -> bool:
+    """Return whether the answers to a question are options, which have no order."""
+    return not isinstance(asked, PlacedScore) and asked.question.value_type == "text"
 
 
 def _question(
@@ -76,7 +82,7 @@ def _question(
     rows = study.rows_of(asked)
     if cells.setting is not None:
         rows = rows[rows["code"] == cells.setting.code]
-    if asked.question.value_type == "text":
+    if _names_options(asked):
         if asked.question.names_several:
             return values, {}
         numbers = {option: number for number, option in enumerate(asked.levels, start=1)}
@@ -101,11 +107,15 @@ def _levels(levels: Mapping[int, str], cannot_judge: str) -> dict[int, str]:
     return {**levels, **off}
 
 
-def sav(study: Study, table: Delivered, coded: Mapping[str, dict[int, str]]) -> bytes:
-    """Write the table; ``coded`` has the levels of columns whose missing answers have codes."""
+def sav(study: Study, table: Delivered, coded: Mapping[str, dict[int, str]], options: Collection[str] = ()) -> bytes:
+    """Return the table as a .sav file.
+
+    ``coded`` has the levels of columns whose missing answers have codes; those of ``options`` have no order.
+    """
     names = names_of([column.name for column in table.columns])
     columns = {names[column.name]: column for column in table.columns}
     levels = {names[name]: found for name, found in coded.items()}
+    ordered = {names[name] for name in coded.keys() - set(options)}
     flags = {name: {0: "false", 1: "true"} for name, column in columns.items() if column.kind == "flag"}
     frame = pd.DataFrame({names[column.name]: _plain(column, table.frame[column.name]) for column in table.columns})
     import pyreadstat  # noqa: PLC0415  # only this table needs it
@@ -122,7 +132,10 @@ def sav(study: Study, table: Delivered, coded: Mapping[str, dict[int, str]]) -> 
                 for name, found in (levels | flags).items()
             },
             missing_ranges={name: [*sorted(CODES & found.keys())] for name, found in levels.items()},
-            variable_measure={name: _measure(column, name in levels) for name, column in columns.items()},
+            variable_measure={
+                name: "ordinal" if name in ordered else "nominal" if name in levels else _measure(column)
+                for name, column in columns.items()
+            },
             variable_format={
                 name: form for name, column in columns.items() if (form := _format(column, table.frame[column.name]))
             },
@@ -160,9 +173,7 @@ def _label(name: str, column: Column) -> str:
     return f"{column.description}{unit}" if name == column.name else f"{column.name}: {column.description}{unit}"
 
 
-def _measure(column: Column, coded: bool) -> str:
-    if coded:
-        return "ordinal"
+def _measure(column: Column) -> str:
     return "nominal" if column.kind in {"text", "time", "flag"} else "scale"
 
 

@@ -20,7 +20,7 @@ from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.levels.statistic import statistics
 from study_app.analysis.levels.tracks import OF_INTERVALS, tracks
 from study_app.analysis.questions import scored
-from study_app.store.columns import INTERVALS, RESPONSES, TRIALS_2, tables_of
+from study_app.store.columns import INTERVALS, RESPONSES, TRIALS_2, TRIALS_MISSING, tables_of
 from study_app.store.csv_files import Column, Kind, header, optional, unsealed
 
 
@@ -58,7 +58,7 @@ _LEVEL_COLUMNS: Final = {column.name: column for column in (*TRIALS_2, *INTERVAL
 _OF_PERSON: Final = tuple(_LEVEL_COLUMNS[name] for name in ("study", "participant", "simulated", "pilot", "group"))
 TYPES: Final[dict[Kind, str]] = {"text": "string", "number": "Float64", "integer": "Int64", "flag": "boolean"}
 
-TRACKS: Final = (*(_LEVEL_COLUMNS[name] for name in (*_OF_TRIAL, *_OF_BLOCK)), *JUDGED, *OF_TRACKS)
+TRACKS: Final = (*(_LEVEL_COLUMNS[name] for name in (*_OF_TRIAL, *_OF_BLOCK)), *JUDGED, TRIALS_MISSING, *OF_TRACKS)
 
 
 def level_tables(study: Study) -> Iterator[Delivered]:
@@ -67,7 +67,7 @@ def level_tables(study: Study) -> Iterator[Delivered]:
         return
     intervals = tables_of(study.protocol_format)["intervals"]
     intervals = intervals if study.revealed else unsealed(intervals)
-    yield delivered("intervals", (*intervals, *JUDGED), study.intervals)
+    yield delivered("intervals", (*intervals, *JUDGED, TRIALS_MISSING), study.intervals)
     if not study.revealed:
         return
     frame = _named(study, tracks(study)).rename(columns={"level": "level_asked"})
@@ -101,7 +101,7 @@ def names_of_sealed(study: Study) -> set[str]:
     return {column.name for column in INTERVALS if column.sealed} if study.levels else set()
 
 
-OF_A_FORM: Final = Setting("")
+OF_A_FORM: Final = Setting(code="")
 """Stands for the setting of an answer in a form, which has none."""
 
 _BY_NAME: Final = {column.name: column for column in (*TRIALS_2, *RESPONSES)}
@@ -129,7 +129,7 @@ MEASURED: Final = (
         "agree_percent",
         "number",
         f"Share of the valid answers that agree (levels {AGREEMENT[0]} to {AGREEMENT[-1]}).",
-        "%",
+        unit="%",
         minimum=0,
         maximum=100,
     ),
@@ -149,11 +149,12 @@ def deliver(study: Study) -> tuple[Delivered, ...]:
     trials = trials if study.revealed else unsealed(trials)
     responses = tables_of(study.protocol_format)["responses"]
     about = achieved if responses is RESPONSES else _may_miss(achieved)
+    judged = (*JUDGED, TRIALS_MISSING) if study.levels else JUDGED
     tables = (
-        delivered("responses", (*responses, *JUDGED, *about), _named(study, _with_delay_error(study))),
+        delivered("responses", (*responses, *judged, *about), _named(study, _with_delay_error(study))),
         delivered(
             "trials",
-            (*trials, *JUDGED, *(_may_miss(achieved) if study.levels else achieved)),
+            (*trials, *judged, *(_may_miss(achieved) if study.levels else achieved)),
             _named(study, study.trials),
         ),
         delivered("aggregate", (*_aggregate_head(), *opened, *MEASURED), _aggregate(study)),

@@ -126,11 +126,13 @@ def over_delay(sheet: Sheet, axes: Axes, values: Array, delays_ms: Array, spread
     for place, offset in zip(shown, offsets, strict=True):
         name = f"{axes.get_label()}-participant{place + 1}"
         axes.plot(delays_ms, values[place] + offset, "o-", color=style.PARTICIPANT, zorder=2, gid=name, **thin)
-    q1, median, q3 = (np.array(side) for side in zip(*(quartiles(column) for column in values.T), strict=True))
+    of_delays = [quartiles(column) for column in values.T]
+    q1, q3 = [it.q1 for it in of_delays], [it.q3 for it in of_delays]
     band = axes.fill_between(delays_ms, q1, q3, color=style.BAND, alpha=0.85, linewidth=0, zorder=1)
     band.set_gid(f"{axes.get_label()}-quartiles")
     thick: Style = {"linewidth": 1.6, "markersize": 3.6, "markerfacecolor": "white", "markeredgewidth": 1.0}
-    axes.plot(delays_ms, median, "o-", color=style.ACCENT, zorder=4, gid=f"{axes.get_label()}-median", **thick)
+    medians = [it.median for it in of_delays]
+    axes.plot(delays_ms, medians, "o-", color=style.ACCENT, zorder=4, gid=f"{axes.get_label()}-median", **thick)
 
 
 def lines_of(participants: int) -> list[int]:
@@ -405,7 +407,7 @@ def draw_agreement(study: Study, block: Block, look: Look) -> Sheet:
     return sheet
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Widths:
     """Of every panel alike [pt]: one answer, the sides of the line, the neutral column and the column of n."""
 
@@ -433,7 +435,7 @@ def _widths(tables: Sequence[pd.DataFrame], room: float) -> _Widths:
     ):
         answer *= 0.99
     left, right, neutral = sides
-    return _Widths(answer, left, right, neutral, n)
+    return _Widths(answer=answer, left=left, right=right, neutral=neutral, n=n)
 
 
 def _lacks_answers(counts: pd.DataFrame) -> pd.Series[bool]:

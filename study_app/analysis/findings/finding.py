@@ -32,7 +32,7 @@ FEWER_DRAWS: Final = 1999
 """So many rearrangements are drawn for the test over all statements above ``MANY``, which has no approximation."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class BlockAnswers:
     """A block's answers as arrays, settings in their order; NaN where one is missing.
 
@@ -121,15 +121,15 @@ def of_tables(
     Without ``sessions``, arrays of the same shape, all answers are of one session.
     """
     return BlockAnswers(
-        block,
-        decided,
-        people,
-        {item: medians(answers) for item, answers in single.items()},
-        seed,
-        Failures() if failures is None else failures,
-        single,
-        {item: np.ones_like(answers) for item, answers in single.items()} if sessions is None else sessions,
-        verdicts_only,
+        block=block,
+        decided=decided,
+        people=people,
+        values={item: medians(answers) for item, answers in single.items()},
+        seed=seed,
+        failures=Failures() if failures is None else failures,
+        single=single,
+        sessions={item: np.ones_like(answers) for item, answers in single.items()} if sessions is None else sessions,
+        verdicts_only=verdicts_only,
     )
 
 
@@ -214,7 +214,18 @@ def in_family(
         least = correct([*ps[:place], outcome.smallest_p, *ps[place + 1 :]])[place]
         said = answers.verdict(p, least, primary=of_primary[place])
         adjusted = None if p is None else max(p, answers.gate)
-        found.append(Tested(item, outcome, family, len(ps), correction, adjusted, of_primary[place], said))
+        found.append(
+            Tested(
+                item=item,
+                outcome=outcome,
+                family=family,
+                members=len(ps),
+                correction=correction,
+                p_adjusted=adjusted,
+                primary=of_primary[place],
+                verdict=said,
+            )
+        )
     return tuple(found)
 
 
@@ -320,7 +331,7 @@ NO_EVIDENCE: Final = "That is not evidence that there is nothing."
 FOUND: Final = ("shown", "suggested")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
     """A row of the first page: the verdict on one question (the key of a finding) about one block (its id), in words.
 
@@ -450,4 +461,6 @@ class Finding(Generic[R]):
 
     def answered(self, verdict: str, text: str, *, claims: bool = False) -> Answer:
         """Return an answer to its question in this block."""
-        return Answer(self.key, self.found.id, self.found.title, verdict, text, claims)
+        return Answer(
+            question=self.key, block=self.found.id, title=self.found.title, verdict=verdict, text=text, claims=claims
+        )

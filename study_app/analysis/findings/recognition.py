@@ -98,6 +98,9 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
             ("of", lambda rate: str(rate.n)),
             ("share", lambda rate: number(rate.rate)),
             ("95 % interval", lambda rate: interval(rate.interval)),
+            ("name most used for", lambda rate: "–" if rate.rival is None else self.found.names[rate.rival]),
+            ("p", lambda rate: p_value(rate.p)),
+            ("adjusted p", lambda rate: p_value(rate.p_adjusted)),
         )
         outcome = named.found
         why = "" if outcome.interval else f" ({outcome.no_interval})"
@@ -111,7 +114,12 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
             f"decided answers {number(outcome.effect)}, 95 % interval {interval(outcome.interval)}{why}. Chance: "
             f"{outcome.method}.{note} One test, corrected for no other."
         )
-        yield paragraph("Intervals of the shares: Clopper-Pearson, which takes participants one by one.", "soft")
+        yield paragraph(
+            "Intervals of the shares: Clopper-Pearson, which takes participants one by one. p tests whether the name "
+            "is used for the liquid more often than for each other liquid, within participants (McNemar's exact test, "
+            "one-sided; the largest p over the others). Adjusted p is corrected by Holm over the liquids.",
+            "soft",
+        )
 
     def figure(self, drawing: Drawing) -> Picture | None:
         study, block, named = drawing.study, drawing.block, self.value
@@ -149,31 +157,21 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
             yield (
                 "A participant was taken to have named the liquid whose statement he or she rated highest; equal "
                 "highest ratings are undecided and count as no hit. Hits were tested against exchanging the liquids "
-                "within participants (exact, one-sided)."
+                "within participants (exact, one-sided). A liquid was called recognised if, in addition, its name was "
+                "used for it more often than for each other liquid (McNemar's exact test within participants, "
+                "one-sided, Holm-adjusted over the liquids)."
             )
 
 
-def recognised(named: RecognitionResult) -> tuple[int, ...]:
+def recognised(named: RecognitionResult, alpha: float) -> tuple[int, ...]:
     """Return the places of the settings that were recognised.
 
-    Only where names are right more often than by chance as a whole; then those whose share of right names, by the
-    lower end of its interval, is above the share of all settings that were given that name.
+    Only where names are right more often than by chance as a whole; then those whose name is used for them more often
+    than for each other setting.
     """
     if named.verdict not in FOUND:
         return ()
-    found = []
-    for rate in named.found.rates:
-        label = named.right[rate.setting]
-        if label is not None and rate.interval is not None and rate.interval.low > given(named, label):
-            found.append(rate.setting)
-    return tuple(found)
-
-
-def given(named: RecognitionResult, label: str) -> float:
-    """Return the share of all answers that gave a name: what is right by chance."""
-    place = named.labels.index(label)
-    asked = sum(sum(row[:-1]) for row in named.found.table)
-    return sum(row[place] for row in named.found.table) / asked if asked else 0.0
+    return tuple(rate.setting for rate in named.found.rates if rate.p_adjusted is not None and rate.p_adjusted <= alpha)
 
 
 class Distinguished(Finding[None]):
@@ -190,7 +188,7 @@ class Distinguished(Finding[None]):
         Exploratory tests count only where no primary one shows anything.
         """
         found, named = self.found, LiquidRecognition.of(self.found)
-        known = () if named is None else recognised(named)
+        known = () if named is None else recognised(named, self.results.decided.alpha)
         differing = [one for one in SettingsDiffer.of(found) if one.verdict in FOUND]
         pairs = [((one.first, one.second), one.tested) for one in Pairs.of(found) if one.tested.verdict in FOUND]
         if len(found.settings) == 2:

@@ -324,7 +324,7 @@ class OverAll(Finding[Outcome | None]):
             )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Effect:
     """The mean difference of a setting (code) from the first one in one statement, of ``n`` participants.
 
@@ -359,9 +359,9 @@ class Effects(Finding[tuple[Effect, ...]]):
             for column in range(1, answers.k):
                 away = values[:, column] - values[:, 0]
                 away = away[~np.isnan(away)]
-                ends = student_interval(away)
+                low, high = student_interval(away)
                 mean = float(away.mean()) if len(away) else None
-                effects.append(Effect(item, codes[column], len(away), mean, *ends))
+                effects.append(Effect(item=item, code=codes[column], n=len(away), mean=mean, low=low, high=high))
         return tuple(effects), ()
 
     def section(self) -> Iterator[str]:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -39,7 +39,7 @@ from study_app.protocol.trials.stimuli import Stimulus
 MOST_NAMED = 6
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SettingEstimate:
     """A participant's settings at one standard, as in `columns.RESULTS`, or the means of all ``n`` participants.
 
@@ -187,7 +187,7 @@ SUMMARIES: Final[dict[Reply, Summary]] = {
 """How the answers at a level are summarised, by the reply that the design asks for."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LevelAnswers:
     """The answers at one level, of one participant or, where ``participant`` is None, of all.
 
@@ -265,29 +265,35 @@ def _at_level(
     summarised = partial(_summarised, summary, (0.0, 1.0) if share else bounds)
     people = rows["participant"].to_numpy()
     own = {person: numbers[people == person] for person in sorted(set(people))}
-    value, low, high = summarised(np.array([one.mean() - units.get(person, 0.0) for person, one in own.items()]))
+    mean = summarised(np.array([one.mean() - units.get(person, 0.0) for person, one in own.items()]))
     count = int(numbers.sum()) if share else None
-    yield make(None, n=len(numbers), participants=len(own), count=count, value=value, low=low, high=high)
+    yield make(participant=None, n=len(numbers), participants=len(own), count=count, **mean._asdict())
     for person, one in own.items():
-        value, low, high = summarised(one)
+        mean = summarised(one)
         if share:
             count = int(one.sum())
             exact = clopper_pearson(count, len(one))
-            low, high = exact.low, exact.high
-        yield make(person, n=len(one), participants=1, count=count, value=value, low=low, high=high)
+            mean = mean._replace(low=exact.low, high=exact.high)
+        yield make(participant=person, n=len(one), participants=1, count=count, **mean._asdict())
 
 
-def _summarised(
-    summary: Summary, bounds: tuple[float, float] | None, values: Array
-) -> tuple[float, float | None, float | None]:
+class _Mean(NamedTuple):
+    """A mean and its 95 % interval."""
+
+    value: float
+    low: float | None
+    high: float | None
+
+
+def _summarised(summary: Summary, bounds: tuple[float, float] | None, values: Array) -> _Mean:
     """Return the mean of shares, points or logarithms and its 95 % interval within bounds, as numbers of their kind."""
     low, high = student_interval(values)
     if summary == "geometric mean":
         low, high = (None if end is None else math.exp(end) for end in (low, high))
-        return math.exp(values.mean()), low, high
+        return _Mean(value=math.exp(values.mean()), low=low, high=high)
     if bounds is not None and low is not None and high is not None:
         low, high = max(low, bounds[0]), min(high, bounds[1])
-    return float(values.mean()), low, high
+    return _Mean(value=float(values.mean()), low=low, high=high)
 
 
 def of_group(found: LevelsResult) -> tuple[LevelAnswers, ...]:

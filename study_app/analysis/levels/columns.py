@@ -7,11 +7,11 @@ without the libraries of the analysis, which may not be installed.
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from study_app.store.columns import INTERVALS, PARTICIPANTS
+from study_app.store.columns import INTERVALS, PARTICIPANTS, TRIALS_MISSING, with_missing_trials
 from study_app.store.csv_files import Column, optional
 from study_app.store.tables.column_dictionary import table_markdown
 
-_STATUS: Final = next(column for column in PARTICIPANTS if column.name == "status")
+_STATUS: Final = next(column for column in with_missing_trials(PARTICIPANTS) if column.name == "status")
 
 JUDGED: Final = (
     Column("session_status", "text", "How the row's session ended.", levels=_STATUS.levels),
@@ -20,18 +20,18 @@ JUDGED: Final = (
     Column(
         "counted",
         "flag",
-        "true where the row is in the aggregate and the figures: main trial, completed session, last attempt, not "
-        "excluded; valid or not.",
+        "true where the row is in the aggregate and the figures: main trial, session that reached its end, "
+        "last attempt, not excluded; valid or not.",
     ),
 )
 
 OPENED: Final = (
     Column("condition", "text", "Id of the condition that the code stands for."),
     Column("liquid", "text", "Id of the liquid that was presented."),
-    Column("delay_ms", "number", "Requested visual delay; n/a where a stimulus varies it.", "ms", minimum=0),
+    Column("delay_ms", "number", "Requested visual delay; n/a where a stimulus varies it.", unit="ms", minimum=0),
 )
 ACHIEVED: Final = optional(
-    "delay_achieved_ms", "number", "Visual delay that was achieved: asked for, plus the trial's mean error.", "ms"
+    "delay_achieved_ms", "number", "Visual delay that was achieved: asked for, plus the trial's mean error.", unit="ms"
 )
 
 _INTERVALS: Final = {column.name: column for column in INTERVALS}
@@ -72,7 +72,7 @@ OF_TRACKS: Final[tuple[Column, ...]] = (
     optional("response", "text", "The answer; n/a without one."),
     optional("value", "number", "The answer as a number, where it is one."),
     optional("right", "flag", "true if the answer was correct; n/a where no answer is."),
-    optional("response_s", "number", "Time from the question to the first choice of an answer.", "s", minimum=0),
+    optional("response_s", "number", "Time from the question to the first choice of an answer.", unit="s", minimum=0),
     optional(
         "reversal", "flag", "true if the up–down track changed its direction here; n/a where the method has no steps."
     ),
@@ -153,7 +153,7 @@ THRESHOLDS: Final[tuple[Column, ...]] = (
         "target_percent",
         "number",
         "Percentage of successes to which the rule of the up–down tracks converges.",
-        "%",
+        unit="%",
         minimum=0,
         maximum=100,
     ),
@@ -211,7 +211,10 @@ RESULTS: Final = {
 
 def dictionary_markdown() -> str:
     """Return the columns of these tables as Markdown: a heading and a table for each."""
-    added = "what `export` adds to responses, trials and intervals; the last four after unblinding"
+    added = (
+        "what `export` adds to responses, trials and intervals; `trials_missing` in studies with trials of intervals, "
+        "the last four after unblinding"
+    )
     of_tracks = (
         "one row per trial with a design, after unblinding; what it has besides IDs and condition of the trial, and "
         "force_mean_n and mean_speed_mps of each interval (…_1, …_2)"
@@ -219,7 +222,7 @@ def dictionary_markdown() -> str:
     tables = {"tracks": Results(of_tracks, OF_TRACKS), **RESULTS}
     return "\n".join(
         (
-            table_markdown("Added by an export", "*_data.csv", added, (*JUDGED, *OPENED, ACHIEVED)),
+            table_markdown("Added by an export", "*_data.csv", added, (*JUDGED, TRIALS_MISSING, *OPENED, ACHIEVED)),
             *(
                 table_markdown(name.capitalize(), f"study-…_description-{name}_data.csv", row, columns)
                 for name, (row, columns) in tables.items()

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import takewhile
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -26,14 +26,24 @@ def _levels(row: Row) -> str:
     return digits(low) if low == high else between(low, high)
 
 
-def _by_levels(rows: pd.DataFrame) -> Iterator[tuple[float | None, float, float, pd.DataFrame]]:
-    """Yield standard, lowest and highest level, and their rows: many levels in `MOST_LEVELS` ranges of neighbours."""
+class _Range(NamedTuple):
+    """The rows between two levels at a standard."""
+
+    standard: float | None
+    low: float
+    high: float
+    rows: pd.DataFrame
+
+
+def _by_levels(rows: pd.DataFrame) -> Iterator[_Range]:
+    """Yield each level as a range; of many levels `MOST_LEVELS` ranges of neighbours."""
     for standard, at_standard in rows[rows["level"].notna()].groupby("standard", dropna=False, sort=True):
         level = at_standard["level"].astype(float)
         levels = np.unique(level.to_numpy())
         for some in np.array_split(levels, min(len(levels), MOST_LEVELS)):
             here = at_standard[level.between(some[0], some[-1])]
-            yield number_or_none(standard), float(some[0]), float(some[-1]), here
+            low, high = float(some[0]), float(some[-1])
+            yield _Range(number_or_none(standard), low=low, high=high, rows=here)
 
 
 def _withheld(block: LevelBlock, intervals: pd.DataFrame) -> Iterator[Row]:
@@ -41,9 +51,9 @@ def _withheld(block: LevelBlock, intervals: pd.DataFrame) -> Iterator[Row]:
     if block.stimulus is None or block.stimulus.vary not in OF_LINK:
         return
     rows = intervals[(intervals["block"] == block.id) & (intervals["presented"] == "comparison")]
-    for standard, low, high, here in _by_levels(rows[rows["withheld_share"].notna()]):
-        percent = 100 * here["withheld_share"].to_numpy(dtype=float)
-        row = {"standard": standard, "low": low, "high": high, "n": len(percent)}
+    for here in _by_levels(rows[rows["withheld_share"].notna()]):
+        percent = 100 * here.rows["withheld_share"].to_numpy(dtype=float)
+        row = {"standard": here.standard, "low": here.low, "high": here.high, "n": len(percent)}
         yield {**row, "mean_percent": float(percent.mean()), "most_percent": float(percent.max())}
 
 

@@ -81,8 +81,7 @@ def _levels_of_block(study: Study, block: LevelBlock, timed: pd.DataFrame, opene
 
 def _times(answers: pd.DataFrame, block: LevelBlock, setting: Setting) -> GroupAnswers:
     seconds = answers.loc[answers["code"] == setting.code, "response_s"].dropna().to_numpy(dtype=float)
-    low, middle, high = quartiles_or_none(seconds)
-    numbers = {"n": len(seconds), "median": middle, "q1": low, "q3": high}
+    numbers = {"n": len(seconds), **quartiles_or_none(seconds)._asdict()}
     return GroupAnswers(setting.code, setting_name(setting, block.settings), numbers)
 
 

@@ -39,7 +39,7 @@ BIASES: Final = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SensitivityEstimate:
     """A participant's sensitivity and bias or, where ``participant`` is None, their means over ``n`` participants.
 
@@ -126,7 +126,7 @@ def _of_choices(
     given = Counter(rows["response"].astype(str))
     found = design.sensitivity(counts, roving=block.standards_rove) if block.has_correct_answer else None
     shares = {answer: given[answer] / len(rows) for answer in design.answers}
-    one = SensitivityEstimate(person, len(rows), shares, **where)  # type: ignore[arg-type]  # standard or comparison
+    one = SensitivityEstimate(participant=person, n=len(rows), shares=shares, **where)  # type: ignore[arg-type]  # standard or comparison
     return one if found is None else _measured(one, found)
 
 

@@ -37,7 +37,7 @@ from study_app.analysis.levels.statistic import (
 from study_app.analysis.levels.tracks import TRACK, answers_of, setting_of
 from study_app.analysis.results import LevelsResult, counted, listed, number
 from study_app.analysis.statistics.outcome import Array
-from study_app.analysis.statistics.thresholds import FEWEST, SETS, WORST, drift, group_mean, p_of_fit
+from study_app.analysis.statistics.thresholds import FEWEST, SETS, WORST, GroupMean, drift, group_mean, p_of_fit
 from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES, SESSION_SD, Assumed, Stimulus, analysis_grid
 from study_app.psychophysics.families import level_at
@@ -58,7 +58,7 @@ REMOVED: Final = (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ThresholdEstimate:
     """A participant's threshold at one standard, as in `columns.RESULTS`, or the group's of ``n`` participants.
 
@@ -254,13 +254,13 @@ def _own(
     fit, found, rows = fitted.fit, fitted.posterior, fitted.rows
     given, grid = fit.given, found.grid
     level_of, threshold, (low, high) = stimulus.level_of, found.threshold, found.interval
-    width, guess, lapse = found.others
+    others = found.others
     psi, (lowest, highest) = fit.expected(found), stimulus.domain
     _, first, cells = np.unique([given.places, fit.shifts], axis=1, return_index=True, return_inverse=True)
     decades = fit.change / (1.0 if grid.log else abs(threshold) * math.log(10))
     percent, compared = compared_percent(block.published), math.nan
     if percent is not None:
-        compared = level_at(grid.family, percent, threshold, *found.others)
+        compared = level_at(grid.family, percent, threshold, **others._asdict())
     return ThresholdEstimate(
         participant=str(fitted.person),
         standard=number_or_none(standard),
@@ -268,9 +268,9 @@ def _own(
         threshold=level_of(threshold),
         low=level_of(low),
         high=level_of(high),
-        width=width,
-        lapse=lapse,
-        guess=guess,
+        width=others.width,
+        lapse=others.lapse,
+        guess=others.guess,
         flat_width=level_of(fit.flat.threshold),
         beyond="above" if threshold > highest else "below" if threshold < lowest else None,
         variance=found.variance,
@@ -298,16 +298,31 @@ def _reversal_mean(block: LevelBlock, stimulus: Stimulus, heard: pd.DataFrame) -
 def _group(stimulus: Stimulus, standard: Any, own: Sequence[ThresholdEstimate], shared: float) -> ThresholdEstimate:
     """Return the random-effects mean of participants, at the published percentage too where all have theirs."""
 
-    def mean(levels: Sequence[float]) -> list[Any]:
-        found = group_mean([*map(stimulus.coordinate, levels)], [one.variance or 0.0 for one in own], shared)
-        return [None if end is None else stimulus.level_of(end) for end in (found.mean, found.low, found.high)]
+    def level_of(end: float | None) -> float | None:
+        return None if end is None else stimulus.level_of(end)
 
-    group = ThresholdEstimate(None, number_or_none(standard), len(own), *mean([one.threshold for one in own]))
+    def mean(levels: Sequence[float]) -> GroupMean:
+        return group_mean([*map(stimulus.coordinate, levels)], [one.variance or 0.0 for one in own], shared)
+
+    found = mean([one.threshold for one in own])
+    group = ThresholdEstimate(
+        participant=None,
+        standard=number_or_none(standard),
+        n=len(own),
+        threshold=stimulus.level_of(found.mean),
+        low=level_of(found.low),
+        high=level_of(found.high),
+    )
     compared = [one.compared for one in own if one.compared is not None]
     if len(compared) < len(own):
         return group
-    middle, low, high = mean(compared)
-    return replace(group, compared=middle, compared_low=low, compared_high=high)
+    found = mean(compared)
+    return replace(
+        group,
+        compared=stimulus.level_of(found.mean),
+        compared_low=level_of(found.low),
+        compared_high=level_of(found.high),
+    )
 
 
 PLACES: Final = 40
@@ -332,7 +347,7 @@ def psychometric_bands(
 Flags = NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TrackCourse:
     """The answers of one participant at one standard in the order of the trials, shape (n,) each.
 
@@ -589,7 +604,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ExponentEstimate:
     """A participant's exponent: of a power law, from ``n`` levels, or Weber's, of the JND over ``n`` standards.
 
@@ -631,7 +646,11 @@ def estimated_exponents(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Exp
         delivered = of_person["level_delivered"].astype(float).groupby(asked).transform("mean")
         levels = delivered.where(delivered > 0, asked).to_numpy()
         if (count := len(np.unique(levels))) >= 2:
-            own.append(ExponentEstimate(str(person), count, estimate_slope(levels, of_person["value"].astype(float))))
+            own.append(
+                ExponentEstimate(
+                    participant=str(person), n=count, exponent=estimate_slope(levels, of_person["value"].astype(float))
+                )
+            )
     if own:
         yield mean_over(own, "exponent")
     yield from own
@@ -664,7 +683,7 @@ def weber_exponents(thresholds: Sequence[ThresholdEstimate], level_kind: str) ->
             if one.participant == person and one.standard is not None and one.standard > 0 and one.threshold > 0
         ]
         if len(places) >= 2:
-            own.append(ExponentEstimate(person, len(places), jnd_slope(*np.array(places).T)))
+            own.append(ExponentEstimate(participant=person, n=len(places), exponent=jnd_slope(*np.array(places).T)))
     if own:
         yield mean_over(own, "exponent")
     yield from own

@@ -57,7 +57,7 @@ SPREADS: Final = 1000
 OVER_ALL: Final = "all statements at once"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Curve:
     """The power of one test over the sizes.
 
@@ -91,7 +91,7 @@ class Curve:
         return None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Powers:
     """What so many simulated studies of each size found."""
 
@@ -112,7 +112,7 @@ def powers(plan: Plan, sizes: Sequence[int], studies: int, asked: int, seed: int
     """Return what ``studies`` of ``asked`` studies found, from their counts."""
     curves = [curve for block in plan.blocks for curve in _curves(block, counts, studies)]
     curves += _contrast_curves(plan, counts, studies)
-    return Powers(plan, tuple(sizes), studies, asked, seed, tuple(curves))
+    return Powers(plan=plan, sizes=tuple(sizes), studies=studies, asked=asked, seed=seed, curves=tuple(curves))
 
 
 def interval(share: float, studies: int) -> tuple[float, float]:
@@ -127,22 +127,36 @@ def _curves(block: Planned, counts: Counts, studies: int) -> Iterator[Curve]:
     means = counts[block.id, "means"] / studies
     for what, over in (("any", "at least one statement"), ("all", OVER_ALL)):
         if (block.id, what) in counts:
-            shares = counts[block.id, what] / studies
-            yield Curve(block.id, question, None, over, None, *_shares(shares), None, None)
+            power, alarms = _shares(counts[block.id, what] / studies)
+            yield Curve(
+                block=block.id,
+                question=question,
+                item=None,
+                over=over,
+                setting=None,
+                power=power,
+                alarms=alarms,
+                effect=None,
+                detectable=None,
+            )
     if (block.id, "found") in counts:
         found = counts[block.id, "found"] / studies
         for place, item in enumerate(block.items):
             effects = _effects(block, means[:, :, place])
             known = effects[FULL] - effects[0] > 0.05
+            power, alarms = _shares(found[:, :, place])
             yield Curve(
-                block.id,
-                question,
-                item.id,
-                "",
-                None,
-                *_shares(found[:, :, place]),
-                float(effects[FULL]),
-                tuple(_detectable(found[at, :, place], effects) for at in range(len(found))) if known else None,
+                block=block.id,
+                question=question,
+                item=item.id,
+                over="",
+                setting=None,
+                power=power,
+                alarms=alarms,
+                effect=float(effects[FULL]),
+                detectable=tuple(_detectable(found[at, :, place], effects) for at in range(len(found)))
+                if known
+                else None,
             )
     yield from _lowest_curves(block, counts, studies)
     yield from _equivalence_curves(block, counts, studies)
@@ -152,11 +166,31 @@ def _contrast_curves(plan: Plan, counts: Counts, studies: int) -> Iterator[Curve
     for one in plan.contrasts:
         power, alarms = _shares(counts[one.described(), "contrast"] / studies)
         within = None if len(one.blocks) == 2 else alarms  # effects are those of the settings of one block
-        yield Curve(one.blocks[0], "contrast", None, one.described(), None, power, within, None, None)
+        yield Curve(
+            block=one.blocks[0],
+            question="contrast",
+            item=None,
+            over=one.described(),
+            setting=None,
+            power=power,
+            alarms=within,
+            effect=None,
+            detectable=None,
+        )
         if one.bound is not None:
             equal = f"{one.described()}, {IF_EQUAL}"
             power, _ = _shares(counts[equal, "contrast"] / studies)
-            yield Curve(one.blocks[0], "contrast", None, equal, None, power, None, None, None)
+            yield Curve(
+                block=one.blocks[0],
+                question="contrast",
+                item=None,
+                over=equal,
+                setting=None,
+                power=power,
+                alarms=None,
+                effect=None,
+                detectable=None,
+            )
 
 
 def _shares(shares: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -191,7 +225,17 @@ def _lowest_curves(block: Planned, counts: Counts, studies: int) -> Iterator[Cur
         if shares[:, place].any():
             for delay in range(1, block.k):
                 power = tuple(shares[:, place, delay].tolist())
-                yield Curve(block.id, "lowest delay", item.id, "", block.names[delay], power, None, None, None)
+                yield Curve(
+                    block=block.id,
+                    question="lowest delay",
+                    item=item.id,
+                    over="",
+                    setting=block.names[delay],
+                    power=power,
+                    alarms=None,
+                    effect=None,
+                    detectable=None,
+                )
 
 
 def _equivalence_curves(block: Planned, counts: Counts, studies: int) -> Iterator[Curve]:
@@ -203,7 +247,17 @@ def _equivalence_curves(block: Planned, counts: Counts, studies: int) -> Iterato
         for delay in range(1, block.k):
             none, full = (tuple(shares[:, effect, place, delay - 1].tolist()) for effect in (0, 1))
             away = float(means[delay, place] - means[0, place])
-            yield Curve(block.id, "equivalence", item.id, "", block.names[delay], full, none, away, None)
+            yield Curve(
+                block=block.id,
+                question="equivalence",
+                item=item.id,
+                over="",
+                setting=block.names[delay],
+                power=full,
+                alarms=none,
+                effect=away,
+                detectable=None,
+            )
 
 
 OF_BLOCK: Final = (
@@ -443,15 +497,15 @@ def _truly_equal(curves: list[Curve]) -> list[Curve]:
     items = {curve.item: [one.alarms for one in curves if one.item == curve.item and one.alarms] for curve in curves}
     return [
         Curve(
-            curves[0].block,
-            "equivalence",
-            item,
-            "",
-            IF_EQUAL,
-            tuple(np.mean(alarms, axis=0).tolist()),
-            None,
-            None,
-            None,
+            block=curves[0].block,
+            question="equivalence",
+            item=item,
+            over="",
+            setting=IF_EQUAL,
+            power=tuple(np.mean(alarms, axis=0).tolist()),
+            alarms=None,
+            effect=None,
+            detectable=None,
         )
         for item, alarms in items.items()
     ]

@@ -25,13 +25,13 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import expected_of, precision_plan, precision_rows, threshold_plan
 from study_app.protocol.describe import describe, limit_rows
 from study_app.protocol.model import Analysis, Contrast, Protocol
-from study_app.protocol.orders.balance import block_order_words
+from study_app.protocol.orders.balance import block_orders_by_group
 from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.table import text_in
 from study_app.protocol.tracks import condition_of, design_of, method_of, standards_of, stimulus_of
 from study_app.protocol.trials.stimuli import assumed_for
 from study_app.psychophysics.people import BETWEEN_PEOPLE
-from study_app.store.exclusions import named
+from study_app.store.exclusions import MISSING_RULE, named
 from study_app.store.merged import DASH, folders_of
 
 FILE: Final = "preregistration.md"
@@ -41,7 +41,7 @@ CATCH: Final = "catch"
 _BLOCK: Final = re.compile(r"^```json\n(\{.*?\})\n```$", re.MULTILINE | re.DOTALL)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Commitment:
     """What was committed to: participants, precision of the group's mean, and the rules that exclude sessions."""
 
@@ -57,12 +57,15 @@ def commitment(protocol: Protocol, protocol_hash: str) -> Commitment:
     """Return what a protocol commits to."""
     decided = protocol.analysis
     return Commitment(
-        protocol.study.name,
-        protocol.study.version,
-        protocol_hash,
-        None if decided is None else decided.participants,
-        None if decided is None else decided.precision,
-        (CATCH,) if any(block.catch is not None for block in protocol.main_blocks) else (),
+        study=protocol.study.name,
+        version=protocol.study.version,
+        protocol_hash=protocol_hash,
+        participants=None if decided is None else decided.participants,
+        precision=None if decided is None else decided.precision,
+        rules=(
+            *([CATCH] if any(block.catch is not None for block in protocol.main_blocks) else []),
+            *([MISSING_RULE] if any(block.design is not None for block in protocol.main_blocks) else []),
+        ),
     )
 
 
@@ -304,11 +307,16 @@ def _design(protocol: Protocol) -> Iterator[str]:
         if study.blinding == "double"
         else "Conditions are known by codes until the key is opened; the operator sees force and wake (single-blind)."
     )
-    if protocol.groups:
-        shares = ", ".join(f"{name} (share {group.share})" for name, group in protocol.groups.items())
-        yield f"Participants are allocated at random, in permuted blocks, to the groups {shares}."
-    if len(protocol.main_blocks) > 1:
-        yield f"Order of blocks {block_order_words(protocol)}."
+    shares = ", ".join(f"{name} (share {share})" for name, share in protocol.shares.items())
+    if protocol.randomises:
+        yield f"Participants are assigned at random, in permuted blocks, to the groups {shares}."
+    elif protocol.asks_group:
+        yield (
+            f"Participants belong to a group by an existing attribute ({shares}), which is recorded at the start of "
+            "their first session. Groups are not randomised, so a difference between them may have other causes."
+        )
+    for group, words in block_orders_by_group(protocol).items():
+        yield f"Order of blocks{f' in group {group}' if group else ''} {words}."
     yield "Orders are drawn for each participant from the session's seed, as described for each block below."
     for block in protocol.main_blocks:
         rows = dict(precision_rows(protocol, block))
@@ -379,6 +387,11 @@ def _exclusions(protocol: Protocol) -> Iterator[str]:
         attempts = protocol.limits.attempts
         times = "" if attempts is None else f", up to {attempts} times"
         yield f"A trial of intervals beyond a limit is not asked about and is presented again{times}."
+        if (permitted := protocol.limits.missing_percent) is not None:
+            yield (
+                f'Rule "missing": at most {permitted:g} % of a session\'s main trials of intervals may stay unanswered '
+                "because no presentation was within the limits. A session with more is incomplete and is excluded."
+            )
     if any(block.design is None for block in protocol.main_blocks):
         yield f"{'Other trials' if has_intervals else 'Trials'} beyond a limit are counted and reported."
     yield f"Limits: {limits}."

@@ -38,7 +38,7 @@ ConditionFeatures: TypeAlias = Mapping[tuple[str, str], Sequence[TrialFeatures]]
 """(Block, condition) → features of rehearsed trials."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Planned(StatementBlock):
     """A main block that asks something: its settings in the order of the tests, delays ascending.
 
@@ -62,7 +62,7 @@ class Planned(StatementBlock):
         return len(self.settings)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Plan:
     """A study that is planned; of its contrasts those of statements within people, and how many others there are.
 
@@ -101,14 +101,14 @@ def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
     stated = [one for one in every if all(one.measure in items.get(it, ()) for it in one.blocks)]
     within = tuple(one for one in stated if one.groups is None)
     return Plan(
-        protocol.study.name,
-        text_in(protocol.study.title, language),
-        protocol.study.version,
-        tuple(_planned(protocol, block, features, language) for block in asked),
-        read_decided([table]),
-        within,
-        len(every) - len(within),
-        tuple((one, shares) for one in stated if (shares := group_shares(protocol, one)) is not None),
+        name=protocol.study.name,
+        title=text_in(protocol.study.title, language),
+        version=protocol.study.version,
+        blocks=tuple(_planned(protocol, block, features, language) for block in asked),
+        decided=read_decided([table]),
+        contrasts=within,
+        untested=len(every) - len(within),
+        between=tuple((one, shares) for one in stated if (shares := group_shares(protocol, one)) is not None),
         untested_bounds=sum(one.bound is not None for one in every if one not in within),
     )
 
@@ -142,12 +142,18 @@ def _planned(protocol: Protocol, block: Block, features: ConditionFeatures, lang
         title=text_in(block.title, language),
         kind=kind,
         settings=tuple(
-            Setting(f"S{number}", name, " + ".join(one.liquid_ids), one.delay_ms, one.label)
+            Setting(
+                code=f"S{number}",
+                condition=name,
+                liquid=" + ".join(one.liquid_ids),
+                delay_ms=one.delay_ms,
+                label=one.label,
+            )
             for number, name in enumerate(names, start=1)
             for one in (conditions[name],)
         ),
         items=tuple(
-            Item(item.id, text_in(item.text, language), text_in(item.short, language))
+            Item(id=item.id, text=text_in(item.text, language), short=text_in(item.short, language))
             for item in _statements(protocol, block)
         ),
         labels=tuple(map(str, range(LOWEST, HIGHEST + 1))),

@@ -240,7 +240,7 @@ COLUMNS: Final = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Precisions:
     """What so many simulated studies of each size found.
 

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from markupsafe import Markup
 
@@ -17,7 +17,7 @@ from study_app.analysis.data.motion import (
     Moved,
     Performance,
 )
-from study_app.analysis.data.study_tables import By, Study, group_counts, group_means
+from study_app.analysis.data.study_tables import By, Study, group_assignment, group_counts, group_means
 from study_app.analysis.figures.answer_figures import people_a_setting
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.finding import Answer, Finding
@@ -50,7 +50,8 @@ from study_app.discovery import by_name
 from study_app.protocol.orders.balance import Evenness
 from study_app.store.delivered import broken_limits
 from study_app.store.exclusions import named
-from study_app.store.unblinding import RULE
+from study_app.store.missing_trials import MISSING_PERCENT, MissingTrials, limit_words
+from study_app.store.unblinding import RULES
 
 WITHOUT_FORCE: Final = {"mouse", "spacemouse"}
 """The devices without force: reading results must not load their descriptors."""
@@ -165,8 +166,10 @@ def methods(study: Study, results: Results) -> str:
 def _sentences(study: Study, results: Results) -> Iterator[str]:
     blocks = [found for found in results.blocks if found.n]
     yield _sample(study)
+    yield _assignment(study)
     yield _apparatus(study)
     yield from level_methods(study.levels, results.levels)
+    yield _missing_sentence(study)
     if blocks:
         yield from _of_statements(study, results, blocks)
     if blocks or results.levels:
@@ -200,7 +203,7 @@ def _sample(study: Study) -> str:
         whole = all(set(people_a_setting(study, block).values()) == {study.n} for block in study.blocks)
         under = ", each under all settings" if whole else _fewer_settings(study)
     late = ""
-    if study.revealed and any(one.rule_or_person != RULE for one in (*study.exclusions, *study.late)):
+    if study.revealed and any(one.rule_or_person not in RULES for one in (*study.exclusions, *study.late)):
         late = " Exclusions were decided while the key was sealed."
         if study.late:
             late = f" Decided after the key was opened: {_late(study)}."
@@ -208,6 +211,20 @@ def _sample(study: Study) -> str:
         f"{people[:1].upper()}{people[1:]}{kind} took part in “{study.title}” (protocol {study.name}, "
         f"{version_words(study)}){under}{gone}.{late}"
     )
+
+
+def _assignment(study: Study) -> str:
+    """Return how participants came into groups; "" without groups."""
+    groups = listed([*study.protocol.get("groups", {})])
+    match group_assignment(study):
+        case "pre-existing":
+            return (
+                f"Participants were assigned to a group by an existing attribute ({groups}), recorded at the start of "
+                "the session; groups were not randomised."
+            )
+        case "randomised":
+            return f"Participants were randomised in permuted blocks to the groups {groups}."
+    return ""
 
 
 def _apparatus(study: Study) -> str:
@@ -291,7 +308,7 @@ def _common(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
             f"decisions of the first session were used (alpha = {decided.alpha_words()})."
         )
     elif decided.made:
-        yield decided.look_words()
+        yield decided.look_words(len(results.people))
     else:
         yield f"No decisions were made beforehand: all results are exploratory, with alpha = {decided.alpha:g}."
     for finding in all_findings():
@@ -328,7 +345,7 @@ def first_page(results: Results, limits: Sequence[str]) -> Markup:
         "first_page.html",
         verdicts=verdicts if rows else "",
         sentences=[
-            *filter(None, [results.decided.look_words()]),
+            *filter(None, [results.decided.look_words(len(results.people))]),
             *(of_levels(results) or (() if rows else (none_found(results),))),
         ],
         limits=list(limits),
@@ -532,6 +549,7 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
     if study.left_out:
         gone.append(f"{counted(study.left_out, 'session')} not completed: left out of every number")
     yield bullets(_first(gone)) if gone else paragraph("Nothing is excluded: every completed session counts whole.")
+    yield from _missing(study)
     if study.doubts:
         yield heading(3, "Files that are not as they were recorded")
         yield bullets(
@@ -555,9 +573,11 @@ def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
             yield _means(found, rows, by)
     if not results.blocks:
         return
+    preexisting = by == "group" and group_assignment(study) == "pre-existing"
     yield paragraph(
         "Mean and standard deviation over participants, each with the mean of their answers. Differences between "
-        f"{by}s are described, not tested.",
+        f"{by}s are described, not tested."
+        f"{' Groups were not randomised, so a difference may have other causes.' * preexisting}",
         "soft",
     )
 
@@ -573,6 +593,65 @@ def _means(found: BlockResult, rows: Sequence[Any], by: By) -> str:
         ("SD", lambda one: number(number_or_none(one.sd), 2)),
         words=3,
     )
+
+
+class _LostTrials(NamedTuple):
+    """A session, whether it counts, and its missing trials."""
+
+    session: str
+    counted: bool
+    missing: MissingTrials
+
+
+def _missing(study: Study) -> Iterator[str]:
+    """Yield who lost how many trials of intervals, which and why; nothing in a study without such trials."""
+    if not study.levels:
+        return
+    yield heading(3, "Trials that were not delivered")
+    sessions: Iterable[Any] = study.participants.itertuples()
+    rows = [
+        _LostTrials(f"{row.participant}, session {row.session}", bool(row.counted), row.missing)
+        for row in sessions
+        if row.missing is not None and row.missing.count
+    ]
+    if rows:
+        yield table_of(
+            rows[:SHOWN],
+            ("Session", lambda one: one.session),
+            ("missing", lambda one: f"{one.missing.count} of {one.missing.asked}"),
+            ("of which", lambda one: listed([f"{_track(study, *of)}: {n}" for of, n in one.missing.tracks.items()])),
+            ("because", lambda one: listed([limit_words(limit, one.missing.limits) for limit in one.missing.reasons])),
+            ("session", lambda one: "counted" if one.counted else "not counted"),
+            words=5,
+        )
+    else:
+        yield paragraph("All trials were delivered.")
+    if len(rows) > SHOWN:
+        yield paragraph(f"And {counted(len(rows) - SHOWN, 'more session')}, in report.json.")
+    permitted = study.protocol.get("limits", {}).get(MISSING_PERCENT)
+    if permitted is not None:
+        yield paragraph(
+            f"The study states that {permitted:g} % of a session's trials may be missing. A session with more is "
+            "incomplete, and not counted unless a person included it again.",
+            "soft",
+        )
+
+
+def _track(study: Study, block: str, code: str) -> str:
+    """Return the name of a setting of a block of levels, or its code while the key is sealed."""
+    titles = {one.id: one.title for one in study.levels}
+    setting = study.settings.get((block, code))
+    return f"{titles.get(block, block)}, {code if setting is None or setting.condition is None else setting.condition}"
+
+
+def _missing_sentence(study: Study) -> str:
+    """Return how many trials of intervals were not delivered in the sessions that count, as a sentence."""
+    known = [one for one in study.participants.loc[study.participants["counted"], "missing"] if one is not None]
+    asked, count = sum(one.asked for one in known), sum(one.count for one in known)
+    if not study.levels or not asked:
+        return ""
+    lost = f"{count or 'None'} of {counted(asked, 'main trial')} {'was' if count == 1 else 'were'} lost"
+    return f"{lost} because no presentation was within the limits."
 
 
 def _first(lines: list[str]) -> list[str]:

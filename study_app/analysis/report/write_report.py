@@ -48,6 +48,7 @@ from study_app.analysis.results import (
 from study_app.errors import AnalysisError
 from study_app.protocol.model import Contrast, Published
 from study_app.store.checksums import sha256
+from study_app.store.columns import TRIALS_MISSING
 from study_app.store.csv_files import Column, csv_bytes, optional
 from study_app.store.folders import StudyFolder
 from study_app.store.merged import MANIFEST, folders_of
@@ -199,7 +200,11 @@ def sessions(study: Study) -> list[dict[str, Any]]:
     """Return of every session what made it what it was: its seed, its protocol's hash, the program's version."""
     columns = ["participant", "session", "status", "counted", "seed", "protocol_hash", "key_hash", "version", "device"]
     rows = study.participants[columns].astype(object).where(study.participants[columns].notna(), None)
-    return [{str(key): plain(value) for key, value in row.items()} for row in rows.to_dict("records")]
+    found = [{str(key): plain(value) for key, value in row.items()} for row in rows.to_dict("records")]
+    if not study.levels:
+        return found
+    missing = [None if one is None else one.count for one in study.participants["missing"]]
+    return [row | {TRIALS_MISSING.name: count} for row, count in zip(found, missing, strict=True)]
 
 
 def files(study: Study) -> dict[str, str]:

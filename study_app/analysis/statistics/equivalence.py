@@ -143,7 +143,7 @@ def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: 
             statistic=min(t_lower, -t_upper),
             p=max(p_lower, p_upper),
             method=f"t({found.n - 1}), bound ±{bound:g} points",
-            interval=Interval(float(low[0]), float(high[0]), level, "t"),
+            interval=Interval(low=float(low[0]), high=float(high[0]), level=level, method="t"),
             no_interval="",
             t_lower=t_lower,
             t_upper=t_upper,
@@ -154,7 +154,9 @@ def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: 
     else:
         found = replace(found, method=f"bootstrap, bound ±{bound:g} points: all differences are equal")
     by_tests = max(p_lower, p_upper, by_bootstrap) <= alpha
-    verdict: Verdict = "equivalent" if by_tests and unseen <= alpha else "out of reach" if unseen > alpha else "inconclusive"
+    verdict: Verdict = (
+        "equivalent" if by_tests and unseen <= alpha else "out of reach" if unseen > alpha else "inconclusive"
+    )
     few = f"too few participants to call it equivalent: {fewest(alpha, bound, largest)} are needed"
     note = "" if verdict == "equivalent" else few if by_tests else "equivalence is not shown"
     return replace(found, verdict=verdict, note=note)

@@ -77,7 +77,7 @@ def mixed(values: ArrayLike, columns: ArrayLike | None = None, direction: Direct
         p = float(variance_ratio.sf(statistic, several, n - several))
     reach = float(student.ppf((1 + SURE) / 2, n - 1)) * errors
     ends = zip((means - reach).tolist(), (means + reach).tolist(), strict=True)
-    intervals = tuple(Interval(low, high, SURE, "Student's t") for low, high in ends)
+    intervals = tuple(Interval(low=low, high=high, level=SURE, method="Student's t") for low, high in ends)
     sides = f"one-sided ({direction})" if direction else "two-sided"
     freedom = f"t({n - 1}), {sides}" if several == 1 else f"F({several}, {n - several})"
     return replace(

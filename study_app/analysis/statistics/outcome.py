@@ -39,7 +39,7 @@ TOO_FEW: Final = f"no interval below {FEW} participants: resampling so few cover
 NO_VARIATION: Final = "no variation: every participant answered alike under all settings"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Interval:
     """An interval of confidence ``level`` (0.95) and the method that it comes from."""
 
@@ -139,6 +139,30 @@ def alpha_of_looks(looks: tuple[int, ...], alpha: float, spending: str) -> tuple
     return tuple(found)
 
 
+MOST_REPORTS: Final = 200
+"""So many reports between the first look and the last are integrated over."""
+
+
+@lru_cache(maxsize=64)
+def error_of_every_report(looks: tuple[int, ...], alpha: float, spending: str) -> float:
+    """Return the error rate of a study that is tested at every participant from the first look on.
+
+    Each test has the alpha of the last look that is reached; for the parameters see `alpha_of_looks`.
+    """
+    levels = np.array(alpha_of_looks(looks, alpha, spending))
+    every = np.unique([*np.linspace(looks[0], looks[-1], MOST_REPORTS).round().astype(int), *looks])
+    reached = np.searchsorted(looks, every, side="right") - 1
+    nodes, of_nodes = np.polynomial.legendre.leggauss(NODES)
+    error, places, weights, before = 0.0, np.zeros(1), np.ones(1), 0.0
+    for share, level in zip(every / looks[-1], levels[reached], strict=True):
+        end, step = float(norm.isf(level / 2)) * math.sqrt(share), math.sqrt(share - before)
+        error += _excess(end, places, weights, step, 0.0)
+        inside = end * nodes
+        density = norm.pdf(inside[:, None], places, step) @ weights
+        places, weights, before = inside, density * end * of_nodes, share
+    return error
+
+
 def _excess(end: float, places: Array, weights: Array, step: float, due: float) -> float:
     """Return how much likelier than ``due`` a walk from ``places`` is beyond ± ``end`` after a ``step``."""
     return float(weights @ (norm.sf(end, places, step) + norm.cdf(-end, places, step))) - due
@@ -148,7 +172,7 @@ def _excess(end: float, places: Array, weights: Array, step: float, due: float) 
 def clopper_pearson(count: int, n: int) -> Interval:
     """Return the exact 95 % interval of a share of ``count`` in ``n``."""
     ends = binomtest(count, n).proportion_ci(0.95, method="exact")
-    return Interval(float(ends.low), float(ends.high), 0.95, "Clopper-Pearson")
+    return Interval(low=float(ends.low), high=float(ends.high), level=0.95, method="Clopper-Pearson")
 
 
 def bootstrap(n: int, seed: int | None, sampled: Callable[[Whole], Array], alike: str) -> tuple[Interval | None, str]:
@@ -170,7 +194,7 @@ def bootstrap(n: int, seed: int | None, sampled: Callable[[Whole], Array], alike
         return None, alike
     low, high = np.quantile(samples, [0.025, 0.975])
     method = f"percentile bootstrap over participants, {SAMPLES} samples"
-    return Interval(float(low), float(high), 0.95, method), ""
+    return Interval(low=float(low), high=float(high), level=0.95, method=method), ""
 
 
 def drawn_p(reached: NDArray[np.bool_], seed: int, least: float) -> tuple[float, float, str]:

@@ -141,7 +141,9 @@ def _fisher(effect: float | None, n: int) -> tuple[Interval | None, str]:
     deviation = math.sqrt((2 * n**3 + 3 * n**2 + n) / 6) / (n * (n + 1) / 2)
     reach = float(norm.ppf(0.975)) * deviation
     low, high = math.tanh(math.atanh(effect) - reach), math.tanh(math.atanh(effect) + reach)
-    return Interval(low, high, 0.95, "Fisher z, approximate: covers about 90 % up to two dozen pairs"), ""
+    return Interval(
+        low=low, high=high, level=0.95, method="Fisher z, approximate: covers about 90 % up to two dozen pairs"
+    ), ""
 
 
 def _note(n: int, different: int, smallest: float | None, effect: float | None, alpha: float) -> str:

@@ -3,18 +3,21 @@
 Cohen (1960), Educ. Psychol. Meas. 20, 37–46.
 
 What a participant names is the single label rated highest ("this liquid behaves like …"); equal highest ratings are
-undecided. Chance is what remains when the settings are exchanged within each participant.
+undecided. Chance is what remains when the settings are exchanged within each participant. A single setting is
+recognised if its name is used for it more often than for each other setting, within participants (McNemar 1947,
+Psychometrika 12, 153–157): who knows one of three and confuses the others uses their names alike for both.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import permutations
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import binom
 
 from study_app.analysis.statistics.outcome import (
     Array,
@@ -25,6 +28,7 @@ from study_app.analysis.statistics.outcome import (
     bootstrap,
     checked,
     clopper_pearson,
+    holm,
     of_values,
     total,
 )
@@ -45,21 +49,30 @@ def kappa(tables: ArrayLike) -> Array:
     return np.where(exists, (agreed - expected) / np.where(exists, 1 - expected, 1.0), np.nan)
 
 
+Flags: TypeAlias = NDArray[np.bool_]
+
 UNDECIDED: Final = -1
 UNANSWERED: Final = -2
 MOST: Final = 8
 """All orders of more settings are too many to go through."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class HitRate:
-    """How often one setting was given its own name: ``hits`` of ``n`` answers, with a Clopper-Pearson interval."""
+    """How often one setting was given its own name: ``hits`` of ``n`` answers, with a Clopper-Pearson interval.
+
+    ``p`` is the largest over the other settings, of which ``rival`` gave it, that the name is used as often for one of
+    them; ``p_adjusted`` is corrected by Holm over the settings with a name. None without an answer or another setting.
+    """
 
     setting: int
     hits: int
     n: int
     rate: float | None
     interval: Interval | None
+    rival: int | None = None
+    p: float | None = None
+    p_adjusted: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,7 +133,7 @@ def recognition(names: ArrayLike, truth: Sequence[int | None], labels: int, *, s
         note=_note(n, int((given == UNDECIDED).sum()), chance.highest),
         expected=chance.mean if n else None,
         table=tuple(tuple(int((column == label).sum()) for label in _columns(labels)) for column in given.T),
-        rates=tuple(_rate(given, setting, label) for setting, label in enumerate(truth) if label is not None),
+        rates=_rates(given, truth),
         decided=int((given >= 0).sum()),
         undecided=int((given == UNDECIDED).sum()),
         unanswered=int((given == UNANSWERED).sum()),
@@ -172,12 +185,38 @@ def _kappa(given: Whole, right: Whole, labels: int, seed: int | None) -> tuple[f
     return whole, *bootstrap(len(tables), seed, resampled, "no interval: all participants gave the same names")
 
 
-def _rate(given: Whole, setting: int, label: int) -> HitRate:
+def _rates(given: Whole, truth: Sequence[int | None]) -> tuple[HitRate, ...]:
+    rates = [_rate(given, setting, label, truth) for setting, label in enumerate(truth) if label is not None]
+    adjusted = holm([rate.p for rate in rates])
+    return tuple(replace(rate, p_adjusted=p) for rate, p in zip(rates, adjusted, strict=True))
+
+
+def _rate(given: Whole, setting: int, label: int, truth: Sequence[int | None]) -> HitRate:
     answers = given[given[:, setting] != UNANSWERED, setting]
     n, hits = len(answers), int((answers == label).sum())
     if not n:
-        return HitRate(setting, 0, 0, None, None)
-    return HitRate(setting, hits, n, hits / n, clopper_pearson(hits, n))
+        return HitRate(setting=setting, hits=0, n=0, rate=None, interval=None)
+    ps = {
+        other: _p_more_often(
+            given[:, setting] == label, given[:, other] == label, (given[:, [setting, other]] != UNANSWERED)
+        )
+        for other, name in enumerate(truth)
+        if name != label
+    }
+    rival = max(ps, key=lambda other: ps[other], default=None)
+    p = None if rival is None else ps[rival]
+    return HitRate(setting=setting, hits=hits, n=n, rate=hits / n, interval=clopper_pearson(hits, n), rival=rival, p=p)
+
+
+def _p_more_often(named: Flags, named_other: Flags, answered: Flags) -> float:
+    """Return the exact one-sided p that a name is used more often for a setting than for another one.
+
+    ``named`` and ``named_other`` say for each participant (n,) whether the name was used for the one and the other;
+    ``answered`` (n, 2) whether both were answered.
+    """
+    both = answered.all(axis=1)
+    more, less = int((named & ~named_other & both).sum()), int((named_other & ~named & both).sum())
+    return float(binom.sf(more - 1, more + less, 0.5)) if more + less else 1.0
 
 
 def _note(n: int, undecided: int, smallest: float) -> str:

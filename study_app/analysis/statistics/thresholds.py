@@ -92,11 +92,13 @@ def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
         curve, dispersion, (lower, upper) = _pooled(order, yes, asked)
         note = _outside(order, curve.threshold, lower, upper)
     if not note:
-        width, guess, lapse = curve.others
+        others = curve.others
         expected = curve.success(order)
         interval = None
         if lower is not None and upper is not None:
-            interval = Interval(lower, upper, SURE, "posterior density, scaled for participants who differ")
+            interval = Interval(
+                low=lower, high=upper, level=SURE, method="posterior density, scaled for participants who differ"
+            )
         note = "; ".join(_remarks(order, lower, upper, len(yes), dispersion))
         found = {
             "statistic": float(deviances(of_yes, of_asked, expected).sum()),
@@ -104,9 +106,9 @@ def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
             "interval": interval,
             "no_interval": "" if interval else _open(lower, upper),
             "expected": tuple(expected.tolist()),
-            "width": width,
-            "guess": guess,
-            "lapse": lapse,
+            "width": others.width,
+            "guess": others.guess,
+            "lapse": others.lapse,
             "lower": lower,
             "upper": upper,
             "dispersion": dispersion,
@@ -147,7 +149,13 @@ def _pooled(levels: Array, yes: Array, asked: Array) -> tuple[Posterior, float, 
     median, factor = WIDTH_PRIOR
     widths = geometric(least * span, most * span, count)
     grid = Grid(
-        "logistic", evenly(low - span, low + 2 * span, PLACES), widths, (median * span, factor), RATES, equal, RATES
+        family="logistic",
+        thresholds=evenly(low - span, low + 2 * span, PLACES),
+        widths=widths,
+        width_prior=(median * span, factor),
+        lapses=RATES,
+        lapse_prior=equal,
+        guesses=RATES,
     )
     found = fit(levels, yes.sum(axis=0), (asked - yes).sum(axis=0), grid)
     if people < 2:
@@ -265,7 +273,7 @@ FEWEST: Final = 3
 """Estimates below which no interval is given."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class GroupMean:
     """The mean of ``n`` estimates, the ends of its 95 % interval, and the variance between them."""
 
@@ -303,7 +311,7 @@ def group_mean(estimates: Sequence[float], variances: Sequence[float], shared: f
     weights, between = random_effects_weights(y, np.asarray(variances, float))
     mean = float((weights * y).sum() / weights.sum())
     if n < FEWEST:
-        return GroupMean(n, mean, None, None, between)
+        return GroupMean(n=n, mean=mean, low=None, high=None, between=between)
     variance = float((weights * (y - mean) ** 2).sum()) / ((n - 1) * float(weights.sum()))
     half = math.hypot(float(student.ppf(0.975, n - 1)) * math.sqrt(variance), Z_95 * math.sqrt(shared))
-    return GroupMean(n, mean, mean - half, mean + half, between)
+    return GroupMean(n=n, mean=mean, low=mean - half, high=mean + half, between=between)

@@ -39,7 +39,7 @@ from study_app.protocol.without_force import without_force
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import Page, TaskPage
 from study_app.session.ports import JournalPort, Ports
-from study_app.session.resume import FIRST, Start, resume_at
+from study_app.session.resume import FIRST, Start, begun_schedule, resume_at
 from study_app.session.runner import Runner
 from study_app.session.simulated.observers import Hand, hand_for, rest
 from study_app.session.transitions.events import (
@@ -59,6 +59,7 @@ from study_app.store.blinded.allocation import session_protocol
 from study_app.store.blinded.blinding import opened
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal_events
+from study_app.store.journals.journal_events import start_of
 from study_app.store.program_log import DEVICE_FAILED
 from study_app.store.progress import Progress, progress_of
 
@@ -68,6 +69,7 @@ if TYPE_CHECKING:
     from study_app.devices.base import Device
     from study_app.devices.rig import Rig
     from study_app.gui.theme.theme import Theme
+    from study_app.haptics.model.ranges import Vector
     from study_app.haptics.runtime.servo import Servo
     from study_app.outlets.session_outlets import Outlets
     from study_app.session.start import NewSession
@@ -393,7 +395,7 @@ class SessionBridge(QObject):
         if self.runner.finished and self._leaves:
             QTimer.singleShot(0, self, self._leave)
         elif self.runner.finished and self.participant.isFullScreen():
-            ended = self.parts.journal.progress.ended == "completed"
+            ended = self.parts.journal.progress.reached_end
             said = ended and isinstance(self.parts.session.schedule.steps[-1], PageStep)  # goodbye, by the study
             QTimer.singleShot(0 if said else END_SHOWN_MS, self.operator, self.operator.come_forward)
 
@@ -450,11 +452,14 @@ class SessionBridge(QObject):
             case "pause":
                 post(PauseRequested(self._now(), "operator"))
             case "repeat":
-                post(RepeatRequested(self._now(), *details))
+                (reason,) = details
+                post(RepeatRequested(self._now(), reason))
             case "note" | "mark":
-                post(Note(self._now(), what, *details or ("",)))
+                (text,) = details or ("",)
+                post(Note(self._now(), what, text))
             case "end":
-                post(EndRequested(self._now(), *details))
+                status, reason = details
+                post(EndRequested(self._now(), status, reason))
             case "diagnose":
                 self._diagnose()
             case "reconnect":
@@ -613,7 +618,7 @@ def planned(chosen: NewSession, protocol: Protocol, store: SessionStore) -> tupl
     """Return what is run in a session that is on the disk, in what order, and where it begins or goes on."""
     protocol = store.as_recorded(protocol)
     protocol = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
-    schedule, start = chosen.schedule(protocol), FIRST
+    schedule, start = begun_schedule(protocol, start_of(store.lines), store.key), FIRST
     if chosen.resumes is not None:
         start = resume_at(protocol, schedule, store.lines, store.key, exactly=chosen.played)
     if descriptor_of(chosen.device).kind == "seen":
@@ -725,12 +730,12 @@ def _calibration(device: Device) -> tuple[tuple[str, str], ...]:
     return (("Calibration", f"of {used['measured']}" if isinstance(used, dict) else "none"),)
 
 
-def _aim(hand: HandOrders | None, servo: Servo) -> Callable[[], tuple[float, float, float]]:
+def _aim(hand: HandOrders | None, servo: Servo) -> Callable[[], Vector]:
     """Return a function that tells where the hand is; for a simulated one its aim, since its lag reveals the liquid."""
     if hand is not None:
         return lambda: hand.aim_m
 
-    def position_m() -> tuple[float, float, float]:
+    def position_m() -> Vector:
         x, y, z = servo.telemetry.position_at(servo.now_ns())[0]
         return float(x), float(y), float(z)
 

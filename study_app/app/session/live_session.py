@@ -426,6 +426,7 @@ def run(
     pilot: bool = False,
     recordings: bool = True,
     row_of: str | None = None,
+    group: str | None = None,
     progress: Callable[[str], object] | None = None,
 ) -> int:
     """Run a session without dialogs; return the exit code when its windows are closed.
@@ -440,7 +441,8 @@ def run(
     windowed, screen : where the participant's window opens; screens count from 1
     results : the study's folder; default ``results/<study>`` of the workspace, of a pilot ``results/<study>-pilot``
     pilot : to try it out: in a window with a frame, apart from the data and marked
-    row_of : the participant who is replaced, whose rows of squares the session takes; default: the participant's own
+    row_of : the participant who is replaced, whose order, and place in the group, the session takes; default: nobody
+    group : the participant's pre-existing group; of a participant with an earlier session default: the recorded one
     recordings : whether every tick of the servo and every frame of a trial is kept
     progress : is given the lines of the pre-flight, before the first page
 
@@ -469,6 +471,7 @@ def run(
         recordings=recordings,
         device_options=device_options or {},
         row_of=row_of,
+        group=group,
     )
     check(chosen, study)
     if Path(protocol).is_file():

@@ -117,7 +117,13 @@ class PlayedSession(LiveSession):
 SIMULATED: Final = "scripted"
 LOOK_S: Final = 0.01
 FOLDER: Final = "liquid-study-play-"
-OUTCOMES: Final = {"completed": "to the end", "aborted": "stopped", "withdrawn": "no consent", "broken": "it failed"}
+OUTCOMES: Final = {
+    "completed": "to the end",
+    "incomplete": "to the end, with trials not delivered",
+    "aborted": "stopped",
+    "withdrawn": "no consent",
+    "broken": "it failed",
+}
 
 
 @dataclass(slots=True)

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QWidget
 
 from study_app.devices.registry import descriptor_of
 from study_app.errors import StudyError
-from study_app.evidence.appraisal import Costs, Errors, Question, start_appraisal_worker
+from study_app.evidence.appraisal import Costs, DeliveryQuestion, Errors, Question, start_appraisal_worker
 from study_app.gui.display.screens import place
 from study_app.gui.preflight.window import (
     ComputerWindow,
@@ -30,11 +30,14 @@ from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.tasks import Stroke
-from study_app.session.preflight import Check, Measurements, Screen, checks
+from study_app.session.preflight import Check, Measurements, PredictedDelivery, Screen, checks
+from study_app.session.resume import begun_schedule
 from study_app.session.start import NewSession, Ready, measured
 from study_app.store.blinded.allocation import session_protocol
+from study_app.store.blinded.blinding import read_key
 from study_app.store.folders import StudyFolder, locate
 from study_app.store.journals import journal
+from study_app.store.journals.journal_events import start_of
 
 LOOK_MS = 100
 PATIENCE_S = 10.0
@@ -53,12 +56,14 @@ class Appraisal:
 
     ``velocity_errors`` are those of `Measurements`, None if all is known of the device.
     ``withheld`` is the share of each liquid's force that is withheld in the fastest stroke on a device of these
-    ``dynamics``, once all are known.
+    ``dynamics``, once all are known. ``delivery`` is what a simulated participant would lose, asked ``last``.
     """
 
-    def __init__(self, scenes: Iterable[Asked], dynamics: Dynamics) -> None:
+    def __init__(self, scenes: Iterable[Asked], dynamics: Dynamics, last: DeliveryQuestion | None = None) -> None:
         self._waiting = list(scenes)
+        self._last = last
         self.dynamics = dynamics
+        self.delivery: PredictedDelivery | None = None
         self._asked = 0
         self.appraiser = start_appraisal_worker()
         self.tick_s: float | None = None
@@ -71,17 +76,21 @@ class Appraisal:
 
     @property
     def over(self) -> bool:
-        return not self._waiting or not self.appraiser.works
+        return (not self._waiting and self._last is None) or not self.appraiser.works
 
     def look(self) -> bool:
         """Take the answers there are; return whether there is news."""
         news = False
         for number, answer in self.appraiser.answers():
-            if number != self._asked or not self._waiting:
+            if number != self._asked or self.over:
                 continue
             if isinstance(answer, Costs):
                 self.tick_s = max(self.tick_s or 0.0, answer.tick_ns * 1e-9)
                 news = True
+                continue
+            if not self._waiting:
+                self.delivery = answer if isinstance(answer, PredictedDelivery) else None
+                self._last, news = None, True
                 continue
             self._errors_n.append(answer.force_n if isinstance(answer, Errors) else None)
             if isinstance(answer, Errors) and answer.velocity is not None:
@@ -98,6 +107,8 @@ class Appraisal:
         if self._waiting:
             _, scene, stroke = self._waiting[0]
             self._asked = self.appraiser.order(Question(scene, stroke, self.dynamics))
+        elif self._last is not None:
+            self._asked = self.appraiser.order(self._last)
 
     def close(self) -> None:
         self.appraiser.close()
@@ -131,7 +142,7 @@ class Preflight(QObject):
         self.measuring.done.connect(self._take)
         self.measuring.failed.connect(self.failed)
         self._ending = threading.Event()
-        self.appraisal = Appraisal(study_scenes(protocol), _dynamics(ready.facts, protocol))
+        self.appraisal = _appraisal(protocol, ready.facts)
         self.window = PreflightWindow(
             protocol.limits.lateness_ms * 1e3, asks_masking=descriptor_of(chosen.device).kind == "felt", theme=theme
         )
@@ -166,6 +177,7 @@ class Preflight(QObject):
             self._ready.facts_with(shown_on.refreshRate(), shown_on.devicePixelRatio()),
             tick_s=found.tick_s,
             withheld=found.withheld,
+            delivery=found.delivery,
             velocity_errors=found.velocity_errors,
         )
 
@@ -211,10 +223,9 @@ class Preflight(QObject):
 
     def _take(self, found: Measurements) -> None:
         self._ready = replace(self._ready, facts=found)
-        dynamics = _dynamics(found, self._protocol)
-        if dynamics != self.appraisal.dynamics:  # the delay has changed since, and with it what is withheld
+        if _dynamics(found, self._protocol) != self.appraisal.dynamics:  # the delay, and with it what is withheld
             self.appraisal.close()
-            self.appraisal, self._appraised = Appraisal(study_scenes(self._protocol), dynamics), False
+            self.appraisal, self._appraised = _appraisal(self._protocol, found), False
         self._show()
 
     def _start(self) -> None:
@@ -223,13 +234,18 @@ class Preflight(QObject):
         self.started.emit(replace(self._ready, facts=facts, masking=masking))
 
 
+def _appraisal(protocol: Protocol, facts: Measurements) -> Appraisal:
+    """Return the appraisal of a study on the device that was measured."""
+    return Appraisal(study_scenes(protocol), _dynamics(facts, protocol), DeliveryQuestion(protocol, facts.delay_ticks))
+
+
 def _goes_on(chosen: NewSession, protocol: Protocol) -> tuple[tuple[str, str], ...]:
     """Return where a session goes on and what is kept, nothing of a new one."""
     if chosen.resumes is None:
         return ()
     own = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
-    schedule = chosen.schedule(own)
-    return resumed_rows(own, schedule, journal.read(locate(chosen.resumes)[1].journal))
+    lines = journal.read(locate(chosen.resumes)[1].journal)
+    return resumed_rows(own, begun_schedule(own, start_of(lines), read_key(chosen.results)), lines)
 
 
 def _largest(errors_n: list[float | None]) -> float | None:

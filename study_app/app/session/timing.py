@@ -18,7 +18,7 @@ MOST_SHARE: Final = 0.15  # of the time that a work may take: what takes longer 
 FORGETS: Final = 0.9  # what a work took at worst is forgotten by so much each time
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class DeferredTask:
     """A recurring task; ``took_ns`` is its longest recent duration."""
 
@@ -45,7 +45,7 @@ class FrameBudget:
     def __init__(
         self, works: Sequence[tuple[Callable[[], object], float]], now_ns: Callable[[], int] = time.perf_counter_ns
     ) -> None:
-        self.tasks = [DeferredTask(do, round(period_s * 1e9)) for do, period_s in works]
+        self.tasks = [DeferredTask(do=do, period_ns=round(period_s * 1e9)) for do, period_s in works]
         self._now_ns = now_ns
 
     def use(self, until_ns: int) -> None:

@@ -7,14 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from study_app.designer.document.fields import (
-    ITEMS,
     LETTER,
     Row,
     check_id,
     initial,
     label_of,
-    languages_of,
-    new_text,
     node_at,
     refused_at,
     row_at,
@@ -34,7 +31,7 @@ from study_app.protocol.checks.cross_references import TEXTS
 from study_app.protocol.checks.force_limits import paced
 from study_app.protocol.source.document import Path, entries, has, names, value_at
 from study_app.protocol.source.problems import Fault, rule_of, shown
-from study_app.protocol.wording.languages import LANGUAGES, language_name
+from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
 
 
 def switched(study: Study, path: Path, kind: str | None) -> tuple[Edit, ...]:
@@ -90,15 +87,6 @@ def filled_in(study: Study, code: str) -> tuple[Edit, ...]:
         elif isinstance(text, str):
             found.append(Set(path, {first: text, code: text}))
     return tuple(found)
-
-
-def is_copied(texts: Mapping[str, Any], code: str, first: str) -> bool:
-    """Return whether a text in a language is still that of the first language, or of a new question.
-
-    A text without a letter, such as "7", is the same in every language.
-    """
-    text = texts.get(code)
-    return text in (texts.get(first), new_text(ITEMS)) and any(map(str.isalpha, str(text or "")))
 
 
 def texts_of(study: Study) -> Iterator[tuple[Path, Any]]:

@@ -14,7 +14,6 @@ from typing import Any, Final
 
 from study_app.designer.document.additions import filled_in, with_language, without_language
 from study_app.designer.document.elements import FIRST, first_element, study_title
-from study_app.designer.document.fields import languages_of
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_edits import Edit, Set
 from study_app.designer.document.toml_text import Refused, Splices, reverted
@@ -24,8 +23,17 @@ from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
 from study_app.number_text import counted
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.document import value_at
-from study_app.protocol.source.files import file_hash, hashes_in, shipped, shipped_file, unbundled, with_liquid_files
+from study_app.protocol.source.files import (
+    file_hash,
+    hashes_in,
+    shipped,
+    shipped_file,
+    unbundled,
+    with_liquid_files,
+    without_mark,
+)
 from study_app.protocol.source.problems import did_you_mean
+from study_app.protocol.wording.languages import languages_of
 from study_app.store.atomic import cannot_write
 from study_app.store.drafts import Draft, Keeper, draft_of, unsaved_files
 from study_app.store.folder_lock import is_open
@@ -285,7 +293,7 @@ class Document:
 
     def keep_mine(self, now_s: float) -> None:
         content = _content(self.file) if self.file.exists() else b""
-        self.saved = content.decode("utf-8", "replace")
+        self.saved = without_mark(content).decode("utf-8", "replace")
         self._rebase(content_hash(content) if self.file.exists() else "")
         self.note_edit(now_s)
 

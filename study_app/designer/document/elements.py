@@ -11,7 +11,6 @@ from study_app.designer.document.fields import (
     Row,
     counted_elements,
     label_of,
-    languages_of,
     named_at,
     refused_at,
     row_at,
@@ -24,6 +23,7 @@ from study_app.number_text import counted, exact_duration
 from study_app.protocol.formats import is_second
 from study_app.protocol.groups import sequences_in
 from study_app.protocol.source.document import Path, entries, has, value_at
+from study_app.protocol.wording.languages import languages_of
 
 TITLES: Final = ("title", "short", "text")
 """Keys of texts that an element is called by, the first that it has."""
@@ -47,7 +47,7 @@ class Element:
     step: Path = ()  # its entry in the list that orders it: the session's or a questionnaire's; () without an order
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Outline:
     """The three sections of the outline; parts are sections of tables, each followed by its elements."""
 
@@ -68,7 +68,7 @@ def outline(study: Study) -> Outline:
     )
     order = [path for path in (SEQUENCE, ("sequences",)) if value_at(study.document, path)]
     session = (*(element(study, path) for path in order), *_session(study))
-    return Outline(session, tuple(parts), tuple(element(study, path) for path in tables))
+    return Outline(session=session, parts=tuple(parts), study=tuple(element(study, path) for path in tables))
 
 
 def element(study: Study, path: Path, depth: int = 0) -> Element:

@@ -20,6 +20,7 @@ from study_app.protocol.questions import POINTS
 from study_app.protocol.source.document import Path, entries, has, names, value_at
 from study_app.protocol.source.problems import rule_of, shown
 from study_app.protocol.table import ALTERNATIVES, NOT_WITH, SECTIONS
+from study_app.protocol.wording.languages import languages_of
 
 Document = Mapping[str, Any]
 ITEMS = "items"
@@ -82,11 +83,6 @@ def renamed(document: Document, thing: Path, name: str, recorded: frozenset[str]
     if item is None:
         return (Rename(thing, name, references_to(document, thing)),)
     return (Set((*thing, "id"), name), *(Set(place, name) for place in references_to(document, thing)))
-
-
-def languages_of(document: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the languages of a study; a file that names none has English."""
-    return tuple(str(code) for _, code in entries(document, "study.languages.*")) or ("en",)
 
 
 def id_at(document: Document, thing: Path) -> str:
@@ -380,6 +376,7 @@ LABELS: Final = {
     "design": "Trial design",  # a study has a design, too
     "designs": "Trial designs",
     "feedback_s": "Feedback duration",
+    "group_assignment": "Assignment to groups",
     "level_error_ms": "Level error of delays",
     "obrien-fleming": "O’Brien–Fleming",
     "participants": "Participants planned",
@@ -400,7 +397,7 @@ class Choice:
     sentence: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
     """One row of a form."""
 
@@ -470,12 +467,18 @@ def row_at(document: Mapping[str, Any], path: Path) -> Row | None:
         default = part.get("default", None if None in named else part.get("const"))
         required = key in around.get("required", ())
         return Row(
-            path, "kind", label_of(key), value=value, default=default, required=required, choices=options,
+            path=path,
+            kind="kind",
+            label=label_of(key),
+            value=value,
+            default=default,
+            required=required,
+            choices=options,
             model=around.get("title", ""),
-        )  # fmt: skip
+        )
     nodes = node_at(document, path)
     if not nodes:
-        return None if value is None else Row(path, "unknown", label_of(path[-1]), value=value)
+        return None if value is None else Row(path=path, kind="unknown", label=label_of(path[-1]), value=value)
     row = _row(document, path, nodes, value, required=path[-1] in around.get("required", ()))
     pairs = [pair for pair in around.get(ALTERNATIVES, ()) if path[-1] in pair]
     instead = next((key for pair in pairs for key in pair if key != path[-1]), "")
@@ -493,10 +496,10 @@ def _row(document: Mapping[str, Any], path: Path, nodes: tuple[Node, ...], value
         "required": required,
     }
     if is_localised(nodes):
-        return Row(path, "paragraphs" if first.get("lines") == "several" else "localised", **common)
+        return Row(path=path, kind="paragraphs" if first.get("lines") == "several" else "localised", **common)
     if len(nodes) > 1 and not tags(nodes)[0]:
         either = tuple(_row(document, path, (node,), value, required=required) for node in nodes)
-        return Row(path, "either", **common, either=either)
+        return Row(path=path, kind="either", **common, either=either)
     named = (*path, 0) if first.get("type") == "array" else path
     references = choices_at(document, named)
     kind = _kind(first, isinstance(references, tuple))
@@ -506,7 +509,9 @@ def _row(document: Mapping[str, Any], path: Path, nodes: tuple[Node, ...], value
     options = tuple(Choice(name, sentences.get(name, "")) for name in names)
     limits = _numbers_in(first) if kind in {"vector", "numbers", "points"} else first
     common["sections"] = sections_at(named) if kind in {"reference", "references"} else ()
-    return Row(path, kind, **common, choices=options, bounds=_bounds(first, limits), reason=limits.get(REASON, ""))
+    return Row(
+        path=path, kind=kind, **common, choices=options, bounds=_bounds(first, limits), reason=limits.get(REASON, "")
+    )
 
 
 def _kind(node: Node, references: bool) -> Kind:

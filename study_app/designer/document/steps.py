@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import KW_ONLY, dataclass, fields, is_dataclass, replace
 from typing import Any, Literal, TypeAlias
 
 from study_app.designer.document.additions import (
@@ -25,7 +25,6 @@ from study_app.designer.document.fields import (
     deletions,
     initial,
     label_of,
-    languages_of,
     named_at,
     references_to,
     renamed,
@@ -43,7 +42,7 @@ from study_app.number_text import counted
 from study_app.protocol.formats import is_second
 from study_app.protocol.questionnaires import written_out
 from study_app.protocol.source.document import Path, names, value_at
-from study_app.protocol.wording.languages import language_name
+from study_app.protocol.wording.languages import language_name, languages_of
 
 Recorded: TypeAlias = Callable[[Path], frozenset[str]]
 """Returns the ids beside an element under which answers are recorded: its own then stays."""
@@ -58,6 +57,7 @@ class Step:
     select: Path | None = None  # what is selected after it; None stands for the same
     continues: object = None  # what it may continue: typing in one field is one step
     text: str | None = None  # the file's text that the edits are made in, None for the text that there is
+    _: KW_ONLY
     said: str = ""  # what a screen reader says of it
     fresh: Literal["", "new", "copy"] = ""  # whether what is selected after it is new: a text takes the keyboard
 

@@ -14,7 +14,7 @@ from study_app.errors import Problem, ProtocolError
 from study_app.protocol.load import examined, located, read_document
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import Path, Places
-from study_app.protocol.source.files import TABLE, with_liquid_files
+from study_app.protocol.source.files import TABLE, is_utf16, with_liquid_files, without_mark
 from study_app.protocol.source.problems import Fault
 
 _NOT_TOML: Final = "the file cannot be read: correct its text first"
@@ -121,9 +121,11 @@ class Study:
 
 
 def read(source: bytes, folder: File = File()) -> Study:
-    """Return the study from a file's bytes."""
+    """Return the study from a file's bytes; a byte order mark is no part of its text."""
+    if is_utf16(source):
+        raise Refused("this is UTF-16 text: save the file as UTF-8")
     try:
-        return Study(source.decode("utf-8"), folder)
+        return Study(without_mark(source).decode("utf-8"), folder)
     except UnicodeDecodeError as error:
         line = source.count(b"\n", 0, error.start) + 1
         raise Refused(f"line {line} is not UTF-8 text: save the file as UTF-8") from error

@@ -253,7 +253,16 @@ class Spans:
             comma = _COMMA.match(self.text, entry.end)
             after = comma.end() if comma else entry.end
             tail = _TAIL.match(self.text, after)
-            found.append(Slot(start, entry.start, entry.end, after, tail.end() if tail else after, own))
+            found.append(
+                Slot(
+                    start=start,
+                    entry=entry.start,
+                    end=entry.end,
+                    tail=after,
+                    tail_end=tail.end() if tail else after,
+                    own_line=own,
+                )
+            )
             floor = found[-1].tail_end
             index += 1
         return found

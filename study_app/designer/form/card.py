@@ -34,6 +34,7 @@ from study_app.designer.form.rows import STUDY_LANGUAGES, Form, FormRow, Section
 from study_app.designer.form.special import (
     BLOCK_ORDER,
     DESCRIPTION,
+    GROUP_ASSIGNMENT,
     HYPOTHESES,
     ORDER,
     POINTS,
@@ -138,7 +139,7 @@ EDITORS: Final[Mapping[tuple[str, str], SpecialEditor]] = {
     key: editor
     for editor in (
         CONDITIONS, DESCRIPTION, SENTENCES, ORDER, POINTS, QUESTION_KIND, QUESTION_LIST, LEVELS, TRIAL,
-        BLOCK_ORDER, HYPOTHESES,
+        BLOCK_ORDER, GROUP_ASSIGNMENT, HYPOTHESES,
     )
     for key in editor.keys
 }  # fmt: skip

@@ -54,7 +54,7 @@ class AxisLimit:
     level: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LevelAxis:
     """An axis of levels."""
 
@@ -101,19 +101,19 @@ def level_axis(study: Study, row: Row) -> LevelAxis | None:
     spacing = "in ratio" if log else "even"
     beyond = "".join(f" {capitalised(one.words)}." for one in shown.values())
     return LevelAxis(
-        low,
-        high,
-        least,
-        most,
-        log,
-        stimulus.grid,
-        factor,
-        words.unit,
-        f"{words.kind}{f', {words.unit}' if words.unit else ''}, {'logarithmic' if log else 'linear'}",
-        standard,
-        shown,
-        tuple((value / factor, rounded(value)) for value in ticks),
-        f"{stimulus.steps} levels from {words.words(low)} to {words.words(high)}, {spacing}.{beyond}",
+        low=low,
+        high=high,
+        least=least,
+        most=most,
+        logarithmic=log,
+        levels=stimulus.grid,
+        factor=factor,
+        unit=words.unit,
+        caption=f"{words.kind}{f', {words.unit}' if words.unit else ''}, {'logarithmic' if log else 'linear'}",
+        standard=standard,
+        limits=shown,
+        ticks=tuple((value / factor, rounded(value)) for value in ticks),
+        sentence=f"{stimulus.steps} levels from {words.words(low)} to {words.words(high)}, {spacing}.{beyond}",
     )
 
 

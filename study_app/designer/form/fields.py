@@ -27,7 +27,8 @@ from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButton, Toggle
 from study_app.gui.widgets.labels import Elided, label, set_property
-from study_app.number_text import number_of, typed_numbers
+from study_app.number_text import number_of, typed_numbers, unclear_number
+from study_app.protocol.wording.languages import language_name
 
 HAND_ON_MS = 150
 """What is typed is handed on so long after the first key [ms]: typing without a rest is kept as well."""
@@ -415,8 +416,8 @@ class LineField(Field):
         elif row.kind in {"number", "whole number"}:
             value = number_of(text)
             if value is None or (row.kind == "whole number" and isinstance(value, float)):
-                wanted = "a whole number" if row.kind == "whole number" else "a number"
-                self.refusal = f"“{text}” is not {wanted}. {kept(row.value)}"
+                why = unclear_number(text) if value is None else f"“{text}” is not a whole number"
+                self.refusal = f"{why}. {kept(row.value)}"
         elif row.kind in {"numbers", "vector"}:
             try:
                 value = [number for _, number in typed_numbers(text)]
@@ -649,7 +650,7 @@ class LanguagesField(Field):
 
     @cached_property
     def copied(self) -> QLabel:
-        """Which texts are those of the first language; made when it is first needed."""
+        """Which texts are still in another language; made when it is first needed."""
         made = label("", "small", "warn")
         made.hide()
         self.outer.addWidget(made)
@@ -661,12 +662,13 @@ class LanguagesField(Field):
         return any(written) and not all(written)
 
     def show_value(self) -> None:
-        """Show each text; a plain one stands for the first language. A text that is that of the first one is marked."""
-        value = self.row.value
-        named, copies = self.row.languages[0][1], self.row.copied
-        if copies or "copied" in self.__dict__:
-            self.copied.setText(f"As in {named}, not translated yet: {', '.join(copies)}")
-            self.copied.setVisible(bool(copies))
+        """Show each text; a plain one stands for the first language. A text that is not translated yet is marked."""
+        value, untranslated = self.row.value, self.row.untranslated
+        if untranslated or "copied" in self.__dict__:
+            source = language_name(untranslated[0].source) if untranslated else ""
+            lacking = ", ".join(language_name(text.language) for text in untranslated)
+            self.copied.setText(f"As in {source}, not translated yet: {lacking}")
+            self.copied.setVisible(bool(untranslated))
         for number, (code, line) in enumerate(self.lines.items()):
             text = value.get(code, "") if isinstance(value, dict) else value if number == 0 else ""
             line.show_text(text if isinstance(text, str) else "")

@@ -16,17 +16,7 @@ from study_app.designer.document.elements import (
     title_of,
     used_by,
 )
-from study_app.designer.document.fields import (
-    Choice,
-    Row,
-    label_of,
-    languages_of,
-    named_at,
-    refused_at,
-    row_at,
-    rows,
-    sections_of,
-)
+from study_app.designer.document.fields import Choice, Row, label_of, named_at, refused_at, row_at, rows, sections_of
 from study_app.designer.document.steps import AddToSession, Request, SetValue, index_of
 from study_app.designer.document.study import Study
 from study_app.designer.form.card import EDITORS
@@ -43,10 +33,11 @@ from study_app.designer.form.rows import (
 from study_app.designer.measures.study_facts import copied_texts, texts_by_language
 from study_app.designer.outline import icon_of
 from study_app.number_text import capitalised
+from study_app.protocol.checks.untranslated import untranslated_at
 from study_app.protocol.formats import is_second
-from study_app.protocol.groups import sequences_in
+from study_app.protocol.groups import ASSIGNMENT, sequences_in
 from study_app.protocol.source.document import Path, Places, names, places_of, value_at
-from study_app.protocol.wording.languages import LANGUAGES, language_name
+from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
 
 ENTRIES: Final = "In this order"
 DEEPEST: Final = 3
@@ -63,7 +54,9 @@ def form(study: Study, path: Path) -> Form:
         lines = [f"Line {one.line}: " if one.line else "" for one in study.problems]
         said = [_sentence(one.message, one.hint) for one in study.problems]
         why = tuple(map("".join, zip(lines, said, strict=True)))
-        return Form(FIRST, title_of({}, FIRST), icon_of(FIRST, {}), UNREADABLE, faults=why, unreadable=True)
+        return Form(
+            path=FIRST, title=title_of({}, FIRST), icon=icon_of(FIRST, {}), kind=UNREADABLE, faults=why, unreadable=True
+        )
     document, places = study.document, places_of(study.text)
     own_row = row_at(document, path) if len(path) == 1 else None
     if own_row is not None and own_row.kind == "tables":
@@ -75,6 +68,8 @@ def form(study: Study, path: Path) -> Form:
         if (path == SEQUENCE or main) and (of_blocks := rows_of_blocks(document)):
             together = tuple(_form_row(study, row, places) for row in of_blocks)
             sections = (*sections, Section(path, "The main blocks together", together))
+        if path[:1] == ("groups",) and (assignment := row_at(document, ASSIGNMENT)) is not None:
+            sections = (Section(path, "", (_form_row(study, assignment, places),)), *sections)
     shown = {row.path for section in sections for row in section.rows}
     shown |= {section.path for section in sections if section.path != path}
     within = [fault for fault in study.faults if fault.path[: len(path)] == path]
@@ -89,15 +84,22 @@ def form(study: Study, path: Path) -> Form:
         name = ""
     title = title_of(document, path)
     return Form(
-        path, title, icon_of(path, document), kind_of(path) or KINDS.get(path, "Section of the file"),
-        None if name is None else str(name), sections, own, of_id, position_of(document, path),
-        question_lines(study, path[:-1]) if path[2:3] == ("items",) else NO_QUESTIONS,
-        tuple((path[:length], title_of(document, path[:length])) for length in (1, 2, 4) if length <= len(path)),
-        f"Feel {title}" if len(path) == 2 and path[0] in WITH_LIQUIDS else "",
-        bool(number_rows(document, path)),
-        used_by(document, path),
-        tuple(asking(document, path)),
-    )  # fmt: skip
+        path=path,
+        title=title,
+        icon=icon_of(path, document),
+        kind=kind_of(path) or KINDS.get(path, "Section of the file"),
+        id=None if name is None else str(name),
+        sections=sections,
+        faults=own,
+        id_faults=of_id,
+        position=position_of(document, path),
+        questions=question_lines(study, path[:-1]) if path[2:3] == ("items",) else NO_QUESTIONS,
+        around=tuple((path[:length], title_of(document, path[:length])) for length in (1, 2, 4) if length <= len(path)),
+        feel=f"Feel {title}" if len(path) == 2 and path[0] in WITH_LIQUIDS else "",
+        series=bool(number_rows(document, path)),
+        used=used_by(document, path),
+        asks=tuple(asking(document, path)),
+    )
 
 
 def asking(document: Mapping[str, Any], path: Path) -> Iterator[tuple[str, Request]]:
@@ -210,7 +212,7 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
     faults = tuple(_sentence(fault.message, fault.hint) for fault in study.faults if fault.path[: len(path)] == path)
     if path == STUDY_LANGUAGES:
         row = replace(row, choices=tuple(Choice(code, language_name(code)) for code in LANGUAGES))
-    codes = languages_of(document)
+    codes, is_text = languages_of(document), row.kind in {"localised", "paragraphs"}
     number = None
     if row.kind == "either":
         number = next((index for index, one in enumerate(row.either) if _fits(one, row.value)), 0)
@@ -218,8 +220,8 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
         **values_of(row),
         place=place_words(path, places.line(path)),
         faults=faults,
-        languages=tuple((code, language_name(code)) for code in codes)
-        if row.kind in {"localised", "paragraphs"} else (),
+        languages=tuple((code, language_name(code)) for code in codes) if is_text else (),
+        untranslated=tuple(untranslated_at(document, row.path, row.value, codes)) if is_text else (),
         entries=tuple(_entries(study, row)),
         target=named_at(document, path) if row.kind == "reference" and isinstance(row.value, str) else None,
         notes=tuple(_notes(document, row)),

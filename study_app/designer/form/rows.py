@@ -4,18 +4,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Final
 
-from study_app.designer.document.additions import is_copied
-from study_app.designer.document.fields import Choice, Row, label_of, languages_of, singular
+from study_app.designer.document.fields import Choice, Row, label_of, singular
 from study_app.designer.document.steps import Request
 from study_app.designer.document.study import Study
+from study_app.protocol.checks.untranslated import UntranslatedText
 from study_app.protocol.source.document import Path, value_at
-from study_app.protocol.wording.languages import LANGUAGES, language_name
+from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
 
 ICONS: Final = {"rating": "scale", "slider": "slider", "number": "number", "choice": "list", "text": "letter"}
 STATEMENT: Final = "statement"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class QuestionLine:
     """One question."""
 
@@ -57,7 +57,15 @@ def _line(
     faults = sum(fault.path[: len(path)] == path for fault in study.faults)
     shown = tuple(one.strip() if isinstance(one, str) else "" for one in texts)
     number = path[-1] + 1 if isinstance(path[-1], int) else 0
-    return QuestionLine(path, number, kind, ICONS.get(kind, "scale"), shown, _note(item, numbers), faults)
+    return QuestionLine(
+        path=path,
+        number=number,
+        kind=kind,
+        icon=ICONS.get(kind, "scale"),
+        texts=shown,
+        note=_note(item, numbers),
+        faults=faults,
+    )
 
 
 def _note(item: Mapping[str, Any], numbers: Mapping[str, int]) -> str:
@@ -90,7 +98,7 @@ class Entry:
     target: Path = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FormRow(Row):
     """One row of the form."""
 
@@ -103,13 +111,8 @@ class FormRow(Row):
     number: int | None = None  # of alternatives ("either"), which one the value is
     # keys of which exactly one is given, with their labels: this row's and the other one
     keys: tuple[tuple[str, str], ...] = ()
+    untranslated: tuple[UntranslatedText, ...] = ()  # in which languages a text is not translated yet
     facts: Any = None  # what its special editor shows beyond the value; None where it has none
-
-    @property
-    def copied(self) -> tuple[str, ...]:
-        """The languages in which a text is still that of the first language."""
-        texts = self.value if isinstance(self.value, Mapping) else {}
-        return tuple(name for code, name in self.languages[1:] if is_copied(texts, code, self.languages[0][0]))
 
     @property
     def removable(self) -> bool:
@@ -146,7 +149,7 @@ class Section:
     faults: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Form:
     """The form of one element."""
 

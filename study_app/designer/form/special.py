@@ -11,7 +11,7 @@ from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QBoxLayout, QLabel, QSizePolicy, QWidget
 
 from study_app.designer.document.elements import title_of
-from study_app.designer.document.fields import Row, languages_of
+from study_app.designer.document.fields import Row, label_of
 from study_app.designer.document.steps import AddElement, AddEntry, Do, RemoveKey, Request, SetValue, Several
 from study_app.designer.document.study import Study
 from study_app.designer.form.fields import (
@@ -37,14 +37,14 @@ from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hb
 from study_app.gui.widgets.cards import Chip, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import Ink, figures, label
-from study_app.number_text import capitalised, number_of
+from study_app.number_text import capitalised, number_of, unclear_number
 from study_app.protocol import questions
 from study_app.protocol.model import OF_LEVELS
-from study_app.protocol.orders.balance import block_order_words
+from study_app.protocol.orders.balance import block_orders_by_group
 from study_app.protocol.sequences import borders_even, row_count
 from study_app.protocol.source.document import entries, names, value_at
 from study_app.protocol.trials import designs, tasks
-from study_app.protocol.wording.languages import language_name
+from study_app.protocol.wording.languages import language_name, languages_of
 
 ROUNDS: Final = 3
 SQUARES: Final[Mapping[Any, Literal["williams", "latin"]]] = {"williams": "williams", "latin": "latin"}
@@ -69,7 +69,7 @@ def order_balance(study: Study, row: Row) -> tuple[Verdict, str] | None:
     rows = row_count(square, codes)
     numbers = ", ".join(str(rows * number) for number in range(1, ROUNDS + 1))
     carries = square == "williams" and isinstance(repetitions, int) and borders_even(codes, max(1, repetitions))
-    at = f"at every multiple of {rows} participants."
+    at = f"at every multiple of {rows} participants{' in a group' if study.document.get('groups') else ''}."
     if carries or codes == 2:
         return ("ok", "check", f"balanced at {numbers} …"), f"Positions and carry-over are balanced {at}"
     return ("warn", "warning", f"in part at {numbers} …"), f"Only positions are balanced, {at}"
@@ -337,11 +337,18 @@ def order_of_blocks(study: Study, _row: Row) -> str:
     protocol = valid_part(study).protocol
     if protocol is None or len(protocol.main_blocks) < 2:
         return ""
-    return f"{capitalised(block_order_words(protocol).partition(': ')[2])}."
+    words = {group: words.partition(": ")[2] for group, words in block_orders_by_group(protocol).items()}
+    return " ".join(f"{capitalised(f'{group}: {one}' if group else one)}." for group, one in words.items())
+
+
+def choice_sentences(_study: Study, row: Row) -> str:
+    """Return the sentence of each choice, one per line."""
+    described = [choice for choice in row.choices if choice.value is not None and choice.sentence]
+    return "\n".join(f"{label_of(choice.value or '')}: {choice.sentence}." for choice in described)
 
 
 class Said(Extra, QLabel):
-    """What the planned participants get."""
+    """A sentence below a choice that says what it means."""
 
     def __init__(self) -> None:
         super().__init__(wordWrap=True)
@@ -353,6 +360,9 @@ class Said(Extra, QLabel):
 
 
 BLOCK_ORDER: Final = SpecialEditor((("StudyHead", "block_order"),), adds=lambda _field: Said(), facts=order_of_blocks)
+GROUP_ASSIGNMENT: Final = SpecialEditor(
+    (("StudyHead", "group_assignment"),), adds=lambda _field: Said(), facts=choice_sentences
+)
 
 MEASURES: Final = tuple(zip(OF_LEVELS, ("Threshold", "Exponent", "Sensitivity d′", "Setting (PSE)"), strict=True))
 RELATIONS: Final = (
@@ -362,7 +372,7 @@ BOUND, RATIO = 0.5, 1.25
 NOTHING_TO_COMPARE: Final = "It compares two main blocks, two conditions of a block, or two groups: add a second one."
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Compared:
     """A block, or a condition or group in a block, with the measures that it has, each with its words."""
 
@@ -401,12 +411,12 @@ def _compared(document: Mapping[str, Any]) -> Iterator[Compared]:
             measures = tuple((str(item.get("id")), title_of(document, path)) for item, path in items)
         if not measures:
             continue
-        yield Compared("blocks", name, name, title, measures)
+        yield Compared(key="blocks", block=name, name=name, words=title, measures=measures)
         conditions = block.get("conditions") if "design" not in block else ()
         for key, inner in (("conditions", conditions), ("groups", names(document, "groups"))):
             for one in inner if isinstance(inner, tuple | list) else ():
                 words = f"{title_of(document, (key, str(one)))} in {title}"
-                yield Compared(key, name, str(one), words, measures)
+                yield Compared(key=key, block=name, name=str(one), words=words, measures=measures)
 
 
 class Hypothesis(QWidget):
@@ -491,7 +501,7 @@ class Hypothesis(QWidget):
 
     def _take_bound(self, text: str) -> None:
         bound = number_of(text)
-        self.refused.emit("" if bound is not None else f"“{text}” is not a number. {kept(self.value.get('bound'))}")
+        self.refused.emit("" if bound is not None else f"{unclear_number(text)}. {kept(self.value.get('bound'))}")
         if bound is not None:
             self.changed.emit({**self.value, "bound": bound})
 

@@ -1,7 +1,7 @@
 """Cards of measures: words, numbers, bars and tables, as values and as the widgets that show them."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Final, TypeAlias
 
 from PySide6.QtCore import QEvent, QRectF, Qt
@@ -34,6 +34,7 @@ class NumberCard:
 
     title: str
     number: str
+    _: KW_ONLY
     unit: str = ""
     note: Verdict = ("neutral", "", "")
     more: str = ""

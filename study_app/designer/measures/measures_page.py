@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QPaintEvent, QShowEvent
-from PySide6.QtWidgets import QScrollArea, QSizePolicy, QWidget
+from PySide6.QtWidgets import QScrollArea, QSizePolicy, QToolTip, QWidget
 
 from study_app.designer.measures.cards import UNKNOWN, CardGrid, NumbersRow, Verdict
 from study_app.designer.measures.levels import LevelBlock, LevelWords, rounded
@@ -21,7 +21,7 @@ from study_app.gui.widgets.cards import Card, Chip, Icon, paint_ground
 from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.numbers import NumberField
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
-from study_app.number_text import capitalised
+from study_app.number_text import capitalised, unclear_number
 from study_app.protocol.checks.force_limits import clipped, clipped_unpaced
 
 if TYPE_CHECKING:
@@ -53,8 +53,9 @@ class Control(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Preferred)
         hbox(self.words, self.field, self.unit, spacing=6, margins=0, parent=self)
         self.show_words(words, unit)
-        self.field.entered.connect(self.entered)
-        self.field.unread.connect(lambda _text: self.field.put_back())
+        self.field.entered.connect(self._take)
+        self.field.unread.connect(self._refuse)
+        self.field.abandoned.connect(lambda: self.field.show_state(""))
         self.field.stepped.connect(lambda steps: self.entered.emit(self._value + steps * self._step))
 
     def show_words(self, words: str, unit: str) -> None:
@@ -62,6 +63,17 @@ class Control(QWidget):
         self.unit.setText(unit)
         self.unit.setVisible(bool(unit))
         self.field.setAccessibleName(f"{words}, {unit}" if unit else words)
+
+    def _take(self, value: float) -> None:
+        self.field.show_state("")
+        self.entered.emit(value)
+
+    def _refuse(self, text: str) -> None:
+        """Leave the text in the field, and say above it why it is no number."""
+        why = f"{unclear_number(text)}, or press Esc"
+        self.field.show_state("refused")
+        self.field.setAccessibleDescription(why)
+        QToolTip.showText(self.field.mapToGlobal(self.field.rect().topLeft()), why, self.field)
 
     def show_number(self, text: str) -> None:
         self._value = float(text)

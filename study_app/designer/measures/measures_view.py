@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from study_app.designer.document.elements import SEQUENCE, title_of
-from study_app.designer.document.fields import languages_of
 from study_app.designer.document.study import Study
 from study_app.designer.measures.cards import (  # fmt: skip
     NARROW_CODES,
@@ -39,7 +38,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import BlockOrder, order_of
 from study_app.protocol.source.document import Path
-from study_app.protocol.wording.languages import language_name
+from study_app.protocol.wording.languages import language_name, languages_of
 
 BELOW: Final = 4
 """So many cards stay below the other tabs."""
@@ -157,22 +156,22 @@ def number_cards(
 ) -> tuple[NumberCard, ...]:
     """Return the four numbers of a block whose tracks are simulated."""
     breaks = f", {counted(order.breaks, 'break')}" if order.breaks else ""
+    figure, unit = duration_figure(duration_s)
     return (
         _range(of, simulated, controls),
         _one_person(of, simulated),
         _people(of, simulated, controls),
         NumberCard(
-            "Lasts", *duration_figure(duration_s),
-            ("neutral", "clock", f"{order.trials} trials{breaks}"), simulated=False,
+            "Lasts", figure, unit=unit, note=("neutral", "clock", f"{order.trials} trials{breaks}"), simulated=False
         ),
-    )  # fmt: skip
+    )
 
 
 def _unknown(title: str, unit: str, simulated: Simulated) -> NumberCard:
     """Return a number that is not known: not yet, because its simulation failed, or because nothing simulates it."""
     if simulated.failed:
-        return NumberCard(title, UNKNOWN, unit, FAILED, simulated.failed)
-    return NumberCard(title, UNKNOWN, unit, ("neutral", "info", "not simulated"))
+        return NumberCard(title, UNKNOWN, unit=unit, note=FAILED, more=simulated.failed)
+    return NumberCard(title, UNKNOWN, unit=unit, note=("neutral", "info", "not simulated"))
 
 
 def _range(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberCard:
@@ -182,11 +181,11 @@ def _range(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberCa
     clipped = of.clipped_words
     if found.ends is None:
         if found.planted:
-            return NumberCard(title, "none", "", ("bad", "warning", "estimates are biased"), clipped)
+            return NumberCard(title, "none", unit="", note=("bad", "warning", "estimates are biased"), more=clipped)
         if of.clipping is None:
-            return NumberCard(title, "none", "", ("bad", "warning", "levels are too small"), TOO_SMALL)
+            return NumberCard(title, "none", unit="", note=("bad", "warning", "levels are too small"), more=TOO_SMALL)
         why = "the standard is clipped" if of.clipping.clips_standard else CLIPPED[2]
-        return NumberCard(title, "none", "", ("bad", "warning", why), clipped)
+        return NumberCard(title, "none", unit="", note=("bad", "warning", why), more=clipped)
     low, high = found.ends
     note: Verdict = ("neutral", "info", f"of {words.number(of.words.stimulus.levels[1])} {words.unit} at most")
     if words.stimulus.level_kind == "weber" and of.standard is not None:
@@ -194,7 +193,9 @@ def _range(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberCa
         note = ("neutral", "info", f"{' to '.join(values)} {words.value_unit}")
     if not low * 0.999 <= controls.threshold <= high * 1.001:
         note = ("warn", "warning", f"not {words.words(controls.threshold)}")
-    return NumberCard(title, f"{words.number(low, 2)} – {words.number(high, 2)}", words.unit, note, clipped)
+    return NumberCard(
+        title, f"{words.number(low, 2)} – {words.number(high, 2)}", unit=words.unit, note=note, more=clipped
+    )
 
 
 def _one_person(of: LevelBlock, simulated: Simulated) -> NumberCard:
@@ -202,9 +203,9 @@ def _one_person(of: LevelBlock, simulated: Simulated) -> NumberCard:
     if found is None:
         return _unknown("One person", "%", simulated)
     if not of.measures(found.threshold):
-        return NumberCard("One person", UNKNOWN, "%", CLIPPED, of.clipped_words)
+        return NumberCard("One person", UNKNOWN, unit="%", note=CLIPPED, more=of.clipped_words)
     note: Verdict = ("neutral", "people", f"at a {of.words.name} of {of.words.words(found.threshold)}")
-    return NumberCard("One person", f"± {100 * found.error:.0f}", "%", note, of.as_asked)
+    return NumberCard("One person", f"± {100 * found.error:.0f}", unit="%", note=note, more=of.as_asked)
 
 
 def _people(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberCard:
@@ -214,14 +215,14 @@ def _people(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberC
         return _unknown(title, "% of studies", simulated)
     title = f"{people(found.participants, controls.planned)} in ± {100 * found.precision:g} %"
     if not of.measures(controls.threshold):
-        return NumberCard(title, UNKNOWN, "% of studies", CLIPPED, of.clipped_words)
+        return NumberCard(title, UNKNOWN, unit="% of studies", note=CLIPPED, more=of.clipped_words)
     enough = found.share >= ENOUGH
     note: Verdict = ("ok", "check", "Enough") if enough else ("warn", "warning", "Not enough")
     many = f"more than {found.most}" if found.enough is None else f"about {found.enough}"
     needed = f"{100 * ENOUGH:g} % are enough" if enough else f"Needed: {many} participants for {100 * ENOUGH:g} %"
     more = f"{needed}; with {found.more_trials} trials: {100 * found.more_share:.0f} %"
     more = ". ".join(filter(None, (more, ON_AVERAGE if simulated.warnings else "", of.as_asked)))
-    return NumberCard(title, f"{100 * found.share:.0f}", "% of studies", note, more)
+    return NumberCard(title, f"{100 * found.share:.0f}", unit="% of studies", note=note, more=more)
 
 
 def session_card(study: Study, facts: Facts, path: Path) -> MeasureCard:

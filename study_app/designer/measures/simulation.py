@@ -66,7 +66,7 @@ class Asked:
     success: bool
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Observed:
     """What observers with one threshold showed; levels are those of the stimulus, not comparisons.
 
@@ -92,7 +92,7 @@ class Observed:
     trials: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Planted:
     """A threshold that was planted, the mean estimate's error as a share of it, and how many intervals held it."""
 
@@ -113,7 +113,7 @@ class Measurable:
     planted: tuple[Planted, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class GroupPrecision:
     """How many simulated studies know the group's mean threshold as precisely as planned.
 
@@ -141,7 +141,7 @@ class Finding:
     detectable: float | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Detectable:
     """The smallest differences that simulated studies of a block show, of each statement that the answer model knows.
 
@@ -192,18 +192,18 @@ def observe(plan: ThresholdPlan, threshold: float, lapses: float, check: Check =
     at = np.linspace(*stimulus.domain, POINTS)
     quantiles = np.quantile(found, SHARES)
     return Observed(
-        threshold,
-        lapses,
-        len(found),
-        float(planted.probability(u)),
-        tuple(stimulus.level_of(float(one)) for one in at),
-        tuple(planted.probability(at).tolist()),
-        tuple(tuple(_function(first, float(one), at)) for one in quantiles),
-        _asked(plan, np.concatenate(presented)),
-        course or (),
-        tuple(_one(plan, first)),
-        float(np.std(errors)) if plan.measures(np.array(u)) else math.inf,
-        plan.trials,
+        threshold=threshold,
+        lapses=lapses,
+        observers=len(found),
+        at_threshold=float(planted.probability(u)),
+        levels=tuple(stimulus.level_of(float(one)) for one in at),
+        planted=tuple(planted.probability(at).tolist()),
+        found=tuple(tuple(_function(first, float(one), at)) for one in quantiles),
+        asked=_asked(plan, np.concatenate(presented)),
+        course=course or (),
+        one=tuple(_one(plan, first)),
+        error=float(np.std(errors)) if plan.measures(np.array(u)) else math.inf,
+        trials=plan.trials,
     )
 
 
@@ -234,7 +234,7 @@ def measurable(
             levels += [stimulus.level_of(one) for one in estimates.medians.tolist()]
             held.append((estimates.lows <= u) & (u <= estimates.highs))
         bias = float(np.mean(levels)) / threshold - 1.0
-        found.append(Planted(threshold, bias, float(np.mean(np.concatenate(held)))))
+        found.append(Planted(threshold=threshold, bias=bias, coverage=float(np.mean(np.concatenate(held)))))
     return Measurable(_longest(found), tuple(found))
 
 
@@ -325,7 +325,7 @@ _NAMED_BY: Final = {"stimuli": "stimulus", "methods": "method", "designs": "desi
                     "tasks": "task"}  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Controls:
     """What is simulated: participants, the threshold (a level), the lapse rate, and the precision that is wanted.
 
@@ -498,7 +498,15 @@ def _group(plan: ThresholdPlan, controls: Controls, check: Check) -> GroupPrecis
         enough = next((size for place, size in enumerate(sizes) if found.within(place, precision) >= ENOUGH), None)
     most = max(MOST_PEOPLE, people)
     return GroupPrecision(
-        people, THRESHOLD_STUDIES, precision, plan.trials, shares[0], more.trials, shares[1], most, enough
+        participants=people,
+        studies=THRESHOLD_STUDIES,
+        precision=precision,
+        trials=plan.trials,
+        share=shares[0],
+        more_trials=more.trials,
+        more_share=shares[1],
+        most=most,
+        enough=enough,
     )
 
 
@@ -587,7 +595,7 @@ def _detectable(order: Simulation, check: Check) -> tuple[Detectable | None, tup
         for one, bound in stated
         if one in shares
     )
-    return Detectable(people, STUDIES, HIGHEST, tuple(findings)), shown
+    return Detectable(participants=people, studies=STUDIES, points=HIGHEST, findings=tuple(findings)), shown
 
 
 _features_of: dict[str, ConditionFeatures] = {}

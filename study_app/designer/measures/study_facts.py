@@ -1,19 +1,20 @@
 """What is known of a study, even of a faulty one: its texts by language, its valid part, and facts of that."""
 
+from collections import Counter
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from typing import Any, Final
 
-from study_app.designer.document.additions import is_copied, texts_of
+from study_app.designer.document.additions import texts_of
 from study_app.designer.document.elements import title_of
-from study_app.designer.document.fields import alternatives, initial, is_localised, label_of, languages_of, named_at
+from study_app.designer.document.fields import alternatives, initial, is_localised, label_of, named_at
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_edits import Set, Unset, meaning
 from study_app.designer.document.toml_text import Refused
 from study_app.haptics.model.slope_limits import HAND_MPS, steady
-from study_app.number_text import counted
+from study_app.protocol.checks.untranslated import describe_untranslated, untranslated_texts
 from study_app.protocol.checks.warnings import warnings
 from study_app.protocol.json_schema import schema
 from study_app.protocol.load import examined
@@ -22,7 +23,7 @@ from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s, step_duration_s
 from study_app.protocol.source.document import Path, frozen, has, value_at
 from study_app.protocol.source.problems import Fault
-from study_app.protocol.wording.languages import language_name
+from study_app.protocol.wording.languages import languages_of
 from study_app.store.verification.leaks import Telltales
 from study_app.store.workstation import device_without_force
 
@@ -32,7 +33,7 @@ READ: Final = ("pages", "blocks", "tasks", "designs")
 """Sections whose texts are read before the last answer; statements may name what is compared, as all see the same."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Revealing:
     """A text that reveals a condition: its key, the element's title, and the word that reveals it."""
 
@@ -60,20 +61,13 @@ def missing_texts(study: Study) -> dict[str, int]:
 
 
 def copied_texts(study: Study) -> dict[str, int]:
-    """Return for each further language how many of its texts are those of the first one, or of a new question."""
-    first, *others = languages_of(study.document)
-    texts = [value for _, value in texts_of(study) if isinstance(value, Mapping)]
-    counted = {code: sum(is_copied(value, code, first) for value in texts) for code in others}
-    return {code: count for code, count in counted.items() if count}
+    """Return for each language how many of its texts are still in another language; none where it has none."""
+    return dict(Counter(text.language for text in untranslated_texts(study.document)))
 
 
 def to_translate(study: Study) -> tuple[str, ...]:
-    """Return a warning for each language with copied texts; they prevent no session."""
-    first = language_name(languages_of(study.document)[0])
-    return tuple(
-        f"study.languages: {counted(count, 'text')} to translate to {language_name(code)}, as in {first} so far"
-        for code, count in copied_texts(study).items()
-    )
+    """Return a warning for each language with untranslated texts."""
+    return tuple(describe_untranslated(study.document, lists_places=False))
 
 
 def revealing(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:
@@ -88,7 +82,7 @@ def revealing(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:
         words_there = [word for text in texts if isinstance(text, str) for word in words.in_text(text.casefold())]
         if words_there:
             element = title_of(study.document, path[:2])
-            found.append(Revealing(path, element, label_of(path[-1]), words_there[0]))
+            found.append(Revealing(path=path, element=element, key=label_of(path[-1]), word=words_there[0]))
     return tuple(found)
 
 
@@ -268,7 +262,7 @@ def _text(document: Any) -> Any:
     return dict.fromkeys(codes, TEXT) if len(codes) > 1 else TEXT
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
     """What a study is, in numbers: those that depend on a broken element are not known."""
 

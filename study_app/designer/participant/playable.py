@@ -11,7 +11,7 @@ from PySide6.QtCore import QObject, Signal
 
 from study_app.designer.document.document import Document
 from study_app.designer.document.elements import title_of
-from study_app.designer.document.fields import languages_of, named_places
+from study_app.designer.document.fields import named_places
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_edits import Edit, Set, Unset
 from study_app.designer.document.toml_text import Refused
@@ -28,7 +28,7 @@ from study_app.protocol.orders.durations import variants
 from study_app.protocol.orders.schedule import FormStep, PageStep, Step, Trial, build_schedule
 from study_app.protocol.source.document import Path, has, value_at
 from study_app.protocol.source.files import file_of, unbundled, with_liquid_files
-from study_app.protocol.wording.languages import language_name
+from study_app.protocol.wording.languages import language_name, languages_of
 from study_app.session.pages import Page
 from study_app.session.transitions.page_builder import PARTICIPANT, SEED, Moment, Preview, preview
 from study_app.store.study_versions import kept_content, kept_versions
@@ -52,7 +52,7 @@ SIZES: Final = (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ParticipantView:
     """What the tab shows."""
 

@@ -419,7 +419,7 @@ class ParticipantPreview(Card):
         self.after.clicked.connect(lambda: self.go(1))
         self.moments.chosen.connect(self.show_moment)
         self.zoom.chosen.connect(self._show_fitted)
-        page = PanePage("participant", "Participant", self, self.aside,
+        page = PanePage(name="participant", words="Participant", body=self, aside=self.aside,
                         most_px=lambda: self.most_px, tip=tip("page"))  # fmt: skip
         place.pane.add_page(page, first=True)
         add_commands(place, {"page": self.enter_page, "language": self.show_next_language})
@@ -596,17 +596,17 @@ class ParticipantPreview(Card):
             step = f"{step} ({found.session})"
         self.show_view(
             ParticipantView(
-                page,
-                self._language,
-                shown.protocol.study.languages,
-                step,
-                index > 0,
-                index + 1 < len(shown.schedule.steps),
-                moment_words(pages),
-                self._moment,
-                self._question(study),
-                self._note(study, found),
-                self._photodiode,
+                page=page,
+                language=self._language,
+                languages=shown.protocol.study.languages,
+                step=step,
+                has_before=index > 0,
+                has_after=index + 1 < len(shown.schedule.steps),
+                moments=moment_words(pages),
+                moment=self._moment,
+                focused=self._question(study),
+                note=self._note(study, found),
+                photodiode=self._photodiode,
             )
         )
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.haptics.model.layout import LIMITER_GLITCH
+from study_app.haptics.model.ranges import Vector
 from study_app.haptics.runtime.telemetry import timing
 
 Floats = NDArray[np.float64]
@@ -28,12 +29,20 @@ _NEAR: Final = 10
 _REACH: Final = 5  # widths of the Gaussian on either side
 
 
+class Spread(NamedTuple):
+    """What half and 99 % of the values do not exceed, and the greatest of them; NaN without any."""
+
+    median: float
+    most: float
+    greatest: float
+
+
 class Regularity(NamedTuple):
     """The loop's timing with the device: see `regularity`."""
 
     ticks: int
-    lateness_ms: tuple[float, float, float]
-    busy_ms: tuple[float, float, float]
+    lateness_ms: Spread
+    busy_ms: Spread
     new_share: float
     longest_gap_ms: float
     delay_ticks: tuple[int, int]
@@ -88,10 +97,11 @@ def regularity(samples: Any, rate_hz: float) -> Regularity:
     )
 
 
-def _spread(values: Floats) -> tuple[float, float, float]:
+def _spread(values: Floats) -> Spread:
     if len(values) == 0:
-        return math.nan, math.nan, math.nan
-    return tuple(float(it) for it in (*np.percentile(values, (50, 99)), values.max()))  # type: ignore[return-value]
+        return Spread(median=math.nan, most=math.nan, greatest=math.nan)
+    median, most = np.percentile(values, (50, 99)).tolist()
+    return Spread(median=median, most=most, greatest=float(values.max()))
 
 
 def noise(samples: Any) -> Noise:
@@ -142,12 +152,12 @@ def motion_under_force(stretches: Sequence[Any], axis: int, rate_hz: float) -> M
     mass_kg, damping_nspm, friction_n, *_ = np.linalg.solve(triangle, force_n(delay_s) @ orthogonal)
     left, variance = residual_n2(delay_s), float(force_n(delay_s).var())
     return Motion(
-        float(mass_kg),
-        float(damping_nspm),
-        float(friction_n),
-        1e3 * delay_s,
-        1.0 - left / variance if variance > 0.0 else 0.0,
-        count_um(stretches, axis),
+        mass_kg=float(mass_kg),
+        damping_nspm=float(damping_nspm),
+        friction_n=float(friction_n),
+        delay_ms=1e3 * delay_s,
+        explained=1.0 - left / variance if variance > 0.0 else 0.0,
+        count_um=count_um(stretches, axis),
     )
 
 
@@ -195,15 +205,18 @@ def _prepared(samples: Any, axis: int, step_s: float) -> _Prepared:
     t_s, position_m = _new(samples)
     grid_s = np.arange(t_s[0], t_s[-1], step_s)
     x_m = np.interp(grid_s, t_s, position_m[:, axis])
-    bell, *derivatives = _gaussians(step_s)
-    smooth, v_mps, a_mps2 = (np.convolve(x_m - x_m.mean(), kernel, "valid") for kernel in (bell, *derivatives))
+    kernels = _gaussians(step_s)
+    bell = kernels.bell
+    smooth, v_mps, a_mps2 = (np.convolve(x_m - x_m.mean(), it, "valid") for it in (bell, kernels.first, kernels.second))
     friction = np.convolve(np.tanh(v_mps / SLOW_MPS), bell, "valid")
     reach = len(bell) // 2
     whole = slice(reach, len(smooth) - reach)  # where friction is smoothed like the rest
     terms = np.column_stack([a_mps2[whole], v_mps[whole], friction, smooth[whole], np.ones_like(friction)])
     sent_s = (samples.time_ns - samples.time_ns[0]) * 1e-9
     # A force acts from its write to the next: its middle is half a tick later.
-    return _Prepared(terms, sent_s + 0.5 * step_s, samples.device_force_n[:, axis], grid_s, bell)
+    return _Prepared(
+        terms=terms, sent_s=sent_s + 0.5 * step_s, sent_n=samples.device_force_n[:, axis], grid_s=grid_s, bell=bell
+    )
 
 
 def gain_of(sent_n: Sequence[float], shown_g: Sequence[float]) -> Gain:
@@ -212,7 +225,9 @@ def gain_of(sent_n: Sequence[float], shown_g: Sequence[float]) -> Gain:
     line = np.column_stack([asked, np.ones_like(asked)])
     (slope, offset_n), *_ = np.linalg.lstsq(line, shown_n, rcond=None)
     left_n = shown_n - line @ (slope, offset_n)
-    return Gain(float(slope), float(offset_n), float(np.abs(left_n).max()), len(asked))
+    return Gain(
+        gain=float(slope), offset_n=float(offset_n), residual_n=float(np.abs(left_n).max()), readings=len(asked)
+    )
 
 
 def _new(samples: Any) -> tuple[Floats, Floats]:
@@ -221,8 +236,16 @@ def _new(samples: Any) -> tuple[Floats, Floats]:
     return (new.time_ns - samples.time_ns[0]) * 1e-9, np.array(new.position_m)
 
 
-def _gaussians(step_s: float) -> tuple[Floats, Floats, Floats]:
-    """Return a Gaussian and its first and second derivative, for convolution, exact for 1, t and t²."""
+class _Kernels(NamedTuple):
+    """A Gaussian and its first and second derivative, for convolution."""
+
+    bell: Floats
+    first: Floats
+    second: Floats
+
+
+def _gaussians(step_s: float) -> _Kernels:
+    """Return kernels that are exact for 1, t and t²."""
     reach = math.ceil(_REACH * SIGMA_S / step_s)
     t_s: Floats = step_s * np.arange(-reach, reach + 1, dtype=float)
     bell = np.exp(-0.5 * (t_s / SIGMA_S) ** 2)
@@ -232,9 +255,9 @@ def _gaussians(step_s: float) -> tuple[Floats, Floats, Floats]:
     second = (t_s**2 - (bell * t_s**2).sum()) * bell
     second -= second.mean()
     second /= 0.5 * (second * t_s**2).sum()
-    return bell, first, second
+    return _Kernels(bell=bell, first=first, second=second)
 
 
-def _three(values: Floats) -> tuple[float, float, float]:
+def _three(values: Floats) -> Vector:
     x, y, z = (float(it) for it in values)
     return x, y, z

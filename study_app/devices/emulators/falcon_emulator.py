@@ -25,6 +25,7 @@ from study_app.haptics.kernels.c_functions import c_function, record_at
 from study_app.haptics.kernels.compiled import entry_of, kernel
 from study_app.haptics.kernels.plant import HANDLE
 from study_app.haptics.model.layout import records
+from study_app.haptics.model.ranges import Vector
 
 EMULATOR = np.dtype(
     [
@@ -430,10 +431,9 @@ class Emulator(HandOrders):
         return int(self.state.run.lights)
 
     @property
-    def torques(self) -> tuple[int, int, int]:
-        """The last torque command [units]; 0 without power."""
-        first, second, third = self.state.run.torque
-        return int(first), int(second), int(third)
+    def torques(self) -> tuple[int, ...]:
+        """The last torque command of each motor [units]; 0 without power."""
+        return tuple(int(units) for units in self.state.run.torque)
 
     @property
     def highest_torque(self) -> int:
@@ -457,14 +457,14 @@ class Emulator(HandOrders):
         return int(self.state.run.refused)
 
     @property
-    def force_n(self) -> tuple[float, float, float]:
+    def force_n(self) -> Vector:
         """The force of its motors on the hand, by virtual work [N]."""
         update_force(self.state)
         x, y, z = self.state.arms.force_n
         return float(x), float(y), float(z)
 
     @property
-    def position_m(self) -> tuple[float, float, float]:
+    def position_m(self) -> Vector:
         x, y, z = self.state.handle.position_m
         return float(x), float(y), float(z)
 

@@ -25,7 +25,7 @@ class EmulatedLink:
         service.connected()
 
     def calls(self) -> TransferCalls:
-        return TransferCalls(*service_calls(self._service))
+        return service_calls(self._service)
 
     def send(self, data: bytes) -> None:
         self._service.take_bytes(data)

@@ -23,6 +23,7 @@ import numpy as np
 from study_app.devices.emulators import inverse3_stream
 from study_app.devices.emulators.inverse3_stream import SERVICE
 from study_app.devices.hand import HandOrders
+from study_app.devices.inverse3.service import TransferCalls
 from study_app.devices.simulated import QUANTUM_M, TREMOR_M, new_scripted_handle
 from study_app.errors import DeviceError
 from study_app.haptics.model.layout import records
@@ -411,7 +412,7 @@ class Service(HandOrders):
         self.state.text_size = data.size
 
 
-def service_calls(service: Service) -> tuple[int, int, int]:
-    """Return handle and addresses of ``send`` and ``recv`` in place of the system's."""
+def service_calls(service: Service) -> TransferCalls:
+    """Return the service as a byte stream, with functions in place of the system's ``send`` and ``recv``."""
     send, receive = inverse3_stream.stream_functions()
-    return service.handle, int(send.address), int(receive.address)
+    return TransferCalls(handle=service.handle, send=int(send.address), receive=int(receive.address))

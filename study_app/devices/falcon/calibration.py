@@ -41,7 +41,7 @@ _OFFSETS_RAD: Final = math.radians(15)  # nor its arms' offset
 _STEPS: Final = 20
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Calibration:
     """The result of `fit`; ``measured`` is the day, ``residual_n`` the root mean square of the residual."""
 
@@ -110,7 +110,15 @@ def fit(
         )
     residual_n = math.sqrt(float(left @ left) / len(counts))
     day = (measured or date.today()).isoformat()
-    return Calibration(geometry.name, gain, offset_rad, float(own_n), residual_n, len(counts), day)
+    return Calibration(
+        geometry=geometry.name,
+        units_per_nm=gain,
+        arm_offset_rad=offset_rad,
+        own_weight_n=float(own_n),
+        residual_n=residual_n,
+        poses=len(counts),
+        measured=day,
+    )
 
 
 def left_over(found: Calibration, poses: Any, forces_n: Any, units: Any) -> Any:
@@ -215,7 +223,7 @@ Ask = Callable[[str, str], Callable[[], str | None]]
 operator has answered, then the answer."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Notes:
     """The measurements, one row per rest: encoder counts, force on the grip [N] and motor units, each (n, 3)."""
 
@@ -388,4 +396,4 @@ def _noted(notes: list[tuple[Any, float, Any]]) -> Notes:
     counts, loads_n, units = zip(*notes, strict=True)
     forces_n = np.zeros((len(notes), 3))
     forces_n[:, 1] = -np.array(loads_n)
-    return Notes(np.array(counts), forces_n, np.array(units))
+    return Notes(counts=np.array(counts), forces_n=forces_n, units=np.array(units))

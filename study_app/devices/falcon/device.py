@@ -71,7 +71,9 @@ class FalconDevice(FramedDevice):
         mechanism = mechanics.new_mechanism(self._geometry, calibration.UNCALIBRATED_UNITS_PER_NM)
         memory = exchange.new_exchange(BulkCalls(0, 0), mechanism, self._geometry, force_limit_n)
         super().__init__(memory, workspace_m, force_limit_n, exchange.exchange_functions())
-        self._dynamics = Dynamics(None, mechanics.count_at(mechanism, self._geometry.centre_m), exchange.LEAST_MASS_KG)
+        self._dynamics = Dynamics(
+            delay_s=None, count_m=mechanics.count_at(mechanism, self._geometry.centre_m), mass_kg=exchange.LEAST_MASS_KG
+        )
         self._check_reach(mechanism)
 
     @classmethod
@@ -96,7 +98,9 @@ class FalconDevice(FramedDevice):
         gain = calibration.UNCALIBRATED_UNITS_PER_NM if used is None else used.units_per_nm
         mechanism = mechanics.new_mechanism(geometry, gain, 0.0 if used is None else used.arm_offset_rad)
         self._dynamics = Dynamics(
-            round_trip_s, mechanics.count_at(mechanism, geometry.centre_m), exchange.LEAST_MASS_KG
+            delay_s=round_trip_s,
+            count_m=mechanics.count_at(mechanism, geometry.centre_m),
+            mass_kg=exchange.LEAST_MASS_KG,
         )
         self.memory[:] = exchange.new_exchange(connection.calls(), mechanism, geometry, self.force_limit_n)
         self._start_guard(connection.name)

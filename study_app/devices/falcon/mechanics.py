@@ -31,7 +31,7 @@ from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.model.layout import records
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Geometry:
     """Lengths [m] and angles [rad] of a delta mechanism after Stamper.
 
@@ -62,7 +62,7 @@ GEOMETRIES: Final = {
     known.name: known
     for known in (
         Geometry(
-            "libnifalcon",
+            name="libnifalcon",
             arm_m=0.060,
             rod_m=0.1025,
             ends_m=0.0225,
@@ -73,7 +73,7 @@ GEOMETRIES: Final = {
             zero_rad=math.radians(35),
         ),
         Geometry(
-            "zm-redux",
+            name="zm-redux",
             arm_m=0.060,
             rod_m=0.1025,
             ends_m=0.0225,
@@ -85,7 +85,7 @@ GEOMETRIES: Final = {
         ),
         # Its lateral offsets have a sign convention of their own; their difference is about a millimetre.
         Geometry(
-            "martin-hillier",
+            name="martin-hillier",
             arm_m=0.060,
             rod_m=0.1025,
             ends_m=0.0230,

@@ -451,28 +451,32 @@ def probe(usb: Any = None, platform: str = sys.platform) -> Backend:
     by = f"libusb {_version()}"
     usb = usb if usb is not None else libusb_package.get_libusb1_backend()
     if usb is None:
-        return Backend("falcon", by, NOT_AVAILABLE, can, failures_on(platform).mode("no-libusb").cure)
+        return Backend("falcon", by, state=NOT_AVAILABLE, can=can, why=failures_on(platform).mode("no-libusb").cure)
     found = find_falcons(usb)
     if not found:
-        return Backend("falcon", by, NONE, can, failures_on(platform).mode("not-connected").cure)
+        return Backend("falcon", by, state=NONE, can=can, why=failures_on(platform).mode("not-connected").cure)
     serials = [serial_of(one) for one in found]
     why = ""
     if None in serials:
         cause = failures_on(platform).mode("driver" if platform == "win32" else "permission").cause
         why = f"one does not report its serial number; perhaps {cause}: liquid-study devices doctor finds out"
-    return Backend("falcon", by, "connected: " + ", ".join(serial or "unnamed" for serial in serials), can, why)
+    return Backend(
+        "falcon", by, state="connected: " + ", ".join(serial or "unnamed" for serial in serials), can=can, why=why
+    )
 
 
 def probe_ftdi(d2xx: Any = None, platform: str = sys.platform) -> Backend:
     """Return whether FTDI's driver can be used on a platform, with its library or the one that loads."""
     can = "the same, where FTDI's or Novint's driver is bound to it; taken by itself where libusb may not open it"
     if platform != "win32":
-        return Backend("falcon", "ftd2xx", NOT_AVAILABLE, can, "for Windows alone, where drivers keep libusb out")
+        return Backend(
+            "falcon", "ftd2xx", state=NOT_AVAILABLE, can=can, why="for Windows alone, where drivers keep libusb out"
+        )
     try:
         load_d2xx() if d2xx is None else d2xx
     except UsbFailure as failure:
-        return Backend("falcon", "ftd2xx", NOT_AVAILABLE, can, str(failure))
-    return Backend("falcon", "ftd2xx", DRIVER_READY, can)
+        return Backend("falcon", "ftd2xx", state=NOT_AVAILABLE, can=can, why=str(failure))
+    return Backend("falcon", "ftd2xx", state=DRIVER_READY, can=can)
 
 
 def _version() -> str:

@@ -298,11 +298,11 @@ def probe() -> Backend:
     try:
         library = Library()
     except DeviceFailure as failed:
-        return Backend("force-dimension", "libdrd", NOT_AVAILABLE, _CAN, FAILURES.sentence(failed.mode))
+        return Backend("force-dimension", "libdrd", state=NOT_AVAILABLE, can=_CAN, why=FAILURES.sentence(failed.mode))
     by, found = f"libdrd {library.version}", library.devices
     if found < 1:
-        return Backend("force-dimension", by, NONE, _CAN, FAILURES.sentence("no-device"))
-    return Backend("force-dimension", by, f"connected: {found}", _CAN)
+        return Backend("force-dimension", by, state=NONE, can=_CAN, why=FAILURES.sentence("no-device"))
+    return Backend("force-dimension", by, state=f"connected: {found}", can=_CAN)
 
 
 def _within(value: float, limits: tuple[float, float]) -> float | None:

@@ -72,7 +72,8 @@ class SocketLink(io.RawIOBase):
 
     def calls(self) -> TransferCalls:
         self._socket.setblocking(False)
-        return TransferCalls(self._socket.fileno(), *_addresses())
+        send, receive = _addresses()
+        return TransferCalls(handle=self._socket.fileno(), send=send, receive=receive)
 
     @contextmanager
     def _in_time(self) -> Iterator[None]:
@@ -140,12 +141,12 @@ def probe(host: str = "127.0.0.1", ports: tuple[int, ...] = PORTS) -> Backend:
     found = ask(host, "/devices", ports)
     by = "Inverse Service"
     if not isinstance(found, dict):
-        return Backend("inverse3", by, NOT_AVAILABLE, CAN, FAILURES.sentence("no-service"))
+        return Backend("inverse3", by, state=NOT_AVAILABLE, can=CAN, why=FAILURES.sentence("no-service"))
     listed = found.get("inverse3")
     ids = [entry.get("device_id") for entry in listed if isinstance(entry, dict)] if isinstance(listed, list) else []
     if names := [name for name in ids if isinstance(name, str) and ID.fullmatch(name)]:
-        return Backend("inverse3", by, f"connected: {', '.join(names)}", CAN)
-    return Backend("inverse3", by, NONE, CAN, FAILURES.sentence("no-device"))
+        return Backend("inverse3", by, state=f"connected: {', '.join(names)}", can=CAN)
+    return Backend("inverse3", by, state=NONE, can=CAN, why=FAILURES.sentence("no-device"))
 
 
 def shortened(value: Any) -> str:

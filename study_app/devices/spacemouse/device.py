@@ -107,7 +107,7 @@ class SpaceMouseDevice(PointedDevice):
     def _read_on(self) -> None:
         """Read until the mouse is closed or lost; the servo learns of a loss at its next tick."""
         assert self._model is not None  # noqa: S101 - it is open
-        moving = Displacement(0, 0, 0)
+        moving = Displacement(right=0, toward=0, down=0)
         place_m = self.aim_m
         now_s = heard_s = self._now_s()
         while not self._ending.is_set():
@@ -120,7 +120,7 @@ class SpaceMouseDevice(PointedDevice):
             if said is not None:
                 heard_s = now_s
             elif now_s - heard_s > _SILENT_S:
-                moving = Displacement(0, 0, 0)
+                moving = Displacement(right=0, toward=0, down=0)
             step_s = min(now_s - before_s, _LONGEST_STEP_S)
             goes = velocity_mps(moving)
             if any(goes):

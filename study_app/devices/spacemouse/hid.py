@@ -19,6 +19,7 @@ from typing import Any, Final
 from study_app.devices.descriptor import NONE, NOT_AVAILABLE, Backend
 from study_app.errors import DeviceError, DeviceNotFound
 from study_app.haptics.model.layout import BUTTON_STOP
+from study_app.haptics.model.ranges import Vector
 
 DISPLACEMENT, BUTTONS, LED = 1, 3, 4
 FULL_DEFLECTION: Final = 350
@@ -32,7 +33,7 @@ _PAIR: Final = 0b11
 _KNOWN_BUTTONS: Final = 0b11
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Model:
     """One of 3Dconnexion's; ``escape`` is the bit of its Esc button, None where it has none."""
 
@@ -44,23 +45,23 @@ class Model:
 
 
 MODELS: Final = (
-    Model("SpacePilot", 0x046D, 0xC625, 10, light=False),
-    Model("SpaceNavigator", 0x046D, 0xC626),
-    Model("SpaceExplorer", 0x046D, 0xC627, 6),
-    Model("SpacePilot Pro", 0x046D, 0xC629, 22),
-    Model("SpaceMouse Pro", 0x046D, 0xC62B, 22),
-    Model("SpaceMouse Wireless", 0x256F, 0xC62E),
-    Model("SpaceMouse Pro Wireless", 0x256F, 0xC632, 22),
-    Model("SpaceMouse Enterprise", 0x256F, 0xC633, 22),
-    Model("SpaceMouse Compact", 0x256F, 0xC635),
-    Model("SpaceMouse Pro Wireless (Bluetooth)", 0x256F, 0xC638, 22),
-    Model("SpaceMouse Wireless (new)", 0x256F, 0xC63A),
-    Model("SpaceMouse (USB)", 0x256F, 0xC641, light=False),
-    Model("Universal Receiver", 0x256F, 0xC652, 22),
+    Model(name="SpacePilot", vendor=0x046D, product=0xC625, escape=10, light=False),
+    Model(name="SpaceNavigator", vendor=0x046D, product=0xC626),
+    Model(name="SpaceExplorer", vendor=0x046D, product=0xC627, escape=6),
+    Model(name="SpacePilot Pro", vendor=0x046D, product=0xC629, escape=22),
+    Model(name="SpaceMouse Pro", vendor=0x046D, product=0xC62B, escape=22),
+    Model(name="SpaceMouse Wireless", vendor=0x256F, product=0xC62E),
+    Model(name="SpaceMouse Pro Wireless", vendor=0x256F, product=0xC632, escape=22),
+    Model(name="SpaceMouse Enterprise", vendor=0x256F, product=0xC633, escape=22),
+    Model(name="SpaceMouse Compact", vendor=0x256F, product=0xC635),
+    Model(name="SpaceMouse Pro Wireless (Bluetooth)", vendor=0x256F, product=0xC638, escape=22),
+    Model(name="SpaceMouse Wireless (new)", vendor=0x256F, product=0xC63A),
+    Model(name="SpaceMouse (USB)", vendor=0x256F, product=0xC641, light=False),
+    Model(name="Universal Receiver", vendor=0x256F, product=0xC652, escape=22),
 )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Displacement:
     """Of the cap, about -350 to 350 each: right, toward the user, down."""
 
@@ -83,7 +84,7 @@ def parse(report: bytes) -> Displacement | Buttons | None:
     kind, rest = report[0], report[1:]
     if kind == DISPLACEMENT and len(rest) >= 6:
         right, toward, down = (int.from_bytes(rest[at : at + 2], "little", signed=True) for at in (0, 2, 4))
-        return Displacement(right, toward, down)
+        return Displacement(right=right, toward=toward, down=down)
     if kind == BUTTONS and rest:
         return Buttons(int.from_bytes(rest, "little"))
     return None
@@ -101,7 +102,7 @@ def program_buttons(held: int, model: Model) -> int:
     return buttons
 
 
-def velocity_mps(displacement: Displacement) -> tuple[float, float, float]:
+def velocity_mps(displacement: Displacement) -> Vector:
     """Return the velocity of the hand (x right, y up, z toward the user) that a displacement asks for [m/s]."""
     return _speed(displacement.right), -_speed(displacement.down), _speed(displacement.toward)
 
@@ -187,11 +188,11 @@ def probe(hid: Any = None) -> list[Backend]:
     try:
         found = find_space_mice(load_hid() if hid is None else hid)
     except (DeviceError, OSError) as error:
-        return [Backend("spacemouse", by, NOT_AVAILABLE, can, str(error))]
+        return [Backend("spacemouse", by, state=NOT_AVAILABLE, can=can, why=str(error))]
     if not found:
-        return [Backend("spacemouse", by, NONE, can, "connect a 3Dconnexion SpaceMouse, or turn it on")]
+        return [Backend("spacemouse", by, state=NONE, can=can, why="connect a 3Dconnexion SpaceMouse, or turn it on")]
     names = sorted({model.name for model, _ in found})
-    return [Backend("spacemouse", by, "connected: " + ", ".join(names), can)]
+    return [Backend("spacemouse", by, state="connected: " + ", ".join(names), can=can)]
 
 
 def _version() -> str:

@@ -49,7 +49,7 @@ PUBLISHED: Final[Mapping[str, Callable[[float], float]]] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Surveyed:
     """One liquid: its Reynolds number at the scene's greatest speed, its model, and the errors of that.
 
@@ -100,15 +100,17 @@ def _surveyed(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) ->
     speed_mps = scene.motion_in(liquid).speed_mps or math.nan
     creeping = max(share(truths.oscillation(alone)), share(truths.start(alone)))
     return Surveyed(
-        name,
-        speed_mps,
-        mps_per_reynolds,
-        model.name,
-        creeping if speed_mps <= NO_REFERENCE_REYNOLDS * mps_per_reynolds else None,
-        None if steady is None else share(steady),
-        max(map(share, solved)) if solved else None,
-        (min(speeds) / mps_per_reynolds, max(speeds) / mps_per_reynolds) if solved else (math.nan, math.nan),
-        expected(scene),
+        liquid=name,
+        speed_mps=speed_mps,
+        mps_per_reynolds=mps_per_reynolds,
+        model=model.name,
+        creeping=creeping if speed_mps <= NO_REFERENCE_REYNOLDS * mps_per_reynolds else None,
+        steady=None if steady is None else share(steady),
+        solver=max(map(share, solved)) if solved else None,
+        solver_reynolds=(min(speeds) / mps_per_reynolds, max(speeds) / mps_per_reynolds)
+        if solved
+        else (math.nan, math.nan),
+        expected=expected(scene),
     )
 
 

@@ -66,7 +66,7 @@ MODELS: Final = (
 _START: Final = {"length": 300, "scaling": 1000.0}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Fitted:
     """One model on one motion, at the scene's rate: its parameters, and its error against the solver.
 
@@ -202,8 +202,14 @@ class Tick:
 
     def __init__(self, name: str, setup: Mapping[str, float], *, sent: bool) -> None:
         place, values = ENGINES[name]
-        given = (setup["density_kg_m3"], setup["viscosity_pa_s"], setup["diameter_m"])
-        scene = scene_of(MODELS[place], Case("liquid", *given, 0.0), values)
+        case = Case(
+            liquid_id="liquid",
+            density_kg_m3=setup["density_kg_m3"],
+            viscosity_pa_s=setup["viscosity_pa_s"],
+            diameter_m=setup["diameter_m"],
+            speed_mps=0.0,
+        )
+        scene = scene_of(MODELS[place], case, values)
         dynamics = None
         if sent:
             scene = scene.model_copy(update={"velocity": Ewma()})

@@ -29,7 +29,7 @@ _SETTLED: Final = 1e-8
 _EDGE: Final = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
     """Extent of the mesh ahead of, behind and beside the ball, and lengths of its edges, in diameters.
 

@@ -26,7 +26,7 @@ BEGIN: Final = Constants(c_m=0.5, c_y=1.0, c_z=2.0, c_s=1.0, beta=1.0, r_0=5.0)
 """Initial values of the search: orders of magnitude."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class MotionError:
     """RMS error as a share of the RMS force, and greatest error as a share of the greatest force, of one motion.
 
@@ -109,8 +109,21 @@ def refit(
     for table, one in zip(tables, solved, strict=True):
         progress(f"... without {table.case.liquid_id}, {table.notes['title']} ...")
         others = _fit([it for it in solved if it is not one], constants)
-        errors.append(MotionError(table, others, one.errors(constants), one.errors(others), _as_run(table)))
-    errors += [MotionError(it, constants, None, _Solved(it).errors(constants), _as_run(it)) for it in held_out]
+        errors.append(
+            MotionError(
+                table=table,
+                others=others,
+                fitted=one.errors(constants),
+                left_out=one.errors(others),
+                program=_as_run(table),
+            )
+        )
+    errors += [
+        MotionError(
+            table=it, others=constants, fitted=None, left_out=_Solved(it).errors(constants), program=_as_run(it)
+        )
+        for it in held_out
+    ]
     return Refit(constants, tuple(errors))
 
 
@@ -130,13 +143,13 @@ def _fit(solved: Sequence[_Solved], begin: Constants) -> Constants:
     """Search in the logarithms, so that constants stay positive."""
 
     def residuals(logs: Floats) -> Floats:
-        constants = Constants(*np.exp(logs).tolist())
+        constants = Constants._make(np.exp(logs).tolist())
         return np.concatenate([it.residuals(constants) for it in solved])
 
     found = least_squares(residuals, np.log(begin), diff_step=1e-4, xtol=1e-6, ftol=1e-9)
     if not found.success:
         raise StudyError(f"no constants were found: {found.message}")
-    return Constants(*np.exp(found.x).tolist())
+    return Constants._make(np.exp(found.x).tolist())
 
 
 def evidence(found: Refit) -> Evidence:

@@ -67,7 +67,7 @@ class EngineError(Exception):
     """The engine did not answer as it must."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Motion:
     """One solved motion at `RATE_HZ`: place, velocity and the solver's force, each (n,).
 
@@ -88,7 +88,7 @@ class Motion:
         return {name: float(self.notes[name]) for name in ("density_kg_m3", "viscosity_pa_s", "diameter_m")}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Score:
     """The error along one motion, RMS and greatest as shares of the force's, and the time of a tick [ns]."""
 
@@ -135,7 +135,15 @@ def _motion(name: str, text: str, *, fitted: bool) -> Motion:
     even_s = np.arange(math.floor(t_s[-1] * RATE_HZ) + 1) / RATE_HZ
     even_mps = np.interp(even_s, t_s, velocity_mps)
     place_m = np.concatenate([[0.0], np.cumsum((even_mps[1:] + even_mps[:-1]) / (2 * RATE_HZ))])
-    return Motion(name, fitted, notes, even_s, place_m, even_mps, np.interp(even_s, t_s, force_n))
+    return Motion(
+        name=name,
+        fitted=fitted,
+        notes=notes,
+        t_s=even_s,
+        position_m=place_m,
+        velocity_mps=even_mps,
+        force_n=np.interp(even_s, t_s, force_n),
+    )
 
 
 def score(engine: Engine, motion: Motion) -> Score:
@@ -157,7 +165,9 @@ def score(engine: Engine, motion: Motion) -> Score:
         raise EngineError(f"{motion.name}: a force is not a finite number, or is missing")
     error_n = force_n - motion.force_n
     rms = float(np.linalg.norm(error_n) / np.linalg.norm(motion.force_n))
-    return Score(motion, rms, float(np.abs(error_n).max() / np.abs(motion.force_n).max()), tick_ns)
+    return Score(
+        motion=motion, rms=rms, greatest=float(np.abs(error_n).max() / np.abs(motion.force_n).max()), tick_ns=tick_ns
+    )
 
 
 def release(

@@ -135,7 +135,7 @@ def _slope(x: Floats) -> Floats:
 
 def _oscillation(keulegan_carpenter: float) -> VelocityProfile:
     """Return four periods of an oscillation by the Keulegan–Carpenter number U T/D."""
-    sine = Sine(1.0, keulegan_carpenter, 0.0)
+    sine = Sine(amplitude=1.0, period=keulegan_carpenter, phase=0.0)
     words = f"oscillation, KC {keulegan_carpenter:g}"
     return VelocityProfile(
         f"oscillation-kc{keulegan_carpenter:g}", words, (Step(0.0, 1.0),), (sine,), 4 * keulegan_carpenter
@@ -151,7 +151,12 @@ MULTI_SINE: Final = VelocityProfile(
     "multi-sine",
     "multi-sine",
     (Step(0.0, 1.0),),
-    (Sine(0.38, 2.0, 0.4), Sine(0.38, 3.7, 2.1), Sine(0.38, 6.9, 4.4), Sine(0.38, 13.0, 1.0)),
+    (
+        Sine(amplitude=0.38, period=2.0, phase=0.4),
+        Sine(amplitude=0.38, period=3.7, phase=2.1),
+        Sine(amplitude=0.38, period=6.9, phase=4.4),
+        Sine(amplitude=0.38, period=13.0, phase=1.0),
+    ),
     26.0,
 )
 OSCILLATION_KC4: Final = _oscillation(4.0)
@@ -196,7 +201,7 @@ The reversal at Re 60 and the return also served to choose the form of the law.
 """
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
     """A ball in one liquid that moves along a profile with the speed ``speed_mps`` as U."""
 
@@ -263,5 +268,10 @@ def _case(liquid_id: str, speed_mps: float, profile: VelocityProfile = STOPPING)
     scene = load_scene(shipped_file(PROTOCOL), liquid_id)
     (liquid,) = scene.liquids
     return Case(
-        liquid_id, liquid.density_kg_m3, liquid.viscosity_pa_s or math.nan, scene.body.diameter_m, speed_mps, profile
+        liquid_id=liquid_id,
+        density_kg_m3=liquid.density_kg_m3,
+        viscosity_pa_s=liquid.viscosity_pa_s or math.nan,
+        diameter_m=scene.body.diameter_m,
+        speed_mps=speed_mps,
+        profile=profile,
     )

@@ -48,7 +48,14 @@ class Table:
         """What was solved, by the notes of a table of `MOTION`."""
         profile = PROFILES[self.notes.get("profile", STOPPING.name)]
         density_kg_m3, viscosity_pa_s, diameter_m, speed_mps = (float(self.notes[name]) for name in _OF_THE_CASE)
-        return SolvedCase(self.notes["liquid"], density_kg_m3, viscosity_pa_s, diameter_m, speed_mps, profile)
+        return SolvedCase(
+            liquid_id=self.notes["liquid"],
+            density_kg_m3=density_kg_m3,
+            viscosity_pa_s=viscosity_pa_s,
+            diameter_m=diameter_m,
+            speed_mps=speed_mps,
+            profile=profile,
+        )
 
 
 def text(notes: Mapping[str, str], columns: Mapping[str, Sequence[float] | Floats]) -> bytes:
@@ -100,7 +107,7 @@ def left_out(folder: Traversable | None = None) -> dict[str, Constants]:
         header, *rows = csv.reader(file.read_text(encoding="utf-8").splitlines())
         if tuple(header) != LEFT_OUT:
             raise ValueError(f"its columns are {','.join(header)}, not {','.join(LEFT_OUT)}")  # noqa: TRY301
-        return {name: Constants(*map(float, values)) for name, *values in rows}
+        return {name: Constants._make(map(float, values)) for name, *values in rows}
     except (OSError, ValueError, TypeError) as error:
         raise StudyError(
             f"{file.name} cannot be used ({error}): make it again with liquid-study cfd --refit --to DIR"
@@ -168,5 +175,14 @@ def solver_truths(scene: Scene, folder: Traversable | None = None) -> tuple[Trut
         source = f"fluid solver: {notes.get('command', 'unknown command')}"
         title = notes.get("title", "a solved flow")
         constants = without.get(table.case.name) if without else None
-        found.append(Truth(title, source, (case,), computing_s, notes.get("machine", ""), constants))
+        found.append(
+            Truth(
+                name=title,
+                source=source,
+                cases=(case,),
+                computing_s=computing_s,
+                machine=notes.get("machine", ""),
+                left_out=constants,
+            )
+        )
     return tuple(found)

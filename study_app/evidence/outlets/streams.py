@@ -87,7 +87,7 @@ MOST_ERROR_MS: Final = 1.0
 MARKER_EVERY_S: Final = 0.05
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Streamed:
     """What arrived of so many ``seconds``.
 
@@ -176,7 +176,7 @@ MOST_RATIO: Final = 1.10
 _DRAWS: Final = 2000
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Ratio:
     """A percentile of the lateness with outlets, by that without them, and its 95 % interval.
 
@@ -249,12 +249,12 @@ def ratio_of(active: Sequence[NDArray[np.int64]], rest: Sequence[NDArray[np.int6
     draws = [float(np.mean(logs[rng.integers(0, len(logs), len(logs))])) for _ in range(_DRAWS)]
     low, high = np.exp(np.percentile(draws, [2.5, 97.5]))
     return Ratio(
-        percentile,
-        1e-3 * float(np.median(own)),
-        1e-3 * float(np.median(other)),
-        float(np.exp(logs.mean())),
-        float(low),
-        float(high),
+        percentile=percentile,
+        with_us=1e-3 * float(np.median(own)),
+        without_us=1e-3 * float(np.median(other)),
+        ratio=float(np.exp(logs.mean())),
+        low=float(low),
+        high=float(high),
     )
 
 

@@ -23,7 +23,7 @@ VIRTUAL: Final = "virtual"
 EVERY_S: Final = 0.05
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TriggerDelays:
     """How long events took to a byte.
 
@@ -85,7 +85,7 @@ def measure(
         The port cannot be opened, or failed.
     """
     if port != VIRTUAL:
-        return TriggerDelays(port, _written_us(_send(port, seconds, ending, progress)[1]))
+        return TriggerDelays(port=port, written_us=_written_us(_send(port, seconds, ending, progress)[1]))
     with VirtualPort() as virtual:
         sent, sink = _send(virtual.address, seconds, ending, progress)
         came = virtual.unplug()
@@ -93,11 +93,11 @@ def measure(
     idle_ns = [at_ns for byte, at_ns in came[1:] if not byte]  # the first 0 is from opening the port
     pairs = list(zip(codes, sent, strict=False))
     return TriggerDelays(
-        f"{virtual.address} (virtual)",
-        _written_us(sink),
-        np.array([at_ns - event_ns for (_, at_ns), (_, event_ns) in pairs]) * 1e-3,
-        np.array([off_ns - on_ns for (_, on_ns), off_ns in zip(codes, idle_ns, strict=False)]) * 1e-6,
-        sum(byte != code for (byte, _), (code, _) in pairs) + abs(len(codes) - len(sent)),
+        port=f"{virtual.address} (virtual)",
+        written_us=_written_us(sink),
+        read_us=np.array([at_ns - event_ns for (_, at_ns), (_, event_ns) in pairs]) * 1e-3,
+        high_ms=np.array([off_ns - on_ns for (_, on_ns), off_ns in zip(codes, idle_ns, strict=False)]) * 1e-6,
+        wrong=sum(byte != code for (byte, _), (code, _) in pairs) + abs(len(codes) - len(sent)),
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import cache
 from typing import Final, TypeAlias
 
@@ -34,12 +35,23 @@ Trial: TypeAlias = Callable[[np.random.Generator], bool]
 Drawn: TypeAlias = Callable[[np.random.Generator, int], Array]
 """Draws the numbers of so many participants."""
 
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrawnStudies:
+    """Studies of so many ``participants``, of which ``trial`` draws one and says whether it makes the ``claim``."""
+
+    name: str
+    participants: int
+    claim: str
+    trial: Trial
+
+
 SHOWN: Final = "shown"
 EQUIVALENT: Final = "called equivalent"
 
 
-def false_claims() -> Iterator[tuple[str, int, str, Trial]]:
-    """Yield every cell whose claim is false: its name, its number of participants, the claim, and a study of it."""
+def false_claims() -> Iterator[DrawnStudies]:
+    """Yield studies whose claims are false."""
     yield from _thresholds()
     yield from _recognition()
     yield from _equivalence()
@@ -47,9 +59,14 @@ def false_claims() -> Iterator[tuple[str, int, str, Trial]]:
     yield from _trends()
 
 
-def powers() -> Iterator[tuple[str, int, str, Trial]]:
-    """Yield cells whose claim is true, as `false_claims`: how often a true difference of thresholds is shown."""
-    yield "thresholds of two blocks, 1.5 : 1, 3-down-1-up, 60 trials", 12, SHOWN, _compares_thresholds(12, 1.5)
+def powers() -> Iterator[DrawnStudies]:
+    """Yield studies whose claims are true."""
+    yield DrawnStudies(
+        name="thresholds of two blocks, 1.5 : 1, 3-down-1-up, 60 trials",
+        participants=12,
+        claim=SHOWN,
+        trial=_compares_thresholds(12, 1.5),
+    )
 
 
 def _shows(*samples: Array, alternative: str = "two-sided") -> bool:
@@ -65,8 +82,13 @@ DESIGN: Final = ForcedChoice()
 METHOD: Final = UpDown(rule="3down1up", trials=30, tracks=2)
 
 
-def _thresholds() -> Iterator[tuple[str, int, str, Trial]]:
-    yield "thresholds of two blocks, equal, 3-down-1-up, 60 trials", 12, SHOWN, _compares_thresholds(12, 1.0)
+def _thresholds() -> Iterator[DrawnStudies]:
+    yield DrawnStudies(
+        name="thresholds of two blocks, equal, 3-down-1-up, 60 trials",
+        participants=12,
+        claim=SHOWN,
+        trial=_compares_thresholds(12, 1.0),
+    )
 
 
 def _compares_thresholds(n: int, ratio: float) -> Trial:
@@ -94,12 +116,19 @@ def _compares_thresholds(n: int, ratio: float) -> Trial:
 LIQUIDS: Final = ("water", "honey", "oil")
 
 
-def _recognition() -> Iterator[tuple[str, int, str, Trial]]:
+def _recognition() -> Iterator[DrawnStudies]:
     for n in (12, 24, 60):
         for share in (0.5, 0.8):
             name = f"honey known, water and oil both called water in {100 * share:.0f} %"
-            yield name, n, "water or oil recognised", _recognises(n, share, known=(1,))
-        yield "all three liquids guessed", n, "a liquid recognised", _recognises(n, 0.5, known=())
+            yield DrawnStudies(
+                name=name, participants=n, claim="water or oil recognised", trial=_recognises(n, share, known=(1,))
+            )
+        yield DrawnStudies(
+            name="all three liquids guessed",
+            participants=n,
+            claim="a liquid recognised",
+            trial=_recognises(n, 0.5, known=()),
+        )
 
 
 def _recognises(n: int, share: float, known: tuple[int, ...]) -> Trial:
@@ -116,16 +145,21 @@ def _recognises(n: int, share: float, known: tuple[int, ...]) -> Trial:
     return trial
 
 
-def _equivalence() -> Iterator[tuple[str, int, str, Trial]]:
+def _equivalence() -> Iterator[DrawnStudies]:
     for bound in (0.5, 1.0):
         share = bound / STEPS
         for words, others in (("0", (0.0,)), ("−1, 0 or 1", (-1.0, 0.0, 0.0, 1.0))):
             name = f"one in {1 / share:.0f} differs by 6 points, the others by {words}, bound {bound:g}"
             for n in (14, 20, 30, 40):
-                yield name, n, EQUIVALENT, _misses(n, share, others, bound)
+                yield DrawnStudies(name=name, participants=n, claim=EQUIVALENT, trial=_misses(n, share, others, bound))
     for members in (1, 4, 6):
         words = "one hypothesis" if members == 1 else f"{members} hypotheses"
-        yield f"{words} at the bound, normal", 20, f"any {EQUIVALENT}", _calls_equivalent(20, members)
+        yield DrawnStudies(
+            name=f"{words} at the bound, normal",
+            participants=20,
+            claim=f"any {EQUIVALENT}",
+            trial=_calls_equivalent(20, members),
+        )
 
 
 def _misses(n: int, share: float, others: tuple[float, ...], bound: float) -> Trial:
@@ -145,14 +179,26 @@ def _calls_equivalent(n: int, members: int) -> Trial:
     return trial
 
 
-def _contrasts() -> Iterator[tuple[str, int, str, Trial]]:
+def _contrasts() -> Iterator[DrawnStudies]:
     for n in (8, 12, 30):
         for ratio in (1, 3, 6):
             name = f"two groups, sizes 1 : 2, SDs {ratio} : 1"
-            yield name, n, SHOWN, _compares_groups(round(n / 3), n - round(n / 3), ratio)
+            yield DrawnStudies(
+                name=name, participants=n, claim=SHOWN, trial=_compares_groups(round(n / 3), n - round(n / 3), ratio)
+            )
     for n in (8, 12, 20, 30):
-        yield "paired, one in six 5 points higher, the others 1 lower", n, SHOWN, _compares_pairs(n, _one_in_six)
-    yield "paired, exponential", 30, SHOWN, _compares_pairs(30, lambda rng, n: rng.exponential(size=n) - 1)
+        yield DrawnStudies(
+            name="paired, one in six 5 points higher, the others 1 lower",
+            participants=n,
+            claim=SHOWN,
+            trial=_compares_pairs(n, _one_in_six),
+        )
+    yield DrawnStudies(
+        name="paired, exponential",
+        participants=30,
+        claim=SHOWN,
+        trial=_compares_pairs(30, lambda rng, n: rng.exponential(size=n) - 1),
+    )
 
 
 def _compares_groups(n: int, other: int, ratio: float) -> Trial:
@@ -173,12 +219,19 @@ NOISE: Final = 0.7
 MANY: Final = 20_000
 
 
-def _trends() -> Iterator[tuple[str, int, str, Trial]]:
+def _trends() -> Iterator[DrawnStudies]:
     """Yield trends of people's own that are skewed: of mean 0, so that ranks fall, and of rank correlation 0."""
     for n in (12, 30):
-        yield "own trends, skewed, mean 0: ranks fall", n, "a rise shown", _follows(n, 0.0, "rise")
+        yield DrawnStudies(
+            name="own trends, skewed, mean 0: ranks fall",
+            participants=n,
+            claim="a rise shown",
+            trial=_follows(n, 0.0, "rise"),
+        )
         name = "own trends, skewed, mean rank correlation 0"
-        yield name, n, "a trend shown", _follows(n, _shift_without_trend(), "either")
+        yield DrawnStudies(
+            name=name, participants=n, claim="a trend shown", trial=_follows(n, _shift_without_trend(), "either")
+        )
 
 
 def _follows(n: int, shift: float, claim: str) -> Trial:

@@ -160,7 +160,7 @@ ALLOWED: Final[dict[Limit, tuple[float, float, float, float]]] = {
 """Of each limit the range that the interval of a rate must touch, and the range that it must not leave."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Rate:
     """Number of ``hits`` among the simulated studies ``of`` one cell."""
 
@@ -287,7 +287,8 @@ def count_studies(simulation: Plan, cell: Cell, truth: Truth, seed: int, batch: 
         for event, happened in _study(simulation, cell, truth, seed, study).items():
             events[event] = events.get(event, 0) + happened
     return tuple(
-        Rate(cell.name, cell.participants, what, limit, hits, studies) for (what, limit), hits in events.items()
+        Rate(cell=cell.name, participants=cell.participants, what=what, limit=limit, hits=hits, studies=studies)
+        for (what, limit), hits in events.items()
     )
 
 
@@ -470,10 +471,10 @@ def single_tests() -> Mapping[Case, tuple[Limit, str, Trial]]:
         (12, 15.0, 1 / 6, "one in six never agrees"),
     ):
         found[words, n] = ("at least 93 %", COVERS, _covered(n, spread_ms, never))
-    for name, n, claim, trial in false_claims():
-        found[name, n] = ("at most 5 %", claim, trial)
-    for name, n, claim, trial in powers():
-        found[name, n] = ("counted", claim, trial)
+    for one in false_claims():
+        found[one.name, one.participants] = ("at most 5 %", one.claim, one.trial)
+    for one in powers():
+        found[one.name, one.participants] = ("counted", one.claim, one.trial)
     return found
 
 
@@ -483,13 +484,14 @@ def count_single(case: Case, seed: int, batch: int, studies: int) -> tuple[Rate,
     number = list(single_tests()).index(case)
     rng = np.random.default_rng([seed, number, batch])
     found = [one for _ in range(studies) if (one := trial(rng)) is not None]
+    rate = partial(Rate, cell=case[0], participants=case[1])
     if what != COVERS:
-        return (Rate(*case, what, limit, sum(map(bool, found)), len(found)),)
-    few = case[1] == SIZES[0]  # of five people intervals are wide by t
+        return (rate(what=what, limit=limit, hits=sum(map(bool, found)), studies=len(found)),)
+    half: Limit = "counted" if case[1] == SIZES[0] else "60 to 80 %"  # of five people intervals are wide by t
     return (
-        Rate(*case, PRINTED, "at least 93 %", len(found), studies),
-        Rate(*case, what, limit, sum(one <= 1.0 for one in found), len(found)),
-        Rate(*case, HALF, "counted" if few else "60 to 80 %", sum(one <= 0.5 for one in found), len(found)),
+        rate(what=PRINTED, limit="at least 93 %", hits=len(found), studies=studies),
+        rate(what=what, limit=limit, hits=sum(one <= 1.0 for one in found), studies=len(found)),
+        rate(what=HALF, limit=half, hits=sum(one <= 0.5 for one in found), studies=len(found)),
     )
 
 

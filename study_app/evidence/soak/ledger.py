@@ -146,7 +146,7 @@ def prepare() -> None:
     write_down(records(_LEDGER, 1)[0], wake[0], elements, records(SAMPLE, 0), 0, 0)
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class Drift:
     """How far the wakes of a servo were from their definition at most, in units of Σ|e|/S, looked at now and then.
 

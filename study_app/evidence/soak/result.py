@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from study_app.evidence.soak.faulty_device import BUTTON, GLITCH, JUMP, KINDS, LOST, LOST_AT_WRITE, NON_FINITE, SILENCE
 from study_app.evidence.soak.ledger import Drift
@@ -27,7 +27,7 @@ _SEEN: Final = {
 }
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class Rests:
     """What was left of wake [m/s] and force [N] after the hand had kept still, at most.
 
@@ -40,7 +40,16 @@ class Rests:
     force_n: float = 0.0
 
 
-@dataclass(frozen=True)
+class InjectedFault(NamedTuple):
+    """How many times a fault was injected, in how many readings, and how many of these telemetry has."""
+
+    name: str
+    times: int
+    readings: int
+    seen: int | None
+
+
+@dataclass(frozen=True, kw_only=True)
 class SoakResult:
     """The numbers of a soak.
 
@@ -73,13 +82,14 @@ class SoakResult:
         return self.memory[-1] - self.memory[0]
 
     @property
-    def faults(self) -> tuple[tuple[str, int, int, int | None], ...]:
-        """Of each kind: its name, how many times, how many readings, and how many of these telemetry has."""
+    def faults(self) -> tuple[InjectedFault, ...]:
+        """The faults of each kind."""
         rows = []
         for kind, name in enumerate(KINDS):
             shown = kind != JUMP or self.virtual  # a tick may take long for other reasons too
             seen = int(self.counts[_SEEN[kind]]) if shown else None
-            rows.append((name, int(self.device.episodes[kind]), int(self.device.injected[kind]), seen))
+            times, readings = int(self.device.episodes[kind]), int(self.device.injected[kind])
+            rows.append(InjectedFault(name, times=times, readings=readings, seen=seen))
         return tuple(rows)
 
     @property

@@ -41,6 +41,7 @@ from study_app.evidence.soak.sample_audit import Audit
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.motion import Floats
+from study_app.haptics.model.ranges import Vector
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import slew_limit_n
 from study_app.haptics.runtime.clocks.clock import SystemClock, VirtualClock
@@ -89,7 +90,7 @@ class RestlessHand(ScriptedDevice):
     def _speed_mps(self) -> float:
         return float(SLOWEST_MPS * (FASTEST_MPS / SLOWEST_MPS) ** self._draw())
 
-    def _place_m(self) -> tuple[float, float, float]:
+    def _place_m(self) -> Vector:
         x_m, y_m, z_m = (REACH_M * (2 * self._draw() - 1) for _ in range(3))
         return x_m, y_m, z_m
 
@@ -151,7 +152,7 @@ class Stretch(NamedTuple):
     end: int
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class _Due:
     """At which tick the host does something next; below 0: it does not."""
 

@@ -149,7 +149,12 @@ def dynamics_of(case: Case) -> Dynamics:
     """Return what the device states: its least mass and its delay, as they are believed, and its velocity's lag."""
     least_kg = case.believed_kg or (min(case.mass_kg, case.other_kg) if case.other_kg else case.mass_kg)
     lag_s = case.velocity_lag / case.rate_hz if case.estimator == DEVICE else None
-    return Dynamics(case.believed_delay / case.rate_hz, case.quantum_um * 1e-6, least_kg, lag_s)
+    return Dynamics(
+        delay_s=case.believed_delay / case.rate_hz,
+        count_m=case.quantum_um * 1e-6,
+        mass_kg=least_kg,
+        velocity_lag_s=lag_s,
+    )
 
 
 def sine_path(amplitude_m: float, rate_per_s: float, seconds: float, rate_hz: float) -> Floats:
@@ -161,7 +166,9 @@ def sine_path(amplitude_m: float, rate_per_s: float, seconds: float, rate_hz: fl
 
 def law_along(scene: Scene, trace: Any) -> Floats:
     """Return the force (ticks, 3) [N] of the scene on the handle's true motion, with its velocities given."""
-    law = simulate(scene, Motion(trace.t_s, scene.scale * trace.position_m, scene.scale * trace.velocity_mps))
+    law = simulate(
+        scene, Motion(trace.t_s, scene.scale * trace.position_m, velocity_mps=scene.scale * trace.velocity_mps)
+    )
     return np.column_stack([law.fx_n, law.fy_n, law.fz_n])
 
 

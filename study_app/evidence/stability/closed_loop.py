@@ -120,7 +120,7 @@ LONGEST_STEP_S: Final = 25e-6
 SMOOTH_MPS: Final = 1e-3
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Arm:
     """Mass [kg], stiffness [N/m] and damping [N·s/m] of an arm, and of the tissue between arm and handle."""
 
@@ -131,9 +131,9 @@ class Arm:
     tissue_nspm: float
 
 
-LIGHT: Final = Arm(0.554, 135.0, 6.45, 100.0, 2.0)
-MIDDLE: Final = Arm(0.554, 135.0, 6.45, 400.0, 5.0)
-FIRM: Final = Arm(1.5, 500.0, 25.0, 1000.0, 15.0)
+LIGHT: Final = Arm(mass_kg=0.554, stiffness_npm=135.0, damping_nspm=6.45, tissue_npm=100.0, tissue_nspm=2.0)
+MIDDLE: Final = Arm(mass_kg=0.554, stiffness_npm=135.0, damping_nspm=6.45, tissue_npm=400.0, tissue_nspm=5.0)
+FIRM: Final = Arm(mass_kg=1.5, stiffness_npm=500.0, damping_nspm=25.0, tissue_npm=1000.0, tissue_nspm=15.0)
 ARMS: Final[Mapping[str, Arm]] = {"light": LIGHT, "middle": MIDDLE, "firm": FIRM, "lets-go": MIDDLE, "thrown": MIDDLE}
 
 

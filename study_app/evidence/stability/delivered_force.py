@@ -81,9 +81,9 @@ class Device(NamedTuple):
 
 
 DEVICES: Final[Mapping[str, Device]] = {
-    "falcon": Device(38.0, 0.2, 0.1),
-    "inverse3": Device(14.0, 0.2, 0.1),
-    "force-dimension": Device(10.0, 0.2, 0.2),
+    "falcon": Device(count_um=38.0, mass_kg=0.2, least_kg=0.1),
+    "inverse3": Device(count_um=14.0, mass_kg=0.2, least_kg=0.1),
+    "force-dimension": Device(count_um=10.0, mass_kg=0.2, least_kg=0.2),
 }
 """A count of the Inverse3 is not published: [choice]. All drivers permit 8 N."""
 ESTIMATORS: Final = ("kalman", "ewma")
@@ -158,11 +158,21 @@ def _measured(device: str, estimator: str, liquid: str, delay: int) -> Delivered
         plant=SECOND,
     )
     unstable = tuple(one for one in _strokes(case) if not judge(one, safe=True).stable)
-    return Delivered(liquid, estimator, delay, device, *errors(case), unstable)
+    return Delivered(
+        liquid=liquid, estimator=estimator, delay=delay, device=device, **errors(case)._asdict(), unstable=unstable
+    )
 
 
-def errors(case: Case) -> tuple[float, float, float]:
-    """Return the error, the Wiener bound, and the share withheld [%] in a held stroke."""
+class Errors(NamedTuple):
+    """The error, the Wiener bound, and the share withheld [%]."""
+
+    error: float
+    bound: float
+    withheld: float
+
+
+def errors(case: Case) -> Errors:
+    """Return the errors in a held stroke."""
     scene = without_buoyancy(scene_of(case))
     path_m = sine_path(WHOLE.amplitude_m, 2 * math.pi * WHOLE.frequency_hz, LASTS_S, case.rate_hz)
     trace = Bench(case, scene=scene).follow(path_m)
@@ -172,7 +182,7 @@ def errors(case: Case) -> tuple[float, float, float]:
     error = math.sqrt(float(np.sum((sent_n - law_n) ** 2) / np.sum(law_n**2)))
     withheld = float(np.linalg.norm(asked_n - sent_n, axis=1).sum() / np.linalg.norm(asked_n, axis=1).sum())
     bound = wiener_bound(scene, 1e-6 * case.quantum_um, case.delay / case.rate_hz)
-    return 100 * error, 100 * bound, 100 * withheld
+    return Errors(error=100 * error, bound=100 * bound, withheld=100 * withheld)
 
 
 def _strokes(case: Case) -> Iterator[Case]:

@@ -116,7 +116,17 @@ def judge_driven(case: Case) -> Verdict:
         swing_mps > SWING_MPS,
         fast_n - scripted_n > RESTLESS_N,
     )
-    return Verdict(case, True, reasons, balance_j, permitted_j, swing_mps, fast_n, scripted_n, acted(trace))
+    return Verdict(
+        case=case,
+        safe=True,
+        reasons=reasons,
+        balance_j=balance_j,
+        permitted_j=permitted_j,
+        swing_mps=swing_mps,
+        fast_n=fast_n,
+        played_n=scripted_n,
+        acted=acted(trace),
+    )
 
 
 def scripted_traces(case: Case, dynamics: Dynamics) -> list[Any]:
@@ -153,8 +163,8 @@ def _trace(case: Case, device: Driver, hand: Any, dynamics: Dynamics) -> Any:
         safety,
         Records(new_reading(), new_command()),
         Output(telemetry.ring, telemetry.written),
-        DeviceCalls(device.context, device.read.address, device.write.address),
-        ClockCalls(clock.context, clock.now.address, clock.sleep.address),
+        DeviceCalls(context=device.context, read=device.read.address, write=device.write.address),
+        ClockCalls(context=clock.context, now=clock.now.address, sleep=clock.sleep.address),
     )
     run(*arguments, round(_RESTS_S * case.rate_hz))
     rows = round(lasts_s(case) * case.rate_hz)

@@ -77,4 +77,11 @@ def _entry(liquid: str, estimator: str, hand: str, delay_ms: float) -> Entry:
     sent_n = np.linalg.norm(counted.sent_n, axis=1)
     left = math.sqrt(float(np.mean(sent_n**2) / np.mean(counted.permitted_n**2)))
     withheld = float(np.sum(counted.withheld_n) / np.sum(counted.permitted_n))
-    return Entry(liquid, estimator, hand, delay_ms, round(100 * left, 1), round(100 * withheld, 1))
+    return Entry(
+        liquid=liquid,
+        estimator=estimator,
+        hand=hand,
+        delay_ms=delay_ms,
+        left_percent=round(100 * left, 1),
+        withheld_percent=round(100 * withheld, 1),
+    )

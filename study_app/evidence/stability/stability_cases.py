@@ -56,7 +56,7 @@ OF_SOME: Final = ("swaps", "jump_mm", "outliers", "outlier_mm")
 """Fields that a line leaves out where they are 0: the seed of a force link is that of the line."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Grip:
     """A hand as mass, spring and damper that hold the handle (van Beek et al. 2015; Hasser & Cutkosky 2002)."""
 
@@ -66,11 +66,11 @@ class Grip:
 
 
 GRIPS: Final[Mapping[str, Grip]] = {
-    "light": Grip(0.1, 50.0, 2.0),
-    "middle": Grip(0.554, 135.0, 6.45),
-    "firm": Grip(1.0, 800.0, 25.0),
-    LETS_GO: Grip(0.554, 135.0, 6.45),
-    THROWN: Grip(0.554, 135.0, 6.45),
+    "light": Grip(mass_kg=0.1, stiffness_npm=50.0, damping_nspm=2.0),
+    "middle": Grip(mass_kg=0.554, stiffness_npm=135.0, damping_nspm=6.45),
+    "firm": Grip(mass_kg=1.0, stiffness_npm=800.0, damping_nspm=25.0),
+    LETS_GO: Grip(mass_kg=0.554, stiffness_npm=135.0, damping_nspm=6.45),
+    THROWN: Grip(mass_kg=0.554, stiffness_npm=135.0, damping_nspm=6.45),
 }
 
 RANGES: Final[Mapping[str, tuple[float, float]]] = {
@@ -110,7 +110,7 @@ RANGES: Final[Mapping[str, tuple[float, float]]] = {
 ESTIMATORS: Final[Mapping[str, Any]] = {it.name: it.model() for it in KINDS if it.of_device}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
     """One closed loop. ``delay`` is in ticks, ``jitter`` in periods, ``missed`` a share of ticks; sizes as named.
 

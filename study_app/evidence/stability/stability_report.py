@@ -234,12 +234,12 @@ def _compare(case: Case, trace: Any) -> Fidelity:
     force_n = np.linalg.norm(clamped_n, axis=1)
     off_n = np.linalg.norm(trace.sent_n - clamped_n, axis=1)
     return Fidelity(
-        case.liquid,
-        case.rate_hz,
-        case.delay,
-        float(np.sqrt(np.mean(off_n**2))),
-        float(np.sqrt(np.mean(force_n**2))),
-        float(np.mean(off_n > np.maximum(RELATIVE * force_n, ABSOLUTE_N))),
+        liquid=case.liquid,
+        rate_hz=case.rate_hz,
+        delay=case.delay,
+        difference_n=float(np.sqrt(np.mean(off_n**2))),
+        force_n=float(np.sqrt(np.mean(force_n**2))),
+        beyond=float(np.mean(off_n > np.maximum(RELATIVE * force_n, ABSOLUTE_N))),
     )
 
 

@@ -67,7 +67,7 @@ RESTLESS_N: Final = 0.05
 SPREAD_S: Final = math.sqrt(math.log(2.0)) / (2.0 * math.pi * FAST_HZ)  # a Gaussian mean that halves 40 Hz's power
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
     """What became of a case: ``reasons`` why it is unstable, none if it is not, and what was measured.
 
@@ -91,7 +91,17 @@ class Verdict:
 
 def not_finite(case: Case, trace: Any, *, safe: bool) -> Verdict:
     """Return the verdict on a loop that blew up."""
-    return Verdict(case, safe, REASONS[:1], *(math.nan,) * 5, acted(trace))
+    return Verdict(
+        case=case,
+        safe=safe,
+        reasons=REASONS[:1],
+        balance_j=math.nan,
+        permitted_j=math.nan,
+        swing_mps=math.nan,
+        fast_n=math.nan,
+        played_n=math.nan,
+        acted=acted(trace),
+    )
 
 
 def reasons_of(*found: bool) -> tuple[str, ...]:
@@ -130,7 +140,17 @@ def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Ver
         swing_mps > (LATE_SWING_MPS if linked else SWING_MPS),
         fast_n - played_n > (max(RESTLESS_N, LATE_SHARE * played_n) if linked else RESTLESS_N),
     )
-    return Verdict(case, safe, reasons, balance_j, permitted_j, swing_mps, fast_n, played_n, acted(trace))
+    return Verdict(
+        case=case,
+        safe=safe,
+        reasons=reasons,
+        balance_j=balance_j,
+        permitted_j=permitted_j,
+        swing_mps=swing_mps,
+        fast_n=fast_n,
+        played_n=played_n,
+        acted=acted(trace),
+    )
 
 
 def windows(case: Case) -> Iterator[tuple[float, float]]:

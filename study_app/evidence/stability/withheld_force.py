@@ -160,7 +160,7 @@ def _measured(case: Case, mode: str) -> Withheld:
         trace = _played(case, np.concatenate([shaken_m, _stirring_m(shaken_m[-1])]), mode)
         seconds = np.split(trace[len(shaken_m) :], SECONDS)
         after.append(tuple(_share(second) for second in seconds))
-    return Withheld(case.liquid, case.estimator, mode, strokes, tuple(after))
+    return Withheld(liquid=case.liquid, estimator=case.estimator, mode=mode, strokes=strokes, after=tuple(after))
 
 
 def _stroke_m(stroke: Stroke, lasts_s: float) -> NDArray[np.float64]:

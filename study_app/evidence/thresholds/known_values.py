@@ -217,7 +217,9 @@ class KnownThreshold(KnownValue):
         for row in thresholds(levels, frame):
             truth = self.threshold if row.participant is None else truths[row.participant]
             assert row.low is not None and row.high is not None  # noqa: S101, PT018 - ten participants have an interval
-            found.setdefault(row.participant, []).append(Estimated(row.threshold, row.low, row.high, truth))
+            found.setdefault(row.participant, []).append(
+                Estimated(value=row.threshold, low=row.low, high=row.high, truth=truth)
+            )
         group = tuple(found.pop(None))
         return StudyFound(group, tuple(map(tuple, found.values())))
 
@@ -232,11 +234,13 @@ class KnownThreshold(KnownValue):
         errors = self.errors(studies)
         mean = math.expm1(float(errors.mean()))
         what = "mean error of the threshold"
-        yield Verdict(self.name, what, f"{100 * mean:+.1f} %", "within ±5 %", abs(mean) <= ERROR_MOST)
+        yield Verdict(
+            study=self.name, what=what, value=f"{100 * mean:+.1f} %", limit="within ±5 %", holds=abs(mean) <= ERROR_MOST
+        )
         near, n = int((np.abs(np.expm1(errors)) <= NEAR).sum()), len(studies)
         what, limit = f"studies of {PEOPLE} within ±15 %", "at least 95 % (Wilson interval)"
         holds = wilson_interval(near / n, n)[1] >= NEAR_SHARE
-        yield Verdict(self.name, what, f"{100 * near / n:.1f} %", limit, holds)
+        yield Verdict(study=self.name, what=what, value=f"{100 * near / n:.1f} %", limit=limit, holds=holds)
         standards = np.array([one for one in standards_of(self.protocol, self.block) if one is not None])
         if len(standards) < 2:
             return
@@ -248,7 +252,9 @@ class KnownThreshold(KnownValue):
         ]
         slope, true = float(np.mean(slopes)), 0.0 if self._of_delay else 1.0  # a constant JND, or Weber's law
         what, limit = "exponent of JND over standard", f"{true:g} ± {SLOPE_ERROR_MOST:g}"
-        yield Verdict(self.name, what, f"{slope:.3f}", limit, abs(slope - true) <= SLOPE_ERROR_MOST)
+        yield Verdict(
+            study=self.name, what=what, value=f"{slope:.3f}", limit=limit, holds=abs(slope - true) <= SLOPE_ERROR_MOST
+        )
 
     def values_of(self, block: LevelBlock, rows: pd.DataFrame) -> Iterator[float]:
         return (row.threshold for row in thresholds(block, rows) if row.participant is not None)
@@ -258,7 +264,7 @@ class KnownThreshold(KnownValue):
         what = f"threshold of {REHEARSED} people, {'ms' if self.threshold > 1 else 'Weber fraction'}"
         value = f"{self.threshold * math.exp(error):.3g}"
         limit = f"{self.threshold:g} ± {SPREADS} SD ({100 * SPREADS * spread:.0f} %)"
-        return Verdict(self.name, what, value, limit, abs(error) <= SPREADS * spread)
+        return Verdict(study=self.name, what=what, value=value, limit=limit, holds=abs(error) <= SPREADS * spread)
 
 
 @dataclass(frozen=True, slots=True)
@@ -294,13 +300,19 @@ class KnownExponent(KnownValue):
         low, high = student_interval(own)
         assert low is not None and high is not None  # noqa: S101, PT018 - several participants have an interval
         each = tuple((Estimated(one, truth=truth),) for one, truth in zip(own.tolist(), truths, strict=True))
-        return StudyFound((Estimated(float(own.mean()), low, high, EXPONENT),), each)
+        return StudyFound((Estimated(value=float(own.mean()), low=low, high=high, truth=EXPONENT),), each)
 
     def verdicts(self, studies: Sequence[StudyFound]) -> Iterator[Verdict]:
         mean = float(np.mean([found.group[0].value for found in studies]))
         what = f"exponent over {stimulus_of(self.protocol, self.block).vary}"
         limit = f"{EXPONENT:g} ± {EXPONENT_ERROR_MOST:g}"
-        yield Verdict(self.name, what, f"{mean:.3f}", limit, abs(mean - EXPONENT) <= EXPONENT_ERROR_MOST)
+        yield Verdict(
+            study=self.name,
+            what=what,
+            value=f"{mean:.3f}",
+            limit=limit,
+            holds=abs(mean - EXPONENT) <= EXPONENT_ERROR_MOST,
+        )
 
     def values_of(self, block: LevelBlock, rows: pd.DataFrame) -> Iterator[float]:
         return (found.exponent for found in estimated_exponents(block, rows) if found.participant is not None)
@@ -308,7 +320,9 @@ class KnownExponent(KnownValue):
     def recovered(self, values: Sequence[float], spread: float) -> Verdict:
         mean = float(np.mean(values))
         what, limit = f"exponent of {len(values)} people", f"{EXPONENT:g} ± {SPREADS} SD ({SPREADS * spread:.3f})"
-        return Verdict(self.name, what, f"{mean:.3f}", limit, abs(mean - EXPONENT) <= SPREADS * spread)
+        return Verdict(
+            study=self.name, what=what, value=f"{mean:.3f}", limit=limit, holds=abs(mean - EXPONENT) <= SPREADS * spread
+        )
 
 
 Known: TypeAlias = KnownThreshold | KnownExponent
@@ -378,7 +392,7 @@ def coverage(name: str, studies: Sequence[StudyFound], *, few: bool = False) -> 
     groups = [one.covered for found in studies for one in found.group]
     share, slack = float(np.mean(groups)), 3 * math.sqrt(0.95 * 0.05 / len(studies))
     limit, what = f"95 ± {100 * slack:.1f} %", "coverage of the group's 95 % intervals"
-    yield Verdict(name, what, f"{100 * share:.1f} %", limit, abs(share - 0.95) <= slack)
+    yield Verdict(study=name, what=what, value=f"{100 * share:.1f} %", limit=limit, holds=abs(share - 0.95) <= slack)
     own = [one.covered for found in studies for person in found.own for one in person if not math.isnan(one.low)]
     if own:
         (low, high), share = OWN_COVERAGE, float(np.mean(own))
@@ -386,17 +400,27 @@ def coverage(name: str, studies: Sequence[StudyFound], *, few: bool = False) -> 
         if few:
             least, most = wilson_interval(share, len(own))
             value = f"{100 * share:.1f} % [{100 * least:.1f}, {100 * most:.1f}]"
-            yield Verdict(name, what, value, f"reaches {limit}", least <= high and most >= low)
+            yield Verdict(
+                study=name, what=what, value=value, limit=f"reaches {limit}", holds=least <= high and most >= low
+            )
         else:
-            yield Verdict(name, what, f"{100 * share:.1f} %", limit, low <= share <= high)
+            yield Verdict(study=name, what=what, value=f"{100 * share:.1f} %", limit=limit, holds=low <= share <= high)
 
 
 def judged(one: Known, found: Rehearsed, spread: float) -> Iterator[Verdict]:
     """Yield the verdicts on rehearsed participants; ``spread`` is that of studies of as many."""
     share, findings = found.delivered, found.findings
     what = "intervals delivered as requested"
-    yield Verdict(one.name, what, f"{100 * share:.2f} %", "at least 99 %", share >= DELIVERED_LEAST)
-    yield Verdict(one.name, "findings of verify, reproduce and replay", str(findings), "0", findings == 0)
+    yield Verdict(
+        study=one.name, what=what, value=f"{100 * share:.2f} %", limit="at least 99 %", holds=share >= DELIVERED_LEAST
+    )
+    yield Verdict(
+        study=one.name,
+        what="findings of verify, reproduce and replay",
+        value=str(findings),
+        limit="0",
+        holds=findings == 0,
+    )
     yield one.recovered(found.values, spread)
 
 
@@ -442,7 +466,7 @@ def _of_kind(kind: str, errors: Array) -> Verdict:
     low, high = (100 * math.expm1(mean + end) for end in (-chance, chance))
     holds = abs(mean) - chance <= math.log1p(ERROR_MOST)
     value = f"{100 * math.expm1(mean):+.1f} % [{low:+.1f}, {high:+.1f}]"
-    return Verdict(kind, "mean error of the threshold", value, "reaches ±5 %", holds)
+    return Verdict(study=kind, what="mean error of the threshold", value=value, limit="reaches ±5 %", holds=holds)
 
 
 def evidence(verdicts: Sequence[Verdict], heading: str) -> Evidence:

@@ -9,7 +9,7 @@ thresholds over the criterion.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -62,17 +62,25 @@ class Rated:
     found: Threshold
 
 
+class Detected(NamedTuple):
+    """A threshold and its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
 @dataclass(frozen=True, slots=True)
 class Compared:
     """What both procedures find of the same people.
 
-    ``detected_ms`` is the group's threshold in the forced choice, low and high [ms]; ``rated`` are the ratings by
+    ``detected_ms`` is the group's threshold in the forced choice [ms]; ``rated`` are the ratings by
     criterion, the last one after adaptation.
     """
 
     people: int
     seed: int
-    detected_ms: tuple[float, float, float]
+    detected_ms: Detected
     rated: tuple[Rated, ...]
 
 
@@ -93,12 +101,12 @@ def compare(count: int, seed: int) -> Compared:
     return Compared(count, seed, detected(people, seed), tuple(rated(people, *one, seed) for one in both))
 
 
-def detected(people: Sequence[Person], seed: int) -> tuple[float, float, float]:
+def detected(people: Sequence[Person], seed: int) -> Detected:
     """Return the group's threshold in `FORCED_CHOICE` with the ends of its 95 % interval [ms]."""
     one = known_value(FORCED_CHOICE, load(FORCED_CHOICE))
     assert isinstance(one, KnownThreshold)  # noqa: S101 - it has forced choices alone
     (group,) = one.simulate(0, seed, observers=[person.observer for person in people]).group
-    return group.value, group.low, group.high
+    return Detected(value=group.value, low=group.low, high=group.high)
 
 
 def rated(people: Sequence[Person], criterion_s: float, adapted_s: float, seed: int) -> Rated:

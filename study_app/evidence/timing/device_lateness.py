@@ -24,7 +24,7 @@ _DRAWS: Final = 1000
 _REACH_M: Final = 0.02
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DeviceLateness:
     """The lateness of ticks with a device; ``low`` and ``high`` are the ends of the 95 % interval of ``ratio``.
 
@@ -98,13 +98,13 @@ def _compared(name: str, late_ns: dict[str, list[NDArray[np.int64]]]) -> DeviceL
     p50_ns, p99_ns = np.percentile(np.concatenate(own), [50, 99])
     low, high = np.percentile(draws, [2.5, 97.5])
     return DeviceLateness(
-        name,
-        sum(map(len, own)),
-        1e-3 * float(p50_ns),
-        1e-3 * float(p99_ns),
-        _ratio(own, reference, np.arange(len(own))),
-        float(low),
-        float(high),
+        name=name,
+        ticks=sum(map(len, own)),
+        p50_us=1e-3 * float(p50_ns),
+        p99_us=1e-3 * float(p99_ns),
+        ratio=_ratio(own, reference, np.arange(len(own))),
+        low=float(low),
+        high=float(high),
     )
 
 

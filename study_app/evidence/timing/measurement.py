@@ -367,7 +367,7 @@ class Limit:
         return f"{self.level}: {self.said}: {'met' if self.held else 'missed'}"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Timed:
     """What one run found; ``loops`` come by priority class, the best last, the servo first in each."""
 

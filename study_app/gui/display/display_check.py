@@ -46,6 +46,16 @@ def check_display(environment: Mapping[str, str] = os.environ, platform: str = s
     _reach(display)
 
 
+def missing_for_windows() -> str:
+    """Return which system library Qt's X11 plugin lacks and what brings it, also without a display; "" if none."""
+    try:
+        if platform_is_linux():
+            _load_plugin()
+    except DisplayError as error:
+        return str(error)
+    return ""
+
+
 def missing_library(error: OSError | ImportError) -> DisplayError:
     """Return what to tell of a system library that Qt could not load."""
     library = str(error).partition(":")[0]

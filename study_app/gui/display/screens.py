@@ -15,7 +15,7 @@ from study_app.errors import DisplayError
 FRAME_LOOKS_MS = (300, 1000, 3000)  # when to look for the frame that a window manager puts around a new window
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ScreenShown:
     """A screen as the system tells it: sizes in logical pixels and, where it knows them (else 0), in millimetres."""
 

@@ -56,7 +56,7 @@ _HTML_IMAGE: Final = re.compile(r'<img src="([^"]+)"[^>]*alt="([^"]*)"[^>]*>')
 _EMPTY_CELL: Final = re.compile(r"(?<=\|) *(?=\|)")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class HelpEntry:
     """One row of the list of pages: its page, its title, whether it heads a section, and where it is opened."""
 
@@ -69,10 +69,10 @@ class HelpEntry:
 @cache
 def entries() -> tuple[HelpEntry, ...]:
     """Return the pages in the order of the sections, each section after its own page."""
-    rows = [HelpEntry(FIRST_PAGE, "Start page", heads=True)]
+    rows = [HelpEntry(page=FIRST_PAGE, title="Start page", heads=True)]
     for section, pages in documentation.sections().items():
-        rows.append(HelpEntry(section, plain(documentation.title(section)), heads=True))
-        rows += [HelpEntry(page, plain(documentation.title(page))) for page in pages]
+        rows.append(HelpEntry(page=section, title=plain(documentation.title(section)), heads=True))
+        rows += [HelpEntry(page=page, title=plain(documentation.title(page))) for page in pages]
     return tuple(rows)
 
 
@@ -82,7 +82,11 @@ def found(words: str) -> tuple[HelpEntry, ...]:
         return entries()
     titles = {entry.page: entry.title for entry in entries()}
     return tuple(
-        HelpEntry(one.page, titles[one.page], anchor="" if one.heading == titles[one.page] else anchor_of(one.heading))
+        HelpEntry(
+            page=one.page,
+            title=titles[one.page],
+            anchor="" if one.heading == titles[one.page] else anchor_of(one.heading),
+        )
         for one in documentation.search(words)
     )
 

@@ -1,7 +1,8 @@
 """The dialogs of the home page: a new session, a rehearsal, the workspace. Nothing is created before one accepts."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +25,15 @@ from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
 from study_app.gui.widgets.cards import Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
+from study_app.protocol.checks.untranslated import check_translated
 from study_app.protocol.groups import refuse_beyond_last
+from study_app.protocol.load import read_document
 from study_app.protocol.model import Protocol
+from study_app.protocol.source.files import source_bytes
 from study_app.protocol.wording.languages import language_name
 from study_app.session.simulated.rehearsal_worker import TASK, RehearsalClient, RehearsalOrder
 from study_app.session.start import MAX_SEED, NewSession, check_row, draw_seed, study_results
+from study_app.store.blinded.allocation import Claim, check_choice, claims
 from study_app.store.blinded.blinding import check_conditions
 from study_app.store.folders import StudyFolder, rehearsal_folder
 from study_app.store.sessions.begin import MAX_SESSION, UsedIds, check_participant, used_ids
@@ -56,12 +61,14 @@ class RehearsalDialog(Work):
         self, facts: StudyFacts, results: Path, *, theme: Theme = LIGHT, parent: QWidget | None = None
     ) -> None:
         self.folder = rehearsal_folder(results, facts.protocol.study.name)
+        groups = ", ".join(facts.protocol.groups)
+        dealt = f" They are dealt evenly to the groups {groups}." if facts.protocol.asks_group else ""
         super().__init__(
             parent,
             theme,
             f"Rehearse {facts.title}",
             "Whole sessions run faster than real time, with simulated participants. They are marked as simulated and "
-            f"stored separately, in {self.folder}.",
+            f"stored separately, in {self.folder}.{dealt}",
             ActionButton("fast_forward", "Rehearse", role="primary"),
             fields=(
                 Field("participants", "Simulated participants", "count", limits=(1, MAX_PARTICIPANTS)),
@@ -132,15 +139,25 @@ FRAME = 60  # of a window, at most
 INSIDE, OUTSIDE = "in the workspace", "outside the workspace: Home will not list its sessions"
 HOLDS = "It will contain the folders protocols and results."
 ROW_HINT = "the session takes that participant's row of the square; empty: its own row"
+PLACE_HINT = "the session takes that participant's order and place in the group; empty: its own"
+GROUP_HINT = "what the participant already is; recorded"
 
 
 @dataclass(frozen=True, slots=True)
 class StudyFolderState:
-    """A study's folder when it was read: which ids are used, and why no session of the study can be put there."""
+    """A study's folder when it was read: which ids are used, and why no session of the study can be put there.
+
+    ``held`` are the entries of its participants in groups.
+    """
 
     path: Path
     used: UsedIds
+    held: tuple[Claim, ...]
     fault: str
+
+    def group_of(self, participant: str) -> str | None:
+        """Return the recorded pre-existing group of a participant; None: there is none yet."""
+        return next((claim.group for claim in self.held if claim.participant == participant), None)
 
 
 def read_study_folder_state(path: Path, protocol: Protocol) -> StudyFolderState:
@@ -153,7 +170,7 @@ def read_study_folder_state(path: Path, protocol: Protocol) -> StudyFolderState:
         check_conditions(path, protocol)
     except StoreError as error:
         fault = str(error)
-    return StudyFolderState(path, used, fault)
+    return StudyFolderState(path, used, tuple(claims(folder)), fault)
 
 
 class NewSessionDialog(QDialog):
@@ -222,7 +239,11 @@ class NewSessionDialog(QDialog):
             Field("windowed", "In a window instead of full screen", "check"),
             Field("pilot", "Pilot: marked by a frame, stored separately", "check"),
             Field("results", "Results folder of this study", "folder"),
-            Field("row_of", "Replaces participant", aside=ROW_HINT, parse=lambda text: text or None),
+            choice("group", "Group", {name: name for name in self.facts.protocol.groups}, aside=GROUP_HINT),
+            Field(
+                "row_of", "Replaces participant", aside=PLACE_HINT if self.facts.protocol.groups else ROW_HINT,
+                parse=lambda text: text or None,
+            ),
             *(
                 Field(
                     option.name, option.title, "file" if option.file_filter else "line", aside=option.hint,
@@ -250,7 +271,9 @@ class NewSessionDialog(QDialog):
         for name, value in values.items():
             self.editors[name].show_value(value)
         self.editors["participant"].show_value(self._state_now().used.suggested())
-        self.editors["row_of"].setVisible(self.facts.protocol.assigns_rows)
+        self.editors["group"].show_value(None)  # chosen, never assumed
+        self.editors["group"].setVisible(self.facts.protocol.asks_group)
+        self.editors["row_of"].setVisible(self.facts.protocol.assigns_rows or bool(self.facts.protocol.groups))
 
     def _lay_out(self) -> None:
         self._ways_row, self._inside = QWidget(), QWidget()
@@ -265,6 +288,7 @@ class NewSessionDialog(QDialog):
         pairs = (
             (e["participant"], e["session"]),
             (judged,),
+            (e["group"],),
             (e["seed"], e["operator"]),
             (e["language"], e["device"]),
             (e["screen"], checks),
@@ -349,6 +373,7 @@ class NewSessionDialog(QDialog):
         for option in window_options():
             self.editors[option.name].setVisible(option.name in self._asked())
         participant, session, used = self._value("participant"), self._value("session"), self._state_now().used
+        self._show_recorded_group(self._state_now().group_of(participant))
         numbers = used.numbers(participant)
         self._ways_row.setVisible(session in numbers)
         if session in numbers:  # ways to go on that need no thought; resuming is for home
@@ -368,18 +393,35 @@ class NewSessionDialog(QDialog):
         self.begin.setEnabled(not fault)
         self._fit()
 
+    def _show_recorded_group(self, recorded: str | None) -> None:
+        """Show the group of a participant who has one, who cannot change it; otherwise it is chosen."""
+        group = self.editors["group"]
+        if recorded is not None or not group.isEnabled():
+            group.show_value(recorded)
+        group.setEnabled(recorded is None)
+
     def _refuse(self) -> None:
         """Raise an error if this cannot begin; nothing is touched to find out."""
         if not self._value("results"):
             raise ValueError("choose a results folder")
         participant, session, state = self._value("participant"), self._value("session"), self._state_now()
+        if not self._value("pilot"):
+            check_translated(self._document)
         check_participant(participant, pilot=self._value("pilot"))
         if state.fault:
             raise ValueError(state.fault)
         state.used.check_unused(participant, session)
-        check_row(self._value("row_of"), self.facts.protocol)
-        refuse_beyond_last(self.facts.protocol, session)
+        protocol, group, row_of = self.facts.protocol, self._value("group"), self._value("row_of")
+        check_row(row_of, protocol)
+        refuse_beyond_last(protocol, session)
+        if protocol.asks_group and group is None:
+            raise ValueError("choose the participant's group")
+        check_choice(protocol, state.held, participant, group=group, row_of=row_of)
         self.chosen()
+
+    @cached_property
+    def _document(self) -> Mapping[str, Any]:
+        return read_document(source_bytes(self.facts.source), self.facts.source)[0]
 
     def _asked(self) -> set[str]:
         return {option.name for option in descriptor_of(self._value("device")).window_options}

@@ -35,13 +35,13 @@ class Destination(NamedTuple):
 
 
 DESTINATIONS = (
-    Destination("home", "home", "Home", "Home"),
-    Destination("designer", "designer", "Study designer", "Designer"),
-    Destination("results", "bars", "Results", "Results"),
-    Destination("lab", "sliders", "Liquid lab", "Lab"),
-    Destination("devices", "device", "Devices", "Devices"),
-    Destination("machine", "screen", "This machine", "Machine"),
-    Destination("help", "info", "Help", "Help"),
+    Destination(name="home", icon="home", word="Home", short="Home"),
+    Destination(name="designer", icon="designer", word="Study designer", short="Designer"),
+    Destination(name="results", icon="bars", word="Results", short="Results"),
+    Destination(name="lab", icon="sliders", word="Liquid lab", short="Lab"),
+    Destination(name="devices", icon="device", word="Devices", short="Devices"),
+    Destination(name="machine", icon="screen", word="This machine", short="Machine"),
+    Destination(name="help", icon="info", word="Help", short="Help"),
 )
 
 

@@ -24,16 +24,17 @@ from study_app.number_text import counted
 from study_app.protocol.load import is_scene_file, load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial
-from study_app.protocol.source.files import at_hand, find, shipped, shipped_file
+from study_app.protocol.source.files import at_hand, find, shipped, shipped_file, without_mark
 from study_app.protocol.wording.languages import language_name
 from study_app.session.resume import begun_schedule, find_protocol, is_rehearsal, resume_at, source_to_resume
 from study_app.store import receipt
 from study_app.store.blinded.allocation import session_protocol
+from study_app.store.blinded.blinding import read_key
 from study_app.store.drafts import draft_files, draft_of, unsaved_files
 from study_app.store.folder_lock import is_open
 from study_app.store.folders import locate
 from study_app.store.journals import journal
-from study_app.store.journals.journal_events import start_of
+from study_app.store.journals.journal_events import COMPLETED, INCOMPLETE, start_of
 from study_app.store.study_settings import kept_original
 from study_app.store.workstation import recent_protocols
 from study_app.workspace import workspace
@@ -50,7 +51,7 @@ class DraftNote:
     kept_at: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class StudyFacts:
     """A protocol as a card shows it; ``source`` is the name or path it is loaded by.
 
@@ -79,7 +80,7 @@ class StudyFacts:
         return Path(self.source).stem
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class BrokenFacts:
     """A protocol file that cannot be used, and the first thing wrong with it; the rest as of `StudyFacts`."""
 
@@ -89,7 +90,7 @@ class BrokenFacts:
     draft: DraftNote | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DraftFacts:
     """A study that was never saved: the path of its file, its title, and the rest as of `StudyFacts`."""
 
@@ -177,7 +178,7 @@ def _of_draft(file: Path, draft_words: LoadWords) -> DraftFacts | None:
         return None
     title = draft_words().draft_title(draft.text, file.parent) if draft_words else ""
     note = DraftNote(f"Draft of {time_words(draft.kept_at)}, never saved", draft.kept_at)
-    return DraftFacts(str(file), title or file.stem, origin_of(str(file)), note)
+    return DraftFacts(source=str(file), title=title or file.stem, origin=origin_of(str(file)), draft=note)
 
 
 def holds_liquids_alone(source: str) -> bool:
@@ -224,7 +225,12 @@ def study_facts(source: str, draft_words: LoadWords = None) -> StudyFacts | Brok
     except ProtocolError as error:
         count = len(error.problems)
         others = f". Open it in the designer to see all {count} problems." if count > 1 else ""
-        return BrokenFacts(source, f"{error.problems[0]}{others}", origin_of(source), _draft_note(source, draft_words))
+        return BrokenFacts(
+            source=source,
+            problem=f"{error.problems[0]}{others}",
+            origin=origin_of(source),
+            draft=_draft_note(source, draft_words),
+        )
     language = operator_language(protocol)
     extent = extent_of(protocol)
     return StudyFacts(
@@ -251,7 +257,7 @@ def _draft_note(source: str, draft_words: LoadWords) -> DraftNote | None:
     """Return what is said of a draft: "Draft of today 14:02, not saved: Water"; None where all of it is saved."""
     with suppress(ProtocolError, OSError):
         file = find(source)
-        draft, content = None if is_shipped(source) else draft_of(file), file.read_bytes()
+        draft, content = None if is_shipped(source) else draft_of(file), without_mark(file.read_bytes())
         if draft is not None and draft.text.encode() != content:
             edited = (
                 draft_words().edited_words(content.decode("utf-8", "replace"), draft.text, file.parent)
@@ -278,7 +284,7 @@ def _seconds(moment: str) -> float:
         return 0.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Interrupted:
     """A session that can go on: who, where it stopped and what is on disk, in words; ``folder`` is the session's."""
 
@@ -312,7 +318,7 @@ def interrupted(
             protocol = parse(read(source), source)
             study = locate(session.folder)[0]
             protocol = session_protocol(study, protocol, session.participant, begun.session)
-            schedule = begun_schedule(protocol, begun)
+            schedule = begun_schedule(protocol, begun, read_key(study.path))
             step = resume_at(protocol, schedule, lines).step
         except StudyError:
             continue  # what is wrong with it is said when it is asked for by its folder
@@ -344,12 +350,14 @@ def place_words(protocol: Protocol, schedule: Schedule, step: int) -> str:
 
 
 def held(found: Iterable[SessionFacts], study: str) -> str:
-    """Return how many sessions of a study there are: "4 sessions, 3 complete, 1 excluded, 2 pilots"."""
+    """Return how many sessions of a study there are: "5 sessions, 3 complete, 1 incomplete, 1 excluded, 2 pilots"."""
     of_study = [session for session in found if session.study == study]
     own = [session for session in of_study if not session.kind]
     pilots = sum(session.kind == "pilot" for session in of_study)
-    complete = sum(session.status == "completed" for session in own)
+    complete = sum(session.status == COMPLETED for session in own)
+    incomplete = sum(session.status == INCOMPLETE for session in own)
     excluded = sum(session.excluded is not None for session in own)
     words = [f"{counted(len(own), 'session')}, {complete} complete" if own else "no participant yet"]
+    words += [f"{incomplete} incomplete"] * bool(incomplete)
     words += [f"{excluded} excluded"] * bool(excluded) + [counted(pilots, "pilot")] * bool(pilots)
     return ", ".join(words)

@@ -1,7 +1,7 @@
 """Commands: one table for shortcuts, tips, buttons, menus, the list of keys and what each does; their `QAction`s."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Any, Final
 
 from PySide6.QtCore import Qt
@@ -30,6 +30,7 @@ class Command:
     id: str
     words: str
     keys: tuple[str, ...]
+    _: KW_ONLY
     within: str = ""
     held: bool = False
     run: Callable[[Any], object] | None = None
@@ -62,14 +63,14 @@ COMMANDS: Final = (
     Command("file", "File, and back", ("Ctrl+E",), run=lambda place: place.parts.switch_to_file()),
     Command("back", "Previous element", ("Alt+Left",), run=lambda place: place.ask("back")),
     Command("page", "Participant's page", ("Ctrl+Return",)),
-    Command("leave page", "Leave that page", ("Escape",), "page"),
+    Command("leave page", "Leave that page", ("Escape",), within="page"),
     Command("language", "That page in the next language", ("Ctrl+L",)),
     Command("add", "Add", ("Insert",), run=lambda place: place.ask_to_add()),
-    Command("open entry", "Open what an entry names", ("Return",), "lists"),
+    Command("open entry", "Open what an entry names", ("Return",), within="lists"),
     Command("duplicate", "Duplicate", ("Ctrl+D",), run=lambda place: place.duplicate()),
     Command("series", "Copies that differ in one number", ("Ctrl+Shift+D",), run=lambda place: place.make_series()),
     Command("rename", "Rename", ("F2",), run=lambda place: place.rename()),
-    Command("delete", "Delete", ("Delete",), LISTS, run=lambda place: place.delete()),
+    Command("delete", "Delete", ("Delete",), within=LISTS, run=lambda place: place.delete()),
     Command("up", "Move up", ("Alt+Up",), run=lambda place: place.move_by(-1)),
     Command("down", "Move down", ("Alt+Down",), run=lambda place: place.move_by(1)),
     Command("new", "New study …", ("Ctrl+N",), run=lambda place: place.begin_new()),
@@ -78,13 +79,13 @@ COMMANDS: Final = (
     Command("undo", "Undo", ("Ctrl+Z",), run=lambda place: place.finish("undo")),
     Command("redo", "Redo", ("Ctrl+Shift+Z", "Ctrl+Y"), run=lambda place: place.finish("redo")),
     Command("play", "Play from here", ("F5",)),
-    Command("stop", "Stop playing", ("Escape",), "windows while playing", held=True),
+    Command("stop", "Stop playing", ("Escape",), within="windows while playing", held=True),
     Command("keys", "Keys", ("Shift+F1",), run=lambda place: place.keys_asked.emit()),
-    Command("next field", "Next field", ("Tab",), "field"),
-    Command("accept", "Accept", ("Return",), "field"),
-    Command("restore", "Restore", ("Escape",), "field"),
-    Command("remove", "Remove its key from the file", ("Ctrl+Delete",), "field"),
-    Command("count", "Count up, down", ("Up", "Down"), "field"),
+    Command("next field", "Next field", ("Tab",), within="field"),
+    Command("accept", "Accept", ("Return",), within="field"),
+    Command("restore", "Restore", ("Escape",), within="field"),
+    Command("remove", "Remove its key from the file", ("Ctrl+Delete",), within="field"),
+    Command("count", "Count up, down", ("Up", "Down"), within="field"),
 )
 _OF: Final = {one.id: one for one in COMMANDS}
 _NAMES: Final = {"Return": "Enter", "Escape": "Esc", "Insert": "Ins", "Delete": "Del"}

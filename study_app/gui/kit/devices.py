@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from study_app.gui.theme.theme import Tone
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DeviceShown:
     """A device: ``name`` is for ``--device``, ``can`` says what it can and cannot do.
 
@@ -61,7 +61,16 @@ def device_named(name: str, shown: Iterable[DeviceShown]) -> DeviceShown:
     try:
         kind = descriptor_of(name).name
     except DeviceError as error:
-        return DeviceShown(name, name, "device", "bad", "warning", "Not known", "", _sentence(str(error)))
+        return DeviceShown(
+            name=name,
+            title=name,
+            icon="device",
+            tone="bad",
+            sign="warning",
+            word="Not known",
+            can="",
+            why=_sentence(str(error)),
+        )
     for device in shown:
         if device.name.partition(":")[0] == kind:
             return device
@@ -72,7 +81,9 @@ def looking(name: str) -> DeviceShown:
     """Return what to show of a device before anybody looked."""
     device = _descriptor(name)
     icon = "device" if device is None else device.icon
-    return DeviceShown(name, title_of(name), icon, "neutral", "clock", "Looking …", "", "")
+    return DeviceShown(
+        name=name, title=title_of(name), icon=icon, tone="neutral", sign="clock", word="Looking …", can="", why=""
+    )
 
 
 def device_label(device: str) -> str:

@@ -110,7 +110,14 @@ class Question(QDialog):
             super().accept()
 
     def is_complete(self) -> bool:
-        """Return whether nothing is missing; what is, is said, and gets the keyboard."""
+        """Return whether nothing is missing or refused; what is, is said, and gets the keyboard."""
+        for editor in self.editors.values():
+            try:
+                _ = editor.value
+            except ValueError as refusal:
+                editor.show_refusal(str(refusal))
+                editor.control.setFocus()
+                return False
         for name, sentence in self._needs.items():
             if not self.value(name):
                 self.missing.setText(sentence)

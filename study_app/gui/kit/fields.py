@@ -1,7 +1,7 @@
 """Forms made from descriptions: a `Field` describes one value, an `Editor` is its label, control and line below."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,6 +14,7 @@ from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, Number, Radio, Toggle
 from study_app.gui.widgets.labels import label, set_ink, set_property
 from study_app.gui.widgets.numbers import read_number, write_number
+from study_app.number_text import readings_of, unclear_number
 from study_app.session.start import MAX_SEED
 
 LEAST_WORDS = 280  # narrower, wrapped words would ask for room that they do not need
@@ -37,6 +38,7 @@ class Field:
     kind: Literal["line", "count", "choice", "radio", "switch", "check", "file", "folder"] = "line"
     options: tuple[tuple[Any, str], ...] = ()
     limits: tuple[int, int] = (0, 0)
+    _: KW_ONLY
     unit: str = ""
     hint: str = ""
     aside: str = ""
@@ -47,9 +49,9 @@ class Field:
     write: Callable[[Any], str] = str
 
 
-def choice(name: str, label: str, options: Mapping[Any, str]) -> Field:
+def choice(name: str, label: str, options: Mapping[Any, str], aside: str = "") -> Field:
     """Return the field of a choice between values with their words."""
-    return Field(name, label, "choice", tuple(options.items()))
+    return Field(name, label, "choice", tuple(options.items()), aside=aside)
 
 
 def number(
@@ -60,6 +62,8 @@ def number(
 
     def parse(text: str) -> float | None:
         value = read_number(text) if text else None
+        if len(readings_of(text)) == 2:
+            raise ValueError(f"{unclear_number(text)}.")
         if (text or not may_miss) and (value is None or not limits[0] <= value <= limits[1]):
             raise ValueError(permitted)
         return value
@@ -163,7 +167,8 @@ class Editor(QWidget):
             case "radio":
                 return Radios(self.field.options)
             case "count":
-                count = Number(*self.field.limits, self.field.limits[0])
+                lowest, highest = self.field.limits
+                count = Number(lowest, highest, lowest)
                 count.valueChanged.connect(lambda _value: self.edited.emit(self.field.name))
                 return count
             case "choice":
@@ -201,7 +206,9 @@ class Editor(QWidget):
             case QComboBox():
                 at = self.control.currentIndex()
                 return self._values[at] if at >= 0 else None
-            case QSpinBox():
+            case Number():
+                if refusal := self.control.refusal:
+                    raise ValueError(f"{refusal}.")
                 return self.control.value()
             case QLineEdit():
                 return self.field.parse(self.control.text().strip())

@@ -367,9 +367,9 @@ class ErrorCard(ReadingCard):
     def show_view(self, view: LabView) -> None:
         if self.show_blind(view.workbench.blind):
             return
-        rows = view.errors or (ErrorRow("Not measured yet", ""),)
+        rows = view.errors or (ErrorRow(measure="Not measured yet", value=""),)
         if view.measuring and not view.errors and self.lines and self.lines[0].value.text():
-            rows = tuple(ErrorRow(line.name.whole, UNKNOWN) for line in self.lines)
+            rows = tuple(ErrorRow(measure=line.name.whole, value=UNKNOWN) for line in self.lines)
         _fit(self.lines, len(rows), ErrorLine, self._lines)
         for line, row in zip(self.lines, rows, strict=True):
             line.show_error(row)

@@ -30,7 +30,7 @@ SPAN_S = 2.5
 SIDES: tuple[Side, Side] = ("A", "B")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Now:
     """Where the hand is [m, hand frame], the force felt on it [N], the wake that the body meets [m/s, scene]."""
 
@@ -48,7 +48,7 @@ class CostRow:
     why: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ErrorRow:
     """A measure of how far the felt setting is from its reference, written out: ("Force, largest", "< 0.001 N")."""
 
@@ -57,7 +57,7 @@ class ErrorRow:
     note: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DeviceShown:
     """Which devices can be chosen, which is, and how it is: ``state`` is one or two words.
 
@@ -72,7 +72,7 @@ class DeviceShown:
     diagnosable: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LabView:
     """Everything on the liquid lab's place.
 

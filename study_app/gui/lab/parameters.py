@@ -18,6 +18,7 @@ from study_app.gui.widgets.numbers import NumberField, Range, Slider, read_numbe
 from study_app.haptics.model.effect import Parameter, Value
 from study_app.lab.ab_comparison import Setting, Side, other
 from study_app.lab.parameters import OFF, ON, Section, sections
+from study_app.number_text import readings_of, unclear_number
 
 SWITCH_HEIGHT = 44
 WIDEST = 190
@@ -386,6 +387,9 @@ class NumberRow(ParameterRow):
     def _misread(self, text: str) -> None:
         preset = self._row.preset if self._row is not None else None
         example = self._text(preset) if isinstance(preset, int | float) else "1.5"
+        if len(readings_of(text)) == 2:
+            self.show_refused(f"{unclear_number(text)}, or press Esc.")
+            return
         said = f"“{text}” is not a number" if text.strip() else "This needs a number"
         self.show_refused(f"{said}: write one such as {example}, or press Esc.")
 

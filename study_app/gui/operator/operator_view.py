@@ -13,7 +13,7 @@ from typing import Final, Literal
 from study_app.devices.descriptor import Icon
 from study_app.gui.operator.servo_health import ForceFigures, Tile, Vitals, force_rows, health_tiles
 from study_app.gui.sessions.session_facts import broken_words, operator_language, step_title
-from study_app.number_text import counted, grouped, minutes
+from study_app.number_text import grouped, minutes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import FormStep, Schedule, Step, Trial
 from study_app.protocol.tracks import design_of
@@ -21,6 +21,7 @@ from study_app.protocol.wording.languages import words
 from study_app.store.columns import SEALED
 from study_app.store.delivered import Broken
 from study_app.store.journals.journal_events import Note
+from study_app.store.missing_trials import REASONS
 from study_app.store.progress import Progress, TrialAnswer
 
 State = Literal["preparing", "running", "paused", "force off", "trouble", "ended"]
@@ -38,7 +39,7 @@ class StepRow:
     note: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TrialTime:
     """Time in the task: ``most_s`` None where the task has no end of its own."""
 
@@ -63,17 +64,17 @@ class DeviceView:
     rows: tuple[tuple[str, str], ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class OperatorView:
     """Everything on the operator's window except the two plots' points.
 
     ``elapsed_s`` is the time that was worked: not the gap before a session was resumed. ``main_trials`` counts those
     that were left behind, and all. ``trial`` is the number of the trial under way or answered.
     ``waits`` says that the trouble is a disk that takes nothing: the session goes on when it does again. ``beyond``
-    says whether the device is slower than at the start, which outlets and recordings were lost, then of each trial out
-    of limits which it broke, the newest first. ``may_reconnect`` says that the trouble is a device that can be
-    connected again, ``reconnects`` that it is being so, ``reconnection`` how far that is, or why it failed. ``track``
-    says how the track of the latest trial with a design is doing, without a level.
+    says whether the device is slower than at the start, which outlets and recordings were lost, how many trials were
+    not delivered, then of each trial out of limits which it broke, the newest first. ``may_reconnect`` says that the
+    trouble is a device that can be connected again, ``reconnects`` that it is being so, ``reconnection`` how far that
+    is, or why it failed. ``track`` says how the track of the latest trial with a design is doing, without a level.
     """
 
     study: str
@@ -155,7 +156,7 @@ class Session:
     def main_trials(self, progress: Progress) -> tuple[int, int]:
         """Return how many main trials were left behind, and how many there are."""
         main = [at for at, step in enumerate(self.schedule.steps) if isinstance(step, Trial) and step.phase == "main"]
-        return sum(at < progress.here or progress.ended == "completed" for at in main), len(main)
+        return sum(at < progress.here or progress.reached_end for at in main), len(main)
 
     def broken(self, progress: Progress) -> dict[int, tuple[Broken, ...]]:
         """Return what the trials done broke, as far as the operator may know: if double-blind, lateness and gaps."""
@@ -229,6 +230,7 @@ def operator_view(
             *(f"{title}: {reason}" for title, reason in {**progress.outlets_lost, **(outlets_lost or {})}.items()),
             *_lost(session, progress, {**progress.lost, **(lost or {})}),
             *_lacking(session, progress, {trial.number: dropped} if trial is not None and dropped else {}),
+            *filter(None, [str(progress.missing_trials)]),
             *_beyond(session, progress),
         ),
         blinding=session.protocol.study.blinding,
@@ -263,6 +265,7 @@ def _state_word(state: State, progress: Progress) -> str:
     if progress.ended:
         return {
             "completed": "Complete",
+            "incomplete": "Incomplete",
             "withdrawn": "Withdrawn",
             "aborted": "Ended early",
             "broken": "Ended after a fault",
@@ -287,7 +290,9 @@ def _part_line(session: Session, trial: Trial | None) -> str:
 
 def _heading(session: Session, progress: Progress) -> str:
     if progress.ended:
-        return {"completed": "Session complete"}.get(progress.ended, "Session ended")
+        return {"completed": "Session complete", "incomplete": "Session incomplete"}.get(
+            progress.ended, "Session ended"
+        )
     if progress.here < 0:
         return "Getting ready"
     trial = session.trial(progress)
@@ -302,7 +307,7 @@ def _heading(session: Session, progress: Progress) -> str:
 def _setting_line(session: Session, progress: Progress, *, answering: bool) -> str:
     if progress.ended:
         shown = f"Fingerprint {progress.fingerprint}" if progress.fingerprint else ""
-        return "  ·  ".join(filter(None, ("All answers are on disk", unanswered_words(progress), shown)))
+        return "  ·  ".join(filter(None, ("All answers are on disk", str(progress.missing_trials), shown)))
     trial = session.trial(progress)
     if trial is None:
         if progress.here < 0:
@@ -318,7 +323,7 @@ def _setting_line(session: Session, progress: Progress, *, answering: bool) -> s
         doing = "paused"
     elif answering:
         doing = "answering"
-    if task.targets_m:
+    if task.targets_m and not (progress.start and progress.start.measures_sealed):  # a delay shows in their number
         doing += f"  ·  {progress.targets} {'targets' if task.wanted is None else f'of {task.wanted} targets'}"
     if trial.phase != "main":
         return doing.capitalize()
@@ -335,14 +340,14 @@ def _trial_time(session: Session, progress: Progress, now_s: float) -> TrialTime
     if elapsed is None:
         elapsed = now_s - (progress.trial_since_s if progress.trial_since_s is not None else now_s)
     if progress.of_intervals == trial.number:  # the task's limits are those of each interval
-        return TrialTime(elapsed, None, None)
-    return TrialTime(elapsed, task.least_s, task.limit_s)
+        return TrialTime(elapsed_s=elapsed, least_s=None, most_s=None)
+    return TrialTime(elapsed_s=elapsed, least_s=task.least_s, most_s=task.limit_s)
 
 
 def _step_row(stage: Stage, progress: Progress) -> StepRow:
     many = stage.last - stage.first + 1
     spent = sum(progress.durations_s.get(step, 0.0) for step in range(stage.first, stage.last + 1))
-    if progress.here > stage.last or progress.ended == "completed":
+    if progress.here > stage.last or progress.reached_end:
         return StepRow(stage.label, "done", minutes(spent))
     if stage.first <= progress.here <= stage.last:
         place = f"{progress.here - stage.first + 1} of {many}" if many > 1 else "now"
@@ -351,10 +356,11 @@ def _step_row(stage: Stage, progress: Progress) -> StepRow:
 
 
 def _counts(session: Session, progress: Progress) -> tuple[tuple[str, str], ...]:
-    broken = session.broken(progress).values()
+    broken, missing = session.broken(progress).values(), progress.missing_trials
     return (
         ("Answers on disk", f"{sum(progress.answered.values())} of {session.answers_of}"),
         ("Trials within limits", f"{sum(not one for one in broken)} of {len(broken)}"),
+        *([("Trials not delivered", f"{missing.count} of {missing.asked}")] if missing.count else []),
         ("Marks, repeats", f"{sum(note.kind == 'mark' for note in progress.notes)}, {progress.repeats}"),
     )
 
@@ -430,19 +436,6 @@ def _block_rows(protocol: Protocol, schedule: Schedule, first: int, last: int, l
 
 LONG_RUN: Final = 8
 """So many equal answers in a row are marked."""
-UNDELIVERED: Final[Mapping[str, str]] = {
-    "lateness_ms": "the servo was late",
-    "worst_gap_ms": "the servo missed ticks",
-    "delay_error_ms": "the visual delay was not kept",
-    "frame_gap_ms": "frames were late or missing",
-    "withheld_percent": "force was withheld for safety",
-    "targets_percent": "too few targets were reached",
-    "level_error_percent": "the force was not as requested",
-    "level_error_ms": "the visual delays did not differ as requested",
-    "pace_error_percent": "the hand did not keep the pace",
-    "force_limit_n": "the force limit was reached",
-}
-"""Why an interval was invalid, by the key of the limit that it broke."""
 FAST_S: Final = 0.3
 """A median time to answer below this is marked [s]."""
 
@@ -455,22 +448,15 @@ def track_words(progress: Progress, schedule: Schedule, trial: Trial, choices: M
     own = [one.number for one in schedule.trials if (one.block, one.code) == (trial.block, trial.code)]
     answers = [progress.trial_answers[number] for number in own if number in progress.trial_answers]
     limits = Counter(limit for number in own for limit in progress.undelivered.get(number, ()))
-    behind = [number for number in own if progress.steps.get(number, progress.here) < progress.here]
-    given_up = [number for number in behind if number in progress.undelivered and number not in progress.trial_answers]
+    given_up = [one for one in progress.missing_trials.missing if one.trial in own]
     reasons = Counter(reason for number in own for reason in progress.repeated.get(number, ()))
     return (
         f"Track {trial.code}: {len(answers)} of at most {grouped(len(own))} answered",
         *(_of_answers(answers, choices) if answers else ()),
         *(f"repeated {count}: {reason}" for reason, count in reasons.items()),
-        *(f"not delivered {count}: {UNDELIVERED.get(limit, limit)}" for limit, count in limits.items()),
+        *(f"not delivered {count}: {REASONS.get(limit, limit)}" for limit, count in limits.items()),
         *([f"{len(given_up)} unanswered: no attempt was delivered"] if given_up else []),
     )
-
-
-def unanswered_words(progress: Progress) -> str:
-    """Return how many trials an ended session left unanswered since no attempt was delivered; "" for none."""
-    count = sum(number not in progress.trial_answers for number in progress.undelivered)
-    return f"{counted(count, 'trial')} unanswered: no attempt was delivered" if count else ""
 
 
 def _of_answers(answers: Sequence[TrialAnswer], choices: Mapping[str, str]) -> list[str]:

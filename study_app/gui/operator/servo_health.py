@@ -19,7 +19,7 @@ TRACE_WINDOW_S = 10.0
 TRACE_STEP_S = 0.02
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Vitals:
     """Figures of the tiles; a rate or percentile is None while too little has been measured.
 
@@ -38,7 +38,7 @@ class Vitals:
     first_delay_ticks: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Tile:
     """A number with its unit, a verdict and a line that says what the verdict compares with."""
 
@@ -168,32 +168,32 @@ def health_tiles(vitals: Vitals, rate_hz: float, limit_s: float) -> tuple[Tile, 
     screen = f", {vitals.frame_rate_hz:.1f} Hz" if vitals.frame_rate_hz else ""
     return (
         Tile(
-            "Servo rate",
-            "–" if rate is None else f"{rate:.1f}",
-            "Hz",
-            "open" if rate is None else _verdict(abs(rate - rate_hz) <= 0.01 * rate_hz),
-            f"of {rate_hz:.0f} Hz",
+            title="Servo rate",
+            value="–" if rate is None else f"{rate:.1f}",
+            unit="Hz",
+            verdict="open" if rate is None else _verdict(abs(rate - rate_hz) <= 0.01 * rate_hz),
+            line=f"of {rate_hz:.0f} Hz",
         ),
         Tile(
-            "Lateness, p99",
-            p99_value,
-            p99_unit,
-            "open" if p99 is None else _verdict(p99 <= limit_s),
-            f"limit {duration_words(limit_s)}",
+            title="Lateness, p99",
+            value=p99_value,
+            unit=p99_unit,
+            verdict="open" if p99 is None else _verdict(p99 <= limit_s),
+            line=f"limit {duration_words(limit_s)}",
         ),
         Tile(
-            "Overruns",
-            grouped(vitals.overruns),
-            "",
-            "open" if vitals.ticks == 0 else _verdict(vitals.overruns <= vitals.ticks * 1e-4),
-            f"of {grouped(vitals.ticks)} ticks",
+            title="Overruns",
+            value=grouped(vitals.overruns),
+            unit="",
+            verdict="open" if vitals.ticks == 0 else _verdict(vitals.overruns <= vitals.ticks * 1e-4),
+            line=f"of {grouped(vitals.ticks)} ticks",
         ),
         Tile(
-            "Refreshes missed",
-            grouped(vitals.refreshes_missed),
-            "",
-            "open" if vitals.refreshes == 0 else _verdict(vitals.refreshes_missed <= 0.01 * vitals.refreshes),
-            f"of {grouped(vitals.refreshes)}{screen}",
+            title="Refreshes missed",
+            value=grouped(vitals.refreshes_missed),
+            unit="",
+            verdict="open" if vitals.refreshes == 0 else _verdict(vitals.refreshes_missed <= 0.01 * vitals.refreshes),
+            line=f"of {grouped(vitals.refreshes)}{screen}",
         ),
     )
 
@@ -209,7 +209,7 @@ LIMITERS = tuple(limiter for limiter in ALL_LIMITERS if not limiter.expected)
 FORCE, SIZE = slice(0, 3), 3
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ForceFigures:
     """Of the trial under way, or the last: the force's share of its limit (now, most), and ticks by limiter.
 
@@ -275,7 +275,9 @@ class Forces:
         )
         permitted_n, withheld_n = self._sums_n
         withheld = float(withheld_n / permitted_n) if permitted_n > 0 else 0.0
-        return ForceFigures(self._now_n / self.limit_n, self._most_n / self.limit_n, counted, withheld)
+        return ForceFigures(
+            share=self._now_n / self.limit_n, most=self._most_n / self.limit_n, limiters=counted, withheld=withheld
+        )
 
     def _keep(self, steps: NDArray[np.int64], rows: Floats) -> None:
         firsts = np.concatenate(([0], np.flatnonzero(np.diff(steps)) + 1))

@@ -286,13 +286,13 @@ class OperatorWindow(Themed, QMainWindow):
             assert self.question is not None  # noqa: S101 - just made
             self.question.back.setDefault(True)
 
-    def _ask(self, what: str, *words: Any, **more: Any) -> None:
+    def _ask(self, what: str, title: str, explanation: str, go_on: ActionButton, **more: Any) -> None:
         """Open a question, unless one is open; what it asks for is asked for with its values."""
         if self.question is not None:
             self.question.raise_()
             self.question.activateWindow()
             return
-        question = self.question = Question(self, self.theme, *words, **more)
+        question = self.question = Question(self, self.theme, title, explanation, go_on, **more)
         question.accepted.connect(lambda: self.ask(what, *map(question.value, question.editors)))
         question.finished.connect(self._question_answered)
         question.show()

@@ -37,7 +37,7 @@ from study_app.protocol.questions import (
     Value,
     plain_number,
 )
-from study_app.protocol.table import UNPRINTABLE
+from study_app.protocol.table import UNPRINTABLE, characters
 from study_app.protocol.wording.languages import Words
 
 SHORT = 12  # letters of options of which three stand side by side
@@ -127,7 +127,7 @@ class Entry(EntryKeys, QLineEdit):
 
 
 class NumberField(TypedField):
-    """Point or comma; an entry that is not a permitted number is reported and not taken."""
+    """Point or comma; an entry that is not one permitted number is reported and not taken."""
 
     widget_id: ClassVar[str] = "number"
 
@@ -141,7 +141,7 @@ class NumberField(TypedField):
         self.entry.textChanged.connect(self._edit)
         self._unit = QLabel(view.unit)
         self._unit.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
-        more = (*(() if view.whole else (".",)), *self._signs())
+        more = (*(() if view.whole else (words.decimal_sign,)), *self._signs())
         self._pad = DigitPad(self.entry, more, ACROSS, words.delete_digit, self)
         self._wrong = QLabel(wordWrap=True)
         self._wrong.setStyleSheet(f"color: {PARTICIPANT.warn}; background: transparent;")
@@ -164,7 +164,7 @@ class NumberField(TypedField):
     def show_answer(self, value: Value) -> None:
         self.kept(value)
         if isinstance(value, int | float):
-            self._write(write_number(value, 9))
+            self._write(write_number(value, 9, self._words.decimal_sign))
 
     def clear(self) -> None:
         self._timer.stop()
@@ -184,7 +184,8 @@ class NumberField(TypedField):
     def height_in(self, width: int, room: int) -> int:
         """Return the height [px] that the question needs where its entry is reported as wrong, too."""
         problem = self._wrong.text()
-        self._wrong.setText(problem or self._expected())
+        unclear = self._words.unclear_number("888,888") or self._words.unclear_number("888.888")
+        self._wrong.setText(problem or max(unclear, self._expected(), key=len))
         self._wrong.show()
         height = super().height_in(width, room)
         self._wrong.setText(problem)
@@ -202,9 +203,9 @@ class NumberField(TypedField):
             self._say("")
             self.take_back()
             return True
-        number = read_number(text)
+        number = read_number(text, self._words.decimal_sign)
         if number is None or not self._number.permits(number):
-            self._say(self._expected())
+            self._say(self._words.unclear_number(text) or self._expected())
             self.take_back()
             return False
         self._say("")
@@ -225,7 +226,7 @@ class NumberField(TypedField):
 
     def _take(self) -> None:
         """Take what was typed so far if it is a number; while one types, nothing is reported."""
-        number = read_number(self.entry.text())
+        number = read_number(self.entry.text(), self._words.decimal_sign)
         if number is not None and self._number.permits(number):
             self.give(plain_number(number))
         else:
@@ -234,7 +235,9 @@ class NumberField(TypedField):
     def _expected(self) -> str:
         words, view = self._words, self._number
         kind = words.whole_number if view.whole else words.any_number
-        least, most = (None if one is None else write_number(one, 9) for one in (view.least, view.most))
+        least, most = (
+            None if bound is None else write_number(bound, 9, words.decimal_sign) for bound in (view.least, view.most)
+        )
         if least is not None and most is not None:
             return words.number_between.format(kind=kind, least=least, most=most)
         if least is not None:
@@ -563,19 +566,27 @@ class TextField(TypedField):
 
     def _edit(self) -> None:
         """Keep the text within its length, and free of what cannot be printed."""
-        text = self.entry.toPlainText()
-        kept = "".join(one for one in text if one == "\n" or unicodedata.category(one) not in UNPRINTABLE)
-        kept = kept[: self._shown.longest]
-        if self._shown.lines == 1:
-            kept = kept.replace("\n", " ")
+        text, cursor = self.entry.toPlainText(), self.entry.textCursor()
+        kept = "".join(characters(self._printable(text))[: self._shown.longest])
         if kept != text:
-            place = min(self.entry.textCursor().position(), len(kept))
+            before = _utf16(text)[: 2 * cursor.position()].decode("utf-16-le", "surrogatepass")
+            place = min(len(_utf16(self._printable(before))), len(_utf16(kept))) // 2
             with QSignalBlocker(self.entry):
                 self.entry.setPlainText(kept)
             cursor = self.entry.textCursor()
             cursor.setPosition(place)
             self.entry.setTextCursor(cursor)
         self._timer.start()
+
+    def _printable(self, text: str) -> str:
+        """Return a text without what cannot be printed; a field of one line has no line breaks."""
+        kept = "".join(one for one in text if one == "\n" or unicodedata.category(one) not in UNPRINTABLE)
+        return kept.replace("\n", " ") if self._shown.lines == 1 else kept
+
+
+def _utf16(text: str) -> bytes:
+    """Return a text as Qt counts its places, of two bytes each."""
+    return text.encode("utf-16-le", "surrogatepass")
 
 
 FIELDS: Final[dict[str, type[QuestionField]]] = {

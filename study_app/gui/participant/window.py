@@ -25,6 +25,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.display.screens import place
+from study_app.gui.key_presses import ignores_clicks, key_presses
 from study_app.gui.participant.forms.questions_page import FormWidget
 from study_app.gui.participant.intervals.answer_page import ChoiceWidget, FeedbackWidget, NumberWidget, SettingControls
 from study_app.gui.participant.pages.page_widget import PageContext, PageWidget
@@ -248,6 +249,7 @@ class ParticipantWindow(QWidget):
         self.painting: Thread | None = None
         self.frame_px = PILOT_FRAME if pilot else 0
         self._page: Page | None = None
+        self._presses = key_presses()
         self._widget: PageWidget | TankWidget = self._wait_page(said.preparing)
         self._capture = PointerCapture(self)
         self._capture.moved.connect(self.pointer)
@@ -333,6 +335,7 @@ class ParticipantWindow(QWidget):
             self._put(self._make(page, self._widget))
 
     def _put(self, made: PageWidget | TankWidget) -> None:
+        self._presses.begin_page(made)
         old = self._widget
         if isinstance(old, TankWidget):
             old.painted.disconnect(self.painted)  # a late frame of one trial's tank must not begin the next trial
@@ -362,7 +365,7 @@ class ParticipantWindow(QWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         controls = None if self.tank is None else self.tank.controls
-        if (controls is not None and controls.press(event)) or event.isAutoRepeat():
+        if controls is not None and controls.press(event):
             return
         key = event.key()
         if key in (Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Enter) and self._may_leave_tank():
@@ -381,7 +384,11 @@ class ParticipantWindow(QWidget):
 
     def changeEvent(self, event: QEvent) -> None:
         super().changeEvent(event)
-        if event.type() != QEvent.Type.ActivationChange or not self._captures or self.tank is None:
+        if event.type() != QEvent.Type.ActivationChange or self.tank is None:
+            return
+        if self.tank.controls is not None and not self.isActiveWindow():
+            self.tank.controls.let_go()
+        if not self._captures:
             return
         if self.isActiveWindow() and self.isVisible() and not self._capture.held:
             self._capture.take(self.tank, self.tank.page.workspace_m)
@@ -487,6 +494,8 @@ class ParticipantWindow(QWidget):
 
     def _press(self, bits: int) -> None:
         """Take a click of the mouse that is the device: it goes on where Space would, and is a button anywhere else."""
+        if bits and ignores_clicks(self._widget):
+            return
         if bits & BUTTONS[Qt.MouseButton.LeftButton] and self._may_leave_tank():
             self.event.emit(Continue(self._clock()))
         else:

@@ -140,16 +140,16 @@ def _devices(devices: Sequence[Backend]) -> Check:
     missing = [one.name for one in devices if one.state == NOT_AVAILABLE]
     about = f"cannot be used now: {', '.join(missing)}" if missing else "every device can be used"
     if haptic:
-        return Check("Haptic devices", "ok", ", ".join(one.name for one in haptic), about)
+        return Check("Haptic devices", "ok", ", ".join(one.name for one in haptic), about=about)
     advice = "Connect one, then look at Devices; without one only the mouse and the simulated hand can be used."
-    return Check("Haptic devices", "warning", "none connected", about, advice)
+    return Check("Haptic devices", "warning", "none connected", about=about, advice=advice)
 
 
 def _compiled(cache: Path | None, compiled: int) -> Check:
     if cache is None:
-        return Check("Compiled code", "warning", "not stored", "no folder is writable", RECOMPILES)
+        return Check("Compiled code", "warning", "not stored", about="no folder is writable", advice=RECOMPILES)
     value = f"{compiled} functions compiled" if compiled else "stored"
-    return Check("Compiled code", "ok", value, f"the force model for this processor, in {cache}")
+    return Check("Compiled code", "ok", value, about=f"the force model for this processor, in {cache}")
 
 
 ROW_HEIGHT = 42

@@ -63,7 +63,7 @@ def time_of(text: object) -> datetime | None:
         return None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Trouble:
     """Why there is nothing to show, in one sentence, with the words on the button and what it does."""
 
@@ -73,7 +73,7 @@ class Trouble:
     remedy: Remedy
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ResultsView:
     """Everything the window shows.
 
@@ -384,7 +384,9 @@ class TroubleCard(Card):
         self._remedy = trouble.remedy
 
     def show_going(self, going: Progress) -> None:
-        self.show_trouble(Trouble(f"{going.what[:1].upper()}{going.what[1:]} …", "", "Stop", "stop"))
+        self.show_trouble(
+            Trouble(title=f"{going.what[:1].upper()}{going.what[1:]} …", sentence="", button="Stop", remedy="stop")
+        )
         self.bar.setVisible(True)
         self.bar.show_share(going.share)
 

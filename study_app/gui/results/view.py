@@ -322,7 +322,10 @@ PATIENCE_S: Final = 0.3
 """What takes longer than this says that it goes on."""
 NO_SAV: Final = "Files for SPSS need the package pyreadstat: pip install 'liquid-study[analysis]'"
 MISTAKE: Final = Trouble(
-    "A bug in the program stopped the evaluation", "The terminal shows the details.", "Refresh", "again"
+    title="A bug in the program stopped the evaluation",
+    sentence="The terminal shows the details.",
+    button="Refresh",
+    remedy="again",
 )
 
 Decided: TypeAlias = LeaveOut | TakeBack | OpenKey
@@ -502,7 +505,7 @@ class ResultsPlace(Place):
             width=QUESTION_PX,
         )
         decide = partial(self._decide, "opening the key", OpenKey)
-        dialog.accepted.connect(lambda: decide(dialog.value("by"), dialog.value("reason")))
+        dialog.accepted.connect(lambda: decide(by=dialog.value("by"), reason=dialog.value("reason")))
         self._open(dialog)
 
     def _open_session(self, session: SessionFacts) -> None:
@@ -513,7 +516,13 @@ class ResultsPlace(Place):
         there = [one for one in self.view.sessions if one.excluded is None]
         dialog = LeaveOutDialog(self, self.theme, there, self.view.trials, self.sessions.rows.chosen)
         decide = partial(self._decide, "leaving out", LeaveOut)
-        dialog.accepted.connect(lambda: decide(*dialog.chosen, dialog.value("by"), dialog.value("reason")))
+
+        def leave_out() -> None:
+            participant, session, trial = dialog.chosen
+            by, reason = dialog.value("by"), dialog.value("reason")
+            decide(participant=participant, session=session, trial=trial, by=by, reason=reason)
+
+        dialog.accepted.connect(leave_out)
         self._open(dialog)
 
     def _ask_take_back(self, one: Exclusion) -> None:
@@ -528,8 +537,9 @@ class ResultsPlace(Place):
             needs=NEEDS,
             width=QUESTION_PX,
         )
-        decide = partial(self._decide, "taking the exclusion back", TakeBack, *one.what)
-        dialog.accepted.connect(lambda: decide(dialog.value("by"), dialog.value("reason")))
+        which = {"participant": one.participant, "session": one.session, "trial": one.trial}
+        decide = partial(self._decide, "taking the exclusion back", TakeBack, **which)
+        dialog.accepted.connect(lambda: decide(by=dialog.value("by"), reason=dialog.value("reason")))
         self._open(dialog)
 
     def _ask_tables(self) -> None:
@@ -653,7 +663,9 @@ class ResultsPlace(Place):
                 self._take_sessions(answer)
             case StudyFound() if newest:
                 self._blocks = answer.blocks
-                nothing = Trouble("No figures", "This study has no questionnaire.", "Refresh", "again")
+                nothing = Trouble(
+                    title="No figures", sentence="This study has no questionnaire.", button="Refresh", remedy="again"
+                )
                 self._show(
                     trials=answer.trials,
                     doubts=answer.doubts,
@@ -673,7 +685,11 @@ class ResultsPlace(Place):
             chosen = max(found.studies, key=lambda one: one.newest_s).folder
         if chosen is None:
             sentence = f"The first session of a study creates its folder in {self.results}."
-            self.show_view(ResultsView(trouble=Trouble("No studies yet", sentence, "Go to Home", "home")))
+            self.show_view(
+                ResultsView(
+                    trouble=Trouble(title="No studies yet", sentence=sentence, button="Go to Home", remedy="home")
+                )
+            )
             return
         self._show(studies=found.studies)
         self._read(chosen)
@@ -718,21 +734,27 @@ class ResultsPlace(Place):
             self._read(order.folder)  # it may have changed meanwhile, and what was being read was given up
         elif refused.stopped:
             all_drawn = self._blocks and len(self._redrawn) >= self._blocks
-            trouble = None if all_drawn else Trouble("Stopped", "There are no figures yet.", "Go on", "read")
+            trouble = (
+                None
+                if all_drawn
+                else Trouble(title="Stopped", sentence="There are no figures yet.", button="Go on", remedy="read")
+            )
             self._show(untested=bool(all_drawn), trouble=trouble, drawing=None, testing=None)
         elif isinstance(order, FindStudies):
-            trouble = Trouble("The results folder cannot be read", sentence, "Refresh", "again")
+            trouble = Trouble(
+                title="The results folder cannot be read", sentence=sentence, button="Refresh", remedy="again"
+            )
             self.show_view(ResultsView(trouble=trouble))
         elif refused.lacks_extra:
             sentence = sentence.replace("this needs", "Figures need")
-            trouble = Trouble("Your data are complete", sentence, "Refresh", "again")
+            trouble = Trouble(title="Your data are complete", sentence=sentence, button="Refresh", remedy="again")
             self._show(trouble=trouble, figures=(), drawing=None, testing=None)
         elif self.view.listed and not self.view.sessions:
             sentence = "Results appear after the first session has started."
-            trouble = Trouble("No sessions yet", sentence, "Go to Home", "home")
+            trouble = Trouble(title="No sessions yet", sentence=sentence, button="Go to Home", remedy="home")
             self._show(trouble=trouble, figures=(), drawing=None, testing=None)
         else:
-            trouble = Trouble("The study cannot be read", sentence, "Refresh", "again")
+            trouble = Trouble(title="The study cannot be read", sentence=sentence, button="Refresh", remedy="again")
             self._show(trouble=trouble, figures=(), drawing=None, testing=None)
 
     def _show(self, **changes: Any) -> None:
@@ -752,9 +774,9 @@ class ResultsPlace(Place):
             self._show(trouble=None)
             self.look()
 
-    def _decide(self, what: str, order: Callable[..., Decided], *details: Any) -> None:
+    def _decide(self, what: str, order: Callable[..., Decided], **details: Any) -> None:
         if self.view.chosen is not None:
-            self._ask(order(self.view.chosen, *details), what)
+            self._ask(order(folder=self.view.chosen, **details), what)
 
     def _write(self, make: Callable[..., WriteTables | WriteReport], *details: Any) -> None:
         if self.view.chosen is not None:

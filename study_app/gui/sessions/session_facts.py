@@ -16,11 +16,15 @@ from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s, variants
 from study_app.protocol.orders.schedule import FormStep, PageStep
 from study_app.store import receipt
+from study_app.store.columns import TRIALS_MISSING
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folder_lock import is_open
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
+from study_app.store.journals.journal_events import REACHED_END
 from study_app.store.merged import session_in
+from study_app.store.missing_trials import MissingTrials
+from study_app.store.progress import progress_of
 from study_app.store.study_runs import run_of
 from study_app.store.tables.study_files import participants
 
@@ -31,13 +35,14 @@ pilots."""
 SAMPLE = "sample-"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SessionFacts:
     """A session as a row shows it.
 
     ``status`` is the table's, or "running" where a program has the session open. ``excluded`` is why the analysis
     excludes all of it, None where it does not; ``lost`` counts recordings that could not be stored, ``reconnected`` how
-    often the device failed and was connected again, ``outlets_lost`` streams and ports that failed.
+    often the device failed and was connected again, ``outlets_lost`` streams and ports that failed. ``missing`` are
+    the trials that were not delivered, None if all were.
     """
 
     participant: str
@@ -55,6 +60,7 @@ class SessionFacts:
     lost: int = 0
     reconnected: int = 0
     outlets_lost: int = 0
+    missing: MissingTrials | None = None
 
     @property
     def version(self) -> str:
@@ -81,7 +87,7 @@ class SessionFacts:
 
     @property
     def counts(self) -> bool:
-        return self.status == "completed" and self.excluded is None
+        return self.status in REACHED_END and self.excluded is None
 
     @property
     def name(self) -> str:
@@ -129,9 +135,17 @@ def session_facts(
             lost=lost,
             reconnected=reconnected,
             outlets_lost=outlets_lost,
+            missing=_missing(session) if row.get(TRIALS_MISSING.name) else None,
         )
         for (row, session), (lost, reconnected, outlets_lost) in zip(placed, counts, strict=True)
     ]
+
+
+def _missing(session: SessionFolder) -> MissingTrials | None:
+    """Return the trials of a session that were not delivered; None if its journal cannot be read."""
+    with contextlib.suppress(StoreError):
+        return progress_of(journal.read(session.journal)).missing_trials
+    return None
 
 
 def _began(row: Mapping[str, Any], session: SessionFolder) -> object:
@@ -172,6 +186,7 @@ Chipped: TypeAlias = tuple[Tone, str, str]
 
 STATUS: dict[str, Chipped] = {
     "completed": ("ok", "check", "Complete"),
+    "incomplete": ("warn", "warning", "Incomplete"),
     "running": ("accent", "play", "Running"),
     "unfinished": ("warn", "clock", "Interrupted"),
     "withdrawn": ("neutral", "cross", "Withdrawn"),
@@ -185,6 +200,7 @@ VALIDITY: dict[str | None, Chipped] = {
     None: ("neutral", "ring", "Open"),
 }
 LOST: Chipped = ("warn", "warning", "Recording lost")
+MISSING: Chipped = ("warn", "warning", "Trials missing")
 
 
 LIMIT_WORDS: Mapping[str, tuple[str, str]] = {
@@ -223,8 +239,8 @@ def validity_chip(facts: SessionFacts) -> Chipped:
     """Return what the chip says of a session's limits and recordings, or that it does not count at all."""
     if facts.excluded is not None:
         return "neutral", "cross", "Excluded"
-    if facts.lost and facts.validity != "invalid":
-        return LOST
+    if facts.validity != "invalid" and (facts.missing or facts.lost):
+        return MISSING if facts.missing else LOST
     return VALIDITY[None if facts.needs_care or facts.status == "running" else facts.validity]
 
 
@@ -291,7 +307,7 @@ def form_title(protocol: Protocol, form: str, language: str) -> str:
     return form.replace("_", " ").capitalize() if title is None else protocol.text(title, language)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Extent:
     """Parts, settings, answers and expected duration [s] of each kind of session of a study.
 

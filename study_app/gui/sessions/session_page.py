@@ -28,19 +28,20 @@ from study_app.gui.widgets.cards import Card, Chip
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.gui.widgets.row_table import CHIP_ROLE, Rows, Table
-from study_app.number_text import counted
+from study_app.number_text import capitalised, counted
 from study_app.store.blinded.blinding import opened, opened_key
 from study_app.store.delivered import beyond_limits
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folders import locate
 from study_app.store.journals import journal
-from study_app.store.journals.journal_events import Answer, Event, Note, Repeat, TrialStarted, start_of
+from study_app.store.journals.journal_events import UNDELIVERED, Answer, Event, Note, Repeat, TrialStarted, start_of
+from study_app.store.missing_trials import MISSING_PERCENT, MissingTrials
 from study_app.store.progress import progress_of
 from study_app.store.tables import session_tables
 from study_app.store.tables.study_files import row_of
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TrialRecord:
     """One presentation of a trial.
 
@@ -98,7 +99,12 @@ def read_record(folder: Path) -> SessionRecord:
     return SessionRecord(
         facts=facts,
         about=_about(lines, incidents(facts)),
-        limits=limits_sentence(trials, sealed=key is None and bool(start.measures_sealed)),
+        limits=limits_sentence(
+            trials,
+            progress_of(lines).missing_trials,
+            excluded=facts.excluded is not None,
+            sealed=key is None and bool(start.measures_sealed),
+        ),
         trials=trials,
         notes=tuple(_notes(lines)),
         files=tuple(
@@ -110,15 +116,35 @@ def read_record(folder: Path) -> SessionRecord:
     )
 
 
-def limits_sentence(trials: Sequence[TrialRecord], *, sealed: bool) -> str:
-    """Return how many trials kept the study's limits, and what that means."""
+def limits_sentence(
+    trials: Sequence[TrialRecord], missing: MissingTrials, *, excluded: bool = False, sealed: bool
+) -> str:
+    """Return how many trials were not delivered, how many kept the study's limits, and what that means."""
+    lost = f"{missing_sentence(missing, excluded=excluded)} " if missing.count else ""
+    repeated = sum(one.outcome == UNDELIVERED for one in trials)
+    again = f"{counted(repeated, 'presentation')} broke a limit and had no question. " if repeated else ""
+    return f"{lost}{again}{_judged_sentence([one for one in trials if one.outcome != UNDELIVERED], sealed=sealed)}"
+
+
+def missing_sentence(missing: MissingTrials, *, excluded: bool) -> str:
+    """Return how many trials were not delivered and why, and whether the session is included, as sentences."""
+    permitted = missing.limits.get(MISSING_PERCENT)
+    states = f" The study permits {permitted:g} % of the trials to be missing." if permitted is not None else ""
+    if missing.exceed:
+        included = "Include it again in Results to analyse it." if excluded else "It was included by a person."
+        states += f" The session is incomplete. {included}"
+    return f"{missing}. Nobody answered them.{states}"
+
+
+def _judged_sentence(trials: Sequence[TrialRecord], *, sealed: bool) -> str:
     judged = [one for one in trials if one.valid is not None]
     outside = [one for one in judged if not one.valid]
     later = " Delay error, withheld force and targets reached are judged once the study is unblinded." if sealed else ""
     if not judged:
         return f"No trial has been measured yet.{later}"
     if not outside:
-        return f"All {counted(len(judged), 'measured trial')} met the limits of the study.{later}"
+        every = "The measured trial" if len(judged) == 1 else f"All {len(judged)} measured trials"
+        return f"{every} met the limits of the study.{later}"
     return (
         f"Out of limits: {len(outside)} of {counted(len(judged), 'measured trial')} exceeded a limit of the study. The "
         "answers are kept and still count; exclude those you do not trust in Results. The column “Limits” and the line "
@@ -175,7 +201,8 @@ def _about(lines: Sequence[Event], happened: str) -> str:
     start, row = start_of(lines), session_tables.participant(lines)
     ended = row["session_ended_at"]
     said = [
-        f"Device {start.device}",
+        f"group {start.group}" if start.group is not None else "",
+        f"device {start.device}",
         f"language {row['language']}",
         f"operator {start.operator}" if start.operator else "",
         f"seed {start.seed}",
@@ -183,7 +210,7 @@ def _about(lines: Sequence[Event], happened: str) -> str:
         counted(row["resumed"], "resume") if row["resumed"] else "",
         happened,
     ]
-    return "  ·  ".join(filter(None, said))
+    return capitalised("  ·  ".join(filter(None, said)))
 
 
 def _notes(lines: Sequence[Event]) -> list[str]:
@@ -258,7 +285,10 @@ class SessionPage(Themed, QDialog):
         self._reader.done.connect(self._show)
         self._reader.failed.connect(self._show_unread)
         self.setWindowTitle(f"{facts.name}, {facts.study}")
-        self.status, self.validity = Chip(*status_chip(facts)), Chip(*validity_chip(facts))
+        tone, icon, word = status_chip(facts)
+        self.status = Chip(tone, icon, word)
+        tone, icon, word = validity_chip(facts)
+        self.validity = Chip(tone, icon, word)
         self.about, self.limits = label("", "body", "text2", wraps=True), label("", "body", wraps=True)
         self.model = Rows({heading: heading for heading in HEADINGS}, trial_cell)
         self.trials = Table(self.model, WIDTHS, "Trials")

@@ -28,10 +28,12 @@ def session_cell(facts: SessionFacts, name: str, now: datetime) -> dict[int, Any
     """Return the values of a session's cell in the column of a name, by their roles."""
     chip = {"status": status_chip, "validity": validity_chip}.get(name)
     incident = "device reconnected" if facts.reconnected else "outlet failed" if facts.outlets_lost else ""
+    missing = facts.missing
+    incident = missing.brief if missing else incident
     below = {"status": incident, "study": facts.kind}.get(name, "")
     began = started_words(facts.started, now)
     said = f"{facts.name}: began {began}, {answers_words(facts)} answers"
-    tip, face = ", ".join(filter(None, (said, incidents(facts)))), None
+    tip, face = ", ".join(filter(None, (said, str(missing or ""), incidents(facts)))), None
     match name:
         case "participant":
             words, face = facts.name, font("label", weight=600, scale=1.08)

@@ -103,7 +103,7 @@ RADIUS_CARD = 12
 SHADOW = 3  # of a card, within its rectangle
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Theme:
     """Colours by role, as ``#RRGGBB``; ``dark`` tells which way hover and shadow go.
 
@@ -176,7 +176,7 @@ PARTICIPANT = Theme(
 )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TankColours:
     """The tank's own colours: cold water-grey, the same for every liquid, so that nothing betrays which it is."""
 

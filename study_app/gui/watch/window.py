@@ -41,7 +41,8 @@ from study_app.video.encoding import VideoWriter
 LEAST_N, LEAST_MPS = 0.05, 0.01  # lower peaks are not drawn larger
 MOST_POINTS: Final = 800  # of a curve
 AXIS_PX: Final = 60  # of the plot's numbers
-FORCES_HIDDEN: Final = "Hidden while the study is blinded", "liquid-study unblind RESULTS shows forces."
+FORCES_HIDDEN: Final = "Hidden while the study is blinded"
+SHOWS_FORCES: Final = "liquid-study unblind RESULTS shows forces."
 
 
 class WatchedTank(TankWidget):
@@ -153,7 +154,7 @@ class Stage(QWidget):
         self.tank, self.line = WatchedTank(shown), TimeLine(shown)
         self.forces = None if shown.blinded else ForcePlot(shown)
         self.numbers, self.happened = figures("", "label"), Elided("label", "text2")
-        plot = self.forces or MaskedPanel(*FORCES_HIDDEN)
+        plot = self.forces or MaskedPanel(FORCES_HIDDEN, SHOWS_FORCES)
         plot.setMinimumHeight(88)
         plot.setMaximumHeight(190)
         key = label("" if shown.blinded else "N: line sent, area requested", "small", "text2")

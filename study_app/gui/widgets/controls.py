@@ -1,7 +1,17 @@
 """Controls that the style sheet alone cannot draw: buttons with icon and key cap, choices, check and radio marks."""
 
 from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QPen, QWheelEvent
+from PySide6.QtGui import (
+    QColor,
+    QFocusEvent,
+    QFontMetricsF,
+    QKeyEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QValidator,
+    QWheelEvent,
+)
 from PySide6.QtWidgets import (
     QAbstractButton,
     QCheckBox,
@@ -16,6 +26,7 @@ from PySide6.QtWidgets import (
     QStyleOptionButton,
     QStyleOptionComboBox,
     QStylePainter,
+    QToolTip,
     QWidget,
 )
 
@@ -31,11 +42,10 @@ class PressedByEnter(QPushButton):
     """A button that Enter presses as Space does, in a dialog too, where it would else press the default one."""
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Press on Enter; the keyboard's own repetition presses nothing."""
-        if event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
-            super().keyPressEvent(event)
-        elif not event.isAutoRepeat():
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self.click()
+        else:
+            super().keyPressEvent(event)
 
 
 class Cap(Themed, QWidget):
@@ -253,14 +263,49 @@ class Choice(Themed, QComboBox):
 
 
 class Number(QSpinBox):
-    """A whole number, typed or moved by the arrow keys and the wheel."""
+    """A whole number, typed or moved by the arrow keys and the wheel.
+
+    Qt ignores the keys of signs that no whole number has, so that "2,5" would become 25. Here they are typed; Enter
+    refuses such a text, and leaving the field puts back the number that it had when it was entered. Both say why.
+    """
 
     def __init__(self, lowest: int, highest: int, value: int) -> None:
         super().__init__()
+        self._before = value
         self.setRange(lowest, highest)
         self.setValue(value)
         self.setFont(font("body", tabular=True))
         self.setButtonSymbols(QSpinBox.ButtonSymbols.NoButtons)
+
+    def validate(self, text: str, position: int) -> object:
+        digits = text.removesuffix(self.suffix())
+        if digits and not (digits.isascii() and digits.isdecimal()):
+            return QValidator.State.Intermediate, text, position
+        return super().validate(text, position)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and not self.hasAcceptableInput():
+            self._say_refusal()
+        else:
+            super().keyPressEvent(event)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        self._before = self.value()
+        super().focusInEvent(event)
+
+    def fixup(self, _text: str) -> str:
+        self._say_refusal()
+        return f"{self._before}{self.suffix()}"
+
+    @property
+    def refusal(self) -> str:
+        """Why the text in the field is refused; "" if it is not."""
+        if self.hasAcceptableInput():
+            return ""
+        return f"“{self.cleanText()}” is not a whole number from {self.minimum()} to {self.maximum()}"
+
+    def _say_refusal(self) -> None:
+        QToolTip.showText(self.mapToGlobal(self.rect().bottomLeft()), self.refusal, self)
 
 
 class Check(Themed, QCheckBox):

@@ -1,9 +1,10 @@
 """What places and windows have in common: Esc that stops the force, the interface of a place."""
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
-from PySide6.QtGui import QGuiApplication, QKeyEvent, QWindow
+from PySide6.QtGui import QGuiApplication, QKeyEvent
 from PySide6.QtWidgets import QWidget
 
+from study_app.gui.key_presses import key_presses
 from study_app.gui.theme.themed import Themed
 
 HOLD_MS = 600
@@ -13,7 +14,7 @@ class EscapeKey(QObject):
     """An event filter that sees Esc go down and up, whichever part of a window has the keyboard.
 
     ``held`` comes once it has been down for 600 ms, whatever is shown meanwhile, ``tapped`` where it came up before.
-    The keyboard's own repetition counts for neither. A window that is left ends a hold without either.
+    A window that is left ends a hold without either.
 
     Parameters
     ----------
@@ -29,40 +30,39 @@ class EscapeKey(QObject):
 
     def __init__(self, parent: QObject, *, anywhere: bool = False) -> None:
         super().__init__(parent)
-        self._anywhere = anywhere
         self._aside: QWidget | None = None
         self._began_aside = False
-        self._watched: QWindow | None = None
-        self._timer = QTimer(self, singleShot=True, interval=HOLD_MS)
+        self._pressed_at_ms = 0
+        self._timer = QTimer(self, singleShot=True, interval=HOLD_MS, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._fire)
-        application = QGuiApplication.instance()
-        if anywhere and isinstance(application, QGuiApplication):
-            application.focusWindowChanged.connect(self._watch)
-            self._watch(QGuiApplication.focusWindow())
+        presses = key_presses()  # also of a window's own filter: they decide what is a press
+        if anywhere:
+            presses.changed.connect(self._follow)
 
     def leave_to(self, window: QWidget) -> None:
         self._aside = window
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        kind = event.type()
-        if kind == QEvent.Type.WindowDeactivate and not self._anywhere:
+        if event.type() == QEvent.Type.WindowDeactivate:
             self._timer.stop()
-        if not isinstance(event, QKeyEvent) or event.key() != Qt.Key.Key_Escape or event.isAutoRepeat():
-            return False
-        if kind == QEvent.Type.KeyPress and not self._timer.isActive():
-            self._began_aside = self._is_aside(watched)
-            self._timer.start()
-        elif kind == QEvent.Type.KeyRelease and self._timer.isActive():
-            self._timer.stop()
-            self.tapped.emit()
+        elif isinstance(event, QKeyEvent):
+            self._follow(watched, event)
         return False
 
-    def _watch(self, window: QWindow | None) -> None:
-        """Listen to the window that has the keyboard now: no other one receives keys."""
-        if window is not None and window is not self._watched:
-            window.removeEventFilter(self)  # one that comes back is listened to once
-            window.installEventFilter(self)
-        self._watched = window
+    def _follow(self, window: QObject | None, event: QKeyEvent) -> None:
+        """Follow Esc by presses and releases; their time stamps count if the program was too busy to time a hold."""
+        if event.key() != Qt.Key.Key_Escape:
+            return
+        if event.type() == QEvent.Type.KeyPress and not self._timer.isActive():
+            self._began_aside = self._is_aside(window)
+            self._pressed_at_ms = event.timestamp()
+            self._timer.start()
+        elif event.type() == QEvent.Type.KeyRelease and self._timer.isActive():
+            self._timer.stop()
+            if event.timestamp() - self._pressed_at_ms >= self._timer.interval():
+                self._fire()
+            else:
+                self.tapped.emit()
 
     def _is_aside(self, window: QObject | None) -> bool:
         return window is not None and self._aside is not None and window is self._aside.windowHandle()

@@ -13,28 +13,28 @@ from study_app.gui.widgets.cards import smooth_painter
 from study_app.gui.widgets.labels import set_property
 from study_app.number_text import MINUS, number_of
 
-NUMERALS = set("0123456789.,+-eE \u00a0\u2009\u202f" + MINUS)
+NUMERALS = set("0123456789.,+-eE' \u00a0\u2009\u202f" + MINUS)
 
 
-def read_number(text: str) -> float | None:
-    """Return the number that a text says, with comma or point, real minus or hyphen; None where it says none."""
-    found = number_of(text)
-    return None if found is None else float(found)
+def read_number(text: str, decimal_sign: str = ".") -> float | None:
+    """Return the number that a text says (`number_of`) as a float; None if it says none or can say two."""
+    number = number_of(text, decimal_sign)
+    return None if number is None else float(number)
 
 
-def write_number(value: float, decimals: int) -> str:
+def write_number(value: float, decimals: int, decimal_sign: str = ".") -> str:
     """Return a number with at most so many decimals, without empty ones, with a real minus."""
     text = f"{value:.{decimals}f}"
     text = text.rstrip("0").rstrip(".") if "." in text else text
     if text.strip("-0.") == "":
         text = "0" if value == 0 else f"{value:.2g}"
-    return text.replace("-", MINUS)
+    return text.replace("-", MINUS).replace(".", decimal_sign)
 
 
 class NumberField(QLineEdit):
     """A low field for a number; Return or leaving it takes it, Esc goes back, Up and Down step; Return tries again.
 
-    ``entered(value)`` comes once for what was typed; ``unread(text)`` where it is not a number; ``abandoned()`` at Esc;
+    ``entered(value)`` comes once for what was typed; ``unread(text)`` if it is not one number; ``abandoned()`` at Esc;
     ``stepped(steps)`` at Up and Down. While something is typed, `show_text` does not touch it.
     """
 
@@ -120,7 +120,7 @@ class NumberField(QLineEdit):
         self.flush()
 
     def flush(self) -> None:
-        """Say what was typed, once; it stays where it is not a number."""
+        """Say what was typed, once; it stays where it is not one number."""
         if not self.isModified():
             return
         value = read_number(self.text())

@@ -7,7 +7,7 @@ their folder (``haptics.model.effects.EFFECTS``).
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Any, Literal, NamedTuple, TypeAlias
 
 Value: TypeAlias = "float | str | None"
@@ -36,6 +36,7 @@ class Parameter:
 
     name: str
     label: str
+    _: KW_ONLY
     unit: str = ""
     least: float = LEAST
     most: float = MOST

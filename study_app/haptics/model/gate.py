@@ -232,9 +232,17 @@ def _verdicts(scene: Scene, liquid: Liquid) -> tuple[Verdict, ...]:
     total_n = sum(bound_n for effect, bound_n in found.items() if effect not in barred)
     judged = _chosen(scene, liquid, found, barred, total_n) if liquid.effects == "auto" else _named(liquid, found)
     return tuple(
-        Verdict(liquid.id, effect, found[effect], found[effect] / total_n if total_n > 0 else 0.0, *judged[effect])
+        Verdict(
+            liquid=liquid.id,
+            effect=effect,
+            bound_n=found[effect],
+            share=found[effect] / total_n if total_n > 0 else 0.0,
+            included=included,
+            why=why,
+        )
         for effect in NAMED
         if effect in found
+        for included, why in (judged[effect],)
     )
 
 

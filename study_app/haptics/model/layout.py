@@ -5,7 +5,7 @@ Records are rows of ``np.recarray``: plain structs in compiled code, objects wit
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from functools import partial
 from typing import Any, Final, NamedTuple, TypeAlias
 
@@ -54,27 +54,39 @@ class Limiter(NamedTuple):
 
 
 LIMITERS: Final = (
-    Limiter(LIMITER_SLEW, "slew", "Slew", "the change of force was slowed"),
-    Limiter(LIMITER_FADE, "fade", "Fade", "the force was fading in or out", expected=True),
-    Limiter(LIMITER_SLOPE, "slope", "Slope", "the slope limit bounded the change of force with speed"),
-    Limiter(LIMITER_NORM, "norm", "Force", "the force was cut to the force limit"),
-    Limiter(LIMITER_ENERGY, "energy", "Passivity controller", "the passivity controller changed the force"),
-    Limiter(LIMITER_STALE, "stale", "Stale sample", "the device had no new sample in time"),
-    Limiter(LIMITER_GLITCH, "glitch", "Rejected sample", "a sample was rejected as implausible"),
-    Limiter(LIMITER_NON_FINITE, "non_finite", "Non-finite force", "a force that was not finite was replaced by zero"),
-    Limiter(LIMITER_STOP, "stop", "Force stopped", "the force was stopped", expected=True),
+    Limiter(bit=LIMITER_SLEW, name="slew", label="Slew", meaning="the change of force was slowed"),
+    Limiter(bit=LIMITER_FADE, name="fade", label="Fade", meaning="the force was fading in or out", expected=True),
     Limiter(
-        LIMITER_ESTIMATOR,
-        "estimator",
-        "Velocity filter",
-        "EWMA gave the velocity, because the Kalman filter's innovations were too large or the delay changed",
+        bit=LIMITER_SLOPE, name="slope", label="Slope", meaning="the slope limit bounded the change of force with speed"
+    ),
+    Limiter(bit=LIMITER_NORM, name="norm", label="Force", meaning="the force was cut to the force limit"),
+    Limiter(
+        bit=LIMITER_ENERGY,
+        name="energy",
+        label="Passivity controller",
+        meaning="the passivity controller changed the force",
+    ),
+    Limiter(bit=LIMITER_STALE, name="stale", label="Stale sample", meaning="the device had no new sample in time"),
+    Limiter(bit=LIMITER_GLITCH, name="glitch", label="Rejected sample", meaning="a sample was rejected as implausible"),
+    Limiter(
+        bit=LIMITER_NON_FINITE,
+        name="non_finite",
+        label="Non-finite force",
+        meaning="a force that was not finite was replaced by zero",
+    ),
+    Limiter(bit=LIMITER_STOP, name="stop", label="Force stopped", meaning="the force was stopped", expected=True),
+    Limiter(
+        bit=LIMITER_ESTIMATOR,
+        name="estimator",
+        label="Velocity filter",
+        meaning="EWMA gave the velocity, because the Kalman filter's innovations were too large or the delay changed",
         later=True,
     ),
     Limiter(
-        LIMITER_SATURATED,
-        "saturated",
-        "Saturated motors",
-        "the device's motors saturated: its force was between zero and the recorded one",
+        bit=LIMITER_SATURATED,
+        name="saturated",
+        label="Saturated motors",
+        meaning="the device's motors saturated: its force was between zero and the recorded one",
         later=True,
     ),
 )
@@ -130,6 +142,7 @@ class SampleField:
 
     name: str
     words: str = ""
+    _: KW_ONLY
     column: str = ""
     kind: type = np.int64
     parts: Mapping[str, str] = field(default_factory=dict)

@@ -3,11 +3,10 @@
 Programmed paths are those of the figures.
 """
 
-import csv
 import difflib
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -15,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.errors import Problem, ProtocolError, StudyError
+from study_app.text_tables import SHOWN, Line, decimal_sign_of, decoded, number_in, split, wrong_length
 
 Floats: TypeAlias = NDArray[np.floating[Any]]
 
 PLACES = ("t_s", "x_m", "y_m", "z_m")
 VELOCITIES = ("vx_mps", "vy_mps", "vz_mps")
 MOST_PROBLEMS = 20
-SHOWN = 200  # characters of a bad value shown in messages
 
 HEADER = "t_s,x_m,y_m,z_m, one row per tick"
 
@@ -40,6 +39,7 @@ class Motion:
 
     t_s: Floats
     position_m: Floats
+    _: KW_ONLY
     velocity_mps: Floats | None = None
 
     def __post_init__(self) -> None:
@@ -66,23 +66,20 @@ def read(path: Path) -> Motion:
     """
     try:
         refuse_device(path)
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            lines = list(csv.reader(file, strict=True))
+        table = split(decoded(path.read_bytes()), PLACES + VELOCITIES)
     except OSError as error:
         raise StudyError(f"cannot read the motion {path}: {error.strerror}; name a CSV file of {HEADER}") from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise StudyError(f"cannot read the motion {path}: it is not a CSV text; name a CSV file of {HEADER}") from error
-    while lines and not lines[-1]:
-        lines.pop()
-    header = tuple(lines[0]) if lines else ()
+    except ValueError as error:
+        raise StudyError(f"cannot read the motion {path}: {error}; name a CSV file of {HEADER}") from error
+    header = table.names
     if header not in {PLACES, PLACES + VELOCITIES}:
         permitted = f"the first line must be {','.join(PLACES)}, or that and {','.join(VELOCITIES)}"
         found = ",".join(header)[:SHOWN] or "nothing"
         raise ProtocolError(str(path), (Problem("header", f"is {found}; {permitted}", line=1),))
-    if len(lines) == 1:
+    if not table.lines:
         raise ProtocolError(str(path), (Problem("rows", "there are none", hint="give at least one"),))
-    rows = _numbers(path, lines[1:], len(header))
-    return Motion(rows[:, 0], rows[:, 1:4], rows[:, 4:] if len(header) > len(PLACES) else None)
+    rows = _numbers(path, table.lines, len(header))
+    return Motion(rows[:, 0], rows[:, 1:4], velocity_mps=rows[:, 4:] if len(header) > len(PLACES) else None)
 
 
 def refuse_device(path: Path) -> None:
@@ -99,40 +96,34 @@ def refuse_device(path: Path) -> None:
         raise StudyError(f"cannot read {path}: it is a device, which may have no end; name a CSV file")
 
 
-def _numbers(path: Path, lines: list[list[str]], columns: int) -> Floats:
+def _numbers(path: Path, lines: tuple[Line, ...], columns: int) -> Floats:
     """Return all rows as numbers, or raise an error that lists rows with other text, few fields or decreasing times."""
     problems = []
     rows: list[list[float]] = []
-    for number, fields in enumerate(lines, start=1):
-        values = [_number(field) for field in fields]
-        if len(fields) != columns:
-            problems.append(Problem(f"row {number}", f"has {len(fields)} fields, not {columns}", line=number + 1))
+    complete = [line for line in lines if not wrong_length(line.fields, columns)]
+    try:
+        sign = decimal_sign_of(complete, range(columns))
+    except ValueError as error:
+        raise StudyError(f"{path}, {error}") from error
+    for number, (line, fields) in enumerate(lines, start=1):
+        values = [number_in(field, sign) for field in fields[:columns]]
+        if wrong := wrong_length(fields, columns):
+            problems.append(Problem(f"row {number}", wrong, line=line))
         elif None in values:
             bad = fields[values.index(None)]
-            problems.append(Problem(f"row {number}", f"{bad[:SHOWN]!r} is not a finite number", line=number + 1))
+            problems.append(Problem(f"row {number}", f"{bad[:SHOWN]!r} is not a finite number", line=line))
         else:
             rows.append([value for value in values if value is not None])
             if len(rows) > 1 and rows[-1][0] <= rows[-2][0]:
                 before, now = rows[-2][0], rows[-1][0]
                 message = f"t_s must increase, but {now!r} follows {before!r}"
-                problems.append(Problem(f"row {number}", message, line=number + 1))
+                problems.append(Problem(f"row {number}", message, line=line))
     if len(problems) > MOST_PROBLEMS:
         more = len(problems) - MOST_PROBLEMS
         problems = [*problems[:MOST_PROBLEMS], Problem("rows", f"{more} more such errors")]
     if problems:
         raise ProtocolError(str(path), tuple(problems))
     return np.array(rows)
-
-
-def _number(field: str) -> float | None:
-    """Return the finite number a field holds, or None."""
-    if "_" in field:
-        return None
-    try:
-        value = float(field)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None
 
 
 SPEED_MPS = 1.0
@@ -251,4 +242,4 @@ def _horizontal(t_s: Floats, *, x: Floats, vx: Floats, z: Floats | None = None, 
     rest = np.zeros_like(t_s)
     position_m = np.column_stack([x, rest, rest if z is None else z])
     velocity_mps = np.column_stack([vx, rest, rest if vz is None else vz])
-    return Motion(t_s, position_m, velocity_mps)
+    return Motion(t_s, position_m, velocity_mps=velocity_mps)

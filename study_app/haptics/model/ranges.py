@@ -32,6 +32,8 @@ def within(least: float, most: float, why: str, usual: float | None = None, what
 Coordinate: TypeAlias = Annotated[float, within(-1000, 1000, "a scene is at most 1 km wide")]
 Extent: TypeAlias = Annotated[float, within(1e-3, 1000, "from 1 mm, below what a hand resolves, to 1 km")]
 Metres: TypeAlias = tuple[Coordinate, Coordinate, Coordinate]
+Vector: TypeAlias = tuple[float, float, float]
+"""x, y and z."""
 Flow: TypeAlias = Annotated[float, within(-100, 100, "no liquid flows faster than 100 m/s where a hand can be")]
 DensityKgM3: TypeAlias = Annotated[
     float,

@@ -86,7 +86,9 @@ def damping_limits(period_s: float, delay_ticks: int, velocity: Velocity | Devic
             "run at 250 Hz or more, with a delay of 4 ticks at most"
         )
     beyond = min(1.0, period_s / min(entry.period_s for entry in table()))
-    return DampingLimits(*(beyond * min(limits) for limits in zip(*found, strict=True)))
+    return DampingLimits(
+        drag_nspm=beyond * min(it.drag_nspm for it in found), inertia_nspm=beyond * min(it.inertia_nspm for it in found)
+    )
 
 
 def handle_limits(

@@ -98,7 +98,9 @@ def law_along(scene: Scene, t_s: Floats, position_m: Floats, velocity_mps: Float
     ``position_m`` and ``velocity_mps`` (n, 3) are the hand's, at times (n,) [s].
     """
     place_m = scene.origin_m + scene.scale * position_m
-    force_n: NDArray[np.float64] = samples_along(scene, Motion(t_s, place_m, scene.scale * velocity_mps)).force_n
+    force_n: NDArray[np.float64] = samples_along(
+        scene, Motion(t_s, place_m, velocity_mps=scene.scale * velocity_mps)
+    ).force_n
     return force_n
 
 

@@ -221,8 +221,15 @@ def built_alike(scene: Scene, other: Scene) -> bool:
 
 def _constants(scene: Scene) -> Model:
     """Return a resolved scene's constants, in new memory."""
-    nothing = [layout.records(layout.STATE, 0)] * (len(Model._fields) - 2)
-    model = Model(layout.records(layout.PARAMETERS, 1), layout.records(layout.LIQUID, len(scene.liquids)), *nothing)
+    nothing = layout.records(layout.STATE, 0)
+    model = Model(
+        parameters=layout.records(layout.PARAMETERS, 1),
+        liquids=layout.records(layout.LIQUID, len(scene.liquids)),
+        state=nothing,
+        liquid_states=nothing,
+        forces_n=nothing,
+        rows=nothing,
+    )
     _fill_constants(model, scene, _by_delay(scene, UNKNOWN, CURRENT), UNKNOWN, CURRENT)
     return model
 

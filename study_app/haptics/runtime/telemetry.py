@@ -76,7 +76,7 @@ class Reader:
         return out if kept == waiting else out[:kept]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Timing:
     """The timing of the servo: all zero with too few samples.
 
@@ -95,7 +95,7 @@ def timing(samples: Any, rate_hz: float) -> Timing:
     """Return the timing of ``samples`` (recarray of ``SAMPLE``, in order, gaps allowed) at the nominal ``rate_hz``."""
     ticks = int(samples.size)
     if ticks == 0:
-        return Timing(0, 0.0, 0.0, 0.0, 0)
+        return Timing(ticks=0, rate_hz=0.0, lateness_p99_s=0.0, worst_gap_s=0.0, overruns=0)
     p99_s = float(np.percentile(samples.lateness_ns, 99)) * 1e-9
     follows = np.diff(samples.tick) == 1
     gaps_s = np.diff(samples.time_ns)[follows] * 1e-9

@@ -81,7 +81,7 @@ class LoopThread:
         self.slots = (pack(rest, capacity=elements), pack(rest, capacity=elements))
         self._output = Output(telemetry.ring, telemetry.written)
         self._exchanged = Records(new_reading(), new_command())
-        self._device = DeviceCalls(driver.context, driver.read.address, driver.write.address)
+        self._device = DeviceCalls(context=driver.context, read=driver.read.address, write=driver.write.address)
         self._arguments = (
             self.control,
             self.slots,
@@ -89,7 +89,7 @@ class LoopThread:
             self._exchanged,
             self._output,
             self._device,
-            ClockCalls(clock.context, clock.now.address, clock.sleep.address),
+            ClockCalls(context=clock.context, now=clock.now.address, sleep=clock.sleep.address),
         )
 
     def compile(self) -> None:

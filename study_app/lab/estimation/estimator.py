@@ -46,7 +46,7 @@ _MOST_DRAG: Final = 10.0
 WORDS: Final = {"drag_coefficient": "the drag coefficient", "length": "the length", "scaling": "the scaling"}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
     """Values by name with their 95 % intervals, empty before the first estimate.
 
@@ -65,7 +65,7 @@ class Estimate:
     seconds: float = 0.0
 
 
-NOTHING: Final = Estimate({}, {}, identified=False, reason="nothing was measured yet")
+NOTHING: Final = Estimate(values={}, intervals={}, identified=False, reason="nothing was measured yet")
 
 
 class OnlineEstimator:
@@ -153,7 +153,13 @@ class OnlineEstimator:
             return
         variance_n2, following = self._drag.residual
         found = information(np.array([[value**2 * self._drag.normal_n2]]), variance_n2, following)
-        fit = WakeFit({DRAG: value}, found, following, math.sqrt(3 * variance_n2), self._drag.force_rms_n)
+        fit = WakeFit(
+            values={DRAG: value},
+            information=found,
+            following=following,
+            rms_n=math.sqrt(3 * variance_n2),
+            force_rms_n=self._drag.force_rms_n,
+        )
         self.estimate = self._judged(fit)
 
     def _search(self, rows: Rows) -> None:
@@ -187,14 +193,14 @@ class OnlineEstimator:
         reason = self._doubt(fit)
         intervals = {n: interval(it, float(h)) for (n, it), h in zip(fit.values.items(), half, strict=True) if it > 0}
         return Estimate(
-            fit.values,
-            intervals,
-            not reason,
-            reason,
-            fit.information.smallest,
-            fit.rms_n,
-            fit.force_rms_n,
-            self._seconds,
+            values=fit.values,
+            intervals=intervals,
+            identified=not reason,
+            reason=reason,
+            smallest=fit.information.smallest,
+            rms_n=fit.rms_n,
+            force_rms_n=fit.force_rms_n,
+            seconds=self._seconds,
         )
 
     def _doubt(self, fit: WakeFit) -> str:

@@ -244,7 +244,7 @@ _DAMPING: Final = 1e-6
 """Least relative eigenvalue of the normal matrix: other directions are not changed."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class WakeFit:
     """The result of a search: values by name, the information of the motion about them, and the residual force.
 
@@ -260,7 +260,7 @@ class WakeFit:
     edge: bool = False
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(slots=True, eq=False, kw_only=True)
 class _At:
     """The force at N and S: ``g_n`` by C_d = 1, what was measured of it (rows, 3), C_d and the cost there."""
 
@@ -350,7 +350,7 @@ class WakeSearch:
         drag = _dot(weights, g, y) / size if size > 0 else math.nan
         left = y - drag * g if size > 0 else y
         share = max(float(weights.sum()), 1e-12)  # longer wakes leave fewer rows
-        return _At(length, scaling, g_n, y_n, drag, _dot(weights, left, left) / share)
+        return _At(length=length, scaling=scaling, g_n=g_n, y_n=y_n, drag=drag, cost=_dot(weights, left, left) / share)
 
     def _slopes(self, at: _At) -> Floats:
         """Return the derivatives (m, p) of the force by the logarithms of the parameters [N]."""
@@ -384,11 +384,11 @@ class WakeSearch:
         measured = self._flat(at.y_n)
         axes = max(rows.shape[1], 1)
         return WakeFit(
-            {name: values[name] for name in self._names},
-            found,
-            following,
-            math.sqrt(squares / share * axes),
-            math.sqrt(_dot(weights, measured, measured) / share * axes),
+            values={name: values[name] for name in self._names},
+            information=found,
+            following=following,
+            rms_n=math.sqrt(squares / share * axes),
+            force_rms_n=math.sqrt(_dot(weights, measured, measured) / share * axes),
             edge=LENGTH in self._names and at.length > _EDGE * min(LONGEST, self._most_ticks()),
         )
 

@@ -6,7 +6,6 @@ stamps are the times of the rows.
 
 from __future__ import annotations
 
-import csv
 import importlib
 import math
 from dataclasses import dataclass
@@ -17,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.errors import StudyError
-from study_app.haptics.model.motion import PLACES, SHOWN, VELOCITIES, refuse_device
+from study_app.haptics.model.motion import PLACES, VELOCITIES, refuse_device
+from study_app.text_tables import Line, decoded, fields_of, names_of, numbers_at, separator_of
 
 Floats: TypeAlias = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ GAP_S: Final = 0.05
 """A longer time between two rows restarts the estimation, since the motion between them is unknown."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Rows:
     """Rows of a stream in the scene frame.
 
@@ -46,17 +46,23 @@ class Rows:
         return len(self.t_s)
 
     def part(self, first: int, behind: int | None = None) -> Rows:
-        return Rows(*(getattr(self, name)[first:behind] for name in self.__slots__))
+        return Rows(**{name: getattr(self, name)[first:behind] for name in self.__slots__})
 
 
 def no_rows() -> Rows:
     """Return no rows."""
-    return Rows(np.empty(0), np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 3)), np.empty(0, bool))
+    return Rows(
+        t_s=np.empty(0),
+        position_m=np.empty((0, 3)),
+        velocity_mps=np.empty((0, 3)),
+        force_n=np.empty((0, 3)),
+        usable=np.empty(0, bool),
+    )
 
 
 def joined(*parts: Rows) -> Rows:
     """Return successive rows joined."""
-    return Rows(*(np.concatenate([getattr(it, name) for it in parts]) for name in Rows.__slots__))
+    return Rows(**{name: np.concatenate([getattr(it, name) for it in parts]) for name in Rows.__slots__})
 
 
 class CentredVelocity:
@@ -89,7 +95,13 @@ class CentredVelocity:
         lever_s = times_s - times_s.mean(axis=1, keepdims=True)
         slopes = np.einsum("nw,naw->na", lever_s, places_m) / np.sum(lever_s**2, axis=1)[:, np.newaxis]
         inner = slice(half, half + len(slopes))
-        out = Rows(self._t_s[inner], self._position_m[inner], slopes, self._force_n[inner], np.ones(len(slopes), bool))
+        out = Rows(
+            t_s=self._t_s[inner],
+            position_m=self._position_m[inner],
+            velocity_mps=slopes,
+            force_n=self._force_n[inner],
+            usable=np.ones(len(slopes), bool),
+        )
         self._drop(len(slopes))
         return out
 
@@ -115,6 +127,7 @@ class GrowingCsv:
         self._read = 0
         self._line = 0
         self._rest = b""
+        self._separator, self._columns = ",", 0
         self._places: list[int] = []
         self._has_velocities = False
         self._last_s = -math.inf
@@ -136,16 +149,22 @@ class GrowingCsv:
             if line.strip() and not line.startswith("#"):
                 numbered.append((self._line, line))
         if numbered and not self._places:
-            self._take_header(next(csv.reader([numbered.pop(0)[1]])))
+            self._take_header(numbered.pop(0)[1])
         if not numbered:
             return no_rows()
-        rows = np.array([numbers_in(self.path, number, line, self._places) for number, line in numbered])
+        rows = np.array([self._numbers(number, line) for number, line in numbered])
         falls = np.flatnonzero(np.diff(rows[:, 0], prepend=self._last_s) <= 0)
         if len(falls):
             raise StudyError(f"{self.path}, line {numbered[falls[0]][0]}: t_s must increase, but does not here")
         self._last_s = float(rows[-1, 0])
         if self._has_velocities:
-            return Rows(rows[:, 0], rows[:, 1:4], rows[:, 7:], rows[:, 4:7], np.ones(len(rows), bool))
+            return Rows(
+                t_s=rows[:, 0],
+                position_m=rows[:, 1:4],
+                velocity_mps=rows[:, 7:],
+                force_n=rows[:, 4:7],
+                usable=np.ones(len(rows), bool),
+            )
         return self._centred.take(rows[:, 0], rows[:, 1:4], rows[:, 4:7])
 
     def _bytes(self) -> list[str]:
@@ -160,40 +179,28 @@ class GrowingCsv:
                 found = file.read(_MOST_BYTES)
         except OSError as error:
             raise StudyError(f"cannot read {self.path}: {error.strerror}; name a CSV file of {HEADER}") from error
-        first = self._read == 0
         self._read += len(found)
         *lines, self._rest = (self._rest + found).split(b"\n")
         try:
-            text = [line.decode("utf-8") for line in lines]
-        except UnicodeDecodeError as error:
-            raise StudyError(f"cannot read {self.path}: it is not UTF-8 text; name a CSV file of {HEADER}") from error
-        return [text[0].removeprefix("\ufeff"), *text[1:]] if first and text else text
+            return [decoded(line, number) for number, line in enumerate(lines, start=self._line + 1)]
+        except ValueError as error:
+            raise StudyError(f"cannot read {self.path}: {error}; name a CSV file of {HEADER}") from error
 
-    def _take_header(self, header: list[str]) -> None:
-        names = [name.strip() for name in header]
+    def _numbers(self, number: int, line: str) -> list[float]:
+        try:
+            return numbers_at(Line(number, fields_of(line, self._separator)), self._places, self._columns)
+        except ValueError as error:
+            raise StudyError(f"{self.path}, {error}") from error
+
+    def _take_header(self, header: str) -> None:
         wanted = PLACES + FORCES
+        self._separator = separator_of(header, wanted)
+        names = names_of(header, self._separator)
+        self._columns = len(names)
         if lacking := [name for name in wanted if name not in names]:
             raise StudyError(f"{self.path} has no column {', '.join(lacking)}: the first line must name {HEADER}")
         self._has_velocities = all(name in names for name in VELOCITIES)
         self._places = [names.index(name) for name in wanted + (VELOCITIES if self._has_velocities else ())]
-
-
-def numbers_in(path: Path, number: int, line: str, places: list[int]) -> list[float]:
-    """Return the numbers at these places of a line of a CSV file."""
-    fields = next(csv.reader([line]))
-    if len(fields) <= max(places):
-        raise StudyError(f"{path}, line {number}: has {len(fields)} fields, fewer than the header names")
-    row = []
-    for field in (fields[place] for place in places):
-        try:
-            row.append(float(field))
-        except ValueError:
-            row.append(math.nan)
-        if not math.isfinite(row[-1]):
-            raise StudyError(
-                f"{path}, line {number}: {field[:SHOWN]!r} is not a finite number; correct it or remove the row"
-            )
-    return row
 
 
 LABELS: Final = (*PLACES[1:], *FORCES)
@@ -244,7 +251,13 @@ class LslForce:
             return no_rows()
         self._last_s = float(t_s[-1])
         if self._has_velocities:
-            return Rows(t_s, rows[:, :3], rows[:, 6:], rows[:, 3:6], np.ones(len(rows), bool))
+            return Rows(
+                t_s=t_s,
+                position_m=rows[:, :3],
+                velocity_mps=rows[:, 6:],
+                force_n=rows[:, 3:6],
+                usable=np.ones(len(rows), bool),
+            )
         return self._centred.take(t_s, rows[:, :3], rows[:, 3:6])
 
     def close(self) -> None:

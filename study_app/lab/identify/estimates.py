@@ -62,7 +62,7 @@ def estimate(problem: Problem, liquid_id: str, names: Sequence[str], size: float
     z, ended = solve(problem)
     residual, slopes = -problem.misfit(z).reshape(-1, problem.columns), problem.slopes_of_u(z)
     acts = _acts(problem.u(z), slopes, problem, size)
-    half, correlation = _spread(slopes, acts, residual)
+    half, correlation = _spread(slopes, acts, residual, problem.following(residual))
     values, pairs = problem.values(z), _alike(correlation, problem.alike)
     intervals = [_ends(it, u, by) for it, u, by in zip(problem.parameters, problem.u(z), half, strict=True)]
     warnings = (
@@ -78,7 +78,7 @@ def estimate(problem: Problem, liquid_id: str, names: Sequence[str], size: float
             it.name: round(value) if it.whole else value for it, value in zip(problem.parameters, values, strict=True)
         },
         "intervals": dict(zip(names, intervals, strict=True)),
-        "following": following(residual),
+        "following": problem.following(residual),
         "correlation": correlation,
         "distinguishable": bool(acts.all()) and not pairs,
         "warnings": warnings,
@@ -95,7 +95,7 @@ def _acts(u: Floats, slopes: Floats, problem: Problem, size: float) -> NDArray[n
     return strengths > _NO_EFFECT * size
 
 
-def _spread(slopes: Floats, acts: NDArray[np.bool_], residual: Floats) -> tuple[Floats, Floats]:
+def _spread(slopes: Floats, acts: NDArray[np.bool_], residual: Floats, following: float) -> tuple[Floats, Floats]:
     """Return the half widths (p,) of the intervals in u, and the correlation (p, p) of the estimates."""
     count = len(acts)
     half, correlation = np.full(count, math.inf), np.full((count, count), math.nan)
@@ -106,21 +106,13 @@ def _spread(slopes: Floats, acts: NDArray[np.bool_], residual: Floats) -> tuple[
     covariance = (rows.T / np.maximum(sizes, _SINGULAR * sizes[0]) ** 2) @ rows
     deviations = np.sqrt(np.diag(covariance))
     correlation[np.ix_(acts, acts)] = covariance / np.outer(deviations, deviations)
-    rho = max(following(residual), 0.0)
+    rho = max(following, 0.0)
     independent = max(residual.size * (1 - rho) / (1 + rho), acts.sum() + 1.0)
     freedom = independent - float(acts.sum())
     one_square = float(np.sum(residual**2)) / freedom * independent / residual.size  # of one independent residual
     widening = math.sqrt(residual.size / independent)
     half[acts] = student.ppf((1 + CONFIDENCE) / 2, freedom) * math.sqrt(one_square) * widening * deviations / lengths
     return half, correlation
-
-
-def following(residual: Floats) -> float:
-    """Return the correlation of residuals (n, k) from one row to the next, of all axes together."""
-    whole = float(np.sum(residual**2))
-    if whole == 0.0:
-        return 0.0
-    return min(float(np.sum(residual[1:] * residual[:-1])) / whole, 1 - 1 / len(residual))
 
 
 def _ends(it: Parameter, u: float, half: float) -> tuple[float, float]:

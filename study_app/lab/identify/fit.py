@@ -18,7 +18,7 @@ from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.laws import stress_pa
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Scene
-from study_app.lab.identify.estimates import Estimates, estimate, following
+from study_app.lab.identify.estimates import Estimates, estimate
 from study_app.lab.identify.measured_force import FlowCurve, Measured, vectors_x
 from study_app.lab.identify.parameters import Parameter, find
 from study_app.lab.identify.search import ForceProblem, Problem
@@ -79,13 +79,13 @@ def fit(scene: Scene, liquid_id: str, names: Sequence[str], motion: Motion, forc
     problem = ForceProblem(scene, liquid_id, find(scene, liquid_id, names), measured)
     z, fields = estimate(problem, liquid_id, names, float(np.linalg.norm(measured.force_n)))
     fitted_n = problem.force_n(z)
-    fields["warnings"] += tuple(_of_the_residuals((measured.force_n - fitted_n)[:, problem.axes], measured.force_n))
+    residual_n = (measured.force_n - fitted_n)[:, problem.axes]
+    fields["warnings"] += tuple(_of_the_residuals(residual_n, fields["following"], measured.force_n))
     return Fit(**fields, motion=motion, measured_n=measured.force_n, fitted_n=fitted_n, axes=problem.axes)
 
 
-def _of_the_residuals(residual_n: Floats, force_n: Floats) -> Iterator[str]:
+def _of_the_residuals(residual_n: Floats, rho: float, force_n: Floats) -> Iterator[str]:
     """Yield warnings of correlated residuals, which speak against the model: noise is uncorrelated."""
-    rho = following(residual_n)
     if rho > max(FOLLOWING, CHANCE / math.sqrt(residual_n.size)):
         share = _rms(residual_n) / _rms(force_n)
         yield (
@@ -100,6 +100,10 @@ def _rms(vectors_n: Floats) -> float:
 
 
 CURVE_TABLE: Final = "non_newtonian"
+LEAST_OF_A_BRANCH: Final = 6
+APART: Final = 5.0
+"""Branches differ if the gap between them is so many times its noise. [choice] See `test_noise_makes_no_branches`."""
+LEAST_GAP: Final = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -135,9 +139,33 @@ def fit_curve(scene: Scene, liquid_id: str, names: Sequence[str], curve: FlowCur
             raise StudyError(f"{it.name} does not change a flow curve: fit parameters of the table {CURVE_TABLE}")
     if len(curve.rate_per_s) <= len(parameters):
         raise StudyError(f"{len(curve.rate_per_s)} shear rates are too few for {len(parameters)} parameters")
-    problem = _CurveProblem(scene, liquid_id, parameters, curve)
+    ordered = curve.ordered()
+    problem = _CurveProblem(scene, liquid_id, parameters, ordered)
     z, fields = estimate(problem, liquid_id, names, float(np.sqrt(len(curve.rate_per_s))))
-    return CurveFit(**fields, curve=curve, fitted_pa=problem.stress_pa(z))
+    fields["warnings"] += tuple(_of_branches(curve))
+    return CurveFit(**fields, curve=ordered, fitted_pa=problem.stress_pa(z))
+
+
+def _of_branches(curve: FlowCurve) -> Iterator[str]:
+    """Yield a warning if two branches of a flow curve differ more than the noise along them.
+
+    The noise of their difference is estimated from its second differences along the shear rate.
+    """
+    if (branches := curve.branches()) is None:
+        return
+    (rate_per_s, stress_pa), (other_per_s, other_pa) = branches.one, branches.other
+    common = (rate_per_s >= other_per_s[0]) & (rate_per_s <= other_per_s[-1])
+    log_rate = np.log(rate_per_s[common])
+    gap = np.log(stress_pa[common]) - np.interp(log_rate, np.log(other_per_s), np.log(other_pa))
+    if len(gap) < LEAST_OF_A_BRANCH:
+        return
+    noise = math.sqrt(float(np.mean(np.diff(gap, 2) ** 2)) / 6)
+    size = math.sqrt(float(np.mean(gap**2)))
+    if size > APART * noise and size > LEAST_GAP:
+        yield (
+            f"{branches.words} differ by {100 * math.expm1(size):.0f} % of the stress, which noise does not explain: "
+            "thixotropy or hysteresis; the fit lies between them, and the intervals do not cover both: fit one branch"
+        )
 
 
 class _CurveProblem(Problem):
@@ -150,6 +178,16 @@ class _CurveProblem(Problem):
         super().__init__(scene, liquid_id, parameters)
         self._curve = curve
         self._table = next(liquid for liquid in scene.liquids if liquid.id == liquid_id).non_newtonian
+
+    def _products(self, residual: Floats) -> float:
+        """Return the sum of the products of residuals at successive shear rates.
+
+        Rows of one shear rate have no order: the sum is the mean over all orders of them.
+        """
+        _, at, counts = np.unique(self._curve.rate_per_s, return_inverse=True, return_counts=True)
+        sums, squares = np.bincount(at, residual.ravel()), np.bincount(at, residual.ravel() ** 2)
+        means = sums / counts
+        return float(np.sum((sums**2 - squares) / counts) + np.sum(means[1:] * means[:-1]))
 
     def stress_pa(self, z: Floats) -> Floats:
         """Return the stress (n,) [Pa] at the measured shear rates."""

@@ -1,6 +1,5 @@
 """Reads measured motion and force, or a flow curve, from a file; prepares the motion for `simulate`."""
 
-import csv
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,10 +11,12 @@ from scipy.signal import savgol_filter
 
 from study_app.errors import StudyError
 from study_app.haptics.model.motion import PLACES, VELOCITIES, Floats, Motion, refuse_device
-from study_app.lab.estimation.sources import FORCES, numbers_in
+from study_app.lab.estimation.sources import FORCES
+from study_app.text_tables import decoded, rows_of, split
 
 ALONG_A_LINE: Final = ("t_s", "velocity_mps", "force_n")
 FLOW_CURVE: Final = ("shear_rate_per_s", "shear_stress_pa")
+_COLUMNS: Final = (PLACES + FORCES, ALONG_A_LINE, FLOW_CURVE)
 LONGEST_S: Final = 0.05
 SMOOTHED_S: Final = 0.025
 HEADER: Final = (
@@ -49,9 +50,46 @@ class FlowCurve:
                 row = int(values.argmin()) + 1
                 raise StudyError(f"row {row} has {name} {values.min():g}: it must be above 0; remove the row")
 
+    def ordered(self) -> "FlowCurve":
+        """Return the same rows by shear rate, then by stress."""
+        order = np.lexsort((self.stress_pa, self.rate_per_s))
+        return FlowCurve(self.rate_per_s[order], self.stress_pa[order])
+
+    def branches(self) -> "Branches | None":
+        """Return two branches, each by shear rate: those of repeated rates, else rising and falling rows.
+
+        At rates that were measured repeatedly these are the least and the greatest stresses. None if most rates occur
+        once and the rows do not go up and down, or down and up.
+        """
+        rates, counts = np.unique(self.rate_per_s, return_counts=True)
+        repeated = rates[counts > 1]
+        if len(repeated) > len(rates) / 2:
+            stresses = [self.stress_pa[self.rate_per_s == rate] for rate in repeated]
+            least, greatest = (np.array([end(values) for values in stresses]) for end in (np.min, np.max))
+            words = "the greatest and the least stress at repeated shear rates"
+            return Branches(words=words, one=(repeated, greatest), other=(repeated, least))
+        turns = np.flatnonzero(np.diff(np.sign(np.diff(self.rate_per_s))))
+        if len(turns) != 1:
+            return None
+        ways = [self._sorted(slice(turns[0] + 2)), self._sorted(slice(turns[0] + 1, None))]
+        return Branches(words="stresses at rising and at falling shear rates", one=ways[0], other=ways[1])
+
+    def _sorted(self, rows: slice) -> tuple[Floats, Floats]:
+        order = np.argsort(self.rate_per_s[rows])
+        return self.rate_per_s[rows][order], self.stress_pa[rows][order]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Branches:
+    """Two branches of a flow curve, each as increasing shear rates and stresses; ``words`` name both."""
+
+    words: str
+    one: tuple[Floats, Floats]
+    other: tuple[Floats, Floats]
+
 
 def read(path: Path) -> Measured | FlowCurve:
-    """Read a CSV file with one of the headers in `HEADER`, its columns in any order; others are not read.
+    """Read a table (`text_tables`) with one of the headers in `HEADER`, its columns in any order; others are not read.
 
     Lines that begin with # are left out. Along a line, the motion is along x and places are summed from velocities.
 
@@ -62,35 +100,28 @@ def read(path: Path) -> Measured | FlowCurve:
     """
     try:
         refuse_device(path)
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            numbered = [(number, line) for number, line in enumerate(file, start=1) if line.strip()]
+        table = split(decoded(path.read_bytes()), {name for names in _COLUMNS for name in names}, comment="#")
     except OSError as error:
         raise StudyError(f"cannot read {path}: {error.strerror}; name a CSV file of {HEADER}") from error
-    except UnicodeDecodeError as error:
-        raise StudyError(f"cannot read {path}: it is not UTF-8 text; name a CSV file of {HEADER}") from error
-    numbered = [(number, line) for number, line in numbered if not line.startswith("#")]
-    header = next(csv.reader([numbered[0][1]]), []) if numbered else []
-    names: tuple[str, ...] = PLACES + FORCES
-    if all(name in header for name in names):
-        names += VELOCITIES if all(name in header for name in VELOCITIES) else ()
-    elif all(name in header for name in ALONG_A_LINE):
-        names = ALONG_A_LINE
-    elif all(name in header for name in FLOW_CURVE):
-        names = FLOW_CURVE
-    else:
-        lacking = ", ".join(name for name in names if name not in header)
-        raise StudyError(f"{path} has no column {lacking}: the first line must name {HEADER}")
-    rows = _rows(path, numbered[1:], [header.index(name) for name in names])
+    except ValueError as error:
+        raise StudyError(f"cannot read {path}: {error}; name a CSV file of {HEADER}") from error
+    names = max(_COLUMNS, key=lambda names: len({*names} & {*table.names}) / len(names))
+    if names == PLACES + FORCES and {*VELOCITIES} <= {*table.names}:
+        names += VELOCITIES
+    if lacking := [name for name in names if name not in table.names]:
+        raise StudyError(f"{path} has no column {', '.join(lacking)}: the first line must name {HEADER}")
+    if twice := [name for name in names if table.names.count(name) > 1]:
+        raise StudyError(f"{path} has two columns {twice[0]}: remove one of them")
+    if not table.lines:
+        raise StudyError(f"{path} has a header and no rows: give one for each moment that was measured")
     try:
-        return _measured(rows, names)
+        rows = rows_of(table, [table.names.index(name) for name in names])
+    except ValueError as error:
+        raise StudyError(f"{path}, {error}") from error
+    try:
+        return _measured(np.array(rows), names)
     except StudyError as error:
         raise StudyError(f"{path}: {error}") from error
-
-
-def _rows(path: Path, numbered: list[tuple[int, str]], places: list[int]) -> Floats:
-    if not numbered:
-        raise StudyError(f"{path} has a header and no rows: give one for each moment that was measured")
-    return np.array([numbers_in(path, number, line, places) for number, line in numbered], float)
 
 
 def _measured(rows: Floats, names: tuple[str, ...]) -> Measured | FlowCurve:
@@ -99,7 +130,7 @@ def _measured(rows: Floats, names: tuple[str, ...]) -> Measured | FlowCurve:
     if names == ALONG_A_LINE:
         return along_a_line(rows[:, 0], rows[:, 1], rows[:, 2])
     velocity_mps = rows[:, 7:] if len(names) > len(PLACES + FORCES) else None
-    return Measured(Motion(rows[:, 0], rows[:, 1:4], velocity_mps), rows[:, 4:7])
+    return Measured(Motion(rows[:, 0], rows[:, 1:4], velocity_mps=velocity_mps), rows[:, 4:7])
 
 
 def vectors_x(values: Floats) -> Floats:
@@ -111,7 +142,7 @@ def vectors_x(values: Floats) -> Floats:
 def along_a_line(t_s: Floats, velocity_mps: Floats, force_n: Floats) -> Measured:
     """Return a motion along x from its velocities (n,), and the force (n,) along x."""
     way_m = np.concatenate([[0.0], np.cumsum((velocity_mps[1:] + velocity_mps[:-1]) / 2 * np.diff(t_s))])
-    return Measured(Motion(t_s, vectors_x(way_m), vectors_x(velocity_mps)), vectors_x(force_n))
+    return Measured(Motion(t_s, vectors_x(way_m), velocity_mps=vectors_x(velocity_mps)), vectors_x(force_n))
 
 
 def centred(motion: Motion) -> Motion:
@@ -134,7 +165,7 @@ def centred(motion: Motion) -> Motion:
         raise StudyError(f"{len(motion.t_s)} rows are too few to estimate velocities: measure for {SMOOTHED_S:g} s")
     slopes = savgol_filter(even.position_m, rows, 2, deriv=1, delta=step_s, axis=0)
     velocity_mps = np.column_stack([np.interp(motion.t_s, even.t_s, column) for column in slopes.T])
-    return Motion(motion.t_s, motion.position_m, velocity_mps)
+    return Motion(motion.t_s, motion.position_m, velocity_mps=velocity_mps)
 
 
 def at_rate(motion: Motion, rate_hz: float) -> Motion:
@@ -162,4 +193,4 @@ def at_rate(motion: Motion, rate_hz: float) -> Motion:
         return Motion(t_s, CubicSpline(motion.t_s, motion.position_m)(t_s))
     place = CubicHermiteSpline(motion.t_s, motion.position_m, motion.velocity_mps)
     velocity_mps = np.column_stack([np.interp(t_s, motion.t_s, column) for column in motion.velocity_mps.T])
-    return Motion(t_s, place(t_s), velocity_mps)
+    return Motion(t_s, place(t_s), velocity_mps=velocity_mps)

@@ -20,7 +20,7 @@ NO_LESS_THAN: Final = {"scaling": "length", "thickened_viscosity_pa_s": "zero_sh
 """Fields that must not be less than another of the same table."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Parameter:
     """One number of a scene.
 
@@ -124,7 +124,16 @@ def _parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:
             value = getattr(tables[table], field)
             if value is None:
                 raise StudyError(f"the scene has no initial value of {name}: give one with --set {name}=VALUE")
-            return Parameter(name, table, field, float(value), least, most, above, whole)
+            return Parameter(
+                name=name,
+                table=table,
+                field=field,
+                value=float(value),
+                least=least,
+                most=most,
+                above=above,
+                whole=whole,
+            )
     known = sorted({field for fields in numbers.values() for field in fields} - set(THRESHOLDS))
     near = difflib.get_close_matches(field, known, n=1)
     meant = f"did you mean {near[0]!r}? " if near else ""

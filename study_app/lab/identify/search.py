@@ -106,6 +106,15 @@ class Problem:
         """Return predicted − measured values, (m,), row by row."""
         raise NotImplementedError
 
+    def following(self, residual: Floats) -> float:
+        """Return the correlation of residuals (n, k) from one row to the next, of all axes together."""
+        whole = float(np.sum(residual**2))
+        return min(self._products(residual) / whole, 1 - 1 / len(residual)) if whole else 0.0
+
+    def _products(self, residual: Floats) -> float:
+        """Return the sum of the products of successive residuals."""
+        return float(np.sum(residual[1:] * residual[:-1]))
+
     def values(self, z: Floats) -> list[float]:
         """Return the parameters' values, each in its range, without rounding a length."""
         values = [it.to_value(float(u)) for it, u in zip(self._coordinates, self.u(z), strict=True)]

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from study_app.protocol.groups import SEQUENCES, sequences_in
+from study_app.protocol.groups import ASSIGNMENT, SEQUENCES, sequences_in
 from study_app.protocol.questions import POINTS, Context, Question, Scale, ShowIf, Statement, question_of
 from study_app.protocol.source.document import Path, entries, names, value_at
 from study_app.protocol.source.problems import Fault, did_you_mean, unknown
@@ -186,7 +186,7 @@ def _alike(found: list[tuple[Path, Any]], kind: str) -> Iterator[Fault]:
     seen: set[tuple[str, str]] = set()
     for path, entry in found:
         texts = entry if isinstance(entry, Mapping) else {"": entry}
-        read = {(language, _as_read(text)) for language, text in texts.items() if isinstance(text, str)}
+        read = {(language, as_read(text)) for language, text in texts.items() if isinstance(text, str)}
         if read & seen:
             hint = "people could not tell the two apart: change one"
             yield Fault(path, f"reads as an earlier {kind} does", hint, kind="alike")
@@ -197,7 +197,7 @@ LOOKALIKES = str.maketrans("аеіјорсухѕһοαρνικ", "aeijopcyxshoap
 """Small letters of the Cyrillic and the Greek alphabet, and the Latin ones that look the same."""
 
 
-def _as_read(text: str) -> str:
+def as_read(text: str) -> str:
     """Return what a reader sees of a text: without marks of format, case, width and alphabet."""
     visible = "".join(letter for letter in text if unicodedata.category(letter) != "Cf")
     return " ".join(unicodedata.normalize("NFKC", visible).casefold().translate(LOOKALIKES).split())
@@ -236,6 +236,8 @@ def groups(document: Mapping[str, Any]) -> Iterator[Fault]:
         yield Fault(("sequences",), "give either sequence or sequences, one of the two")
     tables = [table for _, table in entries(document, "groups.*") if isinstance(table, Mapping)]
     if not tables:
+        if value_at(document, ASSIGNMENT) == "pre-existing":
+            yield Fault(ASSIGNMENT, "the study has no groups", "add groups, or leave it out", kind="surplus")
         return
     if len(names(document, "groups")) == 1:
         yield Fault(("groups",), "there is only one group", "add another group, or leave groups out")

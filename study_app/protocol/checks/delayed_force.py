@@ -49,7 +49,14 @@ def table() -> tuple[Entry, ...]:
     """Return the table as it ships."""
     with (resources.files("study_app.protocol.checks") / "delayed_force.csv").open(encoding="utf-8") as file:
         return tuple(
-            Entry(row["liquid"], row["estimator"], row["hand"], *(float(row[key]) for key in Entry._fields[3:]))
+            Entry(
+                liquid=row["liquid"],
+                estimator=row["estimator"],
+                hand=row["hand"],
+                delay_ms=float(row["delay_ms"]),
+                left_percent=float(row["left_percent"]),
+                withheld_percent=float(row["withheld_percent"]),
+            )
             for row in csv.DictReader(file)
         )
 

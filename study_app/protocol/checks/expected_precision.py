@@ -167,7 +167,12 @@ def expected_mean(plan: MeanPlan) -> Expected:
     found = plan.estimates(np.full(MEAN_OBSERVERS, plan.value), np.random.default_rng(SEED))
     spread = float(found.std())
     return Expected(
-        "linear", plan.trials, standards=1, halves={"": [Z_95 * spread]}, spread=spread, threshold=plan.value
+        spacing="linear",
+        trials=plan.trials,
+        standards=1,
+        halves={"": [Z_95 * spread]},
+        spread=spread,
+        threshold=plan.value,
     )
 
 
@@ -277,19 +282,27 @@ class ThresholdPlan:
         assumed, guess = self.method.assumed(stimulus, design), design.guess_rate
         answers = len(design.answers)
         columns = np.array([(it.wrong(answers), it.width, it.change, it.criterion, it.repeats) for it in people]).T
-        lapse, width, change, *preferred = columns if len(people) > 1 else columns[:, 0]
+        lapse, width, change, criterion, repeats = columns if len(people) > 1 else columns[:, 0]
         if guess is None:
             guess = lapse if guesses_of(stimulus, design) is None else FALSE_ALARMS
         presented = None if self.clipping is None else self.presented
         moves = np.log10(change) if stimulus.spacing == "log" else thresholds * np.log(change)
         observers = Observers(
-            assumed.family, thresholds, assumed.width_prior[0] * width, guess, lapse, presented, moves, *preferred
+            family=assumed.family,
+            thresholds=thresholds,
+            width=assumed.width_prior[0] * width,
+            guess=guess,
+            lapse=lapse,
+            presented=presented,
+            moves=moves,
+            criterion=criterion,
+            repeats=repeats,
         )
         noise_trials, high = design.noise(self.method.presentations(stimulus)), stimulus.domain[1]
         tracks, yes = [], [np.zeros((len(thresholds), 0), bool)]
         for number in range(1, self.method.tracks + 1):
             noise = random.random((len(thresholds), noise_trials)) if noise_trials else None
-            if np.any(preferred) and self.two_intervals:
+            if np.any([criterion, repeats]) and self.two_intervals:
                 trials = self.method.presentations(stimulus)
                 towards = random.permuted(np.tile((1.0, -1.0), (len(thresholds), (trials + 1) // 2)), axis=1)
                 observers = replace(observers, towards=towards[:, :trials])
@@ -299,7 +312,7 @@ class ThresholdPlan:
 
         def evenly_spread(level: float, successes: NDArray[np.bool_]) -> Answers:
             none = np.zeros(successes.shape)
-            return Answers(none + level, successes, none, none, none + 0.5)
+            return Answers(levels=none + level, successes=successes, towards=none, before=none, done=none + 0.5)
 
         catch, noises = evenly_spread(high, caught.T), evenly_spread(stimulus.coordinate(0.0), np.concatenate(yes, 1))
         return ObserverAnswers(observers, tuple(tracks), catch, noises)
@@ -311,7 +324,8 @@ class ThresholdPlan:
         """
         low, high = self.stimulus.domain
         parts = [*(one.first(most) for one in answered.tracks), answered.noise, *([] if most else [answered.catch])]
-        answers = Answers(*(np.concatenate(it, axis=1) for it in zip(*parts, strict=True)))
+        joined = {name: np.concatenate([getattr(it, name) for it in parts], axis=1) for name in Answers._fields}
+        answers = Answers(**joined)
         presented = np.unique(answers.levels[~np.isnan(answers.levels)])
         if len(presented) > OBSERVERS:
             presented = np.append(presented[presented < low], np.linspace(low, high, OBSERVERS))
@@ -333,7 +347,7 @@ class ThresholdPlan:
             found += [(own.threshold, *own.interval, own.variance) for own in fitted]
             of_groups.append(shared)
         medians, lows, highs, variances = np.array(found).T
-        return Estimates(medians, lows, highs, variances, np.array(of_groups))
+        return Estimates(medians=medians, lows=lows, highs=highs, variances=variances, shared=np.array(of_groups))
 
     def simulate(
         self, thresholds: Floats, random: Generator, people: Sequence[Person] = (ASSUMED,), together: int = PEOPLE

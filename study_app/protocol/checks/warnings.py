@@ -15,6 +15,7 @@ from study_app.protocol.checks.consistency import LEAST_N, force_n
 from study_app.protocol.checks.delayed_force import delay_warnings
 from study_app.protocol.checks.expected_precision import imprecise
 from study_app.protocol.checks.force_limits import PACED, clipped_unpaced, fastest_hz
+from study_app.protocol.checks.group_names import suggests_attribute
 from study_app.protocol.model import Follow, Protocol, Published, Reach
 from study_app.protocol.orders.durations import variants
 from study_app.protocol.presented.presented_levels import highest_damping
@@ -237,10 +238,21 @@ def _unanswerable(protocol: Protocol) -> Iterator[str]:
             "analysis.participants: is missing: a study that ends at the first significant result has more false "
             "positives than alpha"
         )
+    yield from _attributes(protocol)
     yield from _order_of_blocks(protocol)
     yield from dict.fromkeys(_pages_again(protocol))
     for number, one in enumerate(() if decided is None else decided.published):
         yield from _not_bracketed(protocol, number, one)
+
+
+def _attributes(protocol: Protocol) -> Iterator[str]:
+    """Yield the randomised groups whose names suggest what participants already are."""
+    for name in protocol.groups if protocol.randomises else ():
+        if suggests_attribute(name):
+            yield (
+                f"groups.{name}: the name suggests an attribute that participants already have, but groups are "
+                'randomised: if so, choose study.group_assignment = "pre-existing"'
+            )
 
 
 def _pages_again(protocol: Protocol) -> Iterator[str]:

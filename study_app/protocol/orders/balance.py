@@ -14,6 +14,7 @@ from itertools import count, pairwise
 from typing import TypeAlias
 
 from study_app.errors import StudyError
+from study_app.protocol.groups import next_group
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import CodeOrder, Orders, orders_of
 from study_app.protocol.orders.durations import variants
@@ -24,7 +25,7 @@ from study_app.protocol.streams import draw_secret, group_of, stream
 Table: TypeAlias = tuple[tuple[int, ...], ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Evenness:
     """Orders of one set of codes, counted.
 
@@ -112,25 +113,31 @@ def evenness(codes: Sequence[str], orders: Iterable[Sequence[str]]) -> Evenness:
     )
 
 
-def balance(protocol: Protocol, participants: Sequence[str], seed: int, session: str = "") -> Balance:
+def balance(
+    protocol: Protocol, participants: Sequence[str], seed: int, session: str = "", *, in_group: bool = False
+) -> Balance:
     """Return how even the orders of ``participants`` (ids) would be, all of them under ``seed``.
 
-    In a study each session has a seed of its own; orders from a square do not depend on the seed. Without
-    participants it raises StudyError.
+    In a study each session has a seed of its own; orders from a square do not depend on the seed. ``in_group`` says
+    that these are the participants of a group, whose places in it assign the rows of squares. Without participants it
+    raises StudyError.
     """
     if not participants:
         raise StudyError("no participants: a design is judged over at least one")
     orders = orders_of(protocol)
-    unnumbered = tuple(participant for participant in participants if enrolment(participant) is None)
+    places = [place if in_group else enrolment(who) for place, who in enumerate(participants, start=1)]
+    unnumbered = tuple(who for who, place in zip(participants, places, strict=True) if place is None)
+    placed = [*zip(participants, places, strict=True)]
     blocks = []
     for block in orders.blocks:
         if len(block.codes) > 1:
             title = protocol.text(protocol.blocks[block.id].title, protocol.study.languages[0])
-            counted = evenness(block.codes, [codes_of(orders.study, block, who, seed) for who in participants])
+            shown = [codes_of(orders.study, block, who, seed, place) for who, place in placed]
+            counted = evenness(block.codes, shown)
             blocks.append(BlockBalance(block.id, title, block.order, block.repetitions, counted, unnumbered))
     if orders.block_order != "fixed" and sum(block.phase == "main" for block in orders.blocks) > 1:
         order: CodeOrder = "williams" if orders.block_order == "balanced" else "shuffled"
-        of_blocks = _of_blocks(orders, participants, seed)
+        of_blocks = _of_blocks(orders, placed, seed)
         blocks.append(BlockBalance("", "The main blocks", order, 1, of_blocks, unnumbered))
     return Balance(orders.study, session, len(participants), seed, tuple(blocks))
 
@@ -138,41 +145,70 @@ def balance(protocol: Protocol, participants: Sequence[str], seed: int, session:
 def balances(protocol: Protocol, participants: Sequence[str], seed: int) -> Iterator[Balance]:
     """Yield the balance of each kind of session, over the participants of its group (StudyError without any).
 
-    Participants come into the groups that a rehearsal with this seed would allocate; a group of none is left out.
+    Participants come into the groups that a rehearsal with this seed would give them; a group of none is left out.
     """
-    shares = {name: group.share for name, group in protocol.groups.items()}
+    members: dict[str | None, list[str]] = {group: [] for group in protocol.groups or (None,)}
     secret = draw_secret(stream(seed, "blinding").random)
-    groups = [group_of(shares, secret, entry) if shares else None for entry in range(1, len(participants) + 1)]
+    for entry, who in enumerate(participants, start=1):
+        group = None
+        if protocol.randomises:
+            group = group_of(protocol.shares, secret, entry)
+        elif protocol.groups:
+            group = next_group(protocol.shares, {name: len(members[name]) for name in protocol.groups})
+        members[group].append(who)
     for one in variants(protocol):
-        own = [who for who, group in zip(participants, groups, strict=True) if group == one.group]
-        if own or not shares:
-            yield balance(one.protocol, own, seed, one.name)
+        if members[one.group] or one.group is None:
+            yield balance(one.protocol, members[one.group], seed, one.name, in_group=one.group is not None)
 
 
-def block_order_words(protocol: Protocol) -> str:
-    """Return in which order the main blocks of a session come, and how even it is for the planned participants."""
-    orders, planned = orders_of(protocol), None if protocol.analysis is None else protocol.analysis.participants
+def planned_participants(protocol: Protocol, group: str | None) -> int | None:
+    """Return how many participants are planned for a group (None: for the study), rounded down; None: not decided."""
+    planned = None if protocol.analysis is None else protocol.analysis.participants
+    if planned is None or group is None:
+        return planned
+    return planned * protocol.shares[group] // sum(protocol.shares.values())
+
+
+def block_orders_by_group(protocol: Protocol) -> dict[str, str]:
+    """Return in which order the main blocks come in each group; under "" if all groups are alike or there are none."""
+    words = {
+        one.group or "": block_order_words(
+            one.protocol, planned_participants(protocol, one.group), in_group=one.group is not None
+        )
+        for one in variants(protocol)
+        if len(one.protocol.main_blocks) > 1
+    }
+    return {"": next(iter(words.values()))} if len({*words.values()}) == 1 else words
+
+
+def block_order_words(protocol: Protocol, planned: int | None, *, in_group: bool = False) -> str:
+    """Return in which order the main blocks of a session come, and how even it is for so many ``planned`` participants.
+
+    ``protocol`` is that of the session; ``in_group`` says that the planned participants are those of one group.
+    """
+    orders = orders_of(protocol)
     blocks = sum(block.phase == "main" for block in orders.blocks)
     if orders.block_order == "fixed":
         return "fixed: everybody has them in this order"
     if orders.block_order == "random":
         of = "" if planned is None else f": {planned / blocks:.3g} of {planned} participants have a block in a place"
         return f"random: drawn in each session, even on average only{of}"
-    found = _of_blocks(orders, numbered(planned), 1) if planned is not None else None
+    found = _of_blocks(orders, [("", place) for place in range(1, planned + 1)], 1) if planned else None
     rows = row_count("williams", blocks)
-    words = f"balanced: {rows} orders, by the number in the participant's id"
+    by, of = ("place in the group", " per group") if in_group else ("number in the participant's id", "")
+    words = f"balanced: {rows} orders, by the {by}"
     if planned is None or found is None:
-        return f"{words}; any multiple of {rows} participants is even"
+        return f"{words}; any multiple of {rows} participants{of} is even"
     counts = [count for line in found.positions for count in line]
     even = _times(counts[0]) if found.positions_even else _range(counts)
     more = "" if found.balanced else f"; {planned + -planned % rows} would be even"
-    return f"{words}; {planned} participants have each block in each place {even}{more}"
+    return f"{words}; {planned} participants{of} have each block in each place {even}{more}"
 
 
-def _of_blocks(orders: Orders, participants: Sequence[str], seed: int) -> Evenness:
-    """Return how even the orders of the main blocks are."""
+def _of_blocks(orders: Orders, placed: Iterable[tuple[str, int | None]], seed: int) -> Evenness:
+    """Return how even the orders of the main blocks are; ``placed`` are ids with the numbers that assign their rows."""
     names = [block.id for block in orders.blocks if block.phase == "main"]
-    shown = (blocks_in_order(orders, who, seed) for who in participants)
+    shown = (blocks_in_order(orders, who, seed, place) for who, place in placed)
     return evenness(names, ([names[number] for number in one] for one in shown))
 
 

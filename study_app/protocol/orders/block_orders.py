@@ -16,7 +16,7 @@ CodeOrder: TypeAlias = Literal[Order, TrackOrder]
 """How the codes of a block are ordered: conditions, or the tracks of a design."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class BlockOrder:
     """A block as scheduling sees it: its codes, how they are ordered, and the ids of what is asked.
 

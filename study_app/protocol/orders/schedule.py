@@ -14,7 +14,8 @@ interleaved     of a block with a design: every round presents each track once, 
                 stream "order/PARTICIPANT/BLOCK/ROUND"
 blocked         of a block with a design: one track after another, in random order, from stream
                 "order/PARTICIPANT/BLOCK"
-williams latin  a row of a square, assigned by the number in the participant's id, not by the seed (`sequences`)
+williams latin  a row of a square, assigned by the number in the participant's id or the place in the group, not by the
+                seed (`sequences`)
 ==============  ========================================================================================================
 
 Main blocks take each other's places in a row of a square if their order is balanced, and in an order from stream
@@ -58,7 +59,7 @@ class PageStep:
     page_id: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
     """One presentation and its answers.
 
@@ -111,15 +112,15 @@ class Schedule:
         return tuple(step for step in self.steps if isinstance(step, Trial))
 
 
-def build_schedule(protocol: Protocol | Orders, participant: str, seed: int, row_of: str | None = None) -> Schedule:
+def build_schedule(protocol: Protocol | Orders, participant: str, seed: int, place: int | None = None) -> Schedule:
     """Return the session of ``participant``: a pure function of its arguments.
 
-    ``row_of`` is the id of the participant whose rows of squares the session takes; None: the participant's own.
+    ``place`` is the number that assigns rows of squares (from 1); None: the number in the participant's id.
     """
     orders = orders_of(protocol) if isinstance(protocol, Protocol) else protocol
     steps: list[Step] = []
     number, after, times = 1, None, Counter[str]()
-    for step in _placed(orders, participant, seed, row_of):
+    for step in _placed(orders, participant, seed, place):
         if isinstance(step, str):
             steps.append(PageStep(step))
             continue
@@ -130,41 +131,50 @@ def build_schedule(protocol: Protocol | Orders, participant: str, seed: int, row
             steps.append(FormStep(step.id, items, after, times[step.id]))
             continue
         after = step.id
-        codes = codes_of(orders.study, step, participant, seed, row_of)
+        codes = codes_of(orders.study, step, participant, seed, place)
         for index, code in enumerate(codes, start=1):
             items = _shuffled(step, seed, f"{participant}/{step.id}/{index}")
-            steps.append(Trial(number, step.id, step.phase, step.part, index, step.trials, code, items))
+            steps.append(
+                Trial(
+                    number=number,
+                    block=step.id,
+                    phase=step.phase,
+                    part=step.part,
+                    index=index,
+                    of=step.trials,
+                    code=code,
+                    items=items,
+                )
+            )
             number += 1
             if step.break_page and step.break_every and index < step.trials and index % step.break_every == 0:
                 steps.append(PageStep(step.break_page))
     return Schedule(participant, seed, tuple(steps))
 
 
-def _placed(
-    orders: Orders, participant: str, seed: int, row_of: str | None
-) -> tuple[str | BlockOrder | FormOrder, ...]:
+def _placed(orders: Orders, participant: str, seed: int, place: int | None) -> tuple[str | BlockOrder | FormOrder, ...]:
     """Return the steps with the main blocks in the participant's order; each takes the part of its place."""
     places = [at for at, step in enumerate(orders.steps) if isinstance(step, BlockOrder) and step.phase == "main"]
     steps = list(orders.steps)
-    for at, number in zip(places, blocks_in_order(orders, participant, seed, row_of), strict=True):
+    for at, number in zip(places, blocks_in_order(orders, participant, seed, place), strict=True):
         there, block = orders.steps[at], orders.steps[places[number]]
         if isinstance(there, BlockOrder) and isinstance(block, BlockOrder):
             steps[at] = replace(block, part=there.part)
     return tuple(steps)
 
 
-def blocks_in_order(orders: Orders, participant: str, seed: int, row_of: str | None = None) -> tuple[int, ...]:
+def blocks_in_order(orders: Orders, participant: str, seed: int, place: int | None = None) -> tuple[int, ...]:
     """Return the numbers (from 0, as written) of the main blocks of a session in the order of ``participant``."""
     count = sum(block.phase == "main" for block in orders.blocks)
     if orders.block_order == "random":
         return shuffle(range(count), stream(seed, f"blocks/{participant}").random)
     if orders.block_order == "fixed" or count < 2:
         return tuple(range(count))
-    taken = assigned_row(orders.study, "block order", row_count("williams", count), row_of or participant)
+    taken = assigned_row(orders.study, "block order", row_count("williams", count), participant, place)
     return row("williams", count, taken)
 
 
-def codes_of(study: str, block: BlockOrder, participant: str, seed: int, row_of: str | None = None) -> tuple[str, ...]:
+def codes_of(study: str, block: BlockOrder, participant: str, seed: int, place: int | None = None) -> tuple[str, ...]:
     """Return the codes of a block's trials, in the order in which ``participant`` meets them."""
     codes, times = block.codes, block.repetitions
     match block.order:
@@ -187,7 +197,7 @@ def codes_of(study: str, block: BlockOrder, participant: str, seed: int, row_of:
             )
             return tuple(code for code, slots in tracks for _ in range(slots))
         case "williams" | "latin" as square:
-            taken = assigned_row(study, block.id, row_count(square, len(codes)), row_of or participant)
+            taken = assigned_row(study, block.id, row_count(square, len(codes)), participant, place)
             return tuple(codes[number] for number in row(square, len(codes), taken, times))
 
 
@@ -215,7 +225,7 @@ def draw_key(protocol: Protocol, draw: Draw) -> Key:
 _TOLD = ("block", "phase", "part", "index", "of", "code")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedTrial:
     """One attempt at a trial as a session recorded it; ``items`` in the order shown, None if nothing was answered.
 
@@ -240,15 +250,14 @@ def reproduce(
     recorded: Iterable[RecordedTrial | int],
     *,
     complete: bool,
-    row_of: str | None = None,
+    place: int | None = None,
 ) -> tuple[str, ...]:
     """Return how the trials that were run differ from those that protocol, seed and participant give.
 
     ``protocol`` is that of the session; ``recorded`` is what was run, in the order of time. A ``complete`` session went
-    to its end, so that no trial may be missing. ``row_of`` is the id whose rows of squares the session took, None the
-    participant's own.
+    to its end, so that no trial may be missing. ``place`` is that of `build_schedule`.
     """
-    planned = {trial.number: trial for trial in build_schedule(protocol, participant, seed, row_of).trials}
+    planned = {trial.number: trial for trial in build_schedule(protocol, participant, seed, place).trials}
     attempts = tuple(recorded)
     run = [trial for trial in attempts if isinstance(trial, RecordedTrial)]
     found = [sentence for trial in run for sentence in _against(planned.get(trial.number), trial)]

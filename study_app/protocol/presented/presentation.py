@@ -239,4 +239,6 @@ def trial_result(
     stimulus = None if block.stimulus is None else stimulus_of(protocol, block)
     correct = design.is_correct(arrangement, answer) if has_correct_answer(design, stimulus) else None
     success, noise = design.success(arrangement, answer), not any(design.arrangements[arrangement])
-    return TrialResult(trial, code, level or 0.0, success, correct, catch, noise)
+    return TrialResult(
+        trial=trial, code=code, level=level or 0.0, success=success, correct=correct, catch=catch, noise=noise
+    )

@@ -31,7 +31,7 @@ STEPS: Final = 2**32
 """Of the search for a limit."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Level:
     """One level of one standard, None where the level is the value itself; ``comparison`` is what it stands for.
 
@@ -49,7 +49,7 @@ class Level:
     damping_nspm: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LevelLimits:
     """The highest values of the varied number that two limits leave in full; None: beyond what is looked at.
 
@@ -129,10 +129,18 @@ def standard_of(protocol: Protocol, block_id: str, standard: float) -> Level:
 def _level(stimulus: Stimulus, scene: Scene, hand_mps: float, standard: float | None, level: float) -> Level:
     comparison = stimulus.comparison(standard, level)
     if stimulus.vary in OF_CONDITION or len(scene.liquids) != 1:
-        return Level(standard, level, comparison)
+        return Level(standard=standard, level=level, comparison=comparison)
     varied = override(scene, stimulus.vary, comparison)
     force = steady(varied, hand_mps)
-    return Level(standard, level, comparison, force.drag_n, force.force_n, force.limit, damping_of(varied))
+    return Level(
+        standard=standard,
+        level=level,
+        comparison=comparison,
+        asked_n=force.drag_n,
+        sent_n=force.force_n,
+        clipped_by=force.limit,
+        damping_nspm=damping_of(varied),
+    )
 
 
 def level_limits(protocol: Protocol, block: Block) -> LevelLimits | None:
@@ -153,7 +161,7 @@ def level_limits(protocol: Protocol, block: Block) -> LevelLimits | None:
         unlimited = override(scene, stimulus.vary, value).model_copy(update={"force_limit_n": math.inf})
         return steady(unlimited, hand_mps).limit is not None
 
-    return LevelLimits(_last(beyond_force, most), _last(beyond_loop, most), hand_mps)
+    return LevelLimits(force=_last(beyond_force, most), loop=_last(beyond_loop, most), hand_mps=hand_mps)
 
 
 def _last(beyond: Callable[[float], bool], most: float) -> float | None:

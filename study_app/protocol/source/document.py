@@ -130,7 +130,16 @@ class _Scan:
             index = self._array_tables.get(path, 0)
             self._array_tables[path] = index + 1
             path = (*path, index)
-        self.nodes.append(Node("array table" if many else "table", path, parts, start, self._at, self._at))
+        self.nodes.append(
+            Node(
+                kind="array table" if many else "table",
+                path=path,
+                parts=parts,
+                start=start,
+                value=self._at,
+                end=self._at,
+            )
+        )
         return path
 
     def _within_arrays(self, keys: Path) -> Path:
@@ -156,7 +165,7 @@ class _Scan:
             self._skip_blank()
         value, path = self._at, table + keys
         self._value(path)
-        self.nodes.append(Node(kind, path, parts, start, value, self._at))
+        self.nodes.append(Node(kind=kind, path=path, parts=parts, start=start, value=value, end=self._at))
         return table
 
     def _value(self, path: Path) -> None:
@@ -165,7 +174,7 @@ class _Scan:
             while self._skip_blank() and not self._take("]"):
                 start, entry = self._at, (*path, index)
                 self._value(entry)
-                self.nodes.append(Node("entry", entry, (), start, start, self._at))
+                self.nodes.append(Node(kind="entry", path=entry, parts=(), start=start, value=start, end=self._at))
                 index += 1
                 self._skip_blank()
                 self._take(",")

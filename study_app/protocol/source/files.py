@@ -8,6 +8,7 @@ the lines of the study's own file keep their numbers. A file that names none of 
 
 from __future__ import annotations
 
+import codecs
 import hashlib
 import json
 import re
@@ -30,11 +31,22 @@ DRAWN_OR_LIVE: Final = ("tank", "camera")
 """Views of a condition that are no file."""
 
 
+def without_mark(content: bytes) -> bytes:
+    """Return a file's content without the byte order mark that some editors and spreadsheets write before UTF-8."""
+    return content.removeprefix(codecs.BOM_UTF8)
+
+
+def is_utf16(content: bytes) -> bool:
+    """Return whether a text file is in UTF-16: it begins with a mark of UTF-16, or with a null byte beside a letter."""
+    return content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or b"\0" in content[:2]
+
+
 def with_liquid_files(study: bytes, folder: Path) -> bytes:
-    """Return a study's source: its file ``study``, and the files it names, relative to ``folder``.
+    """Return a study's source: its file ``study`` without a byte order mark, and the files it names in ``folder``.
 
     One that cannot be read is left out; `load.parse` reports it. A source is returned as it is.
     """
+    study = without_mark(study)
     if _HEADER in study or _FOOTAGE_HEADER in study:
         return study
     hashes = {name: digest for name in footage_names(study) if (digest := file_hash(folder / name)) is not None}
@@ -122,7 +134,9 @@ def _values(study: bytes, section: str, key: str) -> list[str]:
 
 def _read(path: Path) -> str | None:
     try:
-        return path.read_bytes().decode() if path.is_file() else None  # never a device or a pipe, which may not end
+        return (
+            without_mark(path.read_bytes()).decode() if path.is_file() else None
+        )  # never a device or a pipe, which may not end
     except (OSError, ValueError):
         return None
 
@@ -159,6 +173,12 @@ def shipped_file(name: str) -> Path:
     return _shipped_folder() / f"{name}.toml"
 
 
+def shipped_studies() -> tuple[Path, ...]:
+    """Return the files of all studies that ship with the program: protocols, and the templates of the designer."""
+    templates = (_PACKAGE / "designer" / "templates").glob("*.toml")
+    return (*(shipped_file(name) for name in shipped()), *sorted(templates))
+
+
 def at_hand() -> tuple[str, ...]:
     """Return the names of the protocols in the workspace, then of those that ship with the program."""
     return tuple(dict.fromkeys((*(path.stem for path in workspace().own_protocols()), *shipped())))
@@ -186,7 +206,7 @@ def _not_found(name_or_path: str | Path, message: str, hint: str) -> ProtocolErr
 
 
 def source_bytes(name_or_path: str | Path) -> bytes:
-    """Return a protocol's file as it is on disk, followed by the liquid files it names (`with_liquid_files`)."""
+    """Return a protocol's file, followed by the liquid files it names (`with_liquid_files`)."""
     path = find(name_or_path)
     try:
         return with_liquid_files(path.read_bytes(), path.parent)

@@ -50,7 +50,7 @@ class Fault(NamedTuple):
     def located(self, places: Places) -> Problem:
         """Return the problem with its line; in the place that people read, entries count from 1."""
         place = ".".join(str(step + 1) if isinstance(step, int) else step for step in self.path)
-        return Problem(place or "file", self.message, places.line(self.path), self.hint)
+        return Problem(place or "file", self.message, places.line(self.path), hint=self.hint)
 
 
 _PATTERNS = {

@@ -65,7 +65,7 @@ class TrackSetting:
     number: int
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, slots=True, repr=False, kw_only=True)
 class TrialResult:
     """One answered trial: its last attempt, confirmed; never printed, since it reveals a level.
 
@@ -178,7 +178,7 @@ class Method(Table):
                     levels[one] = self.level(track, number, heard[one], sources)
                 right = yield np.array([stimulus.coordinate(level) for level in levels]), running
                 for of_track, level, success in zip(heard, levels.tolist(), right.tolist(), strict=True):
-                    of_track.append(TrialResult(number, "", level, success, success))
+                    of_track.append(TrialResult(trial=number, code="", level=level, success=success, correct=success))
 
         return observers.answers(draws, chosen())
 
@@ -286,7 +286,7 @@ class Adjustment(Method):
     def adjusting(self, stimulus: Stimulus, standard: float | None, start: float) -> Adjusting:
         low, high = (stimulus.comparison(standard, level) for level in stimulus.levels)
         step = self.step(stimulus)
-        return Adjusting(stimulus, standard, start, step if high > low else -step)
+        return Adjusting(stimulus=stimulus, standard=standard, start=start, step=step if high > low else -step)
 
     def step(self, stimulus: Stimulus) -> float:
         """Return how far a step goes, in u."""
@@ -294,7 +294,7 @@ class Adjustment(Method):
         return (high - low) / STEPS if self.step_size is None else stimulus.coordinate(self.step_size)
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, slots=True, repr=False, kw_only=True)
 class Adjusting:
     """One setting: from which level it starts, and what its steps lead to; never printed, since it reveals the level.
 

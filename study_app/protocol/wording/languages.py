@@ -11,7 +11,8 @@ from pathlib import Path as File
 from typing import TYPE_CHECKING, Any, Final
 
 from study_app.errors import StudyError
-from study_app.protocol.source.document import Path
+from study_app.number_text import exact_text, readings_of
+from study_app.protocol.source.document import Path, entries
 from study_app.protocol.source.problems import Fault, did_you_mean
 
 RIGHT_TO_LEFT = frozenset({"ar", "dv", "fa", "he", "ks", "ps", "sd", "ug", "ur", "yi"})
@@ -47,6 +48,14 @@ class Words:
             return "".join(entries)
         return f"{', '.join(entries[:-1])} {self.and_} {entries[-1]}"
 
+    def unclear_number(self, text: str) -> str:
+        """Return the sentence that asks again for a number that can be read in two ways; "" if it cannot."""
+        numbers = readings_of(text, self.decimal_sign)
+        if len(numbers) < 2:
+            return ""
+        one, other = (exact_text(number).replace(".", self.decimal_sign) for number in numbers)
+        return self.number_unclear.format(text=text.strip(), one=one, other=other)
+
     def missing(self, numbers: Sequence[int]) -> str:
         """Return the sentence that names the statements (by number, at least one) still without an answer."""
         return self._missing(numbers, self.one_missing, self.many_missing)
@@ -69,6 +78,11 @@ LANGUAGES: Final = {
     code: Words(tomllib.loads((_FOLDER / f"{code}.toml").read_text(encoding="utf-8")))
     for code in ("en", "nl", "de", "fr", "ar")
 }
+
+
+def languages_of(document: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the languages that a study's document states; a file that states none is in English."""
+    return tuple(str(code) for _, code in entries(document, "study.languages.*")) or ("en",)
 
 
 def language_name(code: str) -> str:

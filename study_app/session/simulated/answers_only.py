@@ -22,11 +22,10 @@ from study_app.errors import SessionError
 from study_app.protocol.blocks import Block
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.simulated import NO_FEATURES, Comparison, TrialFeatures, as_requested
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.session.pages import DesignPage, FeedbackPage, Interval, PausePage, QuestionnairePage, TaskPage, TextPage
-from study_app.session.resume import REHEARSED_SCREENS
+from study_app.session.resume import REHEARSED_SCREENS, begun_schedule
 from study_app.session.simulated.observers import reading_s
 from study_app.session.simulated.participant import LOOK_AT_SETTING_S, SimulatedParticipant
 from study_app.session.simulated.rehearsal import REHEARSED_PEOPLE, ConditionFeatures, condition_features
@@ -48,10 +47,11 @@ from study_app.session.transitions.events import (
 from study_app.session.transitions.page_builder import preview
 from study_app.session.transitions.state import FINAL, SessionState
 from study_app.session.transitions.table import advance, open_session
-from study_app.store.folders import rehearsal_folder
+from study_app.store.blinded.allocation import simulated_groups
+from study_app.store.folders import StudyFolder, rehearsal_folder
 from study_app.store.journals.journal import SessionClock
 from study_app.store.journals.journal_events import Event as Line
-from study_app.store.journals.journal_events import FormShown, Note, PageShown, TrialStarted
+from study_app.store.journals.journal_events import FormShown, Note, PageShown, TrialStarted, start_of
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.simulated_sessions import SimulatedStudy
 from study_app.workspace import workspace
@@ -68,6 +68,7 @@ def rehearse_answers(
     participants: int,
     seed: int,
     results: Path | None = None,
+    group: str | None = None,
     features: ConditionFeatures | None = None,
     progress: Callable[[str], object] | None = None,
 ) -> Path:
@@ -83,6 +84,8 @@ def rehearse_answers(
         All randomness comes from it, the key's too.
     results : Path, optional
         Study folder; by default a new ``results/<study>-rehearsal-<n>`` of the workspace.
+    group : str, optional
+        The pre-existing group of all of them; by default they are dealt evenly to such groups.
     features : ConditionFeatures, optional
         What each condition feels like; by default rehearsed first.
     progress : callable, optional
@@ -101,25 +104,26 @@ def rehearse_answers(
     study = parse(source, str(protocol))
     folder = rehearsal_folder(workspace().results, study.study.name) if results is None else Path(results)
     people = tuple(f"P{number:03d}" for number in range(1, participants + 1))
+    groups = simulated_groups(StudyFolder(folder), study, people, group)
     kept = SimulatedStudy(folder, study, source, people, seed=seed, device=DEVICE, screens=REHEARSED_SCREENS)
     if features is None:
         features = condition_features(study, seed=seed, people=REHEARSED_PEOPLE, progress=progress)
     said_s = time.monotonic()
     with kept:
         for number, person in enumerate(people, start=1):
-            _answer(study, person, seed, kept, features)
+            _answer(study, person, groups[person], kept, features)
             if progress is not None and (time.monotonic() - said_s >= SAY_EVERY_S or number == participants):
                 said_s = time.monotonic()
                 progress(f"{person}: {number} of {participants} answered (simulated)")
     return folder
 
 
-def _answer(study: Protocol, who: str, seed: int, kept: SimulatedStudy, features: ConditionFeatures) -> None:
-    """Answer one session of a study."""
+def _answer(study: Protocol, who: str, group: str | None, kept: SimulatedStudy, features: ConditionFeatures) -> None:
+    """Answer one session of a study; ``group`` is the participant's pre-existing group."""
     time_passed = SimulatedTime()
-    store = kept.begin(who, SessionClock(time_passed.ns, datetime.now().astimezone()))
+    store = kept.begin(who, SessionClock(time_passed.ns, datetime.now().astimezone()), group)
     own = store.protocol
-    schedule = build_schedule(own, who, seed)
+    schedule = begun_schedule(own, start_of(store.lines), kept.key)
     state = open_session(own, schedule, kept.key.codes, study.study.languages[0], secret=kept.key.nonce)
     Answering(study, state, store, time_passed, lambda block, condition: features[block, condition]).run()
 

@@ -49,7 +49,7 @@ STAY_S: Final = 0.2
 _SAMPLE = np.dtype([("time_ns", np.int64), ("position_m", np.float64, 3)])
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class SensedTrial:
     """What reached hand and eyes in one trial; ``scale`` is scene metres per hand metre.
 
@@ -106,10 +106,18 @@ class SensedTrial:
         return 0.0 if rows is None else max(rows * self.period_s, 0.0)
 
 
-def exploration(draw: Draw, half_m: tuple[float, float, float], duration_s: float) -> tuple[Floats, Floats]:
-    """Return a motion of at least ``duration_s`` that begins and stays within ``half_m`` of the middle."""
+def exploration(
+    draw: Draw,
+    half_m: tuple[float, float, float],
+    duration_s: float,
+    start_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> tuple[Floats, Floats]:
+    """Return a motion of at least ``duration_s`` that begins at ``start_m`` and stays within ``half_m`` of the middle.
+
+    Times are (n,) [s], positions (n, 3) [m, hand frame].
+    """
     reach_m = 0.7 * np.asarray(half_m)
-    pieces = [np.zeros((1, 3))]
+    pieces = [np.array([start_m])]
     coming: list[Figure] = []
     while sum(map(len, pieces)) < duration_s * RATE_HZ:
         coming = coming or list(shuffle(FIGURES, draw))
@@ -202,7 +210,7 @@ class Explorer:
         least_s = task.limit_s if task.least_s is None else task.least_s
         stay_s = least_s + (0.1 + 0.2 * draw()) * max(least_s, 5.0)
         self._leave_s = math.inf if task.least_s is None else now_s + min(stay_s, task.limit_s)
-        device.follow(*exploration(draw, device.workspace_m, stay_s))
+        device.follow(*exploration(draw, device.workspace_m, stay_s, device.aim_m))
 
     def act(self, now_s: float, _view: TankView) -> bool:
         """Return whether the space bar is pressed."""
@@ -286,11 +294,11 @@ def _followed(task: Task, times_s: Floats) -> Floats:
 
 
 def rest(task: Task, device: HandOrders) -> None:
-    """Let a simulated hand rest after a task: where its next interval begins, if that begins at a place."""
-    if task.start_m is None:
-        device.rest()
-    else:
-        device.reach_to(*task.start_m)
+    """Let a simulated hand go back after a task, without force: to where the task begins, or to the middle.
+
+    A hand that jumped there when the next trial begins would be pushed as no person is.
+    """
+    device.reach_to(*((0.0, 0.0, 0.0) if task.start_m is None else task.start_m))
 
 
 @dataclass(frozen=True, slots=True)
@@ -348,7 +356,9 @@ class ProgrammedBall:
         self, task: Task, workspace_m: tuple[float, float, float], *, hidden_after_lead: bool = False, seed: int = 1
     ) -> None:
         self._task, self._hides = task, hidden_after_lead
-        times_s, self._positions_m = _path(task, workspace_m, min(LONGEST_PATH_S, task.limit_s - BEFORE_END_S), seed)
+        times_s, self._positions_m = task_path(
+            task, workspace_m, min(LONGEST_PATH_S, task.limit_s - BEFORE_END_S), seed
+        )
         self.duration_s = float(times_s[-1])
         self._times_ns = np.round(times_s * 1e9).astype(np.int64)
         samples = np.zeros(len(times_s), _SAMPLE)
@@ -364,7 +374,9 @@ class ProgrammedBall:
         return TankView(position_m, shown, now_ns, self._hides and shown.elapsed_s >= self._task.judged_from_s)
 
 
-def _path(task: Task, workspace_m: tuple[float, float, float], duration_s: float, seed: int) -> tuple[Floats, Floats]:
+def task_path(
+    task: Task, workspace_m: tuple[float, float, float], duration_s: float, seed: int
+) -> tuple[Floats, Floats]:
     """Return times (n,) [s] and positions (n, 3) [m, hand frame] of a path of about ``duration_s``."""
     if isinstance(task, Reach):
         return _reaches(task, duration_s)

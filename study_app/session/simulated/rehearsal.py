@@ -12,14 +12,16 @@ too.
 """
 
 import operator
+import signal
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, Self, TypeAlias
 
 import numpy as np
 
@@ -51,6 +53,7 @@ from study_app.session.resume import (
     FIRST,
     REHEARSED_SCREENS,
     Start,
+    begun_schedule,
     find_protocol,
     is_rehearsal,
     resume_at,
@@ -62,17 +65,22 @@ from study_app.session.simulated.participant import LOOK_AT_SETTING_S, Adjusting
 from study_app.session.tasks import TankView
 from study_app.session.transitions.events import Begin, Continue, Event, ResumeRequested, Stepped, Submitted
 from study_app.store import receipt
-from study_app.store.blinded.allocation import session_protocol
+from study_app.store.atomic import is_there
+from study_app.store.blinded.allocation import session_protocol, simulated_groups
 from study_app.store.blinded.blinding import Key
+from study_app.store.checksums import listed, place_of
+from study_app.store.folder_lock import never_begun
 from study_app.store.folders import StudyFolder, locate, rehearsal_folder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import SessionClock
 from study_app.store.journals.journal_events import Event as Line
 from study_app.store.journals.journal_events import start_of
+from study_app.store.progress import progress_of
 from study_app.store.sessions.begin import SessionStart, begin, used_ids
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.recovery import reopen
+from study_app.store.sessions.recovery import rebuild, reopen
 from study_app.store.tables.study_files import check_study
+from study_app.store.withdrawals import tombstones
 from study_app.workspace import workspace
 
 LOOK_S = 0.05  # the session looks at the device so often
@@ -103,6 +111,57 @@ Answer: TypeAlias = Callable[[Question], Value | Mapping[str, Value] | None]
 
 Where a level is set, the answer is by how many steps, above 0 towards more; 0 confirms it.
 """
+
+
+def _plain(value: Any) -> Any:
+    """Return an answer with Python's own numbers and texts; several, in a list or an array, as a tuple."""
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    return tuple(_plain(one) for one in value) if isinstance(value, list | tuple) else value
+
+
+class HeldSignals:
+    """Holds signals that end the program, such as Ctrl+C, until `obey`, which a session calls between its writes.
+
+    An exception in the midst of a write could leave a line that the journal does not count. A second signal ends the
+    program at once. Only the main thread gets signals; elsewhere nothing is held.
+    """
+
+    def __init__(self) -> None:
+        self._before: dict[int, Any] = {}
+        self._came: int | None = None
+
+    def __enter__(self) -> Self:
+        if threading.current_thread() is threading.main_thread():
+            numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+            handlers = {number: signal.getsignal(number) for number in numbers}
+            self._before = {number: it for number, it in handlers.items() if it not in {signal.SIG_IGN, None}}
+            for number in self._before:
+                signal.signal(number, self._hold)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self._restore()
+        if kind is None:
+            self.obey()
+
+    def obey(self) -> None:
+        """Do what a signal that came would have done."""
+        if self._came is None:
+            return
+        number, self._came = self._came, None
+        handler = self._before[number]
+        if callable(handler):
+            handler(number, None)
+        raise SystemExit(128 + number)
+
+    def _hold(self, number: int, _frame: object) -> None:
+        self._came = number
+        self._restore()
+
+    def _restore(self) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
 
 
 class DiscardingStore:
@@ -152,7 +211,7 @@ class _Setting:
     senses: SensedTrial = field(init=False)
 
     def __post_init__(self) -> None:
-        self.senses = SensedTrial(self.scale)
+        self.senses = SensedTrial(scale=self.scale)
 
 
 class RehearsedSession(SimulatedParticipant):
@@ -172,6 +231,7 @@ class RehearsedSession(SimulatedParticipant):
     ) -> None:
         super().__init__(study, schedule, observer)
         self._answer = answer
+        self.signals = HeldSignals()
         self._known = known or {}
         self._tell_features = features
         self.rig = rig
@@ -245,6 +305,7 @@ class RehearsedSession(SimulatedParticipant):
 
     def _advance(self, seconds: float) -> None:
         """Let the servo take its ticks; who ends the program ends them, and without them no time passes."""
+        self.signals.obey()
         servo = self.rig.servo
         if servo.advance(max(1, round(seconds * servo.rate_hz))) == 0 and servo.fault is None:
             raise SessionError("the rehearsal was stopped from outside")
@@ -255,7 +316,7 @@ class RehearsedSession(SimulatedParticipant):
         named = str(page.trial) if interval is None else f"{page.trial}/{interval.number}"
         arm, draw = self._hand, self._stream(f"{named}/behaviour")
         self._paint = self._stream(f"{named}/screen")
-        senses = SensedTrial(self._study.scene.scale, self._period_s)
+        senses = SensedTrial(scale=self._study.scene.scale, period_s=self._period_s)
         self._touch.read()
         self._next_frame_ns = self.rig.servo.now_ns()
         hand = hand_for(page.task, arm, draw, self._now_s())
@@ -329,7 +390,8 @@ class RehearsedSession(SimulatedParticipant):
         given = None if self._answer is None else self._answer(Question(page, felt))
         if given is None:
             return super()._answers_to(page)
-        answers = given if isinstance(given, Mapping) else {page.items[0].id: given}
+        named = given if isinstance(given, Mapping) else {page.items[0].id: given}
+        answers = {item: _plain(value) for item, value in named.items()}
         if unknown := answers.keys() - {item.id for item in page.items}:
             possible = ", ".join(item.id for item in page.items)
             raise SessionError(f"{', '.join(map(repr, sorted(unknown)))} is not asked on this page: answer {possible}")
@@ -399,6 +461,7 @@ def rehearse(
     device: str = "scripted",
     results: Path | None = None,
     recordings: bool = True,
+    group: str | None = None,
     progress: Callable[[str], object] | None = None,
     observer: Observer | None = None,
 ) -> Path:
@@ -418,6 +481,8 @@ def rehearse(
         Study folder; by default a new ``results/<study>-rehearsal-<n>`` of the workspace.
     recordings : bool
         Whether every tick of the servo and every frame of a trial is kept.
+    group : str, optional
+        The pre-existing group of all of them; by default they are dealt evenly to such groups.
     progress : callable, optional
         Called with a line after each session.
     observer : Observer, optional
@@ -442,17 +507,89 @@ def rehearse(
     people = [f"P{number:03d}" for number in range(1, participants + 1)]
     for person in people:
         used_ids(StudyFolder(folder)).check_unused(person, 1)
-    for person in people:
-        began = time.perf_counter()
-        with open_session(
-            study, source, person, seed=seed, device=device, results=folder, recordings=recordings, observer=observer
-        ) as (rehearsal, store):
-            rehearsal.run()
-        if progress is not None:
-            took_s = time.perf_counter() - began
-            held = f"{store.clock.seconds() / 60:.1f} min of session in {took_s:.1f} s (simulated)"
-            progress(f"{person}: {rehearsal.answers} responses, {held}, fingerprint {store.fingerprint}")
+    for person, own_group in simulated_groups(StudyFolder(folder), study, people, group).items():
+        opening = open_session(
+            study,
+            source,
+            person,
+            seed=seed,
+            device=device,
+            results=folder,
+            recordings=recordings,
+            group=own_group,
+            observer=observer,
+        )
+        _run_to_end(person if own_group is None else f"{person} (group {own_group})", opening, progress)
     return folder
+
+
+def finish_session(
+    protocol: str | Path,
+    participant: str,
+    *,
+    seed: int,
+    device: str,
+    results: Path,
+    progress: Callable[[str], object] | None = None,
+) -> None:
+    """Bring a participant's first session to its end, whatever an earlier call, or a killed program, left of it.
+
+    An interrupted session is resumed with its own seed and device. One that is finished is not touched, nor is anything
+    begun for a participant who withdrew.
+
+    Parameters
+    ----------
+    protocol : str or Path
+        File or name of a protocol.
+    participant : str
+        Whose session it is.
+    seed : int
+        All randomness of a new session comes from it, the key's too.
+    device : str
+        A simulated device, for a new session.
+    results : Path
+        The study folder.
+    progress : callable, optional
+        Called with a line about what was done; not if there was nothing to do.
+
+    Raises
+    ------
+    StudyError
+        As `rehearse` and `reopen_session`; what was kept before is safe.
+    """
+    folder = StudyFolder(results)
+    session = folder.session(participant, 1)
+    is_finished = place_of(folder, session) in {place for _, place in listed(folder.fingerprints)}
+    if is_finished or participant in tombstones(folder):
+        return
+    if not is_there(session.path) or never_begun(session.path):
+        source = source_bytes(protocol)
+        study = parse(source, str(protocol))
+        opening = open_session(study, source, participant, seed=seed, device=device, results=results)
+        _run_to_end(participant, opening, progress)
+    elif progress_of(journal.read(session.journal)).ended is None:
+        _run_to_end(participant, reopen_session(session.path, protocol=protocol), progress)
+    else:  # the program was killed after the session's last line, before its proofs
+        rebuild(session.path)
+        if progress is not None:
+            progress(f"{participant}: tables and checksums of the finished session rebuilt")
+
+
+def _run_to_end(
+    participant: str,
+    opening: AbstractContextManager[tuple[RehearsedSession, SessionStore]],
+    progress: Callable[[str], object] | None,
+) -> None:
+    """Run an opened session to its last page; ``progress`` gets a line with its responses and missing trials."""
+    began = time.perf_counter()
+    with HeldSignals() as signals, opening as (rehearsal, store):
+        rehearsal.signals = signals
+        rehearsal.run()
+    if progress is not None:
+        took_s = time.perf_counter() - began
+        held = f"{store.clock.seconds() / 60:.1f} min of session in {took_s:.1f} s (simulated)"
+        missing = f"; {store.missing_trials}" if store.missing_trials.count else ""
+        progress(f"{participant}: {rehearsal.answers} responses, {held}, fingerprint {store.fingerprint}{missing}")
 
 
 @contextmanager
@@ -466,6 +603,8 @@ def open_session(
     session: int = 1,
     device: str = "scripted",
     recordings: bool = True,
+    group: str | None = None,
+    row_of: str | None = None,
     observer: Observer | None = None,
     answer: Answer | None = None,
 ) -> Iterator[tuple[RehearsedSession, SessionStore]]:
@@ -489,6 +628,10 @@ def open_session(
         A simulated device.
     recordings : bool
         Whether every tick and frame of a trial is kept.
+    group : str, optional
+        The participant's pre-existing group; in a later session by default the recorded one.
+    row_of : str, optional
+        The id of the participant who is replaced.
     observer : Observer, optional
         Discriminates the intervals of a trial; by default each participant is one of people drawn at random.
     answer : callable, optional
@@ -510,12 +653,14 @@ def open_session(
             screens=REHEARSED_SCREENS,
             simulated=True,
             recordings=recordings,
+            row_of=row_of,
+            group=group,
         )
         store = begin(results, study, source, start, clock=SessionClock(rig.servo.now_ns))
         own = session_protocol(StudyFolder(results), store.as_recorded(study), participant, session)
         with store:
             rehearsed = RehearsedSession(
-                own, build_schedule(own, participant, seed), rig, store, observer=observer, answer=answer
+                own, begun_schedule(own, start_of(store.lines), store.key), rig, store, observer=observer, answer=answer
             )
             with _tables_of(store):
                 yield rehearsed, store
@@ -581,7 +726,7 @@ def reopen_session(
             now=max(datetime.now().astimezone(), datetime.fromisoformat(lines[-1].at)),
         )
         own = session_protocol(locate(session_folder)[0], store.as_recorded(study), person, begun.session)
-        schedule = build_schedule(own, person, seed)
+        schedule = begun_schedule(own, begun, store.key)
         with store:
             start = resume_at(own, schedule, lines, store.key)
             known = _features_of_whole_session(own, schedule, rig.device.name, store.key.codes, store.key.nonce)

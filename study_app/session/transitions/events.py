@@ -32,7 +32,7 @@ class ShowPage(Command):
     page: Page
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class StartTrial(Command):
     """Prepare a trial, or one of its intervals: what is ``presented`` is loaded with its tank's first painted frame.
 
@@ -204,7 +204,7 @@ class PauseRequested(Event):
 
 @dataclass(frozen=True, slots=True)
 class ResumeRequested(Event):
-    """The pause ends; an interrupted trial starts again. Only the operator resumes what the operator stopped."""
+    """The pause ends; an interrupted trial starts again. Only the operator ends what a person stopped."""
 
     by: Literal["participant", "operator"]
 

@@ -174,10 +174,10 @@ def pause_again(state: SessionState, event: PauseRequested) -> Result:
 
 
 def resume(state: SessionState, event: ResumeRequested) -> Result:
-    """Go back to what was interrupted, with the force if it was off; the operator's stop is the operator's to end."""
+    """Go back to what was interrupted, with the force if it was off; only the operator ends what is held."""
     if state.held is not None and event.by != "operator":
-        what = "switched the force off" if state.held == "force" else "paused the session"
-        raise SessionError(f"the operator {what}: the operator resumes it, not the {event.by}")
+        what = "the force was stopped" if state.held == "force" else "the operator paused the session"
+        raise SessionError(f"{what}: only the operator resumes it, not the {event.by}")
     back: Commands = (Write(journal.Resumed(by=event.by)),)
     if state.force_off:
         back = (*back, Write(journal.ForceRestored(by=event.by)), FadeIn())
@@ -190,9 +190,9 @@ def resume(state: SessionState, event: ResumeRequested) -> Result:
 
 
 def stop_force(state: SessionState, event: ForceStopped) -> Result:
-    """Switch the force off and pause."""
+    """Switch the force off and pause; only the operator resumes, unless the program itself stopped the force."""
     stopped = Write(journal.ForceStopped(by=event.by))
-    held: Hold | None = "force" if event.by == "operator" else state.held
+    held: Hold | None = state.held if event.by == "program" else "force"
     if state.phase is Phase.PAUSED:
         paused = replace(state, force_off=True, held=held)
         return paused, (StopForce(), stopped, show(paused))
@@ -287,9 +287,9 @@ def recover(state: SessionState, event: WriteCompleted) -> Result:
 
 
 def stop_force_of_stalled(state: SessionState, event: ForceStopped) -> Result:
-    """Switch off a force that is off already; what the operator stopped is the operator's to resume afterwards."""
-    if event.by == "operator":
-        state = replace(state, stall=replace(_stall(state), by="operator"))
+    """Switch off a force that is off already; afterwards only the operator resumes."""
+    if event.by != "program":
+        state = replace(state, stall=replace(_stall(state), by=event.by))
     return state, (StopForce(),)
 
 

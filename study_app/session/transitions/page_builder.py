@@ -224,7 +224,7 @@ def _coming(state: SessionState) -> Trial | None:
 def _among(protocol: Protocol, trial: Trial, label: str, index: int) -> pages.Progress:
     """Return where trial ``index`` of a trial's block is; a block with a criterion may end early."""
     at_most = protocol.blocks[trial.block].until is not None
-    return pages.Progress(trial.part, protocol.parts, label, index, trial.of, at_most)
+    return pages.Progress(part=trial.part, parts=protocol.parts, label=label, index=index, of=trial.of, at_most=at_most)
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,8 +249,8 @@ def preview(study: Protocol, seed: int = SEED, participant: str = PARTICIPANT) -
     draw = stream(seed, "blinding").random
     secret = draw_secret(draw)
     codes = draw_key(study, draw)
-    shares = {name: group.share for name, group in study.groups.items()}
-    own = own_protocol(study, group_of(shares, secret, 1) if shares else None, 1)
+    group = group_of(study.shares, secret, 1) if study.randomises else next(iter(study.groups), None)
+    own = own_protocol(study, group, 1)
     return Preview(own, build_schedule(own, participant, seed), codes, secret)
 
 
@@ -315,4 +315,4 @@ def tested_condition(shown: Preview, index: int) -> str | None:
 
 def _state(shown: Preview, index: int, language: str) -> SessionState:
     plan = Plan(shown.protocol, shown.schedule, shown.codes, language, secret=shown.secret)
-    return SessionState(plan, index=index)
+    return SessionState(plan=plan, index=index)

@@ -76,18 +76,18 @@ class Stall:
     left: tuple[Command, ...] = field(repr=False)
     at_s: float
     before: Phase
-    by: Literal["operator", "program"] = "program"
+    by: Literal["participant", "operator", "device", "program"] = "program"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SessionState:
     """The session at one moment.
 
     ``index`` counts the schedule's steps (−1 before the first, their number after the last), ``attempt`` the
     presentations of the present trial from 1. ``answers`` holds the statements of the present questionnaire that were
     shown or answered. ``interrupted`` is the phase that a pause, or the failure of a device, goes back to.
-    ``force_off`` says that the force was stopped and has not been faded in again, ``held`` what the operator stopped,
-    so that the operator alone resumes. ``stall`` is set while the disk takes nothing.
+    ``force_off`` says that the force was stopped and has not been faded in again, ``held`` what only the
+    operator resumes: a pause, or a force that a person stopped. ``stall`` is set while the disk takes nothing.
     ``since_s`` is when the present step was entered [s, session's clock].
     Of trials with a design ``heard`` holds those answered so far, ``due`` what the present one presents, ``interval``
     which interval it is at (from 1), and ``until_s`` when a rest or a feedback is over [s, session's clock].

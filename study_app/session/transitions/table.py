@@ -122,7 +122,7 @@ def open_session(
         raise SessionError(f"language {language!r}: {protocol.study.name} is written in {known}; choose one of these")
     if not secret and any(block.design is not None for block in protocol.blocks.values()):
         raise SessionError("the levels of this study are drawn from the sealed key: give its secret")
-    return SessionState(Plan(protocol, schedule, key, language, start, secret))
+    return SessionState(plan=Plan(protocol, schedule, key, language, start, secret))
 
 
 def advance(state: SessionState, event: Event) -> tuple[SessionState, tuple[Command, ...]]:

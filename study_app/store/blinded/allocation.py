@@ -1,19 +1,32 @@
-"""The allocation of participants to groups: once per participant, and sealed until the study is unblinded.
+"""Groups of participants: assigned at random and sealed until the study is unblinded, or pre-existing and recorded.
 
-The participants of a folder have entries 1, 2 … in the order in which their first sessions began. An entry is claimed
-by creating ``blinding/allocated/NNN.json`` exclusively, so that two programs get different entries; it is never
-assigned again. The file has the entry, the participant, and, sealed, the group, which follows from entry and secret
-(`protocol.streams`).
+Each participant has an entry, claimed by creating a file in ``blinding/allocated`` exclusively, so that two programs
+get different entries; nobody else gets it, except a participant who replaces the first one.
+
+- **Randomised** (``NNN.json``): entries 1, 2 … in the order in which first sessions began. The group follows from entry
+  and secret (`protocol.streams`); the file holds it sealed.
+- **Pre-existing** (``GROUP-NNN.json``): entries 1, 2 … of each group, whose name is in the file and in journals.
+- **Replacements** (``…NNN-PARTICIPANT.json``) take over the entry, and so the group and the place in it, of the
+  participant whom they replace.
+
+The place in the group assigns rows of squares. Folders that an earlier version began have entries without
+``place_in_group``: there the number in the participant's id goes on to assign them, and a replacement has an entry of
+its own.
 """
 
 import json
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, Final, NamedTuple
 
-from study_app.errors import StoreError
-from study_app.protocol.groups import refuse_beyond_last
+from study_app.errors import StoreError, StudyError
+from study_app.protocol.groups import next_group, refuse_beyond_last
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import own_protocol
+from study_app.protocol.sequences import enrolment
 from study_app.protocol.streams import group_of
 from study_app.store.atomic import (
     cannot_write,
@@ -28,85 +41,218 @@ from study_app.store.blinded.blinding import Key, read_key
 from study_app.store.blinded.sealing import open_text, seal
 from study_app.store.folders import StudyFolder
 
+_STEM: Final = re.compile(r"(?:[a-z0-9_]+-)?[0-9]{3,}(?:-[A-Za-z0-9]+)?")
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Allocation:
-    """A participant's entry and group; ``sealed`` is the group as stored in journal and file."""
+    """A participant's entry and group; ``sealed`` is the group as stored in journal and file, "" if pre-existing.
+
+    ``replaces`` is the participant whose entry it was; ``place_in_group`` says that the place in the group assigns rows
+    of squares.
+    """
 
     entry: int
     group: str = field(repr=False)
     sealed: str
+    replaces: str | None
+    place_in_group: bool
+
+    @property
+    def is_preexisting(self) -> bool:
+        """Whether the group is pre-existing, and so recorded openly."""
+        return not self.sealed
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
-    """The content of an entry's file; ``participant`` is empty if the program ended before it was written."""
+    """The content of an entry's file; ``participant`` is empty if the program ended before it was written.
+
+    ``group`` is that of a pre-existing one, otherwise None.
+    """
 
     path: Path
+    entry: int = 0
+    participant: str = ""
+    sealed: str = ""
+    group: str | None = None
+    replaces: str | None = None
+    place_in_group: bool = False
+
+
+class Begun(NamedTuple):
+    """A participant's entry, pre-existing group and replaced participant, as the first line of a journal has them."""
+
     entry: int
-    participant: str
-    sealed: str
+    group: str | None
+    replaces: str | None
 
 
-def allocate(study: StudyFolder, key: Key, participant: str, *, waits: bool = True) -> Allocation | None:
-    """Return the allocation of a participant; claim the next entry for a new one. None in a study without groups."""
-    if not key.groups:
+def allocate(
+    study: StudyFolder,
+    key: Key,
+    participant: str,
+    *,
+    group: str | None = None,
+    row_of: str | None = None,
+    waits: bool = True,
+) -> Allocation | None:
+    """Return the allocation of a participant; claim an entry for a new one. None in a study without groups.
+
+    ``group`` is a new participant's pre-existing group, ``row_of`` the participant who is replaced; both were checked
+    (`check_choice`).
+    """
+    if not key.groups and group is None and not is_there(study.allocated):
         return None
     if (known := allocated(study, key, participant)) is not None:
         return known
-    folder = study.allocated
-    entry = max([*(claim.entry for claim in claims(study)), *entries_begun(study).values()], default=0)
+    held = claims(study)
+    replaced = _claim_of(held, row_of) if counts_places(held) else None
+    taken = [claim.entry for claim in held] + [begun.entry for begun in entries_begun(study).values()]
+    if key.groups:
+        group = None
+    else:
+        taken = [claim.entry for claim in held if claim.group == group]
+    entry = max(taken, default=0) if replaced is None else replaced.entry - 1
     try:
-        folder.mkdir(exist_ok=True)
+        study.allocated.mkdir(exist_ok=True)
         while True:
             entry += 1
-            allocation = _allocation(key, entry, participant)
-            held = {"entry": entry, "participant": participant, "sealed": allocation.sealed}
+            path = study.allocation(entry, group, participant if replaced is not None else None)
+            claim = Claim(
+                path=path,
+                entry=entry,
+                participant=participant,
+                sealed="" if group is not None else _sealed(key, entry, participant),
+                group=group,
+                replaces=None if replaced is None else replaced.participant,
+                place_in_group=counts_places(held),
+            )
             try:
-                write_through(study.allocation(entry), json.dumps(held).encode() + b"\n", waits=waits)
+                write_through(path, json.dumps(_content(claim)).encode() + b"\n", waits=waits)
             except FileExistsError:  # another program was first
+                if replaced is not None:
+                    raise StoreError(f"{path} was changed: restore it from a copy") from None
                 continue
             if waits:
-                sync_folder(folder)
-            return allocation
+                sync_folder(study.allocated)
+            return _allocation(claim, key)
     except OSError as error:
-        raise cannot_write(folder, error) from error
+        raise cannot_write(study.allocated, error) from error
 
 
 def allocated(study: StudyFolder, key: Key, participant: str) -> Allocation | None:
     """Return the allocation of a participant, None where there is none yet."""
-    for claim in claims(study):
-        if claim.participant != participant:
-            continue
-        found = _allocation(key, claim.entry, participant)
-        if group_in(claim, key) != found.group:
+    if (claim := _claim_of(claims(study), participant)) is not None:
+        if not is_unchanged(claim, key):
             raise StoreError(f"{claim.path} was changed: restore it from a copy")
-        return found
-    if (entry := entries_begun(study).get(participant)) is not None:
+        return _allocation(claim, key)
+    if (begun := entries_begun(study).get(participant)) is not None:
+        path = study.allocation(begun.entry, begun.group, None if begun.replaces is None else participant)
         raise StoreError(
-            f"{study.allocation(entry)} is missing, though participant {participant} has entry {entry}: restore it "
-            "from a copy"
+            f"{path} is missing, though participant {participant} has entry {begun.entry}: restore it from a copy"
         )
     return None
 
 
-def check_session(study: StudyFolder, protocol: Protocol, participant: str, session: int) -> None:
-    """Reject a session that the participant does not have, as far as known; nothing is claimed.
+def check_session(
+    study: StudyFolder,
+    protocol: Protocol,
+    participant: str,
+    session: int,
+    *,
+    group: str | None = None,
+    row_of: str | None = None,
+) -> None:
+    """Reject a session that the participant cannot have, as far as known; nothing is claimed.
 
     Raises
     ------
     StudyError
-        No participant has it, or this one's group has fewer sessions; or the study's key cannot be read.
+        No participant has it, or this one's group has fewer sessions; group or replaced participant are refused
+        (`check_choice`); or the study's key cannot be read.
     """
     refuse_beyond_last(protocol, session)
+    check_choice(protocol, claims(study), participant, group=group, row_of=row_of)
     if protocol.groups and is_there(study.key):
         known = allocated(study, read_key(study.path), participant)
-        if known is not None:
-            own_protocol(protocol, known.group, session)
+        group = group if known is None else known.group
+    if group is not None:
+        own_protocol(protocol, group, session)
+
+
+def check_choice(
+    protocol: Protocol, held: Sequence[Claim], participant: str, *, group: str | None, row_of: str | None
+) -> None:
+    """Reject, as StudyError, a group or a replaced participant that contradicts the protocol or the ``held`` claims."""
+    name, own = protocol.study.name, _claim_of(held, participant)
+    if group is not None and not protocol.asks_group:
+        why = "assigns participants to its groups at random" if protocol.groups else "has no groups"
+        raise StudyError(f"group {group!r}: {name} {why}; leave the group out")
+    permitted = ", ".join(protocol.groups)
+    if protocol.asks_group and group is None and own is None:
+        raise StudyError(
+            f"group is missing: {name} has pre-existing groups; give --group with that of {participant}: {permitted}"
+        )
+    if group is not None and group not in protocol.groups:
+        raise StudyError(f"group {group!r}: {name} has no such group; permitted: {permitted}")
+    if protocol.asks_group and own is not None and own.group not in protocol.groups:
+        raise StudyError(f"participant {participant} is recorded in group {own.group}, which {name} no longer has")
+    if own is not None and group not in (None, own.group):
+        raise StudyError(f"participant {participant} is recorded in group {own.group}, not {group}; give {own.group}")
+    if row_of is not None and protocol.groups:
+        _check_replaced(held, participant, own, group=group, row_of=row_of)
+
+
+def _check_replaced(
+    held: Sequence[Claim], participant: str, own: Claim | None, *, group: str | None, row_of: str
+) -> None:
+    replaced = _claim_of(held, row_of)
+    if not counts_places(held):
+        if enrolment(row_of) is None:
+            raise StudyError(
+                f"row of {row_of!r}: an earlier version began this folder, where the number in the ID assigns rows; "
+                "give an ID with a number, such as P007"
+            )
+    elif own is not None:
+        if own.replaces != row_of:
+            now = "nobody" if own.replaces is None else own.replaces
+            raise StudyError(f"row of {row_of!r}: participant {participant} replaces {now} since the first session")
+    elif replaced is None:
+        raise StudyError(
+            f"row of {row_of!r}: no participant of this folder has this ID; give the ID of the participant who is "
+            "replaced"
+        )
+    elif replaced.group != group:
+        raise StudyError(
+            f"row of {row_of!r}: {row_of} is in group {replaced.group}, {participant} in group {group}; replace a "
+            "participant of the same group"
+        )
+
+
+def simulated_groups(
+    study: StudyFolder, protocol: Protocol, participants: Iterable[str], group: str | None
+) -> dict[str, str | None]:
+    """Return the group that each new simulated participant is given: ``group``, or pre-existing ones dealt evenly.
+
+    StudyError rejects a ``group`` that the study cannot take (`check_choice`).
+    """
+    held = claims(study)
+    sizes = Counter(claim.group for claim in held if claim.group in protocol.groups and claim.replaces is None)
+    dealt: dict[str, str | None] = {}
+    for participant in participants:
+        known = _claim_of(held, participant)
+        own = group
+        if own is None and known is None and protocol.asks_group:
+            own = next_group(protocol.shares, sizes)
+            sizes[own] += 1
+        check_choice(protocol, held, participant, group=own, row_of=None)
+        dealt[participant] = own
+    return dealt
 
 
 def session_protocol(study: StudyFolder, protocol: Protocol, participant: str, session: int) -> Protocol:
-    """Return the protocol of a participant's session, whose group was allocated; nothing is claimed.
+    """Return the protocol of a participant's session, whose group is known; nothing is claimed.
 
     Raises
     ------
@@ -122,20 +268,28 @@ def session_protocol(study: StudyFolder, protocol: Protocol, participant: str, s
 
 
 def claims(study: StudyFolder) -> list[Claim]:
-    """Return the contents of all entries' files, in order."""
-    paths = [path for path in study.allocated.glob("*.json") if path.stem.isdecimal()]
-    return [_claim(study, path) for path in sorted(paths, key=lambda path: int(path.stem))]
+    """Return the contents of all entries' files, by group and entry; replacements after the participant replaced."""
+    paths = [path for path in study.allocated.glob("*.json") if _STEM.fullmatch(path.stem)]
+    found = [_claim(study, path) for path in paths]
+    return sorted(found, key=lambda claim: (claim.group or "", claim.entry, claim.replaces is not None, claim.path))
 
 
-def group_in(claim: Claim, key: Key) -> str | None:
-    """Return the group sealed in an entry's file; None if the file was changed."""
+def counts_places(held: Iterable[Claim]) -> bool:
+    """Return whether places in groups assign rows of squares: in folders without claims of an earlier version."""
+    return all(claim.place_in_group for claim in held if claim.participant)
+
+
+def is_unchanged(claim: Claim, key: Key) -> bool:
+    """Return whether an entry's file holds the group that the key gives, or a pre-existing one."""
+    if claim.group is not None or not key.groups:
+        return claim.group is not None and not key.groups
     opened = open_text(_whose(claim.entry, claim.participant), claim.sealed, key.nonce, frozenset({"group"}))
-    return None if opened is None else opened.get("group")
+    return opened is not None and opened.get("group") == group_of(key.groups, key.nonce, claim.entry)
 
 
-def entries_begun(study: StudyFolder) -> dict[str, int]:
-    """Return the entry of each participant with a session, as the first lines of the journals have it."""
-    found: dict[str, int] = {}
+def entries_begun(study: StudyFolder) -> dict[str, Begun]:
+    """Return what the first lines of the journals say of the entry of each participant with a session."""
+    found: dict[str, Begun] = {}
     for session in study.sessions():
         try:
             with open_regular(session.journal) as file:
@@ -143,25 +297,61 @@ def entries_begun(study: StudyFolder) -> dict[str, int]:
         except (OSError, ValueError):  # not begun, or damaged: `verify` reports it
             continue
         if isinstance(start, dict) and isinstance(start.get("entry"), int):
-            found[session.participant] = start["entry"]
+            replaces = start.get("row_of") if start.get("place_in_group") else None
+            found[session.participant] = Begun(start["entry"], start.get("group"), replaces)
     return found
+
+
+def _claim_of(held: Iterable[Claim], participant: str | None) -> Claim | None:
+    return next((claim for claim in held if participant and claim.participant == participant), None)
+
+
+def _content(claim: Claim) -> dict[str, Any]:
+    """Return the content of an entry's file."""
+    optional = {
+        "group": claim.group,
+        "replaces": claim.replaces,
+        "place_in_group": claim.place_in_group or None,
+        "sealed": claim.sealed or None,
+    }
+    own = {"entry": claim.entry, "participant": claim.participant}
+    return own | {name: value for name, value in optional.items() if value is not None}
 
 
 def _claim(study: StudyFolder, path: Path) -> Claim:
     """Return the content of an entry's file; nothing if it is damaged."""
-    entry = int(path.stem)
     try:
         held = parse_json(read_own(path, study.path))
-        if held["entry"] == entry and isinstance(held["participant"], str) and isinstance(held["sealed"], str):
-            return Claim(path, entry, held["participant"], held["sealed"])
-    except (StoreError, ValueError, KeyError, TypeError):
+        claim = Claim(
+            path=path,
+            entry=held["entry"],
+            participant=held["participant"],
+            sealed=held.get("sealed", ""),
+            group=held.get("group"),
+            replaces=held.get("replaces"),
+            place_in_group=held.get("place_in_group", False),
+        )
+        named = study.allocation(claim.entry, claim.group, claim.participant if claim.replaces else None)
+        if named == path and _content(claim) == held:
+            return claim
+    except (StoreError, ValueError, KeyError, TypeError, AttributeError):
         pass
-    return Claim(path, entry, "", "")
+    return Claim(path=path)
 
 
-def _allocation(key: Key, entry: int, participant: str) -> Allocation:
-    group = group_of(key.groups, key.nonce, entry)
-    return Allocation(entry, group, seal(_whose(entry, participant), {"group": group}, key.nonce))
+def _allocation(claim: Claim, key: Key) -> Allocation:
+    group = claim.group if claim.group is not None else group_of(key.groups, key.nonce, claim.entry)
+    return Allocation(
+        entry=claim.entry,
+        group=group,
+        sealed=claim.sealed,
+        replaces=claim.replaces,
+        place_in_group=claim.place_in_group,
+    )
+
+
+def _sealed(key: Key, entry: int, participant: str) -> str:
+    return seal(_whose(entry, participant), {"group": group_of(key.groups, key.nonce, entry)}, key.nonce)
 
 
 def _whose(entry: int, participant: str) -> list[object]:

@@ -32,11 +32,12 @@ from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.gate import resolve
 from study_app.protocol.model import Protocol, SceneDefaults, StudyLiquid
 from study_app.protocol.orders.schedule import block_codes, draw_key
-from study_app.protocol.streams import draw_secret, group_of, own_code
+from study_app.protocol.sequences import enrolment
+from study_app.protocol.streams import draw_secret, group_of, own_code, place_in_group
 from study_app.protocol.table import RECORDED
 from study_app.store import receipt
 from study_app.store.atomic import append_line, create_folder, is_there, parse_json, read_own
-from study_app.store.blinded.sealing import open_text, seal
+from study_app.store.blinded.sealing import TASK_BYTES, open_text, seal
 from study_app.store.columns import SEALED
 from study_app.store.folders import SessionFolder, StudyFolder, readable
 from study_app.store.journals import journal
@@ -51,10 +52,10 @@ _OF_RECEIPT: Final = ("codes", "slots", "order", "compares")
 """Keys that a receipt adds to a block with a design."""
 _SEALED_IN: Final[Mapping[type[events.Event], frozenset[str]]] = {
     events.TrialStarted: frozenset({"level", "standard", "arrangement", "catch"}),
-    events.IntervalEnded: SEALED,
+    events.IntervalEnded: SEALED | {"reached_s"},
     events.Allocated: frozenset({"group"}),
     events.Recorded: frozenset({"samples_recorded", "frames_recorded", "opened_sha256", "opened_frames_sha256"}),
-    events.TrialEnded: SEALED,
+    events.TrialEnded: SEALED | {"reached_s"},
 }
 """The fields that each event's lines hold sealed."""
 
@@ -66,8 +67,8 @@ class Key:
     ``codes`` is block → code → condition id, or track of a block with a design; ``tables`` holds the protocol's tables
     ``conditions`` and ``liquids``, of a study with designs also ``stimuli``, ``designs``, ``methods`` and
     what ``blocks`` present, ``files`` the texts of its liquid files by their names;
-    ``groups`` is group → share, if there are groups; ``drawn`` says where its randomness came from; ``hash`` is the
-    SHA-256 of the sealed file; ``nonce`` is as secret as the codes.
+    ``groups`` is group → share, if participants are randomised to groups; ``drawn`` says where its randomness came
+    from; ``hash`` is the SHA-256 of the sealed file; ``nonce`` is as secret as the codes.
     """
 
     hash: str
@@ -137,8 +138,8 @@ def _refuse_other_conditions(study: StudyFolder, key: Key, protocol: Protocol) -
     if key.tables_hash != _tables_hash(protocol):
         raise StoreError(
             f"{study.key} was sealed for other conditions than those of this protocol (its liquids, conditions, "
-            "stimuli or blocks were changed): undo that change to continue the study, or give the changed protocol "
-            "another study.name or results folder"
+            "stimuli, blocks or groups were changed): undo that change to continue the study, or give the changed "
+            "protocol another study.name or results folder"
         )
 
 
@@ -232,8 +233,8 @@ def _seal(protocol: Protocol, drawn: str, random: Callable[[], float], files: Ma
     }
     if files:
         content["files"] = dict(files)
-    if protocol.groups:
-        content["groups"] = _shares(protocol)
+    if protocol.randomises:
+        content["groups"] = protocol.shares
     return base64.encodebytes(json.dumps(content, ensure_ascii=False).encode())
 
 
@@ -263,13 +264,9 @@ def _tables_hash(protocol: Protocol) -> str:
     }
     if protocol.design_questions:
         written["designs"] = _tables(protocol)["blocks"]
-    if protocol.groups:
-        written["groups"] = _shares(protocol)
+    if protocol.randomises:
+        written["groups"] = protocol.shares
     return hashlib.sha256(json.dumps(written, sort_keys=True).encode()).hexdigest()
-
-
-def _shares(protocol: Protocol) -> dict[str, int]:
-    return {name: group.share for name, group in protocol.groups.items()}
 
 
 def verified_key(study: StudyFolder) -> Key:
@@ -395,7 +392,11 @@ def sealed(start: events.SessionStarted, event: events.Event, key: Key) -> event
     if not start.measures_sealed or not measured:
         return event
     rest = {name: value for name, value in line.items() if name not in names}
-    return events.read_event({**rest, "sealed": seal(_whose(start, event), measured, key.nonce)})
+    if isinstance(event, events.EndOfTask):
+        text = seal(_whose(start, event), measured, key.nonce, TASK_BYTES)
+    else:
+        text = seal(_whose(start, event), measured, key.nonce)
+    return events.read_event({**rest, "sealed": text})
 
 
 def opened(lines: Iterable[events.Event], key: Key | None) -> list[events.Event]:
@@ -410,9 +411,25 @@ def opened(lines: Iterable[events.Event], key: Key | None) -> list[events.Event]
     if key is None or not lines:
         return lines
     start = events.start_of(lines)
-    if start.entry is not None:
-        start = replace(start, group=group_of(key.groups, key.nonce, start.entry))
-    return [start, *(_opened(start, line, key) for line in lines[1:])]
+    return [replace(start, group=own_group(start, key)), *(_opened(start, line, key) for line in lines[1:])]
+
+
+def own_group(start: events.SessionStarted, key: Key) -> str | None:
+    """Return the group of a session's participant; None in a study without groups."""
+    if start.entry is None or start.group is not None:
+        return start.group
+    return group_of(key.groups, key.nonce, start.entry)
+
+
+def own_place(start: events.SessionStarted, key: Key) -> int | None:
+    """Return the number that assigns a session its rows of squares; None: the number in the participant's id.
+
+    It is the participant's place in the group. Without groups, and where a study with groups began under a version that
+    did not count places, it is the number in the id of the participant who is replaced.
+    """
+    if start.place_in_group and start.entry is not None:
+        return place_in_group(key.groups, key.nonce, start.entry)[1] if key.groups else start.entry
+    return None if start.row_of is None else enrolment(start.row_of)
 
 
 def opened_key(folder: StudyFolder) -> Key | None:

@@ -26,15 +26,19 @@ FRAMES_BYTES_PER_S: Final = 6_000
 """Of the sealed frames of a recording: more than 240 frames per second take."""
 _FACTS_BYTES: Final = 16_384  # of a recording without rows
 _TAG_BYTES = 16
-_BLOCK_BYTES = 1024
+TASK_BYTES: Final = 4096
+"""Of the sealed end of a task: enough for its measures and the times of 300 targets."""
 _PIECE_BYTES = 65_536  # encrypted at once
 _LENGTH_BYTES = 8
 
 
-def seal(whose: Sequence[object], values: Mapping[str, Any], secret: bytes) -> str:
-    """Return values as a sealed text; ``whose`` identifies their owner, and is needed to open it."""
+def seal(whose: Sequence[object], values: Mapping[str, Any], secret: bytes, block_bytes: int = 1024) -> str:
+    """Return values as a sealed text; ``whose`` identifies their owner, and is needed to open it.
+
+    The text is filled up to a multiple of ``block_bytes``, so that its length does not depend on the values.
+    """
     said = json.dumps(events.plain(values), allow_nan=False, separators=(",", ":")).encode()
-    said = said.ljust(-(-len(said) // _BLOCK_BYTES) * _BLOCK_BYTES)
+    said = said.ljust(-(-len(said) // block_bytes) * block_bytes)
     tag = _tag(json.dumps(whose).encode(), said, secret)
     return (tag + _combined(said, tag, secret)).hex()
 

@@ -40,6 +40,10 @@ from study_app.store.atomic import (
 from study_app.store.journals.journal_events import EVENTS, Event, problem, read_event, shortened
 
 FORMAT = 2
+OTHER_LINE_ENDINGS = (
+    "its line endings were changed to CR LF, as git does with core.autocrlf: restore it from a copy, with the line "
+    "“* -text” in the repository's .gitattributes"
+)
 """Of the journal and the receipt; since 2 the lines have ``previous``."""
 RETRY_S = 1.0
 """The background thread repeats a failed flush after this time."""
@@ -150,6 +154,8 @@ def scan(path: Path) -> Contents:
             damage = f"{path}, line {number} {wrong}: it was changed; restore it from a copy"
             return Contents(lines, whole_bytes, damage=damage)
         if (wrong := _break(line, hashed.hexdigest(), chained=chained)) is not None:
+            if pieces[0].endswith(b"\r"):
+                return Contents(lines[:-1], whole_bytes, damage=f"{path}, line 1: {OTHER_LINE_ENDINGS}")
             return Contents(lines[:-1], whole_bytes, damage=f"{path}, line {number} {wrong}")
         lines.append(read_event(line))
         whole_bytes += len(piece) + 1

@@ -25,6 +25,9 @@ CAUSE_WITHHELD = "the session was stopped"
 
 UNDELIVERED = "invalid"
 """The outcome of a trial of which an interval was not delivered as requested."""
+COMPLETED, INCOMPLETE = "completed", "incomplete"
+REACHED_END = (COMPLETED, INCOMPLETE)
+"""The status of sessions that reached their last page: with enough trials, or with more missing than permitted."""
 
 _MOST_SECONDS = 1e9  # of a session's clock
 _MOST = 10**30  # greatest integer that the program writes
@@ -78,17 +81,17 @@ def _are_answers(value: object) -> bool:
     )
 
 
-def _matches(pattern: re.Pattern[str]) -> tuple[Callable[[object], bool], str, Mapping[str, str]]:
+def _text_like(what: str, pattern: re.Pattern[str]) -> Kind:
     def matches(value: object) -> bool:
         return isinstance(value, str) and pattern.fullmatch(value) is not None
 
-    return matches, "string", {"pattern": f"^({pattern.pattern})$"}
+    return Kind(what, matches, "string", {"pattern": f"^({pattern.pattern})$"})
 
 
 Text: TypeAlias = Annotated[str, Kind("text", lambda value: isinstance(value, str), "string")]
-StudyName: TypeAlias = Annotated[str, Kind("study's name", *_matches(STUDY_NAME))]
-ParticipantId: TypeAlias = Annotated[str, Kind("participant's id", *_matches(PARTICIPANT_ID))]
-RecordingName: TypeAlias = Annotated[str, Kind("recording's name", *_matches(RECORDING_NAME))]
+StudyName: TypeAlias = Annotated[str, _text_like("study's name", STUDY_NAME)]
+ParticipantId: TypeAlias = Annotated[str, _text_like("participant's id", PARTICIPANT_ID)]
+RecordingName: TypeAlias = Annotated[str, _text_like("recording's name", RECORDING_NAME)]
 Flag: TypeAlias = Annotated[bool, Kind("flag", lambda value: isinstance(value, bool), "boolean")]
 Integer: TypeAlias = Annotated[int, Kind("integer", _is_integer, "integer")]
 Number: TypeAlias = Annotated[float, Kind("number", _is_number, "number")]
@@ -113,6 +116,15 @@ Numbers: TypeAlias = Annotated[
     ),
 ]
 Texts: TypeAlias = Annotated[Sequence[str], Kind("list of texts", _are_texts, "array", {"items": {"type": "string"}})]
+NumberList: TypeAlias = Annotated[
+    Sequence[float],
+    Kind(
+        "list of numbers",
+        lambda value: isinstance(value, list) and all(map(_is_number, value)),
+        "array",
+        {"items": {"type": "number"}},
+    ),
+]
 Answers: TypeAlias = Annotated[
     Sequence["Response"], Kind("list of answers", _are_answers, "array", {"items": {"$ref": "#/$defs/answer"}})
 ]
@@ -133,7 +145,7 @@ Which: TypeAlias = tuple[int, int, int | None]
 """Trial, attempt and interval, which is None for a trial."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
     """How a question was answered so far; times are seconds on the session's clock, None before the event.
 
@@ -258,7 +270,13 @@ class OfAttempt(Event, group=True):
 
 
 class EndOfTask(OfAttempt, group=True):
-    """The end of a task, with its measures in ``others``."""
+    """The end of a task, with its measures in ``others``.
+
+    ``reached_s`` lists when the targets were reached [s, on the task's clock], if `target_reached` lines would have
+    revealed the condition while the key was sealed.
+    """
+
+    reached_s: NumberList | None = None
 
     def fields(self) -> dict[str, Any]:
         """Return the event's own fields in the order in which they are written: measures first if interrupted."""
@@ -276,6 +294,8 @@ class SessionStarted(Event):
 
     `receipt_hash` is the SHA-256 of the receipt without what changes later (of `session_resumed`: of its entry there);
     `measures_sealed` says whether sealed columns are encrypted, `own_codes` whether codes are the participant's own.
+    `entry` is the participant's entry in the allocation to groups, or the place in a pre-existing `group`;
+    `place_in_group` says that the place in the group assigns rows of squares.
     """
 
     format: Integer | None = None
@@ -301,6 +321,7 @@ class SessionStarted(Event):
     intervals: Flag | None = None
     entry: Integer | None = None
     group: Text | None = None
+    place_in_group: Flag | None = None
 
 
 class SessionResumed(Event):
@@ -427,7 +448,11 @@ class Stepped(OfAttempt):
 
 
 class TargetReached(Event):
-    """A target was reached, on the task's clock."""
+    """A target was reached, on the task's clock.
+
+    While measures are sealed no such line is written, since their number and times would reveal a delay: the end of
+    the task has the times in its `sealed` text, as `reached_s`.
+    """
 
     trial: Integer
     target: Integer

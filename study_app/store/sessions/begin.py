@@ -10,6 +10,7 @@ from typing import Any
 
 import study_app
 from study_app.errors import StoreError
+from study_app.ids import read_as
 from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import own_protocol
@@ -18,7 +19,7 @@ from study_app.protocol.source.files import unbundled
 from study_app.protocol.trials.stimuli import LEVEL_RULES
 from study_app.store import receipt
 from study_app.store.atomic import cannot_write, is_there, make_folder, sweep_old, sync_folder, temporary_path
-from study_app.store.blinded.allocation import Allocation, allocate, check_session
+from study_app.store.blinded.allocation import Allocation, allocate, allocated, check_session
 from study_app.store.blinded.blinding import Key, open_or_draw_key, reveals, sealed_model
 from study_app.store.folder_lock import Opening, abandoned, create_opened, sweep_claims, take_over
 from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder
@@ -69,7 +70,9 @@ class SessionStart:
     video : mapping, optional
         Description of camera and footage for the receipt; None in a study without a video.
     row_of : str, optional
-        The id whose rows of squares the session takes; None: the participant's own.
+        The id of the participant who is replaced; None: nobody, or as the participant's first session says.
+    group : str, optional
+        The participant's pre-existing group; None: there is none, or as the participant's first session says.
     """
 
     participant: str
@@ -87,6 +90,7 @@ class SessionStart:
     outlets: Mapping[str, Any] | None = None
     video: Mapping[str, Any] | None = None
     row_of: str | None = None
+    group: str | None = None
 
 
 def begin(
@@ -120,7 +124,7 @@ def begin(
     check_participant(start.participant, pilot=start.pilot)
     check_study(study_folder, protocol.study.name)
     used_ids(study_folder).check_unused(start.participant, start.session)
-    check_session(study_folder, protocol, start.participant, start.session)
+    check_session(study_folder, protocol, start.participant, start.session, group=start.group, row_of=start.row_of)
     clock = clock if clock is not None else SessionClock()
     make_folder(study_folder.path)
     draw = stream(start.seed, "blinding").random if start.simulated else None
@@ -129,7 +133,7 @@ def begin(
     sealed = not reveals(study_folder.path)
     opening = _claim(place)
     try:
-        allocation = allocate(study_folder, key, start.participant)
+        allocation = allocate(study_folder, key, start.participant, group=start.group, row_of=start.row_of)
         group = None if allocation is None else allocation.group
         own_protocol(protocol, group, start.session)  # refuses a session that the group does not have
         started, first_receipt = first_records(
@@ -153,6 +157,10 @@ def first_records(
     allocation: Allocation | None = None,
 ) -> tuple[SessionStarted, dict[str, Any]]:
     """Return a session's first line, and its receipt as it is before the first trial."""
+    row_of, group = start.row_of, None
+    if allocation is not None:
+        row_of = allocation.replaces if allocation.place_in_group else row_of
+        group = allocation.group if allocation.is_preexisting else None
     fields: dict[str, Any] = {
         "participant": start.participant,
         "session": start.session,
@@ -166,7 +174,7 @@ def first_records(
         "key_hash": key_hash,
         "protocol_hash": protocol_hash(source),
         "version": study_app.__version__,
-        **({} if start.row_of is None else {"row_of": start.row_of}),
+        **{name: value for name, value in (("row_of", row_of), ("group", group)) if value is not None},
     }
     limits = protocol.limits.model_dump(mode="json")
     started = SessionStarted(
@@ -179,6 +187,7 @@ def first_records(
         protocol_format=protocol.format if protocol.format > 1 else None,
         intervals=True if any(block.design is not None for block in protocol.blocks.values()) else None,
         entry=None if allocation is None else allocation.entry,
+        place_in_group=True if allocation is not None and allocation.place_in_group else None,
     )
     first_receipt = {
         "format": FORMAT,
@@ -196,15 +205,15 @@ def first_records(
 
 
 def note_allocation(store: SessionStore) -> None:
-    """Journal the allocation of the session's participant, unless a session of the participant has done so."""
-    study, folder = store.place.study_folder, store.place.folder
-    if start_of(store.lines).entry is None:
+    """Journal the sealed group of the session's participant, unless a session of the participant has done so."""
+    study, folder, start = store.place.study_folder, store.place.folder, start_of(store.lines)
+    if start.entry is None or start.group is not None:
         return
     sessions = [one for one in study.sessions() if one.participant == folder.participant]
     known = [line for one in sessions if is_there(one.journal) for line in journal.scan(one.journal).lines]
     if any(isinstance(line, Allocated) for line in known):
         return
-    allocation = allocate(study, store.key, folder.participant)
+    allocation = allocated(study, store.key, folder.participant)
     if allocation is not None:
         store.append(Allocated(entry=allocation.entry, sealed=allocation.sealed))
 
@@ -267,7 +276,7 @@ class UsedIds:
         return f"P{max((int(match[1]) for match in matches if match), default=0) + 1:03d}"
 
     def check_unused(self, participant: str, number: int) -> None:
-        """Reject a session that exists, or an id that differs from a used one only in capitals.
+        """Reject a session that exists, or a new id that other programs change or that differs only in capitals.
 
         A session that was claimed by an ended program, and never begun, can be begun.
 
@@ -290,6 +299,11 @@ class UsedIds:
                     f"{used!r} "
                     "with a new session number, or another id"
                 )
+        if participant not in self.ids and (what := read_as(participant)):
+            raise StoreError(
+                f"participant id {participant!r} cannot be used: spreadsheets and statistics programs read it as "
+                f"{what}; use another id, such as {self.suggested()}"
+            )
         if (participant, number) in self.held:
             raise self.refusal(participant, number)
 

@@ -22,10 +22,13 @@ from study_app.store import csv_files, receipt
 from study_app.store.atomic import write_file
 from study_app.store.blinded.blinding import Key, as_recorded, opened, opened_key, sealed
 from study_app.store.checksums import fingerprint, note_fingerprint, write_checksums
+from study_app.store.exclusions import exclude_incomplete
 from study_app.store.folder_lock import Opening
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal_events as events
 from study_app.store.journals.journal import Journal
+from study_app.store.missing_trials import MissingTrials
+from study_app.store.progress import progress_of
 from study_app.store.recorder import LEAVING_S, Kept, Recorder
 from study_app.store.tables import session_tables
 from study_app.store.tables.study_files import write_participants
@@ -78,6 +81,7 @@ class SessionStore:
         self.outlets: Outlets | None = None
         self._marked: Marker | None = None  # of the line that could not be written
         self._outlets_lost: set[str] = set()  # that are journalled
+        self._reached_s: list[float] = []  # in the running task of a sealed session
 
     @property
     def folder(self) -> SessionFolder:
@@ -113,19 +117,39 @@ class SessionStore:
     def append(self, event: events.Event, *, t_s: float | None = None, waits: bool = True) -> None:
         """Add an event to the journal; with ``waits`` it is on the disk when this returns, else soon after.
 
-        ``t_s`` is its time [s since the clock's origin], by default now. Fields that reveal a condition are sealed.
+        ``t_s`` is its time [s since the clock's origin], by default now. Fields that reveal a condition are sealed;
+        while measures are sealed, a reached target sends its marker at once and is written at the end of its task.
 
         Raises
         ------
         StoreError
             It was not written, or is not on the disk; the journal is as before and can be tried again.
         """
-        if self._lines:
-            event = sealed(events.start_of(self._lines), event, self.key)
         event = replace(event, t_s=self.clock.seconds() if t_s is None else t_s)
+        if self._lines:
+            start = events.start_of(self._lines)
+            if start.measures_sealed and isinstance(event, events.TargetReached):
+                self._hold_target(event)
+                return
+            event = sealed(start, self._with_targets(event), self.key)
         self._mark(event)
         self._lines.append(self.journal.append(event, t_s=event.t_s, waits=waits))
         self._marked = None
+
+    def _hold_target(self, event: events.TargetReached) -> None:
+        """Send the marker of a reached target; its time is written, sealed, at the end of the task."""
+        self._mark(event)
+        self._marked = None
+        if event.t_task_s is not None:
+            self._reached_s.append(round(event.t_task_s, 6))
+
+    def _with_targets(self, event: events.Event) -> events.Event:
+        """Return the end of a task with the times of the targets that were held back."""
+        if isinstance(event, events.TrialStarted | events.IntervalStarted):
+            self._reached_s = []
+        if isinstance(event, events.EndOfTask) and self._reached_s:
+            return replace(event, reached_s=self._reached_s)
+        return event
 
     def _mark(self, event: events.Event) -> None:
         """Send the marker of an event, before waiting for the disk; only once, even if its line is written again."""
@@ -169,6 +193,9 @@ class SessionStore:
     def finish(self, status: str, reason: str = "") -> None:
         """Write the session's last line, its receipt, all tables, checksums and fingerprint, and close it.
 
+        A completed session is recorded as incomplete if more trials are missing than the study permits; then the rule
+        `exclusions.MISSING_RULE` excludes it.
+
         Raises
         ------
         StoreError
@@ -181,13 +208,16 @@ class SessionStore:
             self._ended_s = (
                 self.clock.seconds() if self._ended_s is None else self._ended_s
             )  # the same when tried again
+            missing = self.missing_trials
+            if status == events.COMPLETED and missing.exceed:
+                status, reason = events.INCOMPLETE, str(missing)
             self.append(events.SessionEnded(status=status, reason=reason), t_s=self._ended_s)
             self.journal.close()
             self._receipt |= {"status": status, "reason": reason, "ended_at": self._lines[-1].at}
         self.write_tables()
         failures = [] if self.behind is None else [self.behind]
         table = partial(write_participants, self.place.study_folder, self.place.study)
-        for write in (self._write_proofs, table):
+        for write in (self._write_proofs, table, self._exclude_if_incomplete):
             try:
                 write()
             except StoreError as error:
@@ -196,6 +226,16 @@ class SessionStore:
         if failures:
             raise failures[0]
         self._over = True
+
+    @property
+    def missing_trials(self) -> MissingTrials:
+        """The main trials of the session so far that were not delivered."""
+        return progress_of(self._lines).missing_trials
+
+    def _exclude_if_incomplete(self) -> None:
+        if self._receipt["status"] == events.INCOMPLETE:
+            of_study, session = self.place.study_folder.path, self.place.folder
+            exclude_incomplete(of_study, session.participant, session.number, str(self._receipt["reason"]))
 
     def close(self) -> None:
         """Close the session without an end; it stays unfinished.

@@ -98,9 +98,12 @@ class SimulatedStudy:
         )
         self.receipt = plain(first_receipt)
 
-    def begin(self, participant: str, clock: SessionClock) -> SimulatedSession:
-        """Return the session of a participant, which is not on the disk before it is finished."""
-        return SimulatedSession(self, participant, clock)
+    def begin(self, participant: str, clock: SessionClock, group: str | None = None) -> SimulatedSession:
+        """Return the session of a participant of a pre-existing group, if the study has these.
+
+        It is not on the disk before it is finished.
+        """
+        return SimulatedSession(self, participant, clock, group)
 
     def keep(self, session: SimulatedSession) -> None:
         """Store a finished session.
@@ -150,7 +153,7 @@ class SimulatedSession:
     ``protocol`` is that of the session: in a study with groups, with the steps of the participant's group.
     """
 
-    def __init__(self, study: SimulatedStudy, participant: str, clock: SessionClock) -> None:
+    def __init__(self, study: SimulatedStudy, participant: str, clock: SessionClock, group: str | None) -> None:
         name = study.protocol.study.name
         self.place = Place(study.folder, study.folder.session(participant, 1), name)
         self.clock = clock
@@ -158,15 +161,17 @@ class SimulatedSession:
         self.content = bytearray()  # of the journal
         self._hash = hashlib.sha256()
         self._study = study
-        allocation = allocate(study.folder, study.key, participant, waits=False)
+        allocation = allocate(study.folder, study.key, participant, group=group, waits=False)
         self.protocol = own_protocol(study.protocol, None if allocation is None else allocation.group, 1)
-        entry = None if allocation is None else allocation.entry
         started_at = clock.at(0)
         at = {"started_at": started_at, "clock": {"origin_ns": clock.origin_ns, "origin_at": started_at}}
-        self.receipt = {**study.receipt, "participant": participant, **at}
-        own: dict[str, Any] = {"participant": participant, "entry": entry, "receipt_hash": receipt.digest(self.receipt)}
-        self.append(replace(study.started, **own), t_s=0.0)
+        of_group = {} if group is None else {"group": group}
+        self.receipt = {**study.receipt, "participant": participant, **of_group, **at}
+        own: dict[str, Any] = {"participant": participant, **of_group, "receipt_hash": receipt.digest(self.receipt)}
         if allocation is not None:
+            own |= {"entry": allocation.entry, "place_in_group": allocation.place_in_group or None}
+        self.append(replace(study.started, **own), t_s=0.0)
+        if allocation is not None and not allocation.is_preexisting:
             self.append(Allocated(entry=allocation.entry, sealed=allocation.sealed))
 
     def append(self, event: Event, *, t_s: float | None = None) -> None:

@@ -40,7 +40,7 @@ LEFT_BEHIND: Final = shutil.ignore_patterns(".open-*.json", ".*.tmp")
 """Files that programs leave in a folder while they have it open, or when they are killed."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Source:
     """The data of a folder that is, or is to be, a site of a merged study.
 
@@ -86,7 +86,7 @@ def merge(given: Mapping[str, Path], to: Path) -> Merged:
     _check_alike((*there, *new), ran)
     _check_sessions((*there, *new))
     at = datetime.now().astimezone().isoformat(timespec="seconds")
-    sites = tuple(Site(one.name, at, one.key.hash, len(one.begun)) for one in new)
+    sites = tuple(Site(name=one.name, merged_at=at, key_hash=one.key.hash, sessions=len(one.begun)) for one in new)
     if merged is None:
         made = Merged(to, new[0].study, ran, sites)
         _create(made, new)
@@ -156,14 +156,14 @@ def _source(name: str, path: Path) -> _Source:
             "sites of one protocol, unchanged to the byte, can be merged"
         )
     return _Source(
-        name,
-        path,
-        state,
-        described,
-        next(iter(hashes), ""),
-        any(one["pilot"] for one in receipts) if receipts else None,
-        verified_key(study),
-        {describe_session(session).begun or str(session.path): session.path for session in sessions},
+        name=name,
+        path=path,
+        state=state,
+        study=described,
+        protocol_hash=next(iter(hashes), ""),
+        pilot=any(one["pilot"] for one in receipts) if receipts else None,
+        key=verified_key(study),
+        begun={describe_session(session).begun or str(session.path): session.path for session in sessions},
     )
 
 

@@ -2,7 +2,16 @@
 
 from collections.abc import Sequence
 
-from study_app.store.columns import EXCLUSIONS, INTERVALS, PARTICIPANTS, RESPONSES, RESPONSES_2, TRIALS, TRIALS_2
+from study_app.store.columns import (
+    EXCLUSIONS,
+    INTERVALS,
+    PARTICIPANTS,
+    RESPONSES,
+    RESPONSES_2,
+    TRIALS,
+    TRIALS_2,
+    with_missing_trials,
+)
 from study_app.store.csv_files import Column
 from study_app.store.journals.journal_events import EVENTS
 from study_app.store.recordings import FRAMES, SAMPLES
@@ -28,6 +37,12 @@ SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
         "…_description-trials_data.csv, …_description-participants_data.csv",
         "what differs in trials if the protocol has format 2; participants have the group, too",
         tuple(column for column in TRIALS_2 if column not in TRIALS),
+    ),
+    (
+        "Participants, trials of intervals",
+        "study-…_description-participants_data.csv",
+        "what differs in a study with trials of intervals",
+        tuple(column for column in with_missing_trials(PARTICIPANTS) if column not in PARTICIPANTS),
     ),
     ("Exclusions", "exclusions.csv", "one row per excluded session or trial", EXCLUSIONS),
     ("Samples", "recordings/trial-….parquet", "one row per tick of the servo", SAMPLES),

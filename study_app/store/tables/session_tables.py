@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 from study_app.errors import StoreError
-from study_app.store.columns import DELIVERED, INTERVALS, TRIALS, VIDEO, tables_of
+from study_app.store.columns import DELIVERED, INTERVALS, TRIALS, TRIALS_MISSING, VIDEO, tables_of
 from study_app.store.csv_files import Column, Row, header, unsealed
 from study_app.store.delivered import within_limits
 from study_app.store.journals import journal_events as events
@@ -176,6 +176,7 @@ def participant(lines: Sequence[events.Event]) -> Row:
         "trials": len(main),
         "responses": len(answered),
         "validity": None if not verdicts else "valid" if all(verdicts) else "invalid",
+        **({TRIALS_MISSING.name: done.missing_trials.count} if start.intervals else {}),
     }
 
 

@@ -17,7 +17,16 @@ from study_app.protocol.table import text_in
 from study_app.store import csv_files, receipt
 from study_app.store.atomic import is_there, parse_json, read_own, write_file
 from study_app.store.blinded.blinding import Key, opened, opened_key, reveals
-from study_app.store.columns import LATER, PARTICIPANTS, PARTICIPANTS_2, SEALED, every_column
+from study_app.store.columns import (
+    GROUP,
+    LATER,
+    PARTICIPANTS,
+    PARTICIPANTS_2,
+    SEALED,
+    TRIALS_MISSING,
+    every_column,
+    with_missing_trials,
+)
 from study_app.store.csv_files import Column, Row, header
 from study_app.store.folder_lock import never_begun
 from study_app.store.folders import SessionFolder, StudyFolder, check_study_name
@@ -125,23 +134,35 @@ def write_participants(folder: StudyFolder, study: str) -> None:
 
 
 def table_bytes(folder: StudyFolder, rows: Sequence[csv_files.Row]) -> bytes:
-    """Return the table with these rows, and the group of each session in a study of format 2 that was unblinded."""
-    return csv_files.csv_bytes(columns_of(folder, rows), [{"group": None} | row for row in rows])
+    """Return the table with these rows, with the columns of `columns_of`."""
+    return csv_files.csv_bytes(
+        columns_of(folder, rows), [{"group": None, TRIALS_MISSING.name: None} | row for row in rows]
+    )
 
 
 def columns_of(folder: StudyFolder, rows: Iterable[csv_files.Row]) -> tuple[Column, ...]:
-    """Return the columns of the table with these rows."""
-    second = any("group" in row for row in rows)
-    return PARTICIPANTS_2 if second and reveals(folder.path) else PARTICIPANTS
+    """Return the columns of the table with these rows.
+
+    The group of each session is among them if it is pre-existing or was unblinded, the number of missing trials if the
+    study has trials of intervals.
+    """
+    rows = list(rows)
+    groups = [row["group"] for row in rows if "group" in row]
+    shows_group = any(groups) or bool(groups and reveals(folder.path))
+    columns = PARTICIPANTS_2 if shows_group else PARTICIPANTS
+    return with_missing_trials(columns) if any(TRIALS_MISSING.name in row for row in rows) else columns
 
 
 def description_bytes(study: StudyHead, *, sealed: bool, protocol_format: int = 1, intervals: bool = False) -> bytes:
     """Return the file for ``study``; the same bytes for the same study on every machine.
 
-    ``sealed`` says that no table has the sealed columns; ``protocol_format`` is the format of the study's file,
-    ``intervals`` whether it has blocks with a design.
+    ``sealed`` says that no table has the sealed columns, except the group if it is pre-existing; ``protocol_format`` is
+    the format of the study's file, ``intervals`` whether it has blocks with a design.
     """
     title = text_in(study.title, study.languages[0])
+    hidden = {column.name for column in every_column(protocol_format, intervals=intervals) if sealed and column.sealed}
+    if study.group_assignment == "pre-existing":
+        hidden.discard(GROUP.name)
     content = {
         "@context": "https://schema.org/",
         "@type": "Dataset",
@@ -152,7 +173,7 @@ def description_bytes(study: StudyHead, *, sealed: bool, protocol_format: int = 
         "variableMeasured": [
             column.variable
             for column in every_column(protocol_format, intervals=intervals)
-            if not (sealed and column.sealed)
+            if column.name not in hidden
         ],
     }
     return (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode()
@@ -204,9 +225,10 @@ def has_intervals(protocol: Mapping[str, Any]) -> bool:
 
 
 def names_sealed(content: bytes) -> bool:
-    """Return whether a description names a sealed column."""
+    """Return whether a description names a sealed column; the group is none if it is pre-existing."""
     with contextlib.suppress(AttributeError, KeyError, TypeError, ValueError):
-        return any(variable["name"] in SEALED for variable in parse_json(content)["variableMeasured"])
+        names = {variable["name"] for variable in parse_json(content)["variableMeasured"]}
+        return not names.isdisjoint(SEALED - {GROUP.name})
     return False
 
 

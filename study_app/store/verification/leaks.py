@@ -11,6 +11,7 @@ import io
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -149,7 +150,7 @@ def _cells(content: str) -> Iterator[tuple[str, str]]:
     header: list[str] = []
     for number, row in enumerate(csv.reader(io.StringIO(content, newline="")), start=1):
         header = header or row
-        for column, cell in zip(header, row, strict=False):
+        for column, cell in zip_longest(header, row, fillvalue=""):
             if column not in _PASSED_OVER:
                 yield f", row {number}, {column}", cell
 

@@ -15,12 +15,12 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import RecordedTrial, Schedule, build_schedule, reproduce
 from study_app.protocol.presented.presentation import arrangement_text, next_level
-from study_app.protocol.streams import Key, group_of
+from study_app.protocol.streams import Key
 from study_app.protocol.tracks import adjusting_of, design_of
 from study_app.protocol.trials.stimuli import LEVEL_RULES
 from study_app.store import receipt
 from study_app.store.blinded import blinding
-from study_app.store.blinded.blinding import opened, read_key, whole_protocol
+from study_app.store.blinded.blinding import opened, own_group, own_place, read_key, whole_protocol
 from study_app.store.folders import locate
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
@@ -49,19 +49,19 @@ def reproduced(session_folder: Path) -> Reproduced:
         raise StoreError(f"{study.key} is not the key that {folder.path} ran under: restore it from a copy")
     if lacking := [name for name in receipt.FIELDS if name not in ran]:
         raise StoreError(f"{folder.receipt} lacks {', '.join(lacking)}: restore it from a copy")
-    seed, participant, row_of = ran["seed"], ran["participant"], ran.get("row_of")
-    complete = ran["status"] == "completed"
+    seed, participant = ran["seed"], ran["participant"]
+    complete = ran["status"] in events.REACHED_END
     try:
-        entry = events.start_of(lines).entry
-        group = None if entry is None else group_of(key.groups, key.nonce, entry)
-        protocol = own_protocol(whole_protocol(ran["protocol"], key), group, ran["session"])
-        schedule = build_schedule(protocol, participant, seed, row_of)
+        start = events.start_of(lines)
+        protocol = own_protocol(whole_protocol(ran["protocol"], key), own_group(start, key), ran["session"])
+        place = own_place(replace(start, row_of=ran.get("row_of")), key)
+        schedule = build_schedule(protocol, participant, seed, place)
         recorded = recorded_trials(opened(lines, key) if lines and events.start_of(lines).own_codes else lines)
     except (KeyError, TypeError, AttributeError, ValueError):  # the reason could reveal a condition
         raise StoreError(
             f"{folder.path}: receipt, key and journal do not give the session: verify the study's folder"
         ) from None
-    found = Reproduced([*reproduce(protocol, seed, participant, recorded, complete=complete, row_of=row_of)])
+    found = Reproduced([*reproduce(protocol, seed, participant, recorded, complete=complete, place=place)])
     if lines and events.start_of(lines).intervals:
         compared = _Compared(protocol, Key(key.codes, key.nonce), schedule)
         _levels(compared, lines, key, found)
@@ -173,7 +173,15 @@ def recorded_trials(lines: Iterable[events.Event]) -> tuple[RecordedTrial | int,
     place: dict[tuple[int, int], tuple[int, RecordedTrial]] = {}
     for line in lines:
         if isinstance(line, events.TrialStarted):
-            told = RecordedTrial(line.trial, line.block, line.phase, line.part, line.index, line.of, line.code)
+            told = RecordedTrial(
+                number=line.trial,
+                block=line.block,
+                phase=line.phase,
+                part=line.part,
+                index=line.index,
+                of=line.of,
+                code=line.code,
+            )
             place[line.trial, line.attempt] = len(attempts), told
             attempts.append(told)
         elif isinstance(line, events.Responses):

@@ -10,6 +10,7 @@ keep their checksums.
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -23,13 +24,13 @@ from study_app.number_text import counted
 from study_app.store import csv_files, receipt
 from study_app.store.atomic import is_there, parse_json, read_own, read_regular, study_root, temporaries
 from study_app.store.blinded.blinding import Key, opened, opened_key, whole_protocol
-from study_app.store.checksums import files, fingerprint, hashed, read_checksums
+from study_app.store.checksums import files, fingerprint, hashed, read_checksums, system_files
 from study_app.store.csv_files import Column
 from study_app.store.folder_lock import is_open, never_begun
 from study_app.store.folders import FINGERPRINTS, SessionFolder
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
-from study_app.store.journals.journal import Contents
+from study_app.store.journals.journal import OTHER_LINE_ENDINGS, Contents
 from study_app.store.progress import Progress, named, progress_of, recordable
 from study_app.store.recorder import recording_files
 from study_app.store.sessions.open_session import Place, table_files
@@ -105,7 +106,7 @@ class Findings:
         return path.relative_to(self.folder).as_posix() if inside else "."
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CheckedSession:
     """What the study's own files are compared with, of one session.
 
@@ -129,7 +130,7 @@ def check_session(place: Place, key: Key | None, found: Findings, *, recordings:
     Without ``recordings`` these are not read, which takes a while.
     """
     errors = Findings(found.folder)
-    checked = CheckedSession(place, running=is_open(place.folder.path))
+    checked = CheckedSession(place=place, running=is_open(place.folder.path))
     with errors.reading(place.folder.path):
         checked = _check(place, key, errors, running=checked.running, recordings=recordings)
     if errors.errors and not checked.running and is_open(place.folder.path):
@@ -152,7 +153,7 @@ def _check(place: Place, key: Key | None, found: Findings, *, running: bool, rec
     if not running:
         _receipt(folder, lines, key, found)
     if not lines:
-        return CheckedSession(place, readable=running or never_begun(folder.path), running=running)
+        return CheckedSession(place=place, readable=running or never_begun(folder.path), running=running)
     start = events.start_of(lines)
     expected = {"participant": folder.participant, "session": folder.number, "study": place.study}
     for name, value in expected.items():
@@ -166,19 +167,23 @@ def _check(place: Place, key: Key | None, found: Findings, *, running: bool, rec
     ended = isinstance(lines[-1], events.SessionEnded)
     hashes = {}
     if ended or not running:
-        hashes = {name: _hash(folder, name) for name in files(folder) if recordings or not name.endswith(".parquet")}
+        names = (*files(folder), *_listed_system_files(folder))
+        hashes = {name: _hash(folder, name) for name in names if recordings or not name.endswith(".parquet")}
     if not running:
         _tables(place, lines, found, ended=ended)
         if ended:
             _checksums(folder, told, hashes, found, recordings=recordings)
         if recordings:
             _recordings(folder, told, key, hashes, found, ended=ended)
+    for name in system_files(folder):
+        if name not in hashes:
+            found.warning(folder.path / name, "is a file of an operating system or of a program that shares files")
     if is_there(folder.rebuilt):
         with found.reading(folder.rebuilt):
             for line in read_own(folder.rebuilt, study_root(folder.rebuilt)).decode("utf-8", "replace").splitlines():
                 found.warning(folder.rebuilt, f"{events.shortened(line)}; only a copy of {FINGERPRINTS} proves more")
     return CheckedSession(
-        place,
+        place=place,
         readable=True,
         running=running,
         chained=lines[-1].previous is not None,
@@ -224,6 +229,11 @@ def _journal(folder: SessionFolder, found: Findings, *, running: bool) -> Conten
     except StoreError as error:
         found.error(folder.journal, str(error))
         return nothing
+    missing = done.missing_trials
+    if missing.count:
+        found.warning(folder.path, str(missing))
+    if done.reached_end and missing.exceed != (done.ended == events.INCOMPLETE):
+        found.error(folder.journal, f"its status is {done.ended!r}, though {missing or 'no trial is missing'}")
     if done.ended is None:
         if not running:
             found.warning(folder.path, "is unfinished: resume it, or leave it unfinished")
@@ -248,7 +258,8 @@ def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, 
     if not lines:
         return
     start = events.start_of(lines)
-    compared = [name for name in (*receipt.COPIED_FIELDS, "row_of") if name in held or name == "row_of"]
+    optional = ("row_of", "group")
+    compared = [name for name in (*receipt.COPIED_FIELDS, *optional) if name in held or name in optional]
     differing = [name for name in compared if held.get(name) != getattr(start, name)]
     differing += _differing(held, lines)
     if not differing and start.receipt_hash not in (None, receipt.digest(held)):
@@ -279,7 +290,7 @@ def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, 
     tables = blocks.values() if isinstance(blocks, dict) else ()
     breaks = [block.get("break_page") for block in tables if isinstance(block, dict)]
     was_last = bool(steps) and steps[-1] not in breaks and left >= steps.count(steps[-1])
-    if isinstance(last, events.SessionEnded) and last.status != "completed" and was_last:
+    if isinstance(last, events.SessionEnded) and last.status not in events.REACHED_END and was_last:
         found.error(folder.journal, f"its status is {last.status!r}, though the last page was left: it was changed")
 
 
@@ -328,7 +339,7 @@ def _removed(lines: Sequence[events.Event]) -> Iterator[str]:
             chosen.pop(line.trial, None)
         elif isinstance(line, events.FormAnswered | events.PassedOver | events.SessionResumed):
             form = None
-        completed = isinstance(line, events.SessionEnded) and line.status == "completed"
+        completed = isinstance(line, events.SessionEnded) and line.status in events.REACHED_END
         for trial, number in list(chosen.items()):
             if completed or (isinstance(line, events.TrialStarted) and line.trial > trial):
                 del chosen[trial]
@@ -418,6 +429,14 @@ def _hash(folder: SessionFolder, name: str) -> str:
         return ""
 
 
+def _listed_system_files(folder: SessionFolder) -> Iterator[str]:
+    """Yield the system's files that were there when the session ended, so that its list has them."""
+    if there := system_files(folder):
+        with contextlib.suppress(StoreError):
+            listed = read_checksums(folder)
+            yield from (name for name in there if name in listed)
+
+
 def _checksums(
     folder: SessionFolder,
     lines: Sequence[events.Event],
@@ -449,7 +468,8 @@ def _checksums(
             elif hashes[name] == opened_hashes.get(listed[name]):
                 found.warning(path, "was opened by an unblinding that did not finish: unblind again")
             elif hashes[name] != listed[name]:
-                found.error(path, CHANGED)
+                unchanged = hashlib.sha256(read_regular(path).replace(b"\r\n", b"\n")).hexdigest() == listed[name]
+                found.error(path, OTHER_LINE_ENDINGS if unchanged else CHANGED)
 
 
 def _recordings(

@@ -19,11 +19,11 @@ from typing import Any, Final, TypeAlias
 from study_app.discovery import registry
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
-from study_app.protocol.streams import group_of
+from study_app.protocol.source.files import without_mark
 from study_app.store import csv_files, exclusions, receipt
 from study_app.store.atomic import is_there, read_own, read_regular, temporaries
 from study_app.store.blinded import blinding
-from study_app.store.blinded.allocation import claims, entries_begun, group_in
+from study_app.store.blinded.allocation import Claim, claims, entries_begun, is_unchanged
 from study_app.store.blinded.blinding import Key, opened, sealed_hash, whole_protocol
 from study_app.store.checksums import Proofs, checked_line, listed, place_of, unreadable
 from study_app.store.columns import EXCLUSIONS
@@ -156,7 +156,7 @@ def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[
     if key is None:
         return
     begun = entries_begun(study)
-    holders: dict[str, int] = {}
+    holders: dict[str, Claim] = {}
     for claim in claims(study):
         if not claim.participant:
             if claim.path.lstat().st_size:
@@ -164,24 +164,31 @@ def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[
             else:
                 found.warning(claim.path, "was claimed by a program that ended before it wrote it; it stays unused")
             continue
-        if not key.groups or group_in(claim, key) != group_of(key.groups, key.nonce, claim.entry):
+        if not is_unchanged(claim, key):
             found.error(claim.path, "was changed: restore it from a copy")
         elif claim.participant in holders:
-            first = holders[claim.participant]
+            first = holders[claim.participant].path.stem
             found.error(claim.path, f"is a second entry of participant {claim.participant}, who has entry {first}")
         elif claim.participant not in begun and claim.participant not in withdrawn:
             found.warning(claim.path, f"belongs to participant {claim.participant}, who has no session yet")
-        holders.setdefault(claim.participant, claim.entry)
-    for participant, entry in begun.items():
-        path = study.allocation(entry)
+        holders.setdefault(claim.participant, claim)
+    for claim in holders.values():
+        if claim.replaces is not None and not _same_entry(claim, holders.get(claim.replaces)):
+            found.error(claim.path, f"replaces participant {claim.replaces}, who has no such entry")
+    shared = Counter((own.group, own.entry) for own in begun.values() if own.replaces is None)
+    for participant, own in begun.items():
+        path = study.allocation(own.entry, own.group, None if own.replaces is None else participant)
         if not is_there(path):
-            found.error(path, f"is missing, though participant {participant} has entry {entry}")
-        elif holders.get(participant) != entry:
-            found.error(path, f"is not of participant {participant}, whose journal has entry {entry}")
-    shared = Counter(begun.values())
-    for participant, entry in begun.items():
-        if shared[entry] > 1:
-            found.error(study.allocated, f"entry {entry} of participant {participant} is another participant's, too")
+            found.error(path, f"is missing, though participant {participant} has entry {own.entry}")
+        elif (holder := holders.get(participant)) is None or holder.path != path or holder.replaces != own.replaces:
+            found.error(path, f"is not of participant {participant}, whose journal has entry {own.entry}")
+        if shared[own.group, own.entry] > 1 and own.replaces is None:
+            what = f"entry {own.entry} of participant {participant} is another participant's, too"
+            found.error(study.allocated, what)
+
+
+def _same_entry(claim: Claim, replaced: Claim | None) -> bool:
+    return replaced is not None and (claim.group, claim.entry) == (replaced.group, replaced.entry)
 
 
 def _withdrawn(study: StudyFolder, found: Findings) -> dict[str, Tombstone]:
@@ -335,7 +342,7 @@ def _exclusions(study: StudyFolder, sessions: Sessions, found: Findings) -> None
         rows = exclusions.exclusions(study.path)
         if not is_there(study.exclusions):
             return
-        for problem in csv_files.problems(exclusions.without_mark(read_regular(study.exclusions)), EXCLUSIONS):
+        for problem in csv_files.problems(without_mark(read_regular(study.exclusions)), EXCLUSIONS):
             found.error(study.exclusions, problem)
         trials = {(one.place.folder.participant, one.place.folder.number): one.trials for one in sessions}
         for row in rows:

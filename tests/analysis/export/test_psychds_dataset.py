@@ -159,7 +159,7 @@ def test_descriptions_name_standard_properties_authors_and_licence(kitchen: Path
 def test_units_and_ranges_hold_in_every_table() -> None:
     (one,) = variables(
         {
-            "study-x_description-a_data.csv": (Column("n", "integer", "Points.", "s", minimum=1, maximum=7),),
+            "study-x_description-a_data.csv": (Column("n", "integer", "Points.", unit="s", minimum=1, maximum=7),),
             "study-x_description-b_data.csv": (optional("n", "number", "Seconds.", minimum=0),),
             "study-x_description-c_data.csv": (optional("n", "number", "Points.", minimum=2, maximum=9),),
         }

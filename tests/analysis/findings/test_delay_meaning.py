@@ -35,9 +35,12 @@ def delays(differences: Mapping[float, list[int]], lowest: tuple[Lowest, ...] = 
         kind="delays",
         revealed=True,
         n=len(next(iter(differences.values()))),
-        settings=tuple(Setting(f"D{place}", f"delay_{ms:g}", "water", ms) for place, ms in enumerate(at)),
+        settings=tuple(
+            Setting(code=f"D{place}", condition=f"delay_{ms:g}", liquid="water", delay_ms=ms)
+            for place, ms in enumerate(at)
+        ),
         names=tuple(f"{ms:g} ms" for ms in at),
-        items=(Item("different", "It was different.", "Different"),),
+        items=(Item(id="different", text="It was different.", short="Different"),),
         labels=tuple("1234567"),
         measures=(),
         findings={ContrastsWithControl.key: against(differences), LowestDelay.key: lowest},

@@ -22,8 +22,8 @@ SEQUENCE = ('sequence = ["viscosity"]', 'sequence = ["viscosity", "detect", "rat
 STIMULUS = Stimulus(vary="damping_nspm", levels=(0.02, 0.6), standards=(8.0,))
 LEVELS = STIMULUS.spaced(9)
 NAMES = ["participant", "session", "trial", "block", "standard", "level", "level_delivered", "analysed", "success"]
-ROVING = tuple(Setting(f"V{number}", f"{standard}/1") for number, standard in enumerate((4, 8), start=1))
-ONE = (Setting("V1", "8/1"),)
+ROVING = tuple(Setting(code=f"V{number}", condition=f"{standard}/1") for number, standard in enumerate((4, 8), start=1))
+ONE = (Setting(code="V1", condition="8/1"),)
 
 
 def levels_file(folder: Path) -> Path:

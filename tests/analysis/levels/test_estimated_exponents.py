@@ -49,7 +49,9 @@ STANDARDS = (4.0, 8.0, 16.0, 32.0)
 def observers(*exponents: float, weber: bool = True) -> list[ThresholdEstimate]:
     """Return thresholds of observers whose JND is 0.5 standard^exponent."""
     return [
-        ThresholdEstimate(f"P{number:03d}", s, 60, 0.5 * s ** (exponent - weber), None, None)
+        ThresholdEstimate(
+            participant=f"P{number:03d}", standard=s, n=60, threshold=0.5 * s ** (exponent - weber), low=None, high=None
+        )
         for s in STANDARDS
         for number, exponent in enumerate(exponents, start=1)
     ]

@@ -19,10 +19,16 @@ from tests.golden import compare
 from tests.golden_values import value_lines
 
 LINK = Stimulus(vary="force_delay_ms", levels=(0, 100), standards=(10.0, 20.0), spacing="linear")
-CONDITIONS = tuple(Setting(f"V{number}", name) for number, name in enumerate(("water", "honey"), start=1))
+CONDITIONS = tuple(
+    Setting(code=f"V{number}", condition=name) for number, name in enumerate(("water", "honey"), start=1)
+)
 BLOCKS = {
     "forced choice": replace(block("2ifc", STIMULUS, ONE), wrong_most=0.2),
-    "rating": block(Rated(kind="rating", scale="s"), LINK, (Setting("V1", "10/1"), Setting("V2", "20/1"))),
+    "rating": block(
+        Rated(kind="rating", scale="s"),
+        LINK,
+        (Setting(code="V1", condition="10/1"), Setting(code="V2", condition="20/1")),
+    ),
     "estimation": block("estimation", STIMULUS, ONE),
     "conditions": block("2ifc", None, CONDITIONS),
 }

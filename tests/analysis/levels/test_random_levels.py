@@ -62,8 +62,19 @@ def filled(number: int) -> tuple[LevelBlock, LevelsResult]:
         n, value = int(rng.integers(1, 30)), float(rng.random()) if share else around(5)
         low, high = some((max(0.0, value - 0.2), min(1.0, value + 0.2) if share else value + 1), 0.8) or (None, None)
         count = round(value * n) if share else None
-        return LevelAnswers(person, standard, level, level, n, len(people) if person is None else 1, count, value,
-                            low, high, catch)  # fmt: skip
+        return LevelAnswers(
+            participant=person,
+            standard=standard,
+            level=level,
+            comparison=level,
+            n=n,
+            participants=len(people) if person is None else 1,
+            count=count,
+            value=value,
+            low=low,
+            high=high,
+            catch=catch,
+        )
 
     def threshold(person: str | None, standard: float | None) -> ThresholdEstimate:
         value = around(ends[1] / 3)
@@ -78,7 +89,15 @@ def filled(number: int) -> tuple[LevelBlock, LevelsResult]:
                 "reversal_mean": some(around(value)), "target_percent": 70.7,
             }  # fmt: skip
         low, high = some((value * 0.7, value * 1.5)) or (None, None)
-        return ThresholdEstimate(person, standard, int(rng.integers(2, 120)), value, low, high, **own)
+        return ThresholdEstimate(
+            participant=person,
+            standard=standard,
+            n=int(rng.integers(2, 120)),
+            threshold=value,
+            low=low,
+            high=high,
+            **own,
+        )
 
     def set_by(person: str | None, standard: float | None) -> SettingEstimate:
         n, value = int(rng.integers(1, 6)), around(ends[0] * 5)
@@ -86,17 +105,39 @@ def filled(number: int) -> tuple[LevelBlock, LevelsResult]:
         levels_ = tuple(around(value) for _ in range(n)) if person else ()
         high = tuple(bool(one) for one in rng.integers(0, 2, n)) if person else ()
         error = None if standard is None else float(rng.normal(0, 0.1))
-        return SettingEstimate(person, standard, n, value, *(some(ends_) or (None, None)), some(around(0.1)), error,
-                            some(float(rng.normal(0, 0.1))), levels_, high)  # fmt: skip
+        low, high_end = some(ends_) or (None, None)
+        return SettingEstimate(
+            participant=person,
+            standard=standard,
+            n=n,
+            pse=value,
+            low=low,
+            high=high_end,
+            jnd=some(around(0.1)),
+            constant_error=error,
+            hysteresis=some(float(rng.normal(0, 0.1))),
+            levels=levels_,
+            started_high=high,
+        )
 
     def sensed(person: str | None, standard: float | None) -> SensitivityEstimate:
         d, n = some(around(1.3)), len(people) if person is None else 20
         shares = {"first": float(rng.random()), "second": float(rng.random())}
-        interval = (some(d - 0.5), d + 0.5) if d else (None, None)
+        low, high = (some(d - 0.5), d + 0.5) if d else (None, None)
         return SensitivityEstimate(
-            person, n, shares, standard, some("oil", 0.2), some(levels[0], 0.3), d, *interval,
-            some(float(rng.normal())), some("differencing"), some(around(1.0)),
-        )  # fmt: skip
+            participant=person,
+            n=n,
+            shares=shares,
+            standard=standard,
+            comparison=some("oil", 0.2),
+            level=some(levels[0], 0.3),
+            d_prime=d,
+            low=low,
+            high=high,
+            criterion=some(float(rng.normal())),
+            model=some("differencing"),
+            other=some(around(1.0)),
+        )
 
     def run(standard: float | None) -> dict[str, Any]:
         reasons = {"pace_error_percent": 2, "slip": 1} if rng.random() < 0.5 else {}
@@ -108,16 +149,22 @@ def filled(number: int) -> tuple[LevelBlock, LevelsResult]:
 
     def exponent(person: str | None) -> ExponentEstimate:
         low, high = some((0.4, 1.2)) or (None, None)
-        return ExponentEstimate(person, int(rng.integers(2, 6)), around(0.8), low, high)
+        return ExponentEstimate(participant=person, n=int(rng.integers(2, 6)), exponent=around(0.8), low=low, high=high)
 
     whom = [None, *people]
     revealed = rng.random() < 0.9
     found = LevelsResult(
-        "b", "Block", design, revealed,
-        tuple(GroupAnswers(f"V{one}", f"standard {one}", {"n": one, "median": some(1.5), "q1": some(1.0), "q3": 2.0})
-              for one in range(2)),
-        summary, "correct" if design != "yesno" else "yes",
-    )  # fmt: skip
+        block="b",
+        title="Block",
+        design=design,
+        revealed=revealed,
+        times=tuple(
+            GroupAnswers(f"V{one}", f"standard {one}", {"n": one, "median": some(1.5), "q1": some(1.0), "q3": 2.0})
+            for one in range(2)
+        ),
+        summary=summary,
+        counts="correct" if design != "yesno" else "yes",
+    )
     if not revealed:
         return _block(design, vary, ends, standards, number), found
     estimated = share and rng.random() < 0.8
@@ -156,8 +203,10 @@ def filled(number: int) -> tuple[LevelBlock, LevelsResult]:
         "family": some(str(rng.choice(["weibull", "normal", "logistic"])), 0.99) if estimated else None,
         "adaptive": bool(estimated and rng.random() < 0.3),
         "published": (published,) if percent or rng.random() < 0.4 else (),
-        "device": some(OwnDynamics(2.0, 0.1, 0.25, 3, int(rng.integers(3, 5))), 0.6),
-    }  # fmt: skip
+        "device": some(
+            OwnDynamics(damping_nspm=2.0, friction_n=0.1, mass_kg=0.25, sessions=3, of=int(rng.integers(3, 5))), 0.6
+        ),
+    }
     if summary == "settings":
         rows["settings"] = tuple(set_by(*one) for one in where)
     else:

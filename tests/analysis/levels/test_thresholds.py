@@ -196,7 +196,7 @@ def tracks_of_staircases(method: UpDown, trials: int) -> pd.DataFrame:
         level = method.after(TrackSetting(STIMULUS, default_design("2ifc"), number), heard[number])
         assert level is not None
         right = bool(draw.random() < success("weibull", math.log10(level), math.log10(0.15), 1.4, 0.5, 0.01))
-        heard[number].append(TrialResult(trial, f"A{number}", level, right, right))
+        heard[number].append(TrialResult(trial=trial, code=f"A{number}", level=level, success=right, correct=right))
         found.append(("P001", "01", trial, "b", 8.0, level, level, True, right, f"A{number}", f"8/{number}"))
     frame = pd.DataFrame(found, columns=[*NAMES, "code", "track"]).assign(catch=False, arrangement="CS")
     return frame.astype({"level_delivered": "Float64", "success": "boolean"})

@@ -27,8 +27,22 @@ def felt_in(protocol: Any) -> dict[tuple[str, str], tuple[TrialFeatures, ...]]:
     """Liquids that differ in force, delays that differ in what was seen."""
     return {
         (block.id, condition): (
-            TrialFeatures(0.3 + 0.6 * number, 4.0, 0.1, 0.01, 0.03, 0.006 + protocol.delay_s(condition)),
-            TrialFeatures(0.4 + 0.6 * number, 4.0, 0.1, 0.02, 0.03, 0.006 + protocol.delay_s(condition)),
+            TrialFeatures(
+                force_mean_n=0.3 + 0.6 * number,
+                force_peak_n=4.0,
+                speed_rms_mps=0.1,
+                push_share=0.01,
+                roughness_n=0.03,
+                delay_s=0.006 + protocol.delay_s(condition),
+            ),
+            TrialFeatures(
+                force_mean_n=0.4 + 0.6 * number,
+                force_peak_n=4.0,
+                speed_rms_mps=0.1,
+                push_share=0.02,
+                roughness_n=0.03,
+                delay_s=0.006 + protocol.delay_s(condition),
+            ),
         )
         for block in protocol.blocks.values()
         for number, condition in enumerate(block.conditions)

@@ -45,7 +45,7 @@ def swept(
     protocol: Protocol, trials: tuple[int, ...], sizes: tuple[int, ...], studies: int, seed: int = 1
 ) -> Precisions:
     *_, (done, found) = sweep(plans(protocol, trials), sizes, studies, seed, Here())
-    return Precisions(protocol, sizes, done, studies, seed, found)
+    return Precisions(protocol=protocol, sizes=sizes, studies=done, asked=studies, seed=seed, found=found)
 
 
 @pytest.mark.slow

@@ -40,7 +40,9 @@ def answered(small: Results) -> Results:
 
 
 def committed(results: Results, participants: int | None = 3, **changes: object) -> Path:
-    one = Commitment("small", "2", HASH, participants, None, (CATCH,))
+    one = Commitment(
+        study="small", version="2", protocol_hash=HASH, participants=participants, precision=None, rules=(CATCH,)
+    )
     path = results.folder / FILE
     path.write_text(f"# Preregistration\n\n{written(one)}", encoding="utf-8")
     return path
@@ -87,7 +89,14 @@ def test_exclusions_by_other_rules_are_listed_and_those_by_its_own_are_not(answe
     (line,) = evaluate_block(answered)
     assert line.startswith("an exclusion by no preregistered rule: ")
     assert line.endswith(": sneezed (AB)")
-    by_rule = Exclusion("P002", 1, None, CATCH, "4 of 8 wrong", "2026-01-06T10:00:00.000+01:00")
+    by_rule = Exclusion(
+        participant="P002",
+        session=1,
+        trial=None,
+        rule_or_person=CATCH,
+        reason="4 of 8 wrong",
+        excluded_at="2026-01-06T10:00:00.000+01:00",
+    )
     listed = (*exclusions(answered.folder), by_rule)
     StudyFolder(answered.folder).exclusions.write_bytes(exclusion_bytes(listed))
     lines = evaluate_block(answered)

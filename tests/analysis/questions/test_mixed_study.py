@@ -30,7 +30,17 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     protocol = mixed_file(place)
     study = load(protocol)
     felt = {
-        ("stir", name): (TrialFeatures(0.5 + n, 4.0, 0.1, 0.02, 0.03, 0.0),) for n, name in enumerate(study.conditions)
+        ("stir", name): (
+            TrialFeatures(
+                force_mean_n=0.5 + n,
+                force_peak_n=4.0,
+                speed_rms_mps=0.1,
+                push_share=0.02,
+                roughness_n=0.03,
+                delay_s=0.0,
+            ),
+        )
+        for n, name in enumerate(study.conditions)
     }
     return rehearse_answers(protocol, participants=PEOPLE, seed=1, results=place / "results", features=felt)
 
@@ -44,7 +54,17 @@ def test_order_is_reproduced_where_answers_hid_questions(tmp_path: Path) -> None
     condition = 'id = "pleasant"\nshow_if = { item = "thickness", at_least = 3 }'
     protocol = mixed_file(tmp_path, ('id = "pleasant"', condition))
     felt = {
-        ("stir", name): (TrialFeatures(0.5 + n, 4.0, 0.1, 0.02, 0.03, 0.0),) for n, name in enumerate(("thin", "thick"))
+        ("stir", name): (
+            TrialFeatures(
+                force_mean_n=0.5 + n,
+                force_peak_n=4.0,
+                speed_rms_mps=0.1,
+                push_share=0.02,
+                roughness_n=0.03,
+                delay_s=0.0,
+            ),
+        )
+        for n, name in enumerate(("thin", "thick"))
     }
     folder = rehearse_answers(protocol, participants=8, seed=1, results=tmp_path / "results", features=felt)
     sessions = StudyFolder(folder).sessions()
@@ -72,8 +92,15 @@ def test_a_form_after_each_block_is_analysed_block_by_block(tmp_path: Path, orde
     last = 'conditions = ["thin", "thick"]'
     old = 'sequence = ["start", "stir", "load", "usability", "end"]'
     sequence = (old, "" if grouped else f"sequence = {orders[0]}"), (last, f"{last}\n{again}{groups}")
-    felt = {(block, name): (TrialFeatures(1.0, 4.0, 0.1, 0.02, 0.03, 0.0),) for block in ("stir", "again")
-            for name in ("thin", "thick")}  # fmt: skip
+    felt = {
+        (block, name): (
+            TrialFeatures(
+                force_mean_n=1.0, force_peak_n=4.0, speed_rms_mps=0.1, push_share=0.02, roughness_n=0.03, delay_s=0.0
+            ),
+        )
+        for block in ("stir", "again")
+        for name in ("thin", "thick")
+    }
     name = 'name = "mixed"'
     named = (name, name if grouped else f'{name}\nblock_order = "{order}"')
     protocol = mixed_file(tmp_path, *sequence, named)
@@ -108,8 +135,15 @@ def test_a_form_after_each_block_is_analysed_block_by_block(tmp_path: Path, orde
 @pytest.mark.parametrize("order", ["balanced", "random"])
 def test_a_form_after_the_last_of_exchanged_blocks_has_all_its_answers(tmp_path: Path, order: str) -> None:
     """It comes after either block, though the file writes it after one of them."""
-    felt = {(block, name): (TrialFeatures(1.0, 4.0, 0.1, 0.02, 0.03, 0.0),) for block in ("stir", "again")
-            for name in ("thin", "thick")}  # fmt: skip
+    felt = {
+        (block, name): (
+            TrialFeatures(
+                force_mean_n=1.0, force_peak_n=4.0, speed_rms_mps=0.1, push_share=0.02, roughness_n=0.03, delay_s=0.0
+            ),
+        )
+        for block in ("stir", "again")
+        for name in ("thin", "thick")
+    }
     last = 'conditions = ["thin", "thick"]'
     sequence = 'sequence = ["start", "stir", "load", "usability", "end"]'
     protocol = mixed_file(

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 from study_app.analysis.data.blocks import Block, Decided, Item
 from study_app.analysis.evaluate import evaluate, evaluate_block
 from study_app.analysis.findings.delays import ContrastsWithControl, LowestDelay
 from study_app.analysis.findings.finding import of_tables
-from study_app.analysis.findings.recognition import LiquidRecognition, RecognitionResult, given, recognised
+from study_app.analysis.findings.recognition import LiquidRecognition, RecognitionResult, recognised
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, gated
 from study_app.analysis.report.sections import CLAIMS, answers, empty_studies, first_page
 from study_app.analysis.results import Results
@@ -130,8 +131,16 @@ def test_the_measured_rate_is_that_of_the_nearest_size(participants: int, n: int
 def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() -> None:
     """One statement rises a little: alone it is significant; the others, which scatter, hide it."""
     rng = np.random.default_rng(4)
-    items = tuple(Item(name, name, name) for name in (*ITEMS, *"abcdefgh"))
-    block = Block("b", "Block", "delays", delays(DELAYS), items, tuple("1234567"), None)
+    items = tuple(Item(id=name, text=name, short=name) for name in (*ITEMS, *"abcdefgh"))
+    block = Block(
+        id="b",
+        title="Block",
+        kind="delays",
+        settings=delays(DELAYS),
+        items=items,
+        labels=tuple("1234567"),
+        cannot_judge=None,
+    )
     single = {item.id: rng.integers(1, 8, (14, 4, 1)).astype(float) for item in items}
     single[ITEMS[0]] = np.clip(np.arange(1, 5)[:, None] + rng.integers(0, 3, (14, 4, 1)), 1, 7).astype(float)
     decided = replace(DECIDED, primary=ITEMS[:1])
@@ -146,17 +155,52 @@ def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() 
         assert (tested.verdict, tested.p_adjusted) == (verdict, gate)
 
 
-def test_a_liquid_is_recognised_where_its_interval_lies_above_the_share_of_its_name() -> None:
-    # Water 10 of 12, but 19 of all 36 names are water; honey 3 of 12, more than its share of names, but not surely so.
-    names = np.column_stack([[0] * 10 + [1] * 2, [1] * 3 + [0] * 9, [2] * 12])
-    named = RecognitionResult(
-        ("water", "honey", "oil"),
-        ("L1", "L2", "L3"),
-        ("water", "honey", "oil"),
-        recognition(names, [0, 1, 2], 3),
-        "shown",
+def recognition_of(names: np.ndarray) -> RecognitionResult:
+    """Return the recognition of three liquids by names 0, 1 and 2 (participants, liquids)."""
+    liquids = ("water", "honey", "oil")
+    return RecognitionResult(
+        labels=liquids,
+        settings=("L1", "L2", "L3"),
+        right=liquids,
+        found=recognition(names, [0, 1, 2], 3),
+        verdict="shown",
     )
-    assert [given(named, label) for label in named.labels] == [19 / 36, 5 / 36, 12 / 36]
-    assert recognised(named) == (2,)
-    assert recognised(replace(named, verdict="suggested")) == (2,)
-    assert recognised(replace(named, verdict="not shown")) == ()
+
+
+def test_a_liquid_is_recognised_where_its_name_is_used_more_often_than_for_each_other() -> None:
+    # Honey is known by all; water and oil are answered alike by 8, and told from each other by 4 of 12.
+    names = np.column_stack([[0] * 8 + [0] * 4, [1] * 12, [0] * 8 + [2] * 4])
+    named = recognition_of(names)
+    water, honey, oil = named.found.rates
+    assert (water.rival, water.p) == (2, 2**-4)  # four used it for water and not for oil, nobody the other way round
+    assert (honey.p, honey.p_adjusted) == (pytest.approx(2**-12), pytest.approx(3 * 2**-12))
+    assert oil.p == 2**-4
+    assert water.p_adjusted == oil.p_adjusted == 2 * 2**-4
+    assert recognised(named, 0.05) == (1,)
+    assert recognised(named, 0.13) == (0, 1, 2)
+    assert recognised(replace(named, verdict="suggested"), 0.05) == (1,)
+    assert recognised(replace(named, verdict="not shown"), 0.05) == ()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [12, 24, 60])
+@pytest.mark.parametrize("bias", [0.5, 0.8])
+def test_liquids_that_are_confused_are_seldom_called_recognised(n: int, bias: float) -> None:
+    """All know honey; water and oil are called water by so many, whichever they are."""
+    rng, studies, false = np.random.default_rng(n), 300, 0
+    for _ in range(studies):
+        names = np.where(rng.random((n, 3)) < bias, 0, 2)
+        names[:, 1] = 1
+        false += bool({0, 2} & {*recognised(recognition_of(names), 0.05)})
+    assert false <= binom.ppf(0.999, studies, 0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [12, 24, 60])
+def test_known_liquids_are_called_recognised(n: int) -> None:
+    rng = np.random.default_rng(n)
+    known = [
+        recognised(recognition_of(np.where(rng.random((n, 3)) < 0.8, [0, 1, 2], rng.integers(0, 3, (n, 3)))), 0.05)
+        for _ in range(100)
+    ]
+    assert sum(one == (0, 1, 2) for one in known) >= (75 if n == 12 else 99)

@@ -21,6 +21,7 @@ from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store import receipt
 from study_app.store.exclusions import exclude, include
 from study_app.store.unblinding import unblind
+from study_app.store.verification.verify_study import verify
 from tests.analysis.conftest import SAMPLE, Results, make_results, twelve
 from tests.protocol.groups.grouped import GROUPS, STUDY
 
@@ -110,7 +111,8 @@ def test_groups_are_reported_after_unblinding_alone(folder: Path, tmp_path: Path
     assert group_counts(sealed) == {}
     assert list(group_means(sealed)) == []
     report(folder, tmp_path / "sealed")
-    assert "first_thin" not in (tmp_path / "sealed" / "report.html").read_text()
+    assert "<td>first_thin" not in (tmp_path / "sealed" / "report.html").read_text()
+    assert "randomised in permuted blocks to the groups" in (tmp_path / "sealed" / "methods.txt").read_text()
     unblind(folder, "AB", "a test")
     study = load_study(folder)
     assert group_counts(study) == {"first_thick": 3, "first_thin": 3}
@@ -125,3 +127,24 @@ def test_groups_are_reported_after_unblinding_alone(folder: Path, tmp_path: Path
     text = (tmp_path / "opened" / "report.html").read_text()
     assert ">Groups</h2>" in text
     assert "first_thin" in text
+
+
+def test_preexisting_groups_are_reported_before_unblinding_as_not_randomised(tmp_path: Path) -> None:
+    head = 'study.name = "grouped"\nstudy.group_assignment = "pre-existing"\n'
+    (tmp_path / "grouped.toml").write_text((STUDY + GROUPS).replace('study.name = "grouped"\n', head))
+    felt = {(block, condition): (NO_FEATURES,) for block in ("thin", "thick") for condition in ("water", "honey")}
+    study = rehearse_answers(tmp_path / "grouped.toml", participants=5, seed=2, results=tmp_path / "r", features=felt)
+    assert group_counts(load_study(study)) == {"first_thick": 2, "first_thin": 3}, "dealt in turn"
+    report(study, tmp_path / "sealed")
+    methods = (tmp_path / "sealed" / "methods.txt").read_text()
+    assert "assigned to a group by an existing attribute (first_thin and first_thick), recorded at the start" in methods
+    assert "groups were not randomised" in methods
+    assert (
+        "Groups were not randomised, so a difference may have other causes"
+        in (tmp_path / "sealed" / "report.html").read_text()
+    )
+    unblind(study, "AB", "a test")
+    assert group_counts(load_study(study)) == {"first_thick": 2, "first_thin": 3}
+    trials = load_study(study).trials
+    assert set(trials["group"]) == {"first_thick", "first_thin"}
+    assert not verify(study).errors

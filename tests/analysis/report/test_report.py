@@ -1,5 +1,6 @@
 """The report: whole, self-contained, the same each time."""
 
+import csv
 import random
 import re
 import shutil
@@ -34,6 +35,21 @@ def test_while_sealed_nothing_is_told_that_blinding_hides(small: Results, tmp_pa
     for path in (tmp_path / "report").iterdir():
         content = path.read_bytes().decode("utf-8", "replace").lower()
         assert not [word for word in HIDDEN if word in content], path.name
+
+
+def test_motion_has_the_median_and_both_quartiles_of_participants(small: Results, tmp_path: Path) -> None:
+    for number_, duration_s in enumerate((1.0, 2.0, 4.0, 8.0, 16.0), start=1):
+        small.add(f"P{number_:03d}", lambda *_: 4, changes={"duration_s": duration_s, "force_mean_n": 20 - duration_s})
+    small.open()
+    report(small.folder, tmp_path / "report")
+    rows = list(csv.DictReader((tmp_path / "report" / "motion.csv").read_text("utf-8").splitlines()))
+    found = {row["measure"]: (row["n"], row["q1"], row["median"], row["q3"]) for row in rows if row["code"] == "L1"}
+    assert found["duration_s"] == ("5", "2.0", "4.0", "8.0")
+    assert found["force_mean_n"] == ("5", "12.0", "16.0", "18.0")
+    assert " 5 4.00 (2.00–8.00) " in read(tmp_path / "report")
+    moved = numbers(tmp_path / "report")["results"]["performance"]["moved"]
+    times = next(one for one in moved if one["measure"] == "duration_s")
+    assert (times["q1"], times["median"], times["q3"]) == (2.0, 4.0, 8.0)
 
 
 @pytest.mark.nightly

@@ -93,7 +93,14 @@ def test_a_site_whose_folder_is_missing_is_not_left_out(sealed: Path, tmp_path: 
 def test_a_site_without_the_preregistration_of_another_is_named(sealed: Path, tmp_path: Path) -> None:
     merge(_copied(sealed, tmp_path), tmp_path / "pooled")
     found = load_study(tmp_path / "pooled")
-    one = Commitment(found.name, found.version, found.participants["protocol_hash"].iloc[0], found.n, None, ())
+    one = Commitment(
+        study=found.name,
+        version=found.version,
+        protocol_hash=found.participants["protocol_hash"].iloc[0],
+        participants=found.n,
+        precision=None,
+        rules=(),
+    )
 
     def said(**others: Commitment) -> tuple[str, ...]:
         for site, own in others.items():

@@ -16,7 +16,10 @@ from study_app.analysis.data.motion import Targets, performance, reaches, submov
 from study_app.analysis.data.study_tables import load_study, pooled
 from study_app.errors import AnalysisError
 from study_app.session.simulated.rehearsal import rehearse
+from study_app.store.blinded.blinding import opened, read_key
 from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
+from study_app.store.journals.journal_events import TrialEnded
 from study_app.store.unblinding import unblind
 from tests.analysis.conftest import SAMPLE, Results, twelve
 from tests.analysis.made_up import delays, study
@@ -48,14 +51,23 @@ def test_they_are_means_over_the_sessions_that_know_them(sample: StudyFolder) ->
     record(sample, 0, BENCH)
     record(sample, 1, {**BENCH, "damping_nspm": [1.5] * 3})
     assert load_study(sample.path).own_dynamics == OwnDynamics(
-        pytest.approx(1.0), pytest.approx(0.1), pytest.approx(0.3), 2, len(sample.sessions())
+        damping_nspm=pytest.approx(1.0),
+        friction_n=pytest.approx(0.1),
+        mass_kg=pytest.approx(0.3),
+        sessions=2,
+        of=len(sample.sessions()),
     )
 
 
 def test_those_of_sites_are_weighted_by_their_sessions() -> None:
-    one, other = (replace(study(delays([0]), []), own_dynamics=own) for own in (OwnDynamics(1, 2, 3, 1, 2), None))
-    third = replace(one, own_dynamics=OwnDynamics(4, 5, 9, 2, 2))
-    assert pooled(Path("nowhere"), {"A": one, "B": other, "C": third}, 0).own_dynamics == OwnDynamics(3, 4, 7, 3, 0)
+    one, other = (
+        replace(study(delays([0]), []), own_dynamics=own)
+        for own in (OwnDynamics(damping_nspm=1, friction_n=2, mass_kg=3, sessions=1, of=2), None)
+    )
+    third = replace(one, own_dynamics=OwnDynamics(damping_nspm=4, friction_n=5, mass_kg=9, sessions=2, of=2))
+    assert pooled(Path("nowhere"), {"A": one, "B": other, "C": third}, 0).own_dynamics == OwnDynamics(
+        damping_nspm=3, friction_n=4, mass_kg=7, sessions=3, of=0
+    )
 
 
 def test_a_bench_that_lacks_a_value_is_refused_with_the_receipt(sample: StudyFolder) -> None:
@@ -163,15 +175,20 @@ def test_reaches_are_those_that_the_session_decided_and_absent_recordings_are_to
     (session,) = StudyFolder(folder).sessions()
     sealed = (session.path / "recordings" / "trial-008.parquet").read_bytes()
     unblind(folder, by="AB", reason="a test")
-    lines = [json.loads(text) for text in session.journal.read_text().splitlines()]
+    ended = {
+        line.trial: line
+        for line in opened(journal.read(session.journal), read_key(folder))
+        if isinstance(line, TrialEnded)
+    }
     study = load_study(folder)
     told: list[tuple[int, int]] = []
     measured = performance(study, lambda done, total: told.append((done, total)))
     assert (measured.trials, measured.recorded, measured.unread) == (7, 7, ())
     assert told == [(done, 7) for done in range(7)]
     for trial in measured.reached:
-        decided = [one["t_task_s"] for one in lines if one["event"] == "target_reached" and one["trial"] == trial.trial]
-        assert [reach.reached_s for reach in trial.found] == pytest.approx(decided[1:], abs=1e-9)
+        decided = ended[trial.trial].reached_s
+        assert len(decided) == ended[trial.trial].others["targets_reached"] > 3
+        assert [reach.reached_s for reach in trial.found] == pytest.approx(decided[1:], abs=1e-6)
         assert trial.valid is True
     times = [one.median or 0.0 for one in measured.moved if one.measure == "movement_time_s"]
     assert len(times) == 7

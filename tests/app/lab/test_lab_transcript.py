@@ -117,8 +117,8 @@ STEPS: dict[str, Any] = {
     "due": lets(due_in_s=5.0),
     "switch": ask("switch"),
     "none due": lets(due_in_s=None),
-    "choose": ask("liquid", "B", Choice("rek2024", "syrup", "Syrup")),
-    "choose none": ask("liquid", "B", Choice("rek2024", "treacle", "Treacle")),
+    "choose": ask("liquid", "B", Choice(source="rek2024", liquid="syrup", title="Syrup")),
+    "choose none": ask("liquid", "B", Choice(source="rek2024", liquid="treacle", title="Treacle")),
     "copy": ask("copy"),
     "costs are asked": lambda lab, *_: lab._cost_due.timeout.emit(),
     "old costs": lets(told=[(0, COSTS)]),
@@ -166,7 +166,7 @@ def test_every_signal(qtbot: Any, tmp_path: Path, monkeypatch: Any, caplog: Any,
 
     monkeypatch.setattr(lab_controller, "STARTS_AFTER_MS", 0)
     at_hand = "study_app.app.lab_controller.liquids_at_hand"
-    monkeypatch.setattr(at_hand, lambda saved: (Choice(saved[-1], "new", "New"),))
+    monkeypatch.setattr(at_hand, lambda saved: (Choice(source=saved[-1], liquid="new", title="New"),))
     (tmp_path / "broken.toml").write_text("format = 1")
     done: list[str] = []
     lives = [Recorded(done)]
@@ -182,7 +182,7 @@ def test_every_signal(qtbot: Any, tmp_path: Path, monkeypatch: Any, caplog: Any,
     place = LabPlace()
     qtbot.addWidget(place)
     place.message.connect(lambda *words: done.append(f"message {words}"))
-    honey, syrup = (Choice("rek2024", name, name.title()) for name in ("honey", "syrup"))
+    honey, syrup = (Choice(source="rek2024", liquid=name, title=name.title()) for name in ("honey", "syrup"))
     lab = LabController(
         place, device="scripted", open_live=open_live, chance=random.Random(1), make_appraiser=lambda: lives[0],  # noqa: S311
         bench=Workbench(honey.setting(), syrup.setting()), liquids=(honey, syrup),

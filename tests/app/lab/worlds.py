@@ -23,7 +23,7 @@ PATIENCE: Any = SimpleNamespace(left_s=20.0)
 COSTS = Costs(160.0, 60.0, (EffectCost("drag", 10.0), EffectCost("history", None, "not used")))
 
 
-ERRORS = Errors(2e-15, 1e-12, 0.0095, ())
+ERRORS = Errors(wake=2e-15, force_n=1e-12, lag_s=0.0095, left_out=())
 
 
 class Prices:

@@ -24,7 +24,18 @@ from study_app.session.start import NewSession, Ready
 from study_app.store.blinded.blinding import open_or_draw_key
 from tests.compiled import needs_servo
 
-CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "scripted", True, None, Path("nowhere"))
+CHOSEN = NewSession(
+    source="demo",
+    participant="P001",
+    session=1,
+    seed=7,
+    operator="AK",
+    language="en",
+    device="scripted",
+    windowed=True,
+    screen=None,
+    results=Path("nowhere"),
+)
 
 
 class Part:
@@ -136,7 +147,21 @@ def test_changed_conditions_are_refused_before_a_device_opens(qtbot, tmp_path, m
     open_or_draw_key(tmp_path, study.model_copy(update={"liquids": {**study.liquids, "unused": unused}}))
     opened = []
     monkeypatch.setattr(live_session, "open_rig", lambda name, *_, **__: opened.append(name))
-    live = LiveSession(NewSession("demo", "P001", 1, 7, "", "en", "mouse", True, None, tmp_path), LIGHT)
+    live = LiveSession(
+        NewSession(
+            source="demo",
+            participant="P001",
+            session=1,
+            seed=7,
+            operator="",
+            language="en",
+            device="mouse",
+            windowed=True,
+            screen=None,
+            results=tmp_path,
+        ),
+        LIGHT,
+    )
     with qtbot.waitSignal(live.over):
         live.open()
     live.wait()

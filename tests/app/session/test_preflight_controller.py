@@ -16,7 +16,7 @@ from study_app.app.session import preflight_controller
 from study_app.app.session.live_session import LiveSession
 from study_app.app.session.preflight_controller import Appraisal, Preflight
 from study_app.errors import DeviceLost, DisplayError
-from study_app.evidence.appraisal import Costs, Errors, Question
+from study_app.evidence.appraisal import Costs, DeliveryQuestion, Errors, Question
 from study_app.gui.theme.theme import LIGHT
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.runtime.clocks.grants import NO_THREAD
@@ -24,12 +24,28 @@ from study_app.haptics.runtime.telemetry import Timing
 from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.load import load
 from study_app.protocol.trials.tasks import Stroke
-from study_app.session.preflight import Measurements
+from study_app.session.preflight import Measurements, PredictedDelivery
 from study_app.session.start import NewSession, Ready
 from tests.session import small
 
-CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "mouse", True, None, Path("nowhere"))
-FACTS = replace(small.WELL, timing=Timing(2000, 1000.0, 6e-5, 2e-3, 0), participant="P001", grant=NO_THREAD)
+CHOSEN = NewSession(
+    source="demo",
+    participant="P001",
+    session=1,
+    seed=7,
+    operator="AK",
+    language="en",
+    device="mouse",
+    windowed=True,
+    screen=None,
+    results=Path("nowhere"),
+)
+FACTS = replace(
+    small.WELL,
+    timing=Timing(ticks=2000, rate_hz=1000.0, lateness_p99_s=6e-5, worst_gap_s=2e-3, overruns=0),
+    participant="P001",
+    grant=NO_THREAD,
+)
 COSTS = Costs(tick_ns=146.0, rest_ns=40.0, effects=())
 
 
@@ -43,10 +59,11 @@ class Answering:
         self.works = True
         self.devices: list[Dynamics] = []
 
-    def order(self, question: Question) -> int:
-        assert question.stroke is not None
-        assert question.stroke.speed_mps > 0
-        self.devices.append(question.dynamics)
+    def order(self, question: Question | DeliveryQuestion) -> int:
+        if isinstance(question, Question):
+            assert question.stroke is not None
+            assert question.stroke.speed_mps > 0
+            self.devices.append(question.dynamics)
         self.asked += 1
         return self.asked
 
@@ -171,7 +188,7 @@ class ConnectedLater:
     listens = False
 
     def statuses(self) -> tuple[OutletStatus, ...]:
-        return (OutletStatus("LSL markers", listens=self.listens),)
+        return (OutletStatus(title="LSL markers", listens=self.listens),)
 
 
 def test_a_recording_program_that_is_connected_meanwhile_is_shown(ask: Callable[..., Preflight], qtbot: Any) -> None:
@@ -190,16 +207,16 @@ def test_a_recording_program_that_is_connected_meanwhile_is_shown(ask: Callable[
 def test_strokes_are_asked_of_the_measured_device_and_again_when_its_delay_has_changed(
     ask: Callable[..., Preflight], monkeypatch: Any, qtbot: Any
 ) -> None:
-    found = replace(FACTS, dynamics=Dynamics(0.0004, 20e-6, 0.3), delay_ticks=1)
+    found = replace(FACTS, dynamics=Dynamics(delay_s=0.0004, count_m=20e-6, mass_kg=0.3), delay_ticks=1)
     made = ask(found)
     first: Any = made.appraisal.appraiser
-    assert first.devices == [Dynamics(0.001, 20e-6, 0.3)]
+    assert first.devices == [Dynamics(delay_s=0.001, count_m=20e-6, mass_kg=0.3)]
     slower = replace(found, delay_ticks=3)
     monkeypatch.setattr(preflight_controller, "measured", lambda *_words, **_named: slower)
     made.window.again_asked.emit()
     qtbot.waitUntil(lambda: not made.measuring.busy)
     again: Any = made.appraisal.appraiser
-    assert again.devices == [Dynamics(0.003, 20e-6, 0.3)]
+    assert again.devices == [Dynamics(delay_s=0.003, count_m=20e-6, mass_kg=0.3)]
     assert not first.works
 
 
@@ -220,9 +237,21 @@ def test_a_mistake_in_measuring_does_not_leave_the_window_waiting(
 @pytest.mark.parametrize(
     ("told", "largest"),
     [
-        ((Errors(0.0, 0.02, 0.0, ()), Errors(0.0, 0.04, 0.0, ())), 0.04),
-        ((Errors(0.0, 0.02, 0.0, ()), Errors(None, None, 0.0, ())), None),
-        (("it could not be measured", Errors(0.0, 0.02, 0.0, ())), None),
+        (
+            (
+                Errors(wake=0.0, force_n=0.02, lag_s=0.0, left_out=()),
+                Errors(wake=0.0, force_n=0.04, lag_s=0.0, left_out=()),
+            ),
+            0.04,
+        ),
+        (
+            (
+                Errors(wake=0.0, force_n=0.02, lag_s=0.0, left_out=()),
+                Errors(wake=None, force_n=None, lag_s=0.0, left_out=()),
+            ),
+            None,
+        ),
+        (("it could not be measured", Errors(wake=0.0, force_n=0.02, lag_s=0.0, left_out=())), None),
     ],
 )
 def test_an_error_that_is_not_known_is_not_called_none(monkeypatch: Any, told: Any, largest: float | None) -> None:
@@ -243,7 +272,13 @@ def test_the_share_withheld_is_asked_of_each_liquid_in_the_fastest_stroke_of_its
     asked = preflight_controller.study_scenes(protocol)
     assert {one.liquid for one in asked} == set(protocol.liquids)
     assert {one.stroke for one in asked if one.liquid == "honey"} == {Stroke(5.0, 0.03)}  # it is explored
-    monkeypatch.setattr(Answering, "given", tuple(Errors(0.0, 0.0, 0.0, (), 0.01 * (n + 1)) for n in range(len(asked))))
+    monkeypatch.setattr(
+        Answering,
+        "given",
+        tuple(
+            Errors(wake=0.0, force_n=0.0, lag_s=0.0, left_out=(), withheld=0.01 * (n + 1)) for n in range(len(asked))
+        ),
+    )
     appraisal = Appraisal(asked, UNKNOWN)
     assert appraisal.withheld is None
     while not appraisal.over:
@@ -252,3 +287,18 @@ def test_the_share_withheld_is_asked_of_each_liquid_in_the_fastest_stroke_of_its
         name: pytest.approx(0.01 * (1 + max(n for n, one in enumerate(asked) if one.liquid == name)))
         for name in protocol.liquids
     }
+
+
+@pytest.mark.parametrize(
+    "answer", [PredictedDelivery(missing=26, asked=40, out=0, judged=0, limit_percent=25), "it could not be predicted"]
+)
+def test_the_trials_that_would_not_be_delivered_are_asked_last(monkeypatch: Any, answer: Any) -> None:
+    monkeypatch.setattr(preflight_controller, "start_appraisal_worker", Answering)
+    monkeypatch.setattr(Answering, "given", (Errors(wake=0.0, force_n=0.02, lag_s=0.0, left_out=()), answer))
+    protocol = load("demo")
+    asked = preflight_controller.study_scenes(protocol)[:1]
+    appraisal = Appraisal(asked, UNKNOWN, DeliveryQuestion(protocol, 1))
+    while not appraisal.over:
+        appraisal.look()
+    assert appraisal.error_n == 0.02
+    assert appraisal.delivery == (answer if isinstance(answer, PredictedDelivery) else None)

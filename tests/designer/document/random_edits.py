@@ -39,7 +39,11 @@ def _owner(text: str, nodes: tuple[Node, ...], at: int) -> Path:
         ended = [node for node in nodes if line < node.end <= at]
         begun = [node for node in nodes if line <= node.start < at]
         return (
-            max(ended, key=lambda node: node.end) if ended else begun[-1] if begun else Node("key", FREE, (), 0, 0, 0)
+            max(ended, key=lambda node: node.end)
+            if ended
+            else begun[-1]
+            if begun
+            else Node(kind="key", path=FREE, parts=(), start=0, value=0, end=0)
         ).path
     rest = text[at:].splitlines()
     if re.match(r"#\s*[-=*#~]{3,}", rest[0]):

@@ -80,7 +80,7 @@ def test_typed_refuses_half_a_character() -> None:
 def test_files_with_a_draft_are_listed(tmp_path: Path) -> None:
     assert drafted_files() == ()
     for name in ("b.toml", "a.toml"):
-        keep(tmp_path / name, Draft("a = 1\n", ""))
+        keep(tmp_path / name, Draft(text="a = 1\n", base=""))
     (data_folder() / "drafts" / "broken.json").write_text("{")
     assert drafted_files() == (tmp_path.resolve() / "a.toml", tmp_path.resolve() / "b.toml")
     discard(tmp_path / "a.toml")
@@ -136,7 +136,7 @@ def test_a_draft_that_cannot_be_written_stays_due(tmp_path: Path, monkeypatch: p
 @pytest.mark.parametrize("content", [b"", b"{", b"[]", b'{"text": 1, "base": "", "selected": [], "kept_at": ""}'])
 def test_a_broken_draft_is_none(tmp_path: Path, content: bytes) -> None:
     file = tmp_path / "a.toml"
-    keep(file, Draft("x", ""))
+    keep(file, Draft(text="x", base=""))
     (path,) = Path(os.environ["LIQUID_STUDY_DATA"], "drafts").glob("*.json")
     path.write_bytes(content)
     assert draft_of(file) is None
@@ -178,15 +178,19 @@ def test_runs_counts_sessions_pilots_and_rehearsals_by_content(tmp_path: Path) -
 def test_a_content_that_was_run_is_kept_before_the_file_changes(tmp_path: Path) -> None:
     file = tmp_path / "demo.toml"
     file.write_text(TEXT, encoding="utf-8")
-    keep_what_was_run(file, [Run("another", "1.0", sessions=1)])
+    keep_what_was_run(file, [Run(hash="another", version="1.0", sessions=1)])
     assert kept_content(content_hash(TEXT.encode())) is None
-    keep_what_was_run(file, [Run(content_hash(TEXT.encode()), "1.0", sessions=1)])
+    keep_what_was_run(file, [Run(hash=content_hash(TEXT.encode()), version="1.0", sessions=1)])
     assert kept_content(content_hash(TEXT.encode())) == TEXT.encode()
 
 
 def test_standing_says_when_saving_asks_and_which_version_is_free() -> None:
-    ran = (Run("abc", "1.0", sessions=2), Run("def", "1.1", sessions=1), Run("pil", "1.2", pilots=3))
-    assert not standing("new", "old", "0.1", [Run("pil", "0.1", pilots=1, rehearsals=2)]).asks
+    ran = (
+        Run(hash="abc", version="1.0", sessions=2),
+        Run(hash="def", version="1.1", sessions=1),
+        Run(hash="pil", version="1.2", pilots=3),
+    )
+    assert not standing("new", "old", "0.1", [Run(hash="pil", version="0.1", pilots=1, rehearsals=2)]).asks
     same = standing("abc", "abc", "1.0", ran)
     assert (same.asks, same.version, same.sessions) == (False, "1.0", 2)
     changed = standing("new", "abc", "1.0", ran)
@@ -198,11 +202,11 @@ def test_standing_says_when_saving_asks_and_which_version_is_free() -> None:
 
 @pytest.mark.parametrize("version", ["", "1 2", "1,2", "é"])
 def test_what_cannot_be_a_version_is_refused(version: str) -> None:
-    check_version("1.2-rc+3", [Run("abc", "1.2-rc+3", pilots=1)])
+    check_version("1.2-rc+3", [Run(hash="abc", version="1.2-rc+3", pilots=1)])
     with pytest.raises(StudyError, match="cannot be a version"):
         check_version(version, [])
     with pytest.raises(StudyError, match="was run with another content"):
-        check_version("1.0", [Run("abc", "1.0", sessions=1)])
+        check_version("1.0", [Run(hash="abc", version="1.0", sessions=1)])
 
 
 @pytest.mark.parametrize(

@@ -317,7 +317,7 @@ def test_no_clipped_level_is_a_threshold_that_can_be_measured() -> None:
         assert clips is not None
         assert clips.highest(focus.plan.stimulus) == pytest.approx(most, rel=1e-4)
         assert (focus.plan.clipping is None) == (changes is unpaced)  # fast motions are repeated, not answered
-    limits = LevelLimits(None, 40.0, 0.1)
+    limits = LevelLimits(force=None, loop=40.0, hand_mps=0.1)
     known = clipping(protocol, protocol.blocks["viscosity"], limits)
     assert known is not None
     assert known.limit == 40.0  # limits that are known are not looked for again

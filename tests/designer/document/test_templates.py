@@ -96,8 +96,8 @@ def simulated(protocol: Protocol, planted: float, unit: str, source: str) -> Kno
     estimates = plan.simulate((plan.stimulus.coordinate(planted / share) + apart).ravel(), rng)
     means = 10.0 ** estimates.medians.reshape(STUDIES, people).mean(axis=1)
     low, high = np.quantile(means, (0.05, 0.95))
-    figures = (round(share * round(float(one), 4), 4) for one in (means.mean(), low, high))
-    return KnownAnswer(planted, unit, source, people, *figures)
+    found, low, high = (round(share * round(float(one), 4), 4) for one in (means.mean(), low, high))
+    return KnownAnswer(planted=planted, unit=unit, source=source, people=people, found=found, low=low, high=high)
 
 
 @pytest.mark.slow

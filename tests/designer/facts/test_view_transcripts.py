@@ -84,7 +84,7 @@ class Shown:
         yield f"brief: {brief(document, path)} | {used_by(document, path)} | {position_of(document, path)}"
         yield f"lines: {marked.selected} {marked.faulty}"
         yield from value_lines(form(study, path), "form")
-        view = measures_view(study, facts(study), path, Controls(12), Simulated(), {})
+        view = measures_view(study, facts(study), path, Controls(participants=12), Simulated(), {})
         yield from self.note("measures", measures(view))
         yield from self.note("to add", tuple(addable(study, path)))
 
@@ -113,27 +113,51 @@ def of_faults(study: Study) -> Iterator[str]:
 
 
 OBSERVED = Observed(
-    0.19, 0.02, 400, 0.75, (0.02, 0.05, 0.1, 0.2, 0.4), (0.5, 0.55, 0.66, 0.78, 0.97),
-    ((0.5, 0.53, 0.6, 0.7, 0.95), (0.5, 0.6, 0.7, 0.85, 0.98)), ((0.05, 0.3), (0.2, 0.7)),
-    ((1, (0.1, 0.15, 0.2, 0.3, 0.5)), (40, (0.15, 0.18, 0.19, 0.2, 0.24))),
-    (Asked(1, 1, 0.2, True), Asked(2, 2, 0.1, False), Asked(3, 1, 0.17, True)), 0.06, 80,
-)  # fmt: skip
-GROUP = GroupPrecision(12, 60, 0.15, 80, 0.7, 107, 0.9, 60, 14)
+    threshold=0.19,
+    lapses=0.02,
+    observers=400,
+    at_threshold=0.75,
+    levels=(0.02, 0.05, 0.1, 0.2, 0.4),
+    planted=(0.5, 0.55, 0.66, 0.78, 0.97),
+    found=((0.5, 0.53, 0.6, 0.7, 0.95), (0.5, 0.6, 0.7, 0.85, 0.98)),
+    asked=((0.05, 0.3), (0.2, 0.7)),
+    course=((1, (0.1, 0.15, 0.2, 0.3, 0.5)), (40, (0.15, 0.18, 0.19, 0.2, 0.24))),
+    one=(Asked(1, 1, 0.2, True), Asked(2, 2, 0.1, False), Asked(3, 1, 0.17, True)),
+    error=0.06,
+    trials=80,
+)
+GROUP = GroupPrecision(
+    participants=12,
+    studies=60,
+    precision=0.15,
+    trials=80,
+    share=0.7,
+    more_trials=107,
+    more_share=0.9,
+    most=60,
+    enough=14,
+)
 SIMULATED = {
     "viscosityjnd": Simulated(
-        OBSERVED, Measurable((0.05, 0.4), (Planted(0.19, 0.01, 0.95),)), GROUP,
+        OBSERVED,
+        Measurable((0.05, 0.4), (Planted(threshold=0.19, bias=0.01, coverage=0.95),)),
+        GROUP,
         warnings=("methods.adaptive.trials: few trials",),
     ),
     "thickness": Simulated(measurable=Measurable(None, ()), failed="The process ended."),
-    "physical2": Simulated(detectable=Detectable(12, 200, 7, (Finding("thick", 0.5), Finding("wet", None)))),
-}  # fmt: skip
+    "physical2": Simulated(
+        detectable=Detectable(
+            participants=12, studies=200, points=7, findings=(Finding("thick", 0.5), Finding("wet", None))
+        )
+    ),
+}
 """What simulations could answer, by study: the cards of blocks show it."""
 
 
 def of_blocks(study: Study, simulated: Simulated) -> Iterator[str]:
     for name in study.document["blocks"]:
         for people in (1, 13):
-            controls = Controls(people, threshold=0.19, planned=12)
+            controls = Controls(participants=people, threshold=0.19, planned=12)
             view = measures_view(study, facts(study), ("blocks", name), controls, simulated, {})
             yield from value_lines(measures(view))
 
@@ -171,9 +195,30 @@ def of_limits() -> Iterator[str]:
         study, _ = template("viscosity-jnd").edited(*edits)
         for threshold in (0.019, 0.19):
             observed = Observed(
-                threshold, 0.02, 400, 0.75, (0.1,), (0.7,), ((0.7,),), (), ((1, (0.1,) * 5),), (), 0.03, 80
+                threshold=threshold,
+                lapses=0.02,
+                observers=400,
+                at_threshold=0.75,
+                levels=(0.1,),
+                planted=(0.7,),
+                found=((0.7,),),
+                asked=(),
+                course=((1, (0.1,) * 5),),
+                one=(),
+                error=0.03,
+                trials=80,
             )
-            group = GroupPrecision(12, 60, 0.15, 80, 0.9, 107, 1.0, 60, 9)
+            group = GroupPrecision(
+                participants=12,
+                studies=60,
+                precision=0.15,
+                trials=80,
+                share=0.9,
+                more_trials=107,
+                more_share=1.0,
+                most=60,
+                enough=9,
+            )
             for simulated in (Simulated(measurable=Measurable(None, ())), Simulated(observed, group=group)):
                 yield f"== {name}, {'' if simulated.observed else 'not '}simulated at {threshold}"
                 controls = Controls(threshold=threshold)

@@ -53,17 +53,40 @@ def answer_to(wanted: Simulation) -> Simulated:
     plan = threshold_plan(wanted.protocol, wanted.protocol.blocks[wanted.block]) if wanted.block else None
     if plan is None:
         found = Finding("feels_liquid", 0.9), Finding("like_honey", None)
-        return Simulated(detectable=Detectable(controls.participants, 200, 7, found))
+        return Simulated(
+            detectable=Detectable(participants=controls.participants, studies=200, points=7, findings=found)
+        )
     levels = plan.stimulus.grid
     curves = tuple(tuple(0.5 + 0.4 * share for _ in levels) for share in QUANTILES)
     one = tuple(Asked(at + 1, 1 + at % 2, levels[at % len(levels)], at % 3 > 0) for at in range(20))
     observed = Observed(
-        controls.threshold, controls.lapses, 400, 0.75, levels, curves[2], curves[::-1],
-        tuple((level, 1 / len(levels)) for level in levels), ((10, QUANTILES), (20, QUANTILES)), one, 0.26, 20,
-    )  # fmt: skip
-    group = GroupPrecision(controls.participants, 60, controls.precision, 80, 0.93, 107, 0.98, 60, 20)
-    hypotheses = tuple((one.described(), "80 % of studies of 12 show a ratio of 1.2") for one in
-                       hypotheses_of(wanted.protocol))  # fmt: skip
+        threshold=controls.threshold,
+        lapses=controls.lapses,
+        observers=400,
+        at_threshold=0.75,
+        levels=levels,
+        planted=curves[2],
+        found=curves[::-1],
+        asked=tuple((level, 1 / len(levels)) for level in levels),
+        course=((10, QUANTILES), (20, QUANTILES)),
+        one=one,
+        error=0.26,
+        trials=20,
+    )
+    group = GroupPrecision(
+        participants=controls.participants,
+        studies=60,
+        precision=controls.precision,
+        trials=80,
+        share=0.93,
+        more_trials=107,
+        more_share=0.98,
+        most=60,
+        enough=20,
+    )
+    hypotheses = tuple(
+        (one.described(), "80 % of studies of 12 show a ratio of 1.2") for one in hypotheses_of(wanted.protocol)
+    )
     return Simulated(observed, Measurable((0.05, 0.5), ()), group, hypotheses=hypotheses, warnings=warnings)
 
 

@@ -44,7 +44,7 @@ def test_slow_numbers_come_are_given_up_and_are_kept(qtbot: Any, designer: Any, 
     shown(qtbot, designer, 0, "5 – 50")
     shown(qtbot, designer, 1, "± 26")
     shown(qtbot, designer, 2, "93")
-    assert designer.header.problems.words == "1 warning"  # that of the precision takes simulated observers
+    assert designer.place.header.problems.words == "1 warning"  # that of the precision takes simulated observers
     assert page.function.plot.accessibleDescription().startswith("Share of answers that are correct")
     assert "19 %" in page.track.plot.accessibleDescription()
     assert page.forces.plot.accessibleDescription().startswith("Force at 31 levels")
@@ -202,8 +202,13 @@ def test_what_studies_show_of_a_contrast_is_that_of_the_command_power(bound: flo
     assert wanted.block == "viscosity"
     ((_, said),) = carry_out(wanted, print, lambda: False).hypotheses
     ((done, found),) = list(sweep(plans(protocol, ()), (30,), 10, 1, Serial()))[-1:]
-    (row,) = [line for line in threshold_markdown(Precisions(protocol, (30,), done, done, 1, found)).splitlines()
-              if line.startswith("| 20 | 30 | ") and "×/÷" in line]  # fmt: skip
+    (row,) = [
+        line
+        for line in threshold_markdown(
+            Precisions(protocol=protocol, sizes=(30,), studies=done, asked=done, seed=1, found=found)
+        ).splitlines()
+        if line.startswith("| 20 | 30 | ") and "×/÷" in line
+    ]
     shown, planned = (said.split("%")[0], row.split("|")[-2]) if bound else (said.split()[-1], row.split("×/÷ ")[-1])
     assert float(shown) == pytest.approx(float(planned.strip(" |%")), rel=0.05)
 

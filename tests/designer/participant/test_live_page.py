@@ -16,9 +16,11 @@ from PySide6.QtWidgets import QApplication
 from study_app.designer.document.steps import DuplicateElement, SetText
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_edits import Set, Unset
+from study_app.gui.key_presses import ignores_clicks
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import TaskPage, TextPage
+from tests.gui.keyboard import Keyboard, handle_in_focus
 
 pytestmark = pytest.mark.slow
 
@@ -78,8 +80,9 @@ def test_keys_answer_the_page_and_go_on_and_esc_leaves_it(qtbot: Any, designer: 
     assert not designer.results.exists()
 
 
-def test_the_mouse_answers_the_scaled_page(designer: Any, live: Any) -> None:
+def test_the_mouse_answers_the_scaled_page(designer: Any, live: Any, qtbot: Any) -> None:
     assert live.scale_now < 0.6
+    qtbot.waitUntil(lambda: not ignores_clicks(live.page_window.widget))
     field = live.page_window.widget.fields[1]
     cell = field.points[4] if hasattr(field, "points") else field.cells[4]
     QTest.mouseClick(live.viewport(), Qt.MouseButton.LeftButton, pos=place_of(live, cell))
@@ -87,6 +90,13 @@ def test_the_mouse_answers_the_scaled_page(designer: Any, live: Any) -> None:
     button = live.page_window.widget.button
     QTest.mouseClick(live.viewport(), Qt.MouseButton.LeftButton, pos=place_of(live, button))
     assert live.page_window.widget.message
+
+
+def test_a_held_digit_answers_one_statement_of_the_preview(designer: Any, live: Any, qtbot: Any) -> None:
+    live.setFocus()
+    handle_in_focus(designer.window, qtbot)
+    Keyboard().hold(Qt.Key.Key_4, repeats=10, text="4")
+    assert list(answers(live).values()) == [4]
 
 
 def test_an_edit_repaints_the_page_and_keeps_answers_and_focus_where_they_were(designer: Any, live: Any) -> None:

@@ -87,7 +87,7 @@ def likert(designer: Any) -> Any:
 def press_f5(qtbot: Any, designer: Any) -> None:
     designer.window.activateWindow()
     qtbot.waitUntil(designer.window.isActiveWindow)
-    with qtbot.waitSignal(designer.header.play.asked):
+    with qtbot.waitSignal(designer.place.header.play.asked):
         designer.key("F5")
 
 
@@ -99,14 +99,14 @@ def lines_of(study: Path) -> list[dict[str, Any]]:
 def play_to_the_end(qtbot: Any, designer: Any) -> Player:
     player, pilots = Player(), designer.playing
     press_f5(qtbot, designer)
-    assert pilots.under_way, (designer.messages, designer.header.strip.notice)
+    assert pilots.under_way, (designer.messages, designer.place.header.strip.notice)
     qtbot.waitUntil(lambda: not pilots.under_way, timeout=SESSION_MS)
     assert not designer.messages
     return player
 
 
 def kept(qtbot: Any, designer: Any) -> Path:
-    qtbot.mouseClick(designer.header.strip.buttons["keep"], Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(designer.place.header.strip.buttons["keep"], Qt.MouseButton.LeftButton)
     (study,) = designer.results.iterdir()
     assert verify(study).sound, verify(study)
     return Path(study)

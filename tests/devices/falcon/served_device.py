@@ -23,7 +23,7 @@ FALCON_SOCKET = framed(
     "study_app.devices.falcon.failures:FAILURES",
     icon="fast_forward",
     kind="simulated",
-    probe=lambda: [Backend("falcon-socket:PATH", "a Unix socket", READY, "an emulated Falcon")],
+    probe=lambda: [Backend("falcon-socket:PATH", "a Unix socket", state=READY, can="an emulated Falcon")],
     argument="PATH",
     argument_required=True,
     options=(BY_COMMAND,),

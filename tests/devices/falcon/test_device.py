@@ -162,7 +162,9 @@ class TestForce:
         assert ticks.after(1) == READ_LOST
 
     def test_a_calibration_of_this_one_is_used_and_told_and_does_not_outlive_it(self):
-        calibration.save("OWN", Calibration("zm-redux", 9000.0, 0.05, measured="2026-11-20"))
+        calibration.save(
+            "OWN", Calibration(geometry="zm-redux", units_per_nm=9000.0, arm_offset_rad=0.05, measured="2026-11-20")
+        )
         emulator = still(geometry="zm-redux", serial="OWN", units_per_nm=9000.0, arm_offset_rad=(0.05, 0.05, 0.05))
         device = EmulatedFalcon(emulator=emulator)
         before = {name: value for name, value in device.describe().items() if name != "dynamics"}  # measured anew

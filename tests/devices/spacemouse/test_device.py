@@ -58,12 +58,12 @@ class TestReports:
             assert all(abs(speed) <= FULL_SPEED_MPS for speed in velocity_mps(said))
 
     def test_push_right_is_x_lift_is_y_and_pull_is_z(self):
-        assert velocity_mps(Displacement(350, 0, 0)) == (FULL_SPEED_MPS, 0, 0)
-        assert velocity_mps(Displacement(0, 0, -350)) == (0, FULL_SPEED_MPS, 0)
-        assert velocity_mps(Displacement(0, 350, 0)) == (0, 0, FULL_SPEED_MPS)
+        assert velocity_mps(Displacement(right=350, toward=0, down=0)) == (FULL_SPEED_MPS, 0, 0)
+        assert velocity_mps(Displacement(right=0, toward=0, down=-350)) == (0, FULL_SPEED_MPS, 0)
+        assert velocity_mps(Displacement(right=0, toward=350, down=0)) == (0, 0, FULL_SPEED_MPS)
 
     def test_a_cap_at_rest_is_at_rest_and_speed_grows_without_a_step(self):
-        speeds = np.array([velocity_mps(Displacement(v, 0, 0))[0] for v in range(-500, 501)])
+        speeds = np.array([velocity_mps(Displacement(right=v, toward=0, down=0))[0] for v in range(-500, 501)])
         assert (speeds[480:521] == 0).all()
         assert np.diff(speeds).max() < FULL_SPEED_MPS / 300
         assert (np.diff(speeds) >= 0).all()
@@ -106,7 +106,7 @@ class TestMoving:
         device, hid = opened(slow, *[b""] * 200, REST)
         with device, Servo(device, clock=VirtualClock()) as servo:
             servo.advance(500)
-            went_m = 0.5 * velocity_mps(Displacement(41, 0, 0))[0]
+            went_m = 0.5 * velocity_mps(Displacement(right=41, toward=0, down=0))[0]
             assert hid.now > 1.5
             assert servo.telemetry.latest().position_m[0] == pytest.approx(went_m, rel=0.05)
 

@@ -19,4 +19,4 @@ TANK = Scene(scale=10, liquids=(WATER,))
 
 def first_seconds(motion, seconds):
     rows = motion.t_s < seconds
-    return Motion(motion.t_s[rows], motion.position_m[rows], motion.velocity_mps[rows])
+    return Motion(motion.t_s[rows], motion.position_m[rows], velocity_mps=motion.velocity_mps[rows])

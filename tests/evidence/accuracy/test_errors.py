@@ -18,7 +18,7 @@ Candidate = namedtuple("Candidate", "name rate_hz")
 def one_case(*force_n):
     force = np.array(force_n, float)
     motion = Motion(np.arange(len(force)) / 1000, np.zeros_like(force))
-    return Truth("one", "", (Case(motion, force, np.array([True] * (len(force) - 1) + [False])),))
+    return Truth(name="one", source="", cases=(Case(motion, force, np.array([True] * (len(force) - 1) + [False])),))
 
 
 def test_errors_are_of_the_rows_that_count_and_shares_of_the_true_force():
@@ -46,7 +46,14 @@ def test_the_front_takes_rounding_errors_and_times_within_a_twentieth_as_equal()
     def row(name, ns, rms):
         candidate = Candidate(name, 1000.0)
         return candidate, Row(
-            "numerical", "water", "t", candidate, Error(0, 0, rms, 0, 0, 0.05), Time(ns, ns, 1), 1, chosen=False
+            "numerical",
+            "water",
+            "t",
+            candidate,
+            Error(rms_n=0, most_n=0, rms=rms, most=0, direction_deg=0, target=0.05),
+            Time(ns, ns, 1),
+            1,
+            chosen=False,
         )
 
     points = dict([row("quick", 10, 0.5), row("dear", 20, 0.6), row("sums", 30, 1e-13), row("list", 900, 1e-16)])

@@ -91,7 +91,13 @@ def test_the_exact_linear_force_is_what_plain_quadrature_gives(profile, t, reyno
 
 def test_what_is_not_axisymmetric_is_refused():
     with pytest.raises(StudyError, match="Reynolds number of 241"):
-        Case("water", 998.2, 1.0016e-3, 0.068, 241 * 1.0016e-3 / 998.2 / 0.068)
+        Case(
+            liquid_id="water",
+            density_kg_m3=998.2,
+            viscosity_pa_s=1.0016e-3,
+            diameter_m=0.068,
+            speed_mps=241 * 1.0016e-3 / 998.2 / 0.068,
+        )
 
 
 # --- What is stored ---

@@ -41,7 +41,14 @@ def rek() -> Plan:
     force_n = {"water": 0.3, "honey": 1.2, "light_oil": 0.6}
     felt = {
         (block.id, name): (
-            TrialFeatures(force_n.get(name, 0.3), 3 * force_n.get(name, 0.3), 0.1, 0.05, 0.1, protocol.delay_s(name)),
+            TrialFeatures(
+                force_mean_n=force_n.get(name, 0.3),
+                force_peak_n=3 * force_n.get(name, 0.3),
+                speed_rms_mps=0.1,
+                push_share=0.05,
+                roughness_n=0.1,
+                delay_s=protocol.delay_s(name),
+            ),
         )
         for block in protocol.main_blocks
         for name in block.conditions
@@ -111,8 +118,9 @@ def test_another_estimator_of_noticed_delays_and_other_intervals_are_noticed(
         found = noticed(*given)
         if found.interval is None or found.effect is None:
             return found
-        ends = (factor * (found.effect + reach * (end - found.effect)) for end in (found.lower, found.upper) if end)
-        return replace(found, interval=Interval(*ends, 0.95, "other"))
+        ends = [factor * (found.effect + reach * (end - found.effect)) for end in (found.lower, found.upper) if end]
+        low, high = ends
+        return replace(found, interval=Interval(low=low, high=high, level=0.95, method="other"))
 
     monkeypatch.setattr(studies, "noticed", other)
     rates = count_single(("one threshold for all", 12), 1, 0, 600 if reach > 1 else 150)

@@ -57,7 +57,7 @@ def errors(x_m: Floats, count_m: float) -> tuple[float, ...]:
     found = []
     for velocity in ESTIMATORS:
         scene = Scene(scale=1, velocity=velocity, knee=Knee(law="none"))
-        samples = samples_along(scene, motion, Dynamics(DELAY_S, count_m, 0.2))
+        samples = samples_along(scene, motion, Dynamics(delay_s=DELAY_S, count_m=count_m, mass_kg=0.2))
         v_mps = samples.velocity_mps[SETTLED:-SETTLED, 0]
         found.append(100 * math.sqrt(np.sum((v_mps * np.abs(v_mps) - right) ** 2) / np.sum(right**2)))
     return tuple(found)
@@ -71,7 +71,7 @@ def smoothed_mps(x_m: Floats, samples: int = SMOOTHED) -> Floats:
 
 def felt(scene: Scene, x_m: Floats, count_m: float) -> Any:
     """Return the samples (n,) of a servo on a device whose encoder counts positions (n,) [m] along x."""
-    dynamics = Dynamics(DELAY_S, count_m, 0.2)
+    dynamics = Dynamics(delay_s=DELAY_S, count_m=count_m, mass_kg=0.2)
     safety = new_safety(FORCE_LIMIT_N, dynamics.delay_ticks(scene.rate_hz))
     samples, motion = records(SAMPLE, len(x_m)), _motion(x_m)
     samples.time_ns = np.round(1e9 * motion.t_s)

@@ -67,7 +67,7 @@ def test_verdicts_do_not_depend_on_the_executor(all_workers):
 @pytest.mark.parametrize("quantum_um", [20.0, 38.0, 60.0])
 def test_a_handle_without_any_friction_comes_to_rest_in_tar(speed_mps, quantum_um):
     """No case is harder on a study's loop: three of these swung on, at up to 65 mm/s, while a debt weighed half."""
-    thrown = Case("physical_tar", 20.0, hand="thrown", motion="stroke", viscous_nspm=0.0)
+    thrown = Case(liquid="physical_tar", scale=20.0, hand="thrown", motion="stroke", viscous_nspm=0.0)
     for jitter, missed in ((0.0, 0.0), (0.0, 0.02), (0.2, 0.0), (0.2, 0.02)):
         changed = {"speed_mps": speed_mps, "quantum_um": quantum_um, "jitter": jitter, "missed": missed}
         verdict = judge(dataclasses.replace(thrown, **changed), safe=True)

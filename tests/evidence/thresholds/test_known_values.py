@@ -158,8 +158,8 @@ def changed(found: StudyFound, factor: float, reach: float) -> StudyFound:
     """Return a study with estimates and intervals times a factor, and the intervals ``reach`` times as wide."""
 
     def one(it: Estimated) -> Estimated:
-        ends = (it.value * factor * (end / it.value) ** reach for end in (it.low, it.high))
-        return Estimated(it.value * factor, *ends, it.truth)
+        low, high = (it.value * factor * (end / it.value) ** reach for end in (it.low, it.high))
+        return Estimated(value=it.value * factor, low=low, high=high, truth=it.truth)
 
     return StudyFound(tuple(map(one, found.group)), tuple(tuple(map(one, person)) for person in found.own))
 
@@ -181,7 +181,7 @@ def test_another_estimator_and_another_interval_are_noticed(
 
 
 def test_the_limit_of_a_coverage_follows_from_the_number_of_all_studies() -> None:
-    held, missed = (StudyFound((Estimated(1.0, 0.5, high, 1.0),), ()) for high in (2.0, 0.9))
+    held, missed = (StudyFound((Estimated(value=1.0, low=0.5, high=high, truth=1.0),), ()) for high in (2.0, 0.9))
     seed = [held] * 183 + [missed] * 17
     (alone,), (pooled,) = coverage("one seed", seed), coverage("two seeds", 2 * seed)
     assert (alone.value, alone.limit, alone.holds) == ("91.5 %", "95 ± 4.6 %", True)
@@ -190,8 +190,10 @@ def test_the_limit_of_a_coverage_follows_from_the_number_of_all_studies() -> Non
 
 @pytest.mark.parametrize(("studies", "holds"), [(10, True), (100, False)])
 def test_few_intervals_are_judged_but_for_chance(studies: int, holds: bool) -> None:
-    held, missed = (((Estimated(1.0, 0.5, high, 1.0),),) * part for high, part in ((2.0, 9), (0.9, 1)))
-    found = [StudyFound((Estimated(1.0, 0.5, 2.0, 1.0),), held + missed)] * studies
+    held, missed = (
+        ((Estimated(value=1.0, low=0.5, high=high, truth=1.0),),) * part for high, part in ((2.0, 9), (0.9, 1))
+    )
+    found = [StudyFound((Estimated(value=1.0, low=0.5, high=2.0, truth=1.0),), held + missed)] * studies
     assert [[*coverage("k", found, few=few)][-1].holds for few in (False, True)] == [False, holds]
 
 
@@ -237,9 +239,9 @@ def test_studies_recover_the_exponent_and_a_wrong_one_is_found(
     assert all(row.holds for row in [*judged, *coverage("thickness", exponents)]), judged
     assert exponent.simulate(0, seed=1).group == exponents[0].group != exponent.simulate(0, seed=2).group
     means = [found.group[0].value for found in exponents]
-    steeper = [StudyFound((Estimated(1.1 * mean, 0.0, 1.0),), ()) for mean in means]
+    steeper = [StudyFound((Estimated(value=1.1 * mean, low=0.0, high=1.0),), ()) for mean in means]
     assert not next(iter(exponent.verdicts(steeper))).holds
-    narrow = [StudyFound((Estimated(mean, mean, mean, EXPONENT),), ()) for mean in means]
+    narrow = [StudyFound((Estimated(value=mean, low=mean, high=mean, truth=EXPONENT),), ()) for mean in means]
     assert not next(coverage("thickness", narrow)).holds
     assert exponent.spread(exponents, 10) < exponent.spread(exponents, 3) < 0.05
 

@@ -94,7 +94,6 @@ def run(monkeypatch, capsys, tmp_path):
 
 
 def test_without_a_display_windows_are_refused_in_one_line(run, monkeypatch):
-    pytest.importorskip("PySide6.QtWidgets")
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr("study_app.gui.application.QApplication.instance", lambda: None)

@@ -11,16 +11,16 @@ from study_app.gui.kit.devices import device_named, devices_shown, looking
 from tests.golden import compare
 from tests.golden_values import value_lines
 
-MOUSE = Backend("mouse", "the window", READY, "seen, not felt")
-EMULATED = Backend("falcon-emulated", "the program", READY, "by command")
+MOUSE = Backend("mouse", "the window", state=READY, can="seen, not felt")
+EMULATED = Backend("falcon-emulated", "the program", state=READY, can="by command")
 
 
 def falcon(state: str, why: str = "") -> Backend:
-    return Backend("falcon", "libusb 1.0", state, "felt, up to 8 N", why)
+    return Backend("falcon", "libusb 1.0", state=state, can="felt, up to 8 N", why=why)
 
 
 def ftdi(state: str, why: str = "") -> Backend:
-    return Backend("falcon", "ftd2xx", state, "the same", why)
+    return Backend("falcon", "ftd2xx", state=state, can="the same", why=why)
 
 
 FOR_WINDOWS = ftdi(NOT_AVAILABLE, "for Windows alone")

@@ -11,6 +11,7 @@ from study_app import app
 from study_app.errors import DisplayError
 from study_app.gui.display.display_check import check_display, missing_library
 from study_app.gui.display.screens import LEAD_NS, STALE_REFRESHES, Frames
+from tests.platforms import needs_window_system
 
 MS = 1_000_000
 
@@ -97,7 +98,11 @@ def test_without_swaps_the_clock_goes_on(screen):
 
 @pytest.mark.parametrize(
     "environment",
-    [{}, {"DISPLAY": ":7654"}, {"QT_QPA_PLATFORM": "xcb", "WAYLAND_DISPLAY": "wayland-0"}],
+    [
+        {},
+        pytest.param({"DISPLAY": ":7654"}, marks=needs_window_system),
+        {"QT_QPA_PLATFORM": "xcb", "WAYLAND_DISPLAY": "wayland-0"},
+    ],
     ids=["none", "not served", "xcb by name"],
 )
 def test_no_display_is_an_error_that_says_what_to_do_and_what_needs_none(environment):

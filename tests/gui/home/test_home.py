@@ -59,13 +59,16 @@ def changes_of_studies(home, folder, chooses):
     yield "it is deleted", come_back(file.unlink)
     text = own_study(folder).read_text(encoding="utf-8")
     fresh_text = 'format = 2\n[study]\nname = "fresh"\ntitle = "Fresh"\n'
-    yield "the program was killed", come_back(lambda: keep(file, Draft(text.replace('"Own"', '"Else"', 1), "")))
+    yield (
+        "the program was killed",
+        come_back(lambda: keep(file, Draft(text=text.replace('"Own"', '"Else"', 1), base=""))),
+    )
     keep_original(fresh, "demo")
-    yield "a study was never saved", come_back(lambda: keep(fresh, Draft(fresh_text, "")))
+    yield "a study was never saved", come_back(lambda: keep(fresh, Draft(text=fresh_text, base="")))
     for name in ("fresh", "own", "demo"):
         yield pen(name)
     yield "press New study", home.new_study.click
-    yield "the draft is that of the file", come_back(lambda: keep(file, Draft(text, "")))
+    yield "the draft is that of the file", come_back(lambda: keep(file, Draft(text=text, base="")))
     elsewhere = folder / "elsewhere.toml"
     elsewhere.write_text(text.replace('name = "own"', 'name = "elsewhere"'), encoding="utf-8")
     for chosen in (elsewhere, folder / "broken.toml"):
@@ -127,7 +130,7 @@ def test_the_card_that_one_went_on_from_keeps_the_keyboard_and_is_in_sight(qtbot
         made = text.replace('name = "own"', f'name = "{name}"').replace("Zest", f"Study {name}")
         (tmp_path / "protocols" / f"{name}.toml").write_text(made, encoding="utf-8")
     file = tmp_path / "protocols" / ("own.toml" if after == "saved" else "fresh.toml")
-    keep(file, Draft(text.replace("Zest", "Else"), ""))
+    keep(file, Draft(text=text.replace("Zest", "Else"), base=""))
     home = open_home(qtbot, tmp_path / "results")
     home.main.resize(1366, 768)
     home.main.activateWindow()

@@ -12,11 +12,13 @@ from study_app.gui.home import dialogs
 from study_app.gui.home.dialogs import NewSessionDialog, RehearsalDialog
 from study_app.gui.home.study_facts import study_facts
 from study_app.gui.widgets.background import Background
+from study_app.protocol.load import load
 from study_app.protocol.source.files import source_bytes
 from study_app.session.start import MAX_SEED
 from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.workstation import MachineSettings
-from tests.protocol.groups.grouped import STUDY
+from tests import studies
+from tests.protocol.groups.grouped import GROUPS, STUDY
 
 pytestmark = pytest.mark.slow
 
@@ -125,7 +127,12 @@ def test_begin_creates_nothing_by_itself_and_gives_what_was_chosen(dialog, resul
 
 
 def test_a_session_begins_with_what_is_set_for_this_machine_unless_its_firmware_is_gone(tmp_path, monkeypatch, opened):
-    screens = tuple(ScreenShown(n, name, 1920, 1080, 60.0, 1.0, 0, 0) for n, name in ((1, "A"), (2, "B"), (3, "C")))
+    screens = tuple(
+        ScreenShown(
+            number=n, name=name, width_px=1920, height_px=1080, refresh_hz=60.0, scaling=1.0, width_mm=0, height_mm=0
+        )
+        for n, name in ((1, "A"), (2, "B"), (3, "C"))
+    )
     monkeypatch.setattr(dialogs, "screens_shown", lambda: screens)
     firmware = tmp_path / "firmware.bin"
     firmware.write_bytes(b"x")
@@ -173,3 +180,46 @@ def test_replaced_participant_is_asked_for_where_rows_are_dealt(qtbot, tmp_path,
     dialog.editors["row_of"].control.setText("anna")
     assert "rows are assigned by the number" in dialog.verdict.text()
     assert not dialog.begin.isEnabled()
+
+
+def grouped(tmp_path: Path, assignment: str) -> Path:
+    study = tmp_path / "grouped.toml"
+    head = f'study.name = "grouped"\nstudy.group_assignment = "{assignment}"\n'
+    study.write_text((STUDY + GROUPS).replace('study.name = "grouped"\n', head))
+    return study
+
+
+def test_a_preexisting_group_is_chosen_before_a_session_begins_and_kept_in_the_next_one(
+    qtbot, tmp_path, opened, results
+):
+    path = grouped(tmp_path, "pre-existing")
+    study = load(str(path))
+    studies.begun(results / "grouped", "P001", study, path.read_bytes(), group="first_thick").close()
+    made = opened(study_facts(str(path)))
+    settle(qtbot, made)
+    group = made.editors["group"]
+    assert group.control.isVisible()
+    assert group.value is None
+    assert not made.begin.isEnabled()
+    assert made.verdict.text() == "Choose the participant's group"
+    qtbot.keyClicks(group.control, "first_thin")
+    assert made.begin.isEnabled()
+    assert (made.chosen().participant, made.chosen().group) == ("P002", "first_thin")
+    made.editors["row_of"].control.setText("P001")
+    assert "P001 is in group first_thick, P002 in group first_thin" in made.verdict.text()
+    made.editors["row_of"].control.clear()
+    made.editors["participant"].control.setText("P001")
+    made.editors["session"].control.setValue(2)
+    assert (group.value, group.isEnabled()) == ("first_thick", False)
+    assert made.begin.isEnabled()
+    made.editors["participant"].control.setText("P003")
+    assert (group.value, group.isEnabled()) == (None, True)
+    assert not made.begin.isEnabled()
+
+
+def test_a_randomised_group_is_not_asked_for(qtbot, tmp_path, opened):
+    made = opened(study_facts(str(grouped(tmp_path, "randomised"))))
+    settle(qtbot, made)
+    assert not made.editors["group"].control.isVisible()
+    assert made.begin.isEnabled()
+    assert made.chosen().group is None

@@ -179,8 +179,8 @@ def test_drafts_come_first_the_newest_of_all_and_a_copy_names_its_original(tmp_p
     for number, name in enumerate(("saved", "older", "newer", "broken")):
         file, own = protocols / f"{name}.toml", text.replace('name = "demo"', f'name = "{name}"')
         file.write_text(own if name != "broken" else own.replace("format = ", "form = "), encoding="utf-8")
-        keep(file, Draft(own.replace("force_limit_n = 6", "force_limit_n = 5") if number else own, ""))
-    keep(protocols / "fresh.toml", Draft('[study]\ntitle = "Fresh"\n', ""))
+        keep(file, Draft(text=own.replace("force_limit_n = 6", "force_limit_n = 5") if number else own, base=""))
+    keep(protocols / "fresh.toml", Draft(text='[study]\ntitle = "Fresh"\n', base=""))
     for name, at in (("older", "2026-11-20T08:00:00+01:00"), ("newer", "2026-11-20T08:30:00+00:00")):
         (kept,) = (file for file in draft_files() if f"{name}.toml" in file.read_text(encoding="utf-8"))
         kept.write_text(json.dumps(json.loads(kept.read_bytes()) | {"kept_at": at}), encoding="utf-8")

@@ -77,22 +77,30 @@ def still_view(bench: Workbench | None = None, **fields: Any) -> LabView:
         "workbench": bench or workbench(),
         "liquids": tuple(Choice(title) for title in ("Water", "Honey", "Light oil", "Syrup")),
         "device": DeviceShown(
-            (("mouse", "Mouse"), ("falcon", "Novint Falcon"), ("simulated", "Simulated")), "mouse", pointer=True
+            choices=(("mouse", "Mouse"), ("falcon", "Novint Falcon"), ("simulated", "Simulated")),
+            chosen="mouse",
+            pointer=True,
         ),
         "paths": (("circle", "Three circles, then a stop"), ("zigzag", "Turns of 90°")),
         "cost": (
-            CostRow("Wake", 84.0), CostRow("Safety", 31.0), CostRow("Drag", 24.0), CostRow("Velocity", 18.0),
-            CostRow("Tests", 4.0), CostRow("Buoyancy", None, "out, 0.00 N"),
-            CostRow("Added mass", None, "not used"), CostRow("History", None, "not used"),
+            CostRow("Wake", 84.0),
+            CostRow("Safety", 31.0),
+            CostRow("Drag", 24.0),
+            CostRow("Velocity", 18.0),
+            CostRow("Tests", 4.0),
+            CostRow("Buoyancy", None, "out, 0.00 N"),
+            CostRow("Added mass", None, "not used"),
+            CostRow("History", None, "not used"),
             CostRow("Current", None, "not used"),
         ),
         "tick_ns": 161.0,
         "errors": (
-            ErrorRow("Wake, of Σ|e|/S", "4e−15"), ErrorRow("Force, largest", "< 0.001 N"),
-            ErrorRow("Lag of the velocity filter", "9 ms"),
+            ErrorRow(measure="Wake, of Σ|e|/S", value="4e−15"),
+            ErrorRow(measure="Force, largest", value="< 0.001 N"),
+            ErrorRow(measure="Lag of the velocity filter", value="9 ms"),
         ),
         "limiters": LimiterCounts().rows(8.0, 1.5),
-    }  # fmt: skip
+    }
     return LabView(**(shown | fields))
 
 
@@ -112,7 +120,11 @@ def lab_view(bench: Workbench | None = None, *, cut: int | None = None, **fields
         "trace": shadow.trace(),
         "tail_a": shadow.tail("A"),
         "tail_b": shadow.tail("B"),
-        "now": Now(*(tuple(last[field].tolist()) for field in ("position_m", "device_force_n", "wake_mps"))),
+        "now": Now(
+            position_m=tuple(last["position_m"].tolist()),
+            force_n=tuple(last["device_force_n"].tolist()),
+            wake_mps=tuple(last["wake_mps"].tolist()),
+        ),
         "limiters": counts.rows(8.0, 1.5),
     }
     return still_view(bench, **(moved | fields))

@@ -30,13 +30,21 @@ def flowing() -> dict[str, Any]:
     tail = SimpleNamespace(positions_m=places, breaks=breaks, ages=1 - share, elements=1700, alive=1210, segments=3)
     t_s = np.linspace(-2.5, 0.0, 2500)
     wave = np.column_stack((np.sin(5 * t_s), np.cos(3 * t_s), 0.2 * t_s))
-    speeds = (0.2 + 0.1 * np.sin(k * t_s) for k in (2, 3, 4))
+    body_mps, wake_a_mps, wake_b_mps = (0.2 + 0.1 * np.sin(k * t_s) for k in (2, 3, 4))
     acting = still_view().limiters
     return {
-        "trace": Trace(t_s, 3 * wave, 2 * wave[::-1], *speeds, presented_a=t_s < -1.0),
+        "trace": Trace(
+            t_s=t_s,
+            force_a_n=3 * wave,
+            force_b_n=2 * wave[::-1],
+            body_mps=body_mps,
+            wake_a_mps=wake_a_mps,
+            wake_b_mps=wake_b_mps,
+            presented_a=t_s < -1.0,
+        ),
         "tail_a": tail,
         "tail_b": replace_fields(tail, positions_m=-places, segments=1, breaks=breaks & (share < 0.1)),
-        "now": Now((0.01, 0.005, 0.004), (2.0, 1.0, 0.5), (0.3, -0.2, 0.1)),
+        "now": Now(position_m=(0.01, 0.005, 0.004), force_n=(2.0, 1.0, 0.5), wake_mps=(0.3, -0.2, 0.1)),
         "limiters": (
             dataclasses.replace(acting[0], ticks=14, acting=True),
             dataclasses.replace(acting[1], ticks=1500),

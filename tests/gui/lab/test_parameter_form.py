@@ -66,6 +66,16 @@ def test_what_the_model_refuses_stays_with_the_reason_until_it_is_mended(place: 
     assert (row.field.text(), row.field.state, row.refused) == ("9000", "changed", "")
 
 
+def test_a_number_that_can_be_read_in_two_ways_changes_nothing(place: Any, told: Any) -> None:
+    row = fields(place)["wake.length"]
+    enter(row.field, "2,500")
+    assert told == []
+    assert (row.field.text(), row.field.state) == ("2,500", "refused")
+    assert row.why.text() == "“2,500” can be read as 2.5 or 2500: write 2.5 or 2500, or press Esc."
+    enter(row.field, "2500")
+    assert told[-1] == ("wake.length", 2500, False)
+
+
 def test_stop_force_speaks_at_the_press_and_is_never_disabled_hidden_or_moved(place: Any, still: LabView) -> None:
     place.show_view(still)
     said = heard(place, "stop")

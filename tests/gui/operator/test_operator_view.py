@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from study_app.gui.operator.operator_view import UNDELIVERED, stages
+from study_app.gui.operator.operator_view import stages
 from study_app.gui.operator.servo_health import ForceFigures, ServoHealth
 from study_app.gui.sessions.session_facts import LIMIT_WORDS
 from study_app.number_text import duration, duration_range, duration_words, grouped, minutes
@@ -16,6 +16,7 @@ from study_app.protocol.orders.schedule import build_schedule
 from study_app.store.columns import TRIALS
 from study_app.store.csv_files import header
 from study_app.store.delivered import beyond_limits
+from study_app.store.missing_trials import MISSING_PERCENT, REASONS
 from tests.golden import compare
 from tests.golden_values import changed, value_lines
 from tests.gui.operator.session import ticks
@@ -49,7 +50,10 @@ STORY = (
     (lambda it: it.welcome(), {}),
     (lambda it: it.tell("note", 3600.0, kind="note", text="however long it took"), {}),
     (lambda it: it.start(1), {"faults": 2, "device_ready": False}),
-    (lambda it: it.tell("pause_asked", 12.0), {"dropped": 7, "forces": ForceFigures(0.2, 0.91, (("slope", 3),), 0.07)}),
+    (
+        lambda it: it.tell("pause_asked", 12.0),
+        {"dropped": 7, "forces": ForceFigures(share=0.2, most=0.91, limiters=(("slope", 3),), withheld=0.07)},
+    ),
     (lambda it: it.end(1, **BROKEN), {"lost": {1: "No space left on device"}}),
     (lambda it: it.tell("recording_lost", 33.0, trial=1, attempt=1, reason="No space left on device"), {}),
     (lambda it: it.answer(1), {"outlets_lost": {"Serial port": "it was unplugged"}}),
@@ -103,7 +107,7 @@ def test_a_view_after_each_event_is_the_reviewed_one(told, blinding, ended, pyte
 
 def pair(told, number, answer, seconds=1.0, attempt=1):
     """Let a pair of intervals be answered."""
-    told.tell("trial_started", 10.0, trial=number, attempt=attempt, sealed="00")
+    told.tell("trial_started", 10.0, trial=number, attempt=attempt, phase="main", sealed="00")
     told.tell("trial_ended", 4.0, trial=number, attempt=attempt, outcome="complete")
     item = {"item": "choice_2ifc", "value": answer, "onset_s": 5.0, "first_s": 5.0 + seconds}
     told.tell("responses", 2.0, trial=number, attempt=attempt, items=[item])
@@ -111,7 +115,7 @@ def pair(told, number, answer, seconds=1.0, attempt=1):
 
 def undelivered(told, number, attempt, *limits):
     """Present a pair whose first interval broke limits."""
-    told.tell("trial_started", 1.0, trial=number, attempt=attempt, sealed="00")
+    told.tell("trial_started", 1.0, trial=number, attempt=attempt, phase="main", sealed="00")
     told.tell("interval_ended", 2.0, trial=number, attempt=attempt, interval=1, outcome="complete", invalid=limits)
     told.tell("trial_ended", 3.0, trial=number, attempt=attempt, outcome="invalid")
 
@@ -151,7 +155,7 @@ def test_tracks_after_each_event_are_the_reviewed_ones(told, pytestconfig):
         lines += [f"== {number}", *changed(before, after)]
         before = after
     compare(Path(__file__).parent / "golden" / "operator_tracks.txt", lines, pytestconfig)
-    assert set(UNDELIVERED) == {*Limits.model_fields, "force_limit_n"} - {"attempts"}
+    assert set(REASONS) == {*Limits.model_fields, "force_limit_n"} - {"attempts", MISSING_PERCENT}
 
 
 def test_rows_cover_every_step_once_and_name_no_condition_and_no_liquid():

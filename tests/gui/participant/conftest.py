@@ -7,11 +7,18 @@ import pytest
 from PySide6.QtGui import QPointingDevice
 from PySide6.QtTest import QTest
 
+from study_app.gui import key_presses
 from study_app.gui.participant.tank_widget import TankWidget
 from study_app.gui.participant.window import PointerCapture
 from study_app.protocol.wording.languages import words
 from tests.gui.participant.driver import Participant
 from tests.gui.small import task_page
+
+
+@pytest.fixture(autouse=True)
+def early_clicks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let pages take clicks at once; how long they ignore them is tested with the key presses."""
+    monkeypatch.setattr(key_presses, "CLICK_MS", 0)
 
 
 @pytest.fixture

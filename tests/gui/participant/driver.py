@@ -6,8 +6,8 @@ import subprocess
 import sys
 from typing import Any
 
-from PySide6.QtCore import QPoint, Qt
-from PySide6.QtGui import QAccessible, QPointingDevice
+from PySide6.QtCore import QEvent, QPoint, Qt
+from PySide6.QtGui import QAccessible, QKeyEvent, QPointingDevice
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QWidget
 
@@ -116,7 +116,12 @@ class Participant:
         QApplication.processEvents()
 
     def type(self, text: str) -> None:
-        QTest.keyClicks(self.focus, text)
+        if text.isascii():
+            QTest.keyClicks(self.focus, text)
+            return
+        for letter in text:  # QTest aborts if it does not know the key
+            for kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
+                QApplication.sendEvent(self.focus, QKeyEvent(kind, 0, Qt.KeyboardModifier.NoModifier, letter))
 
     def click(self, target: str | QWidget, question: int | None = None, place: QPoint | None = None) -> None:
         widget = self.find(target, question) if isinstance(target, str) else target

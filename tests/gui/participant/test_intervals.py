@@ -67,6 +67,20 @@ def test_a_number_above_0_is_taken_and_anything_else_is_reported(opening: Openin
         assert "Enter a number above 0." not in seen.texts
 
 
+@pytest.mark.parametrize(("language", "typed"), [("en", "2,500"), ("de", "2.500")])
+def test_an_estimate_that_can_be_read_in_two_ways_is_asked_for_again(
+    opening: Opening, language: str, typed: str
+) -> None:
+    seen = opening(number(), FULL, language)
+    seen.type(typed)
+    seen.press(KEY.Key_Return)
+    assert values(seen) == []
+    assert words(language).unclear_number(typed) in seen.texts
+    seen.type("2500")
+    seen.press(KEY.Key_Return)
+    assert values(seen) == [2500]
+
+
 def interval(*, adjusts: bool = False, language: str = "en", resting: bool = False) -> TaskPage:
     at = 2 if adjusts or resting else 1
     announced = "Next: the second" if resting else ("First of 2", "Second of 2")[at - 1]

@@ -37,11 +37,11 @@ PARAGRAPHS = ("In this study you move a small ball through simulated liquids and
 
 def pages() -> dict[str, Page]:
     """Return one page of each kind, as full as it can be."""
-    part = Progress(1, 2, "", 4, 3)
+    part = Progress(part=1, parts=2, label="", index=4, of=3)
     return {
         "consent": text_page("consent", paragraphs=PARAGRAPHS, languages=("en", "nl", "de", "fr", "ar")),
         "break": text_page("break", paragraphs=PARAGRAPHS, stays_until_s=1000.0, progress=part),
-        "explore": task_page(explore(), progress=Progress(1, 2, "Liquid setting 1", 1, 3)),
+        "explore": task_page(explore(), progress=Progress(part=1, parts=2, label="Liquid setting 1", index=1, of=3)),
         "reach": task_page(),
         "choice": choice(4),
         "number": number(),

@@ -45,7 +45,7 @@ from tests.gui.transcript import compare, painted, told
 
 FULL, SMALL, LARGE, NARROW = (1366, 768), (1024, 640), (1920, 1080), (683, 384)
 LONG = tuple(f"Sentence {number} is about the study. " * 20 for number in range(1, 5))
-PAIR = Progress(1, 1, "Pair 57", 57, 220, at_most=True)
+PAIR = Progress(part=1, parts=1, label="Pair 57", index=57, of=220, at_most=True)
 ORDINALS = tuple((one, one.title()) for one in ("first", "second", "third", "fourth"))
 ENTER, SPACE, TAB, LEFT, RIGHT, UP, DOWN, HOME, END = (
     getattr(KEY, f"Key_{name}") for name in ("Return", "Space", "Tab", "Left", "Right", "Up", "Down", "Home", "End")
@@ -106,7 +106,7 @@ MIXED: tuple[ItemView, ...] = (
     NumberView("f", 7, "How near?", True, most=3, whole=True),
     TextView("g", 8, "What else?", True, lines=3, longest=12),
 )
-PARTS = Progress(2, 3, "Delay setting 3", 3, 7)
+PARTS = Progress(part=2, parts=3, label="Delay setting 3", index=3, of=7)
 
 PAGES = {
     "instructions": Case(text_page(progress=PARTS), TAB, TAB, SPACE, KEY.Key_Escape),
@@ -115,16 +115,30 @@ PAGES = {
     ),
     "instructions, large text": Case(text_page(), ENTER, size=SMALL, text_scale=2.0),
     "consent": Case(
-        text_page("consent", languages=("en", "nl", "ar")), SPACE, TAB, TAB, TAB, RIGHT,
-        text_page("consent", languages=("en", "nl", "ar"), language="ar"), LEFT, ENTER, ENTER,
+        text_page("consent", languages=("en", "nl", "ar")),
+        SPACE,
+        TAB,
+        TAB,
+        TAB,
+        RIGHT,
+        text_page("consent", languages=("en", "nl", "ar"), language="ar"),
+        LEFT,
+        ENTER,
+        ENTER,
     ),
     "consent, declined": Case(text_page("consent", language="nl"), Click("Ik wil niet meedoen"), said="nl"),
     "break": Case(
-        text_page("break", stays_until_s=130.0, progress=Progress(1, 2, "", 4, 3)), SPACE, Wait(29.4), Wait(0.6), SPACE,
+        text_page("break", stays_until_s=130.0, progress=Progress(part=1, parts=2, label="", index=4, of=3)),
+        SPACE,
+        Wait(29.4),
+        Wait(0.6),
+        SPACE,
         size=LARGE,
     ),
     "break of pairs": Case(text_page("break", progress=replace(PAIR, part=None)), ENTER, said="de"),
-    "debrief": Case(text_page("debrief", progress=Progress(2, 2, "", 8, 7)), ENTER, text_scale=1.5),
+    "debrief": Case(
+        text_page("debrief", progress=Progress(part=2, parts=2, label="", index=8, of=7)), ENTER, text_scale=1.5
+    ),
     "end": Case(EndPage("Thank you", "Let the operator know."), ENTER, KEY.Key_Escape),
     "end, mouse": Case(EndPage("Thank you", "Let the operator know."), captures_pointer=True, said="fr"),
     "trouble": Case(TroublePage("One moment", "Help comes."), ENTER, KEY.Key_Escape),
@@ -139,11 +153,20 @@ PAGES = {
     "number": Case(NUMBER, ENTER, "0", ENTER, "7", Click("⌫"), Click("2"), Click("."), Click("5"), ENTER),
     "number, large text": Case(NUMBER, "x", ENTER, "1e3", ENTER, size=SMALL, text_scale=2.0, said="nl"),
     "setting": Case(
-        interval(1), interval(2, resting=True), interval(2, adjusts=True), RIGHT, LEFT, UP, DOWN,
-        Click("Less"), Click("Done"), ENTER, size=NARROW,
+        interval(1),
+        interval(2, resting=True),
+        interval(2, adjusts=True),
+        RIGHT,
+        LEFT,
+        UP,
+        DOWN,
+        Click("Less"),
+        Click("Done"),
+        ENTER,
+        size=NARROW,
     ),
     "setting, large text": Case(interval(2, adjusts=True), size=NARROW, text_scale=2.0),
-}  # fmt: skip
+}
 
 QUESTIONNAIRES = {
     "statements": Case(
@@ -192,7 +215,20 @@ def filmed(
     width, height = size
     pixels = np.zeros((height, width, 4), np.uint8)
     pixels[..., :3] = colour or (0, 0, 0)
-    frame = VideoFrame(number, width, height, 4 * width, memoryview(pixels), 0, None, 33_333_333) if colour else None
+    frame = (
+        VideoFrame(
+            number=number,
+            width=width,
+            height=height,
+            stride=4 * width,
+            pixels=memoryview(pixels),
+            due_ns=0,
+            age_ns=None,
+            period_ns=33_333_333,
+        )
+        if colour
+        else None
+    )
     return replace(follow_view(x, (0.03, 0.01, 0)), video=frame)
 
 
@@ -213,7 +249,8 @@ TANKS = {
         captures_pointer=True, size=NARROW,
     ),
     "explore": Case(
-        task_page(explore(), progress=Progress(1, 2, "Liquid setting 1", 1, 3)), view(lit=None, elapsed_s=29.9), SPACE,
+        task_page(explore(), progress=Progress(part=1, parts=2, label="Liquid setting 1", index=1, of=3)),
+        view(lit=None, elapsed_s=29.9), SPACE,
         view((0.0, -0.03, -0.03), lit=None, elapsed_s=30.0), SPACE, view(lit=None, elapsed_s=111.0), KEY.Key_Escape,
         size=NARROW,
     ),

@@ -9,12 +9,22 @@ import pytest
 from PySide6.QtCore import QPoint
 from PySide6.QtGui import QPointingDevice
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QLineEdit, QPlainTextEdit, QSlider, QWidget
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QApplication,
+    QLabel,
+    QLineEdit,
+    QPlainTextEdit,
+    QPushButton,
+    QSlider,
+    QWidget,
+)
 
 from study_app.gui.participant.questions import FIELDS
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.protocol.questions import ChoiceView, ItemView, NumberView, RatingView, SliderView
+from study_app.protocol.wording.languages import words
 from study_app.session.pages import QuestionnairePage
 from study_app.session.transitions.events import (
     Begin,
@@ -112,6 +122,67 @@ def test_nothing_is_preset_and_keys_alone_answer_and_submit_once(opening: Openin
     assert seen.kinds.count(Submitted) == 1
     assert seen.kinds[-1] is Submitted
     assert sum(isinstance(event, ItemShown) for event in seen.events) == 1
+
+
+@pytest.mark.parametrize(
+    ("language", "typed", "asks"),
+    [
+        ("en", "2,500", "“2,500” can be read as 2.5 or 2500. Enter 2.5 or 2500."),
+        ("en", "-1,234", "“-1,234” can be read as -1.234 or -1234. Enter -1.234 or -1234."),
+        ("de", "1.234", "„1.234“ kann 1,234 oder 1234 bedeuten. Geben Sie 1,234 oder 1234 ein."),
+        ("nl", "1.234", "“1.234” kan 1,234 of 1234 betekenen. Voer 1,234 of 1234 in."),
+        ("fr", "1.234", "«\u00a01.234\u00a0» peut signifier 1,234 ou 1234. Saisissez 1,234 ou 1234."),
+        ("ar", "2,500", "يمكن أن يعني «2,500» العدد 2.5 أو 2500. أدخل 2.5 أو 2500."),
+        ("en", "1 5", "Enter a number."),
+        ("de", "1'00", "Geben Sie eine Zahl ein."),
+    ],
+)
+def test_a_number_that_is_not_one_is_asked_for_again(opening: Opening, language: str, typed: str, asks: str) -> None:
+    seen = opening(form(NumberView("size", 1, "Large?", True)), FULL, language)
+    seen.type(typed)
+    seen.press(KEY.Key_Return)
+    assert seen.answers == []
+    assert asks in seen.texts
+    assert Submitted not in seen.kinds
+
+
+def test_a_number_is_asked_for_again_even_if_only_one_of_its_readings_is_permitted(opening: Opening) -> None:
+    seen = opening(form(NumberView("size", 1, "Large?", True, least=0.0, most=10.0)), FULL)
+    seen.type("2,500")
+    seen.press(KEY.Key_Return)
+    assert seen.answers == []
+    assert "“2,500” can be read as 2.5 or 2500. Enter 2.5 or 2500." in seen.texts
+
+
+@pytest.mark.parametrize(
+    ("language", "typed", "value"),
+    [
+        ("en", "2,5", 2.5), ("en", "2.500", 2.5), ("de", "0,5", 0.5), ("nl", "2,500", 2.5), ("fr", "1 000", 1000),
+        ("de", "2.5", 2.5), ("ar", "٣٫٥", 3.5), ("ar", "١٬٠٠٠", 1000), ("de", "1.234,5", 1234.5),
+    ],
+)  # fmt: skip
+def test_a_number_with_one_reading_is_taken(opening: Opening, language: str, typed: str, value: float) -> None:
+    seen = opening(form(NumberView("size", 1, "Large?", True)), FULL, language)
+    seen.type(typed)
+    seen.press(KEY.Key_Return)
+    assert seen.answers == [("size", value)]
+
+
+@pytest.mark.parametrize(("language", "sign"), [("en", "."), ("nl", ","), ("de", ","), ("fr", ","), ("ar", ".")])
+def test_numbers_are_shown_and_kept_with_the_languages_decimal_sign(opening: Opening, language: str, sign: str) -> None:
+    page = form(NumberView("size", 1, "Large?", True, least=16.5, most=99.0))
+    seen = opening(page, FULL, language)
+    seen.type("3")
+    seen.press(KEY.Key_Return)
+    assert words(language).number_between.format(kind=words(language).any_number, least=f"16{sign}5", most="99") in (
+        seen.texts
+    )
+    assert [key.text() for key in seen.page.findChildren(QPushButton) if key.text() in {".", ","}] == [sign]
+    back = opening(replace(page, chosen=(("size", 17.125),)), FULL, language)
+    assert entries(back) == [f"17{sign}125"]
+    back.page.button.setFocus()
+    back.press(KEY.Key_Return)
+    assert Submitted in back.kinds
 
 
 @pytest.mark.parametrize("way", ["mouse", "touch", "screen reader"])

@@ -98,7 +98,9 @@ def test_a_small_window_shows_five_a_page_and_asks_page_by_page(opening: Opening
     seen.settle()
     seen.press(KEY.Key_Up)
     assert visible(seen) == [1, 2, 3, 4, 5]
+    seen.settle()
     tap(finger, seen.find("6–9"))
+    seen.settle()
     tap(finger, seen.page.button)
     assert seen.page.message.endswith("6, 7, 8 and 9.")
     seen.press(*[KEY.Key_2] * 4, KEY.Key_Return)

@@ -19,7 +19,16 @@ BLUE, GREEN = (200, 30, 60), (20, 130, 60)
 def frame(number: int, blue_green_red: tuple[int, int, int]) -> VideoFrame:
     pixels = np.zeros((180, 320, 4), np.uint8)
     pixels[..., :3] = blue_green_red
-    return VideoFrame(number, 320, 180, 4 * 320, memoryview(pixels), 0, None, 33_333_333)
+    return VideoFrame(
+        number=number,
+        width=320,
+        height=180,
+        stride=4 * 320,
+        pixels=memoryview(pixels),
+        due_ns=0,
+        age_ns=None,
+        period_ns=33_333_333,
+    )
 
 
 def seen(tank: TankWidget, video: VideoFrame | None) -> np.ndarray:

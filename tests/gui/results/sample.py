@@ -51,8 +51,12 @@ def view(**changes: Any) -> ResultsView:
         "sealed": True,
         "trials": {("P001", 1): ((2, "Part 1, L2"), (3, "Part 1, L1"))},
         "figures": (
-            FigureDrawn("liquids", "Agreement for each setting", "Agreement with nine statements.", SVG),
-            FigureDrawn("delays", "Answers by delay setting", "Agreement with five statements.", SVG),
+            FigureDrawn(
+                name="liquids", title="Agreement for each setting", caption="Agreement with nine statements.", svg=SVG
+            ),
+            FigureDrawn(
+                name="delays", title="Answers by delay setting", caption="Agreement with five statements.", svg=SVG
+            ),
         ),
         "colours": COLOURS,
         "exclusions_file": STUDY / "exclusions.csv",
@@ -60,4 +64,11 @@ def view(**changes: Any) -> ResultsView:
     return ResultsView(**(held | changes))
 
 
-LEFT_OUT = Exclusion("P003", 1, 4, "AK", "phone rang", "2026-11-19T00:00:00+00:00")
+LEFT_OUT = Exclusion(
+    participant="P003",
+    session=1,
+    trial=4,
+    rule_or_person="AK",
+    reason="phone rang",
+    excluded_at="2026-11-19T00:00:00+00:00",
+)

@@ -51,11 +51,17 @@ RESULTS: Actions = {
     "doubts": of_results(doubts=("P001/journal.jsonl", "P002/trials.csv"), chosen=Path("results/demo")),
     "pilot": of_results(studies=(replace(view().studies[0], pilot=True),)),
     "empty figure": of_results(figures=(replace(FIGURES[1], svg=b"", caption="No completed session."),)),
-    "three figures": of_results(figures=(*FIGURES, FigureDrawn("third", "Third", "Caption.", SVG))),
+    "three figures": of_results(
+        figures=(*FIGURES, FigureDrawn(name="third", title="Third", caption="Caption.", svg=SVG))
+    ),
     "drawing": of_results(figures=(), drawing=Progress("drawing", 0.4)),
     "testing": of_results(testing=Progress("testing: Unusable", 0.7)),
     "untested": then("work.stop", untested=True),
-    "trouble": then("work.again", figures=(), trouble=Trouble("It cannot be", "P002 is damaged.", "Look", "again")),
+    "trouble": then(
+        "work.again",
+        figures=(),
+        trouble=Trouble(title="It cannot be", sentence="P002 is damaged.", button="Look", remedy="again"),
+    ),
     "reading": then("trouble.button", sessions=(), figures=()),
     "no sessions": of_results(sessions=(), figures=(), listed=True),
     "no study": of_results(studies=(), chosen=None, sessions=(), figures=()),
@@ -84,7 +90,19 @@ WRITING: Actions = {
     "opened": lambda dialog: dialog.go_on.click(),
 }
 
-TRIAL = TrialRecord(1, 1, "Part 1, L2", "complete", True, (), 9, (), "", "", None)
+TRIAL = TrialRecord(
+    number=1,
+    attempt=1,
+    words="Part 1, L2",
+    outcome="complete",
+    valid=True,
+    broken=(),
+    answers=9,
+    unconfirmed=(),
+    notes="",
+    lost="",
+    excluded=None,
+)
 BROKEN = replace(
     TRIAL,
     number=2,
@@ -107,7 +125,16 @@ RECORD = SessionRecord(
     ),
     notes=("09:31, trial 2: phone rang",),
     files=(("journal.jsonl", 1_234_567), ("receipt.json", 90), ("trials.csv", 5400)),
-    left_out=(Exclusion("P007", 1, 4, "AK", "phone rang", STARTED.isoformat()),),
+    left_out=(
+        Exclusion(
+            participant="P007",
+            session=1,
+            trial=4,
+            rule_or_person="AK",
+            reason="phone rang",
+            excluded_at=STARTED.isoformat(),
+        ),
+    ),
 )
 READ: dict[str, Any] = {}
 """What the page of a session reads: its record, or an error."""
@@ -143,7 +170,16 @@ PAGE: Actions = {
         record=replace(
             RECORD,
             facts=facts("P007", status="withdrawn", validity="invalid", excluded="asleep"),
-            left_out=(Exclusion("P007", 1, None, "AK", "asleep", STARTED.isoformat()),),
+            left_out=(
+                Exclusion(
+                    participant="P007",
+                    session=1,
+                    trial=None,
+                    rule_or_person="AK",
+                    reason="asleep",
+                    excluded_at=STARTED.isoformat(),
+                ),
+            ),
         )
     ),
     "empty": read_again(record=replace(RECORD, trials=(), files=())),

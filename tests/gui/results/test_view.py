@@ -90,7 +90,9 @@ def test_leaving_out_wants_a_name_and_a_reason(place, qtbot):
         "Whole session", "Trial 2: Part 1, L2", "Trial 3: Part 1, L1"
     ]  # fmt: skip
     dialog.editors["trial"].control.setCurrentIndex(2)
-    assert decided(qtbot, place, "AK", "phone rang") == LeaveOut(place.view.chosen, "P001", 1, 3, "AK", "phone rang")
+    assert decided(qtbot, place, "AK", "phone rang") == LeaveOut(
+        folder=place.view.chosen, participant="P001", session=1, trial=3, by="AK", reason="phone rang"
+    )
 
 
 def test_a_figure_asks_for_the_width_at_which_it_is_read_and_the_height_of_its_proportion(place):
@@ -110,7 +112,9 @@ def test_what_is_left_out_is_taken_back_with_a_name_and_a_reason(place, qtbot):
     back = place.exclusions.lines[0].findChild(ActionButton)
     assert back.accessibleName() == "Include again: P003, trial 4"
     click(qtbot, back)
-    assert decided(qtbot, place, "CD", "wrong trial") == TakeBack(place.view.chosen, "P003", 1, 4, "CD", "wrong trial")
+    assert decided(qtbot, place, "CD", "wrong trial") == TakeBack(
+        folder=place.view.chosen, participant="P003", session=1, trial=4, by="CD", reason="wrong trial"
+    )
     back.setFocus()
     place.show_view(view())
     assert place.window().focusWidget() is place.exclusions.leave_out
@@ -139,7 +143,9 @@ def test_text_of_figures_is_at_least_11_px_high(place, qtbot, tmp_path):
     plot(SAMPLE.path, tmp_path)
     for block in load_study(SAMPLE.path).blocks:
         svg = (tmp_path / f"{block.kind}.svg").read_bytes()
-        place.show_view(view(figures=(FigureDrawn(block.id, "Title", "Caption", svg), *view().figures[1:])))
+        place.show_view(
+            view(figures=(FigureDrawn(name=block.id, title="Title", caption="Caption", svg=svg), *view().figures[1:]))
+        )
         drawing = place.figures.cards[0].drawing
         qtbot.waitUntil(lambda shown=drawing: shown.settled)
         sizes_pt = [float(size) for size in re.findall(rb"font(?:-size)?: (?:bold )?([0-9.]+)px", svg)]

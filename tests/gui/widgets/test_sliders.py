@@ -10,6 +10,7 @@ from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from study_app.gui.widgets.controls import Number
 from study_app.gui.widgets.numbers import NumberField, Range, read_number, write_number
 
 SPANS = [
@@ -51,6 +52,7 @@ def test_ends_and_order(span: Range) -> None:
     [
         ("0.75", 0.75), ("0,75", 0.75), ("−20", -20.0), ("-20", -20.0), ("45 918", 45918.0), ("1e-3", 0.001),
         (" 7 ", 7.0), ("", None), ("water", None), ("1.2.3", None), ("nan", None), ("inf", None), ("1e999", None),
+        ("2,500", None), ("1 5", None),
     ],
 )  # fmt: skip
 def test_numbers_are_read_as_people_write_them(text: str, value: float | None) -> None:
@@ -147,3 +149,24 @@ def test_letters_and_undo_reach_the_windows_shortcuts_unless_something_is_typed_
     QTest.keyClicks(field, "7")
     QTest.keySequence(field, QKeySequence("Ctrl+Z"))
     assert heard == ["X", "Ctrl+Z"]
+
+
+@pytest.mark.parametrize("typed", ["2,5", "2.500", "1 5", "-3"])
+def test_a_whole_number_is_typed_in_digits_or_the_one_before_comes_back(qtbot: Any, typed: str) -> None:
+    window = QWidget()
+    column = QVBoxLayout(window)
+    number, other = Number(1, 5000, 7), NumberField()
+    column.addWidget(number)
+    column.addWidget(other)
+    qtbot.addWidget(window)
+    window.show()
+    window.activateWindow()
+    number.setFocus()
+    qtbot.waitUntil(number.hasFocus)
+    number.selectAll()
+    QTest.keyClicks(number, typed)
+    assert number.refusal == f"“{typed}” is not a whole number from 1 to 5000"
+    QTest.keyClick(number, Qt.Key.Key_Return)
+    assert number.text() == typed
+    other.setFocus()
+    assert (number.value(), number.text(), number.refusal) == (7, "7", "")

@@ -13,7 +13,7 @@ def shares(felt, position_m, interval_s=1e-3):
     """Return φ of the scene's water at each place: the drag at a given 1 m/s along x over the drag of full water."""
     position_m = np.asarray(position_m, float)
     velocity_mps = np.tile([1.0, 0.0, 0.0], (len(position_m), 1))
-    motion = Motion(interval_s * np.arange(len(position_m)), position_m, velocity_mps)
+    motion = Motion(interval_s * np.arange(len(position_m)), position_m, velocity_mps=velocity_mps)
     return simulate(felt, motion).fx_n / -WATER_FACTOR
 
 

@@ -123,7 +123,7 @@ def test_added_mass_and_history_are_weakened_where_the_loop_bears_less():
 @pytest.mark.parametrize("effects", [("drag",), ("added_mass", "history")], ids=["drag", "inertia"])
 def test_what_slope_limits_take_counts_as_withheld(effects, velocity):
     steep = scene(liquid(20_000, viscosity_pa_s=10.0, effects=effects), scale=30, velocity=velocity, knee=UNBENT)
-    hand = Hand(steep, dynamics=Dynamics(1e-3, 38e-6, 0.1))
+    hand = Hand(steep, dynamics=Dynamics(delay_s=1e-3, count_m=38e-6, mass_kg=0.1))
     for sample in [hand.tick((0.004 * np.sin(0.02 * k), 0.0, 0.0)) for k in range(400)]:
         asked_n = sample.force_n * min(1.0, 8.0 / max(size(sample.force_n), 1e-9))
         assert sample.permitted_n == pytest.approx(size(asked_n), rel=1e-9)
@@ -187,7 +187,9 @@ def test_between_two_liquids_the_slope_keeps_one_limit():
         knee=UNBENT,
     )
     x = np.linspace(-0.02, 0.06, 80)
-    motion = Motion(np.arange(80) / 1000, np.column_stack([x, 0 * x, 0 * x]), np.tile([0.5, 0.0, 0.0], (80, 1)))
+    motion = Motion(
+        np.arange(80) / 1000, np.column_stack([x, 0 * x, 0 * x]), velocity_mps=np.tile([0.5, 0.0, 0.0], (80, 1))
+    )
     assert simulate(halves, motion).device_fx_n[20:] == pytest.approx(-53 / 30 * 0.5)
 
 
@@ -220,7 +222,7 @@ def test_the_force_changes_by_at_most_the_slew_limit_per_tick():
 
 @pytest.mark.parametrize(("period_s", "mass_kg", "expected"), [(1e-3, 0.25, 1.5), (1e-3, 0.04, 0.6), (4e-3, 0.1, 6.0)])
 def test_the_slew_limit_knows_rate_and_mass(period_s, mass_kg, expected):
-    device = Dynamics(0.0, 38e-6, mass_kg)
+    device = Dynamics(delay_s=0.0, count_m=38e-6, mass_kg=mass_kg)
     assert slew_limit_n(period_s, device) == pytest.approx(expected)
     felt = HONEY.model_copy(update={"rate_hz": 1 / period_s})
     assert pack(felt, dynamics=device).parameters[0].slew_n == pytest.approx(expected)
@@ -236,7 +238,9 @@ def test_the_slew_limit_is_lower_with_the_kalman_filter_which_needs_a_measured_d
 @pytest.mark.parametrize("velocity", [Ewma(), Kalman()])
 def test_a_light_device_bears_less_damping_by_its_mass(velocity):
     felt = HONEY.model_copy(update={"velocity": velocity})
-    whole, half = (pack(felt, dynamics=Dynamics(0.0, 38e-6, kg)).parameters[0] for kg in (0.1, 0.05))
+    whole, half = (
+        pack(felt, dynamics=Dynamics(delay_s=0.0, count_m=38e-6, mass_kg=kg)).parameters[0] for kg in (0.1, 0.05)
+    )
     assert LIGHTER > 1
     assert half.slope_limit_nspm == pytest.approx(0.5**LIGHTER * whole.slope_limit_nspm)
 

@@ -43,7 +43,7 @@ def wandering(seed, seconds=4.0):
         step *= min(1.0, ACCELERATION_MPS2 * TICK_S / max(np.linalg.norm(step), 1e-12))
         velocity_mps[k] = velocity_mps[k - 1] + step
         position_m[k] = position_m[k - 1] + velocity_mps[k] * TICK_S
-    return Motion(np.arange(ticks) * TICK_S, position_m, velocity_mps)
+    return Motion(np.arange(ticks) * TICK_S, position_m, velocity_mps=velocity_mps)
 
 
 WANDERINGS = [wandering(seed) for seed in range(4)]
@@ -97,7 +97,7 @@ def test_the_worst_motion_for_history_all_but_reaches_its_bound():
     turning = np.minimum(np.arange(1, int(turn_s / TICK_S) + 1) * TICK_S * ACCELERATION_MPS2, 2 * SPEED_MPS)
     vx = np.concatenate([np.full(steady_ticks, -SPEED_MPS), turning - SPEED_MPS])
     velocity_mps = np.column_stack([vx, 0 * vx, 0 * vx])
-    motion = Motion(np.arange(len(vx)) * TICK_S, np.cumsum(velocity_mps, axis=0) * TICK_S, velocity_mps)
+    motion = Motion(np.arange(len(vx)) * TICK_S, np.cumsum(velocity_mps, axis=0) * TICK_S, velocity_mps=velocity_mps)
     scene = pool("honey", motion).model_copy(
         update={"motion": MotionBox(speed_mps=SPEED_MPS, acceleration_mps2=ACCELERATION_MPS2)}
     )

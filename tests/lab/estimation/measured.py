@@ -49,7 +49,9 @@ def measured(scene: Scene, t_s: Any, position_m: Any, *, noise_n: float = NOISE_
     scene = scene.model_copy(update={"rate_hz": round(1 / (t_s[1] - t_s[0]))})
     force_n = np.array(ModelAlong(scene, given=True).follow(t_s, position_m, velocity_mps).force_n)
     force_n += noise_n * np.random.default_rng(seed).standard_normal(force_n.shape)
-    return Rows(t_s, position_m, velocity_mps, force_n, np.ones(len(t_s), bool))
+    return Rows(
+        t_s=t_s, position_m=position_m, velocity_mps=velocity_mps, force_n=force_n, usable=np.ones(len(t_s), bool)
+    )
 
 
 def fed(estimator: OnlineEstimator, rows: Rows, batch: int = BATCH) -> Estimate:

@@ -120,7 +120,16 @@ def test_other_forces_are_not_taken_for_drag() -> None:
 
 def test_a_force_of_the_wrong_sign_is_refused() -> None:
     rows = measured(WATER, *stirring(4.0))
-    found = fed(OnlineEstimator(WATER), Rows(rows.t_s, rows.position_m, rows.velocity_mps, -rows.force_n, rows.usable))
+    found = fed(
+        OnlineEstimator(WATER),
+        Rows(
+            t_s=rows.t_s,
+            position_m=rows.position_m,
+            velocity_mps=rows.velocity_mps,
+            force_n=-rows.force_n,
+            usable=rows.usable,
+        ),
+    )
     assert not found.identified
     assert "check its signs" in found.reason
 
@@ -138,7 +147,7 @@ def test_laws_without_the_coefficient_are_refused() -> None:
 def test_a_measurement_that_is_short_slow_or_interrupted_is_said() -> None:
     rows = measured(WATER, *stirring(4.0))
     assert fed(OnlineEstimator(WATER), rows.part(0, 300)).reason.startswith("0.3 s measured, ")
-    slow, gaps = (Rows(*(getattr(rows, it)[::step] for it in Rows.__slots__)) for step in (40, 100))
+    slow, gaps = (Rows(**{it: getattr(rows, it)[::step] for it in Rows.__slots__}) for step in (40, 100))
     with pytest.raises(StudyError, match="rows per second"):
         fed(OnlineEstimator(WATER), slow)
     interrupted = fed(OnlineEstimator(WATER), gaps)

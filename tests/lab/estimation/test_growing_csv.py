@@ -44,10 +44,13 @@ def test_velocities_follow_from_positions(tmp_path: Path) -> None:
     ("line", "what"),
     [
         ("0.1,0,0,0,1\n", "line 3: has 5 fields"),
+        ("0,1,0,0,0,0,0,0,0,0,0\n", "line 3: has 11 fields, more than the 10 of the header"),
+        ('0.1,0,0,0,0,0,0,0,0,"0,5"\n', "line 3: '0,5' is not a finite number; write a decimal point"),
+        ("0.1,0,0,0,0,0,0,0,0,1_0\n", "line 3: '1_0' is not a finite number"),
         ("0.1,0,0,0,much,0,0,0,0,0\n", "line 3: 'much' is not a finite number"),
         ("0.1,0,0,0,nan,0,0,0,0,0\n", "line 3: 'nan' is not a finite number"),
         ("0.1,0,0,0,0,0,0,0,0,0\n0.1,0,0,0,0,0,0,0,0,0\n", "line 4: t_s must increase"),
-        ("\x80\n", "not UTF-8"),
+        ("\x80\n", "not UTF-8 text in line 3"),
     ],
 )
 def test_a_line_that_cannot_be_used_is_named(tmp_path: Path, line: str, what: str) -> None:
@@ -70,3 +73,11 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
     begun(path)
     with pytest.raises(StudyError, match="became shorter"):
         source.poll()
+
+
+def test_columns_may_be_separated_by_semicolons(tmp_path: Path) -> None:
+    rows = measured(WATER, *stirring(0.1))
+    path = begun(tmp_path / "robot.csv")
+    path.write_text(f"\ufeff{path.read_text()}{''.join(lines(rows))}".replace(",", ";"), encoding="utf-8")
+    source = GrowingCsv(path)
+    assert np.array_equal(joined(source.poll(), source.poll()).force_n, rows.force_n)

@@ -50,7 +50,7 @@ def noisy(scene, motion, deviation_n, *, following=0.0, seed=SEED):
 
 def slowed(motion, force_n, rows):
     """Return some rows of a measurement."""
-    return Motion(motion.t_s[rows], motion.position_m[rows], motion.velocity_mps[rows]), force_n[rows]
+    return Motion(motion.t_s[rows], motion.position_m[rows], velocity_mps=motion.velocity_mps[rows]), force_n[rows]
 
 
 def write_csv(path, motion, force_n, *, velocities=True, comment=""):

@@ -57,7 +57,7 @@ def strokes():
     angle = 2 * np.pi * (0.2 * t_s + 0.75 * t_s**2 / 6)
     place, speed = 0.045 * np.sin(angle), 0.045 * rate_per_s * np.cos(angle)
     still = np.zeros_like(t_s)
-    return Motion(t_s, np.column_stack([place, still, still]), np.column_stack([speed, still, still]))
+    return Motion(t_s, np.column_stack([place, still, still]), velocity_mps=np.column_stack([speed, still, still]))
 
 
 @pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
@@ -161,3 +161,71 @@ def test_a_flow_curve_that_cannot_be_used_is_one_line(tmp_path, text, said):
     with pytest.raises(StudyError, match=said) as caught:
         measured_force.read(tmp_path / "curve.csv")
     assert "\n" not in str(caught.value)
+
+
+def loop(*, gap, noise=0.012, seed=2):
+    """Return a ramp up and down over 22 shear rates, whose way back has stresses lower by a share ``gap``."""
+    up = measured("ketchup", noise=noise, rates=np.geomspace(0.1, 100, 22), seed=seed)
+    down = measured("ketchup", noise=noise, rates=np.geomspace(0.1, 100, 22), seed=seed + 1)
+    rates = np.concatenate([up.rate_per_s, down.rate_per_s[::-1]])
+    return FlowCurve(rates, np.concatenate([up.stress_pa, (1 - gap) * down.stress_pa[::-1]]))
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.2])
+def test_a_fit_does_not_depend_on_the_order_of_rows(gap):
+    curve = loop(gap=gap)
+    orders = [
+        np.arange(44),
+        np.arange(44)[::-1],
+        np.argsort(curve.rate_per_s),
+        np.random.default_rng(3).permutation(44),
+    ]
+    curves = [FlowCurve(curve.rate_per_s[order], curve.stress_pa[order]) for order in orders]
+    fields = list(STARTS["ketchup"])
+    first, *others = (fit_curve(begun("ketchup"), "ketchup", fields, ordered) for ordered in curves)
+    for other in others:
+        assert (other.values, other.intervals, other.following) == (first.values, first.intervals, first.following)
+        assert other.warnings == first.warnings
+
+
+def test_branches_that_differ_are_named_with_their_gap():
+    found = fit_curve(begun("ketchup"), "ketchup", list(STARTS["ketchup"]), loop(gap=0.2))
+    said = "the greatest and the least stress at repeated shear rates differ by 25 % of the stress"
+    assert any(warning.startswith(said) for warning in found.warnings)
+    low, high = found.intervals["yield_stress_pa"]
+    assert 1 < low < high < 30
+
+
+def test_branches_at_other_shear_rates_are_told_by_the_way_of_the_ramp():
+    curve = loop(gap=0.2)
+    rates = curve.rate_per_s * np.where(np.arange(44) < 22, 1.0, 1.05)
+    found = fit_curve(begun("ketchup"), "ketchup", list(STARTS["ketchup"]), FlowCurve(rates, curve.stress_pa))
+    assert any(it.startswith("stresses at rising and at falling shear rates differ by") for it in found.warnings)
+
+
+def test_noise_makes_no_branches():
+    for seed in range(20):
+        found = fit_curve(begun("ketchup"), "ketchup", list(STARTS["ketchup"]), loop(gap=0.0, seed=10 * seed))
+        assert not any("branch" in warning for warning in found.warnings)
+
+
+def test_a_table_of_an_instrument_gives_the_numbers_of_a_plain_one(tmp_path):
+    curve = loop(gap=0.0)
+    rows = [f"{rate:.5f},{stress:.3f}" for rate, stress in zip(curve.rate_per_s, curve.stress_pa, strict=True)]
+    plain = "shear_rate_per_s,shear_stress_pa\n" + "\n".join(rows)
+    said = []
+    for text in (plain, plain.replace(",", ";").replace(".", ","), plain.replace(",", "\t")):
+        path = tmp_path / "flow.csv"
+        path.write_text(text, encoding="utf-8")
+        shown = identify("slime", "--measured", path, "--liquid", "ketchup", "--fit", ",".join(STARTS["ketchup"]))
+        assert shown.exit_code == 0
+        said.append(shown.output)
+    assert said[0] == said[1] == said[2]
+
+
+def test_a_table_with_more_fields_than_its_header_is_refused(tmp_path):
+    path = tmp_path / "flow.csv"
+    path.write_text("shear_rate_per_s,shear_stress_pa\n1,5,26,7\n2,5,28,6\n4,5,31,3\n6,5,33,3\n", encoding="utf-8")
+    with pytest.raises(StudyError) as refusal:
+        identify("slime", "--measured", path, "--liquid", "ketchup", "--fit", "flow_index")
+    assert str(refusal.value) == f"{path}, line 2: has 4 fields, more than the 2 of the header: write decimal points"

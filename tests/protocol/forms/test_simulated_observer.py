@@ -10,7 +10,9 @@ LIQUID = tuple(item.id for item in REK.questionnaires["liquid"].items)
 DELAY = tuple(item.id for item in REK.questionnaires["delay"].items)
 
 # What a rehearsed participant meets in each liquid while exploring it for half a minute.
-WATER = TrialFeatures(1.38, 8.0, 0.131, 0.004, 0.051, 0.004)
+WATER = TrialFeatures(
+    force_mean_n=1.38, force_peak_n=8.0, speed_rms_mps=0.131, push_share=0.004, roughness_n=0.051, delay_s=0.004
+)
 
 
 felt_anything = st.builds(

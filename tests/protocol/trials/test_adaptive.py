@@ -29,7 +29,11 @@ def answers_of(protocol: Protocol, threshold: float, seed: int = 1) -> list[Tria
             assert due.level is not None
             right = draw.random() < (0.98 if due.level > threshold else 0.5)
             noise = not any(design.arrangements[due.arrangement])
-            heard.append(TrialResult(trial.number, trial.code, due.level, right, right, noise=noise))
+            heard.append(
+                TrialResult(
+                    trial=trial.number, code=trial.code, level=due.level, success=right, correct=right, noise=noise
+                )
+            )
     return heard
 
 
@@ -46,7 +50,7 @@ def test_the_next_level_depends_on_the_levels_presented_and_not_on_how_answers_a
         assert due == again
         assert due.level == heard[number].level
     # Answers at another level than would be chosen count at that level.
-    other = [TrialResult(one.trial, one.code, 0.8, True, True) for one in heard[:10]]
+    other = [TrialResult(trial=one.trial, code=one.code, level=0.8, success=True, correct=True) for one in heard[:10]]
     moved = next_level(protocol, key, schedule, schedule.trials[10], other)
     assert moved is not None
     assert moved.level != heard[10].level

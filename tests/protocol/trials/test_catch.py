@@ -55,6 +55,10 @@ def test_answers_to_catch_trials_move_no_level(method: str) -> None:
             assert due is not None
             assert due.level is not None
             right = attentive if due.catch else trial.number % 3 > 0
-            heard.append(TrialResult(trial.number, trial.code, due.level, right, right, due.catch))
+            heard.append(
+                TrialResult(
+                    trial=trial.number, code=trial.code, level=due.level, success=right, correct=right, catch=due.catch
+                )
+            )
             levels.setdefault(attentive, []).append(due.level)
     assert levels[True] == levels[False]

@@ -51,7 +51,7 @@ class LightDevice(ScriptedDevice):
 
     @property
     def dynamics(self) -> Dynamics:
-        return Dynamics(0.0, 10e-6, 0.005)
+        return Dynamics(delay_s=0.0, count_m=10e-6, mass_kg=0.005)
 
 
 class TachometerDevice(ScriptedDevice):

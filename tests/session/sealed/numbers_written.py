@@ -24,7 +24,9 @@ def every_number(
     lines: Iterable[dict[str, Any]],
     presented: Callable[[dict[str, Any]], str | None],
 ) -> Trials:
-    """Return what a session's files hold about each trial, but answers and times of actions, and sizes of files.
+    """Return what a session's files hold about each trial, but answers and times of actions.
+
+    Sizes of files are among the numbers, and of each event, by interval, how many lines it has and how far apart.
 
     Parameters
     ----------
@@ -40,10 +42,19 @@ def every_number(
     for line in lines:
         if line["event"] == "trial_started" and (what := presented(line)) is not None:
             found[session.participant, line["trial"]] = (what, {})
+    interval = 0
+    written_s: dict[tuple[Any, ...], float] = {}
     for line in lines:
+        interval = 0 if line["event"] == "trial_started" else interval
         trial = (session.participant, line.get("trial"))
         if trial in found and line["event"] not in ABOUT_ANSWERS:
             found[trial][1].update(numbers(line, f"{line['event']} {line.get('interval', '')} "))
+            interval = line.get("interval", interval)
+            count = f"number of {line['event']} {interval}"
+            found[trial][1][count] = found[trial][1].get(count, 0.0) + 1
+            if (before := written_s.get((*trial, count))) is not None:
+                found[trial][1][f"since the last {line['event']} {interval}"] = line["t_s"] - before
+            written_s[*trial, count] = line["t_s"]
         if trial in found and line["event"] == "recorded":
             paths = [session.path / line[name] for name in ("recording", "recording_frames")]
             found[trial][1].update((f"size {number}", path.stat().st_size) for number, path in enumerate(paths))

@@ -1,5 +1,6 @@
 """Simulated participants: how they move, what they sense, and how they go through a session."""
 
+import signal
 from collections.abc import Iterable
 from itertools import count
 from pathlib import Path
@@ -22,6 +23,7 @@ from study_app.session.simulated.rehearsal_worker import RehearsalOrder, carry_o
 from study_app.session.tasks import TankView, TaskView
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
+from study_app.store.journals.journal import Journal
 from study_app.store.journals.journal_events import Responses
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.tables.study_files import write_description
@@ -30,6 +32,33 @@ from tests.journal_lines import raw
 from tests.session import small
 
 HALF_M = (0.05, 0.03, 0.03)
+
+
+@needs_servo
+@pytest.mark.parametrize(
+    ("number", "ends_by"), [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, SystemExit)], ids=["Ctrl+C", "ended"]
+)
+def test_a_signal_within_a_write_leaves_a_journal_that_can_be_resumed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals, ends_by: type[BaseException]
+) -> None:
+    write, lines, sent = Journal._write, count(1), []
+
+    def interrupted(self: Journal, content: bytes) -> Any:
+        done = write(self, content)
+        if next(lines) == 8:
+            sent.append(number)
+            signal.raise_signal(number)  # Python's handler runs before the journal counts the line
+        return done
+
+    monkeypatch.setattr(Journal, "_write", interrupted)
+    with pytest.raises(ends_by):
+        rehearsal.rehearse("demo", participants=1, seed=1, results=tmp_path)
+    (session,) = StudyFolder(tmp_path).sessions()
+    assert sent
+    assert journal.whole(session.journal).lines[7].n == 8
+    rehearsal.resume(session.path)
+    responses = [line for line in journal.read(session.journal) if isinstance(line, Responses)]
+    assert [line.trial for line in responses] == [1, 2, 3, 4]
 
 
 @pytest.mark.slow
@@ -74,7 +103,9 @@ def test_senses_measure_force_speed_of_the_hand_roughness_and_delay() -> None:
     for age_ms in (100, 110):
         painted_ns = 1_000_000_000
         shown_ns = painted_ns - age_ms * 1_000_000
-        senses.see(painted_ns, TankView(np.zeros(3), TaskView(0, 0, 1, 0.0, 0.0), shown_ns))
+        senses.see(
+            painted_ns, TankView(np.zeros(3), TaskView(lit=0, reached=0, of=1, dwell=0.0, elapsed_s=0.0), shown_ns)
+        )
     felt = senses.features()
     assert felt.force_mean_n == pytest.approx(2.5)
     assert felt.force_peak_n == pytest.approx(5)

@@ -12,8 +12,9 @@ import pytest
 
 from study_app.errors import StoreError, StudyError
 from study_app.protocol.orders.durations import own_protocol
-from study_app.protocol.orders.schedule import build_schedule, stream
+from study_app.protocol.orders.schedule import stream
 from study_app.protocol.simulated import NO_FEATURES
+from study_app.session.resume import begun_schedule
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import ConditionFeatures
 from study_app.store.blinded import allocation
@@ -21,6 +22,7 @@ from study_app.store.blinded.allocation import allocate, allocated, claims, sess
 from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
+from study_app.store.journals.journal_events import start_of
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import reopen
 from study_app.store.unblinding import unblind
@@ -90,7 +92,7 @@ def test_no_file_names_a_group_of_a_participant(tmp_path: Path) -> None:
         assert found is not None
         assert set(line) == {"n", "event", "t_s", "at", "entry", "sealed", "previous"}
         assert (claim.pop("sealed"), line["sealed"]) == (found.sealed, found.sealed)
-        assert claim == {"entry": 1, "participant": "P001"}
+        assert claim == {"entry": 1, "participant": "P001", "place_in_group": True}
         readable[found.group] = found.sealed
         receipt = json.loads(store.folder.receipt.read_text())
         assert "entry" not in receipt
@@ -207,8 +209,9 @@ def test_a_rehearsal_allocates_from_its_seed_and_reproduces(tmp_path: Path) -> N
         found = allocated(study, key, session.participant)
         assert found is not None
         own = own_protocol(grouped(), found.group, 1)
-        trials = [line["code"] for line in raw(journal.read(session.journal)) if line["event"] == "trial_started"]
-        assert trials == [trial.code for trial in build_schedule(own, session.participant, 3).trials]
+        lines = journal.read(session.journal)
+        trials = [line["code"] for line in raw(lines) if line["event"] == "trial_started"]
+        assert trials == [trial.code for trial in begun_schedule(own, start_of(lines), key).trials]
         assert reproduced(session.path).differences == []
     assert not verify(folder).errors
     unblind(folder, "AB", "a test")

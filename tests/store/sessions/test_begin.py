@@ -12,7 +12,9 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
 from study_app.store.atomic import sync_folder
+from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
+from study_app.store.sessions.begin import UsedIds, used_ids
 from tests.platforms import files_up_to
 from tests.store.conftest import Start, study_tables
 from tests.store.sessions.conftest import every_byte
@@ -132,3 +134,31 @@ def test_halves_of_a_killed_program_go_when_the_next_session_begins(start: Start
         os.utime(half, (0, 0))
     start("P008").close()
     assert not any(half.exists() for half in halves)
+
+
+CHANGED = {
+    "a missing value": ("NA", "nan", "None", "NULL", "null", "na"),
+    "true or false": ("TRUE", "false", "T", "F"),
+    "a number": ("1E5", "007", "00", "12e3", "inf", "Infinity", "0x1F", "1234567890123456"),
+    "a date or a time": ("MAR1", "1MAR", "dec10", "SEPT2", "May2024", "12JAN24", "12pm"),
+}
+
+
+@pytest.mark.parametrize(("read_as", "participant"), [(what, one) for what, ids in CHANGED.items() for one in ids])
+def test_an_id_that_other_programs_change_is_refused(tmp_path: Path, read_as: str, participant: str) -> None:
+    with pytest.raises(StoreError) as refused:
+        used_ids(StudyFolder(tmp_path)).check_unused(participant, 1)
+    assert f"participant id '{participant}' cannot be used" in str(refused.value)
+    assert f"read it as {read_as}; use another id, such as P001" in str(refused.value)
+
+
+KEPT = ("P1", "P007", "7", "101", "S01", "Anna", "NA1", "E5", "1A", "March", "TRUE1", "X0")
+
+
+@pytest.mark.parametrize("participant", KEPT)
+def test_an_id_that_other_programs_keep_is_not(tmp_path: Path, participant: str) -> None:
+    used_ids(StudyFolder(tmp_path)).check_unused(participant, 1)
+
+
+def test_a_participant_who_has_such_an_id_already_has_further_sessions(tmp_path: Path) -> None:
+    UsedIds(tmp_path, frozenset({("007", 1)}), ("007",)).check_unused("007", 2)

@@ -288,7 +288,12 @@ class Changed(Files):
         erased = tuple(describe_session(one) for one in folder.sessions() if one.participant == participant)
         self.delete(f"data/sub-{participant}")
         self.cover_up()
-        add_tombstone(folder, Tombstone(participant, "2026-03-02T09:30:00+01:00", "AK", "asked", erased))
+        add_tombstone(
+            folder,
+            Tombstone(
+                participant=participant, at="2026-03-02T09:30:00+01:00", by="AK", reason="asked", sessions=erased
+            ),
+        )
 
     def drop(self, event: str, at: int = 0) -> None:
         def change(lines: Lines) -> None:

@@ -73,7 +73,14 @@ def test_a_removed_confirmation_is_found_where_the_session_went_on(
     tmp_path: Path, removed: Callable[[dict[str, Any]], bool], number: int
 ) -> None:
     """Also of a session that was completed right after it, and whose last form has no answer."""
-    felt = {("stir", name): (TrialFeatures(1.0, 4.0, 0.1, 0.02, 0.03, 0.0),) for name in ("thin", "thick")}
+    felt = {
+        ("stir", name): (
+            TrialFeatures(
+                force_mean_n=1.0, force_peak_n=4.0, speed_rms_mps=0.1, push_share=0.02, roughness_n=0.03, delay_s=0.0
+            ),
+        )
+        for name in ("thin", "thick")
+    }
     shorter = 'sequence = ["start", "stir", "load", "usability", "end"]', 'sequence = ["start", "stir", "end"]'
     file = mixed_file(tmp_path, shorter)
     study = rehearse_answers(file, participants=1, seed=1, results=tmp_path / "mixed", features=felt)

@@ -25,6 +25,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QButtonGroup, QCheckBox, QRadioButton, QSizePolicy, QStyle, QWidget
 
+from study_app.gui.key_presses import digit_of
 from study_app.gui.participant.pages.page_widget import Button, beginning, page_painter, point_at
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
@@ -627,15 +628,14 @@ class OptionsField(QuestionField):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Choose with digits and Space, point with left and right; the rest is the page's."""
-        number = event.key() - Qt.Key.Key_0
+        number = digit_of(event)
         plain = not event.modifiers() & Qt.KeyboardModifier.ControlModifier
-        if 1 <= number <= self.digits and plain:
-            if not event.isAutoRepeat():
-                self.choose(number - 1, by_key=True)
+        if number is not None and 1 <= number <= self.digits and plain:
+            self.choose(number - 1, by_key=True)
         elif event.key() in (Qt.Key.Key_Left, Qt.Key.Key_Right):
             self._step(self.forward if event.key() == Qt.Key.Key_Right else -self.forward)
         elif event.key() == Qt.Key.Key_Space:
-            if self.pointed >= 0 and not event.isAutoRepeat():
+            if self.pointed >= 0:
                 self.choose(self.pointed, by_key=True)
         else:
             super().keyPressEvent(event)
@@ -757,7 +757,7 @@ class TypedField(QuestionField):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in ENTER and self.typed():
-            if not event.isAutoRepeat() and self.finish():
+            if self.finish():
                 self.left.emit()
         else:
             super().keyPressEvent(event)

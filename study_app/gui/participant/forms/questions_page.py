@@ -10,6 +10,7 @@ from PySide6.QtGui import QAccessible, QColor, QFont, QFontMetrics, QFontMetrics
 from PySide6.QtWidgets import QLabel, QLayout, QPushButton, QStyle, QWidget
 
 from study_app.discovery import by_name
+from study_app.gui.key_presses import key_presses
 from study_app.gui.participant.forms.question_field import MARGIN, QuestionField, question_of, target_px
 from study_app.gui.participant.pages.page_widget import (
     GoButton,
@@ -303,8 +304,7 @@ class QuestionsPage(PageWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
-            if not event.isAutoRepeat():
-                self.submit()
+            self.submit()
         elif event.key() in (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Backspace):
             self._move(1 if event.key() == Qt.Key.Key_Down else -1)
         else:
@@ -384,6 +384,7 @@ class QuestionsPage(PageWidget):
         index = next((n for n, part in enumerate(self.parts) if field in part), self._part)
         if index != self._part:
             self._show(index)
+            key_presses().begin_page(self)
         field.setFocus(Qt.FocusReason.OtherFocusReason)
         self._tell()
 

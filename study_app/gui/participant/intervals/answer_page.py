@@ -9,6 +9,7 @@ from PySide6.QtCore import QEvent, QObject, QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QKeyEvent, QPainter, QPen, QShowEvent, QWheelEvent
 from PySide6.QtWidgets import QLabel, QLineEdit, QPushButton, QWidget
 
+from study_app.gui.key_presses import digit_of
 from study_app.gui.participant.pages.page_widget import (
     DigitPad,
     GoButton,
@@ -117,13 +118,13 @@ class ChoiceWidget(AnswerPage):
             super().keyPressEvent(event)
 
     def _take(self, event: QKeyEvent) -> bool:
-        """Take a key of the page; a key that is held is pressed once."""
-        number = event.key() - Qt.Key.Key_1
+        """Take a key of the page; an arrow that repeats moves nothing here."""
+        number = digit_of(event)
         away = ARROWS.get(Qt.Key(event.key()))
         if event.isAutoRepeat():
             return True
-        if 0 <= number < len(self.buttons):
-            self.answer(self._values[number])
+        if number is not None and 1 <= number <= len(self.buttons):
+            self.answer(self._values[number - 1])
         elif away is not None:
             self._go(-away if self.mirrored else away)
         elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
@@ -222,7 +223,7 @@ LONGEST = 12
 
 
 class NumberWidget(AnswerPage):
-    """A field for a number, with point or comma; anything but a number above 0 is reported and not accepted."""
+    """A field for a number, with point or comma; anything but one number above 0 is reported and not accepted."""
 
     def __init__(self, page: NumberPage, context: PageContext) -> None:
         super().__init__(page, context)
@@ -233,7 +234,7 @@ class NumberWidget(AnswerPage):
         self.wrong = QLabel("", self)
         self.wrong.setStyleSheet(f"color: {PARTICIPANT.warn}; background: transparent;")
         self.field.textChanged.connect(lambda _text: self.wrong.clear())
-        self._pad = DigitPad(self.field, (".",), ACROSS, self._words.delete_digit, self)
+        self._pad = DigitPad(self.field, (self._words.decimal_sign,), ACROSS, self._words.delete_digit, self)
         self.keys = self._pad.keys
         self.button = GoButton(self._words.continue_, self._words.enter_key, self)
         self.button.clicked.connect(self._confirm)
@@ -255,19 +256,20 @@ class NumberWidget(AnswerPage):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
-            if not event.isAutoRepeat():
-                self._confirm()
+            self._confirm()
         else:
             super().keyPressEvent(event)
 
     def _confirm(self) -> None:
         """Answer with the number in the field, or report what is wrong with it."""
-        number = read_number(self.field.text())
+        text = self.field.text()
+        number = read_number(text, self._words.decimal_sign)
         if number is not None and self._permits(number):
             self.answer(plain_number(number))
             return
-        self.wrong.setText(self._words.number_wanted)
-        say(self.field, self._words.number_wanted)
+        problem = self._words.unclear_number(text) or self._words.number_wanted
+        self.wrong.setText(problem)
+        say(self.field, problem)
         self.field.setFocus()
         self.field.selectAll()
 
@@ -322,7 +324,7 @@ class SettingControls(QWidget):
     def turn_to(self, page: TaskPage) -> None:
         """Appear where the level of an interval is set, and go with it."""
         self._adjusts = page.adjusts
-        self._let_go()
+        self.let_go()
         self.setVisible(self._adjusts and self._buttons)
 
     def place(self, scale: float, middle: float) -> None:
@@ -354,8 +356,8 @@ class SettingControls(QWidget):
         return True
 
     def release(self, event: QKeyEvent) -> None:
-        if not event.isAutoRepeat() and KEYS.get(Qt.Key(event.key()), 0) == self._held:
-            self._let_go()
+        if KEYS.get(Qt.Key(event.key()), 0) == self._held:
+            self.let_go()
 
     def turn_wheel(self, event: QWheelEvent) -> None:
         """Step with each notch of the wheel: forwards is more."""
@@ -364,7 +366,8 @@ class SettingControls(QWidget):
         self._turned -= steps * NOTCH
         self._step(steps)
 
-    def _let_go(self) -> None:
+    def let_go(self) -> None:
+        """Stop stepping; a window that is left never hears the release of its key."""
         self._held = self._turned = 0
         self._timer.stop()
 
@@ -373,6 +376,6 @@ class SettingControls(QWidget):
             self.event_made.emit(Stepped(self._clock(), steps))
 
     def _confirm(self) -> None:
-        self._let_go()
+        self.let_go()
         if self._adjusts:
             self.event_made.emit(Submitted(self._clock()))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEvent, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QAccessible,
     QAccessibleEvent,
@@ -23,6 +23,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QAbstractButton, QGroupBox, QLineEdit, QPushButton, QRadioButton, QSizePolicy, QWidget
 
+from study_app.gui.key_presses import digit_of
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
 from study_app.gui.widgets.boxes import grid
@@ -400,8 +401,7 @@ class LanguageButton(LitButton, QRadioButton):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
-            if not event.isAutoRepeat():
-                self.click()
+            self.click()
         else:
             super().keyPressEvent(event)
 
@@ -471,14 +471,19 @@ DELETE = "⌫"
 
 
 class DigitPad(QWidget):
-    """Keys in rows of ``across``, in the same order in every language; ``more`` come after the digits."""
+    """Keys in rows of ``across``, in the same order in every language; ``more`` come after the digits.
+
+    The keyboard's digit row types digits into ``field`` in every layout; a minus stays one if ``more`` has it.
+    """
 
     def __init__(self, field: QLineEdit, more: tuple[str, ...], across: int, delete_name: str, parent: QWidget) -> None:
         super().__init__(parent)
         self._field = field
+        self._typed = (*DIGITS, *more)
+        field.installEventFilter(self)
         self.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
         self._grid = grid(margins=0, parent=self)
-        self.keys = [QPushButton(text, self) for text in (*DIGITS, *more, DELETE)]
+        self.keys = [QPushButton(text, self) for text in (*self._typed, DELETE)]
         for place, key in enumerate(self.keys):
             key.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             key.setAccessibleName(delete_name if key.text() == DELETE else key.text())
@@ -492,6 +497,14 @@ class DigitPad(QWidget):
             key.setFont(face)
             key.setStyleSheet(f"padding: 0; min-height: {height - 2}px;")
             key.setFixedSize(width, height)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress:
+            digit = digit_of(event)
+            if digit is not None and event.text() not in self._typed:
+                self._field.insert(str(digit))
+                return True
+        return super().eventFilter(watched, event)
 
     def _press(self, text: str) -> None:
         self._field.setFocus(Qt.FocusReason.MouseFocusReason)

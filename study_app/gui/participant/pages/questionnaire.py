@@ -30,7 +30,7 @@ CELL_GAP = 6.0
 POINTS = 7
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
     """What is asked, measured at scale 1 [px].
 
@@ -43,7 +43,7 @@ class Asked:
     word: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
     """The sizes of a row, from its number to "cannot judge" [logical px].
 

@@ -127,8 +127,10 @@ class ReadingPage(PageWidget):
         self._column.setAutoFillBackground(False)
         self._content = QRectF()
         QScroller.grabGesture(self._scroll.viewport(), QScroller.ScrollerGestureType.TouchGesture)
-        self.button = GoButton(*button, parent=self) if button is not None else None
-        if self.button is not None:
+        self.button = None
+        if button is not None:
+            text, key = button
+            self.button = GoButton(text, key, parent=self)
             self.button.clicked.connect(self.go_on)
 
     def go_on(self) -> None:
@@ -210,8 +212,7 @@ class DeclineButton(QPushButton):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Decline with Enter, too, where the keyboard is here: it must not agree."""
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
-            if not event.isAutoRepeat():
-                self.click()
+            self.click()
         else:
             super().keyPressEvent(event)
 
@@ -348,7 +349,7 @@ class TextWidget(ReadingPage):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         enter = event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter)
         space = event.key() == Qt.Key.Key_Space and not self._consent
-        if (enter or space) and not event.isAutoRepeat():
+        if enter or space:
             self.go_on()
         else:
             super().keyPressEvent(event)
@@ -365,16 +366,15 @@ VEIL = 0.80  # how much of the page under a pause is hidden
 class PauseWidget(ReadingPage):
     """The pause, over the page that it interrupts; after a force stop it says that the force is off.
 
-    Where the operator stopped, there is nothing to press: the operator goes on. Of a mouse, which gives no force, it
+    Where only the operator resumes, there is nothing to press. Of a mouse, which gives no force, it
     never speaks of one.
     """
 
     def __init__(self, page: PausePage, context: PageContext, under: QPixmap | None = None) -> None:
         self.under, words = under, context.words
         if page.force_off and not context.by_mouse:
-            title = words.force_held_title if page.held == "force" else words.force_off_title
             body = words.force_off_body if page.held is None else words.force_held_body
-            column = ("stop", title, (body,), PARTICIPANT.bad)
+            column = ("stop", words.force_off_title, (body,), PARTICIPANT.bad)
             label = words.force_on
         else:
             body = words.pause_body if page.held is None else words.pause_held_body
@@ -385,7 +385,7 @@ class PauseWidget(ReadingPage):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Go on with Enter; Space alone could still be the key of the page before."""
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and not event.isAutoRepeat():
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self.go_on()
         else:
             super().keyPressEvent(event)
@@ -428,7 +428,7 @@ class NoticeWidget(ReadingPage):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         keys = (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space)
-        if self.button is not None and event.key() in keys and not event.isAutoRepeat():
+        if self.button is not None and event.key() in keys:
             self.go_on()
         else:
             super().keyPressEvent(event)

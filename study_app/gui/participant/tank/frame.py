@@ -27,7 +27,7 @@ GLASS_ABOVE = 0.13  # of the water's height
 MARGIN_M = 0.0025  # between ball and glass
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Box:
     """The inside of the tank: half width, floor, water level, glass edge, half depth [m]."""
 
@@ -54,7 +54,7 @@ class Box:
         return tuple((x, y, z) for x in (-self.x, self.x) for y in (self.floor, self.top) for z in (-self.z, self.z))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Camera:
     """A pinhole at (0, ``eye_y``, ``eye_z``) [m] that looks down by ``pitch`` [rad]; ``focal`` and ``centre`` in px."""
 
@@ -72,17 +72,17 @@ class Camera:
         distance = DISTANCE * (box.water - box.floor) + box.z
         eye_y = middle + math.sin(pitch) * distance
         eye_z = math.cos(pitch) * distance
-        bare = cls(eye_y, eye_z, 1.0, 0.0, 0.0, pitch)
+        bare = cls(eye_y=eye_y, eye_z=eye_z, focal=1.0, centre_x=0.0, centre_y=0.0, pitch=pitch)
         pixels = [bare.point(corner) for corner in box.corners()]
         xs, ys = [x for x, _ in pixels], [y for _, y in pixels]
         focal = min(width / (max(xs) - min(xs)), height / (max(ys) - min(ys)))
         return cls(
-            eye_y,
-            eye_z,
-            focal,
-            left + width / 2 - focal * (max(xs) + min(xs)) / 2,
-            top + height / 2 - focal * (max(ys) + min(ys)) / 2,
-            pitch,
+            eye_y=eye_y,
+            eye_z=eye_z,
+            focal=focal,
+            centre_x=left + width / 2 - focal * (max(xs) + min(xs)) / 2,
+            centre_y=top + height / 2 - focal * (max(ys) + min(ys)) / 2,
+            pitch=pitch,
         )
 
     def distance(self, point: Point) -> float:
@@ -131,7 +131,7 @@ class Placed:
     place: QRectF
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class BallPlace:
     """Where the proxy is drawn: middle, radius by depth step, haze, and the floor below it [px]."""
 

@@ -86,7 +86,7 @@ EFFECT = Effect(
     damping_nspm=lambda record, rate: damping_nspm(record.mass_kg, rate * record.filter_per_s),
     open_values={"filter_s": lambda scene: smoothing_s(scene.velocity, None, SMOOTHING_S)},
     controls=(
-        Parameter("added_mass.coefficient", "Coefficient", "", most=2.0),
-        Parameter("added_mass.filter_s", "Smoothing", "s", most=0.2, factor=1e3, shown_unit="ms", decimals=1),
+        Parameter("added_mass.coefficient", "Coefficient", unit="", most=2.0),
+        Parameter("added_mass.filter_s", "Smoothing", unit="s", most=0.2, factor=1e3, shown_unit="ms", decimals=1),
     ),
 )

@@ -134,13 +134,33 @@ EFFECT = Effect(
         Parameter(
             "current.kind", "Current", choices=(("uniform", "Uniform"), ("channel", "Channel"), ("vortex", "Vortex"))
         ),
-        Parameter("current.velocity_mps", "Speed", "m/s", -5.0, 5.0),
-        Parameter("current.centre_m", "Centre", "m", -1.0, 1.0, factor=1e3, shown_unit="mm", decimals=0),
-        Parameter("current.heading_deg", "Heading", "°", decimals=0),
+        Parameter("current.velocity_mps", "Speed", unit="m/s", least=-5.0, most=5.0),
         Parameter(
-            "current.width_m", "Width", "m", 0.01, 5.0, logarithmic=True, factor=1e3, shown_unit="mm", decimals=0
+            "current.centre_m", "Centre", unit="m", least=-1.0, most=1.0, factor=1e3, shown_unit="mm", decimals=0
         ),
-        Parameter("current.peak_mps", "Peak speed", "m/s", -5.0, 5.0),
-        Parameter("current.core_m", "Core", "m", 0.01, 2.0, logarithmic=True, factor=1e3, shown_unit="mm", decimals=0),
+        Parameter("current.heading_deg", "Heading", unit="°", decimals=0),
+        Parameter(
+            "current.width_m",
+            "Width",
+            unit="m",
+            least=0.01,
+            most=5.0,
+            logarithmic=True,
+            factor=1e3,
+            shown_unit="mm",
+            decimals=0,
+        ),
+        Parameter("current.peak_mps", "Peak speed", unit="m/s", least=-5.0, most=5.0),
+        Parameter(
+            "current.core_m",
+            "Core",
+            unit="m",
+            least=0.01,
+            most=2.0,
+            logarithmic=True,
+            factor=1e3,
+            shown_unit="mm",
+            decimals=0,
+        ),
     ),
 )

@@ -177,6 +177,13 @@ EFFECT = Effect(
                 ("linear", "Linear damper"),
             ),
         ),
-        Parameter("drag.damping_nspm", "Damping at the hand", "N·s/m", *DAMPING_NSPM, logarithmic=True),
+        Parameter(
+            "drag.damping_nspm",
+            "Damping at the hand",
+            unit="N·s/m",
+            least=DAMPING_NSPM[0],
+            most=DAMPING_NSPM[1],
+            logarithmic=True,
+        ),
     ),
 )

@@ -146,7 +146,7 @@ EFFECT = Effect(
     adjustable=False,  # its intervals depend on its numbers
     open_values={"smoothing_s": lambda scene: smoothing_s(scene.velocity, None, SMOOTHING_S)},
     controls=(
-        Parameter("history.window_s", "Window", "s", factor=1e3, shown_unit="ms", decimals=0),
-        Parameter("history.smoothing_s", "Smoothing", "s", most=0.2, factor=1e3, shown_unit="ms", decimals=1),
+        Parameter("history.window_s", "Window", unit="s", factor=1e3, shown_unit="ms", decimals=0),
+        Parameter("history.smoothing_s", "Smoothing", unit="s", most=0.2, factor=1e3, shown_unit="ms", decimals=1),
     ),
 )

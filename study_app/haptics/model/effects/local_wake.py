@@ -98,12 +98,14 @@ EFFECT = Effect(
     open_values={"reach_m": lambda scene: scene.body.diameter_m},
     start=start_tail,
     controls=(
-        Parameter("local_wake.length", "Length", "ticks", logarithmic=True, whole=True, decimals=0),
-        Parameter("local_wake.scaling", "Scaling", "ticks", 1.0, 1e5, logarithmic=True, decimals=0),
-        Parameter("local_wake.exponent", "Exponent", "", 0.05, logarithmic=True),
-        Parameter("local_wake.decay", "Decay", "per tick", 0.99, decimals=6),
-        Parameter("local_wake.reach_m", "Reach", "m", 1e-3, 0.5, factor=1e3, shown_unit="mm", decimals=1),
-        Parameter("local_wake.spreading_m2ps", "Spreading", "m²/s", most=0.1, factor=1e4, shown_unit="cm²/s"),
+        Parameter("local_wake.length", "Length", unit="ticks", logarithmic=True, whole=True, decimals=0),
+        Parameter("local_wake.scaling", "Scaling", unit="ticks", least=1.0, most=1e5, logarithmic=True, decimals=0),
+        Parameter("local_wake.exponent", "Exponent", unit="", least=0.05, logarithmic=True),
+        Parameter("local_wake.decay", "Decay", unit="per tick", least=0.99, decimals=6),
+        Parameter(
+            "local_wake.reach_m", "Reach", unit="m", least=1e-3, most=0.5, factor=1e3, shown_unit="mm", decimals=1
+        ),
+        Parameter("local_wake.spreading_m2ps", "Spreading", unit="m²/s", most=0.1, factor=1e4, shown_unit="cm²/s"),
         Parameter("local_wake.axes", "Axes", choices=(("xz", "Horizontal"), ("xyz", "All three"))),
     ),
 )

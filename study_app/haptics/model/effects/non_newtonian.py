@@ -117,7 +117,9 @@ STATE: Fields = (
 
 
 def _control(field: str, label: str, unit: str, least: float, most: float, **more: Any) -> Parameter:
-    return Parameter(f"non_newtonian.{field}", label, unit, least, most, **({"logarithmic": True} | more))
+    return Parameter(
+        f"non_newtonian.{field}", label, unit=unit, least=least, most=most, **({"logarithmic": True} | more)
+    )
 
 
 EFFECT = Effect(

@@ -163,7 +163,10 @@ def test_what_was_typed_leaves_only_where_it_must(
     exclude(results, "P001", 1, trial=1, by="zq_by", reason="zq_why")
     include(results, "P001", 1, trial=1, by="zq_by", reason="zq_again")
     exclude(results, "P001", 1, trial=2, by="zq_by", reason="zq_why")
-    add_tombstone(folder, Tombstone("P009", "2026-03-02T09:30:00+01:00", "zq_by", "zq_withdrawn", ()))
+    add_tombstone(
+        folder,
+        Tombstone(participant="P009", at="2026-03-02T09:30:00+01:00", by="zq_by", reason="zq_withdrawn", sessions=()),
+    )
     unblind(results, "zq_by", "zq_opened")
     logging.getLogger("study_app").error("failed: %s", "zq_note")
     caplog.clear()

@@ -62,7 +62,15 @@ class TestFit:
 
 
 class TestKeeping:
-    CALIBRATION = Calibration("zm-redux", 7000.0, 0.03, 1.1, 0.05, 6, "2026-11-20")
+    CALIBRATION = Calibration(
+        geometry="zm-redux",
+        units_per_nm=7000.0,
+        arm_offset_rad=0.03,
+        own_weight_n=1.1,
+        residual_n=0.05,
+        poses=6,
+        measured="2026-11-20",
+    )
 
     @pytest.fixture
     def folder(self, tmp_path):

@@ -22,7 +22,7 @@ def river(current, **fields):
 def resting_at(places_m):
     """Return a motion that is at rest at each of these places in turn."""
     places_m = np.asarray(places_m, float)
-    return Motion(np.arange(len(places_m)) / 1000, places_m, np.zeros_like(places_m))
+    return Motion(np.arange(len(places_m)) / 1000, places_m, velocity_mps=np.zeros_like(places_m))
 
 
 def flow(felt, places_m):

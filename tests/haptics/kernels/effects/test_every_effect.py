@@ -43,7 +43,7 @@ def test_the_effect_is_packed_by_its_bit_and_changes_the_force_by_its_bound_at_m
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_body_at_rest_feels_weight_and_current_alone(name):
-    deep = Motion(np.arange(30) / 1000, np.tile([0.1, -0.3, 0.0], (30, 1)), np.zeros((30, 3)))
+    deep = Motion(np.arange(30) / 1000, np.tile([0.1, -0.3, 0.0], (30, 1)), velocity_mps=np.zeros((30, 3)))
     felt = force_n(given(in_lab(name)), deep)
     assert felt.any() == (name in FELT_AT_REST)
     assert felt == pytest.approx(np.tile(felt[-1], (30, 1)))
@@ -54,7 +54,7 @@ def test_a_body_at_rest_feels_weight_and_current_alone(name):
 def test_turning_the_motion_about_the_vertical_turns_the_force(name, angle):
     turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
     motion, scene = wandering(TICKS), given(in_lab(name))
-    turned = Motion(motion.t_s, motion.position_m @ turn.T, motion.velocity_mps @ turn.T)
+    turned = Motion(motion.t_s, motion.position_m @ turn.T, velocity_mps=motion.velocity_mps @ turn.T)
     expected = force_n(scene, motion) @ turn.T
     assert force_n(scene, turned) == pytest.approx(expected, abs=1e-9 * max(abs(expected).max(), 1e-3))
 

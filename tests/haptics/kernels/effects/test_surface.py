@@ -34,7 +34,9 @@ def through(y_m, velocity_mps, interval_s=1e-3):
     """Return a motion at these heights (n,) with one velocity (3,)."""
     y_m = np.asarray(y_m, float)
     places = np.column_stack([0 * y_m, y_m, 0 * y_m])
-    return Motion(np.arange(len(y_m)) * interval_s, places, np.tile(np.asarray(velocity_mps, float), (len(y_m), 1)))
+    return Motion(
+        np.arange(len(y_m)) * interval_s, places, velocity_mps=np.tile(np.asarray(velocity_mps, float), (len(y_m), 1))
+    )
 
 
 @pytest.mark.parametrize("region", [POOL, TANK], ids=["box", "cylinder"])
@@ -71,7 +73,9 @@ def test_entering_through_the_surface_takes_no_time_and_through_a_wall_20_ms():
     assert falling == pytest.approx([0.0, WATER_FACTOR])
     x_m = np.where(np.arange(40) < 10, 1.5, 0.9)
     places = np.column_stack([x_m, np.zeros(40), np.zeros(40)])
-    entering = simulate(pool("drag"), Motion(np.arange(40) / 1000, places, np.tile([-1.0, 0.0, 0.0], (40, 1)))).fx_n
+    entering = simulate(
+        pool("drag"), Motion(np.arange(40) / 1000, places, velocity_mps=np.tile([-1.0, 0.0, 0.0], (40, 1)))
+    ).fx_n
     assert entering[:10] == pytest.approx(0)
     assert entering[10:30] == pytest.approx(WATER_FACTOR * np.arange(1, 21) / 20)
 

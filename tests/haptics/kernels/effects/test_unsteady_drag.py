@@ -44,7 +44,7 @@ def test_as_re_vanishes_it_is_stokes_added_mass_and_basset_within_a_percent(name
     box = MotionBox(speed_mps=0.6, acceleration_mps2=6)
     felt = tank(name).model_copy(update={"motion": box, "rate_hz": 4000.0})
     (case,) = truth(felt).cases
-    slow = Motion(case.motion.t_s, case.motion.position_m / 1e3, case.motion.velocity_mps / 1e3)
+    slow = Motion(case.motion.t_s, case.motion.position_m / 1e3, velocity_mps=case.motion.velocity_mps / 1e3)
     error_n = 1e3 * vectors(simulate(felt, slow), "force") - case.force_n
     rms = np.sqrt(np.mean(error_n[case.counted] ** 2) / np.mean(case.force_n[case.counted] ** 2))
     assert rms <= 0.01

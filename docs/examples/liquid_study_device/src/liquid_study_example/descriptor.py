@@ -13,7 +13,7 @@ def _described(way, title):
         "liquid_study_example.failures:FAILURES",
         icon="device",
         kind="felt",
-        probe=lambda: [Backend(name, "liquid-study-example", READY, "force up to 8 N")],
+        probe=lambda: [Backend(name, "liquid-study-example", state=READY, can="force up to 8 N")],
     )
 
 

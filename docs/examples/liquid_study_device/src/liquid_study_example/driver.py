@@ -54,7 +54,7 @@ class ExampleDevice(FramedDevice):
         self.name, self._way = f"example-{way}", way
         functions = tuple(CFunction(self._address(name)) for name in ("read", "write"))
         super().__init__(records(EXCHANGE, 1), workspace_m, force_limit_n, functions)
-        self._dynamics = Dynamics(DELAY_S[way], COUNT_M, MASS_KG, VELOCITY_LAG_S)
+        self._dynamics = Dynamics(delay_s=DELAY_S[way], count_m=COUNT_M, mass_kg=MASS_KG, velocity_lag_s=VELOCITY_LAG_S)
 
     def _function(self, name):
         return getattr(library(), f"{self._way}_{name}")

@@ -26,6 +26,6 @@ LIGHT_HAND = DeviceDescriptor(
     kind="simulated",
     degrees_of_freedom=3,
     open=open_light_hand,
-    probe=lambda: [Backend("light-hand", "the plug-in", READY, "simulated hand with a light grip")],
+    probe=lambda: [Backend("light-hand", "the plug-in", state=READY, can="simulated hand with a light grip")],
     moves_by_itself=True,
 )

@@ -33,4 +33,4 @@ class Datagrams:
         self._socket.close()
 
 
-UDP = SinkKind("udp", Datagrams.title, "udp:127.0.0.1:9000", Datagrams)
+UDP = SinkKind("udp", Datagrams.title, example="udp:127.0.0.1:9000", open=Datagrams)

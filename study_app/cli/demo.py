@@ -1,0 +1,138 @@
+"""The demo: from the first compilation to the report of a small study, and the program on its results."""
+
+import os
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+import click
+
+from study_app.cli.options import EXIT_FOUND, end_if, keep_offered_workspace, progress
+from study_app.number_text import counted
+
+STUDY: Final = "demo"
+FOLDER: Final = "demo-simulated"
+"""The study folder: neither that of real sessions, nor one that `rehearse` would take."""
+DEVICE: Final = "falcon-emulated"
+PARTICIPANTS: Final = ("P001", "P002")
+SEED: Final = 4
+"""Every trial of the two is within the limits that the study sets for a valid trial."""
+UNSEEN_PLATFORMS: Final = ("offscreen", "minimal", "minimalegl")
+"""Qt platforms whose windows nobody sees."""
+
+
+@click.command()
+@click.option("--no-window", is_flag=True, help="Do not open the program on the results.")
+@click.pass_context
+def demo(context: click.Context, *, no_window: bool) -> None:
+    """Run the demo study with two simulated participants on an emulated Falcon, report it, and show the results.
+
+    Uses the session runner, the servo, and the Falcon's own driver on an emulated device. Needs no display; if there is
+    one, the program opens on the results. Called again, it finishes what was interrupted and changes nothing else.
+    """
+    from study_app.workspace import workspace
+
+    keep_offered_workspace()
+    study = workspace().results.absolute() / FOLDER
+    report = workspace().folder.absolute() / f"{FOLDER}-report"
+    click.echo(f"Demo study with {counted(len(PARTICIPANTS), 'simulated participant')} on an emulated Falcon")
+    _run_sessions(study)
+    _unblind(study)
+    failed = _write_report(study, report)
+    click.echo(f"Sessions and tables: {study}")
+    if (report / "report.html").is_file():
+        click.echo(f"Report with figures and tables: {report / 'report.html'}")
+    if not no_window:
+        context.exit(_show(study) or (EXIT_FOUND if failed else 0))
+    end_if(failed)
+
+
+def _run_sessions(study: Path) -> None:
+    """Bring the session of each participant to its end."""
+    from study_app.protocol.source.files import shipped_file
+    from study_app.session.simulated.rehearsal import finish_session
+    from study_app.store.folders import StudyFolder
+    from study_app.store.sessions.begin import used_ids
+
+    protocol = shipped_file(STUDY)
+    if not used_ids(StudyFolder(study)).held:
+        click.echo("Preparing the force model: compiled once on this computer, for up to a minute")
+        with progress() as show:
+            show("compiling")
+            _compile(protocol)
+    for participant in PARTICIPANTS:
+        finish_session(protocol, participant, seed=SEED, device=DEVICE, results=study, progress=click.echo)
+
+
+def _compile(protocol: Path) -> None:
+    """Compile driver and emulator here, the servo in another process: 36 s of processor time in a row, not 49 s."""
+    from study_app.workers.executors import Workers, open_executor
+
+    with open_executor(Workers(1)) as executor:
+        servo = executor.submit(run_servo, protocol, "scripted", ticks=1)
+        run_servo(protocol, DEVICE, ticks=0)
+        servo.result()
+
+
+def run_servo(protocol: Path, device: str, *, ticks: int) -> None:
+    """Open a simulated device as a session does, run the servo for some ticks, and close both."""
+    from study_app.protocol.load import load
+    from study_app.session.simulated.rehearsal import rehearsal_rig
+
+    with rehearsal_rig(load(protocol), PARTICIPANTS[0], SEED, device) as rig:
+        if ticks:
+            rig.servo.advance(ticks)
+
+
+def _unblind(study: Path) -> None:
+    """Open the key of the simulated study, once."""
+    from study_app.store.unblinding import is_unblinded, unblind_folder
+
+    if is_unblinded(study):
+        return
+    for opened in unblind_folder(study, by="demo", reason="every participant is simulated").values():
+        for sentence in opened.left:
+            click.echo(f"warning: {sentence}", err=True)
+    click.echo("Key opened: the tables name the conditions")
+
+
+def _write_report(study: Path, to: Path) -> list[str]:
+    """Write the report unless it is there; return the sections that failed."""
+    from study_app.errors import MissingExtra, naming_the_extra
+    from study_app.store.output_files import outputs
+
+    failed: list[str] = []
+    if any(output.to == to.resolve() and len(output.paths) == len(output.files) for output in outputs(study)):
+        return failed
+    try:
+        with progress() as show, naming_the_extra():
+            from study_app.analysis.report.write_report import report
+
+            files = report(study, to, progress=show, warn=partial(click.echo, err=True), failed=failed.append)
+    except MissingExtra as error:
+        click.echo(f"No report: {error}")
+        return failed
+    click.echo(f"Report written: {counted(len(files), 'file')}")
+    for line in failed:
+        click.echo(line, err=True)
+    return failed
+
+
+def _show(study: Path) -> int:
+    """Open the program on the results and return its exit code; or say how to open it, and return 0."""
+    from study_app.errors import DisplayError
+    from study_app.gui.display.display_check import check_display, missing_for_windows
+
+    platform = os.environ.get("QT_QPA_PLATFORM", "").partition(":")[0]
+    try:
+        check_display()
+        if platform not in UNSEEN_PLATFORMS:
+            from study_app import app
+
+            click.echo("Opening the program on these results; close its window to end")
+            return int(app.home(then=lambda visit: visit.show_study(study)))
+        reason = f"QT_QPA_PLATFORM={platform} shows no window"
+    except DisplayError as error:
+        reason = missing_for_windows() or str(error)
+    click.echo(f"The program was not opened: {reason}; open it later with: liquid-study")
+    return 0

@@ -1,0 +1,181 @@
+"""Key presses: every window of the program receives one press and one release per physical key press.
+
+X11 repeats a held key as pairs of a release and a press with equal time stamps, and Qt marks few of them as
+`isAutoRepeat`. A real press comes later than the release before it, so equal time stamps tell the two apart.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
+from PySide6.QtGui import QGuiApplication, QKeyEvent, QWindow
+from PySide6.QtWidgets import QWidget
+
+RELEASE_MS: Final = 30  # a release is real unless a press with its time stamp follows within this time
+CLICK_MS: Final = 250  # a page ignores clicks for so long after it appeared
+MOVING: Final = frozenset({
+    Qt.Key.Key_Left, Qt.Key.Key_Right, Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown,
+    Qt.Key.Key_Backspace, Qt.Key.Key_Delete,
+})  # fmt: skip
+ONCE: Final = frozenset({Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape, Qt.Key.Key_Tab, Qt.Key.Key_Backtab})
+"""Keys that are pressed once in text fields as well."""
+SHIELD: Final = Qt.WidgetAttribute.WA_TransparentForMouseEvents
+SHIFTING: Final = (
+    Qt.KeyboardModifier.ShiftModifier
+    | Qt.KeyboardModifier.ControlModifier
+    | Qt.KeyboardModifier.AltModifier
+    | Qt.KeyboardModifier.MetaModifier
+)
+
+
+class _Release(NamedTuple):
+    key: int
+    event: QKeyEvent
+
+
+class KeyPresses(QObject):
+    """Filters the keys of the window that has the keyboard, before the window and its shortcuts receive them.
+
+    A repeat reaches only the widget that received the press, and only there if it types text or if the key moves
+    something; it is then marked as `isAutoRepeat`. Shortcuts act once per press. ``changed(window, event)`` carries
+    every real press and, up to 30 ms late, every real release.
+    """
+
+    changed = Signal(object, object)
+
+    def __init__(self, application: QGuiApplication) -> None:
+        super().__init__(application)
+        self._window: QWindow | None = None
+        self._receivers: dict[int, QObject | None] = {}  # of the presses that were delivered, by key
+        self._release: _Release | None = None  # the last release, until it is known to be real
+        self._sent: QKeyEvent | None = None  # an event of this filter, on its way through it
+        self._settling = QTimer(self, singleShot=True, interval=RELEASE_MS)
+        # An overdue timer may come before a press that waits in the queue; a timer without a time comes after it.
+        self._settling.timeout.connect(lambda: QTimer.singleShot(0, self, self._settle_if_due))
+        application.focusWindowChanged.connect(self._watch)
+        self._watch(application.focusWindow())
+
+    def begin_page(self, page: QWidget) -> None:
+        """Keep what was pressed before ``page`` appeared from acting on it: held keys, and clicks for 250 ms."""
+        self._receivers.clear()
+        page.setAttribute(SHIELD)
+        unshield = QTimer(page, singleShot=True, interval=CLICK_MS)
+        unshield.timeout.connect(lambda: page.setAttribute(SHIELD, False))
+        unshield.timeout.connect(unshield.deleteLater)
+        QTimer.singleShot(0, unshield, unshield.start)  # once the page is painted
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if not isinstance(event, QKeyEvent) or event is self._sent:
+            return False
+        if event.type() == QEvent.Type.KeyRelease:
+            return self._hold_back(event)
+        if event.type() not in {QEvent.Type.KeyPress, QEvent.Type.ShortcutOverride}:
+            return False
+        key = _physical_key(event)
+        repeats = event.isAutoRepeat() or self._repeats(key, event)
+        if not repeats:
+            self._settle()
+        if event.type() == QEvent.Type.ShortcutOverride:
+            if repeats:
+                event.accept()  # not a shortcut's
+            else:
+                self._receivers.pop(key, None)
+            return repeats
+        if repeats:
+            self._release = None
+            self._repeat(watched, key, event)
+            return True
+        self._receivers[key] = QGuiApplication.focusObject()
+        self.changed.emit(watched, event)
+        return False
+
+    def _watch(self, window: QWindow | None) -> None:
+        """Filter the events of the window that has the keyboard now: no other one receives keys."""
+        if window is not None and window is not self._window:
+            window.removeEventFilter(self)  # one that comes back is filtered once
+            window.installEventFilter(self)
+        self._window = window
+
+    def _repeats(self, key: int, event: QKeyEvent) -> bool:
+        release = self._release
+        return release is not None and release.key == key and release.event.timestamp() == event.timestamp()
+
+    def _repeat(self, window: QObject, key: int, event: QKeyEvent) -> None:
+        """Send a repeat, marked as one, to the widget that received the press."""
+        receiver = QGuiApplication.focusObject()
+        if receiver is None or self._receivers.get(key) is not receiver:
+            return
+        if event.key() in MOVING or (event.key() not in ONCE and _takes_text(receiver)):
+            self._send(window, _marked_repeat(event))
+
+    def _hold_back(self, event: QKeyEvent) -> bool:
+        """Keep a release until it is known to be real; one that no keyboard made is passed at once."""
+        if event.isAutoRepeat():
+            return True
+        self._settle()
+        if event.nativeScanCode():
+            self._release = _Release(_physical_key(event), event.clone())
+            self._settling.start()
+            return True
+        self.changed.emit(self._window, event)
+        return False
+
+    def _settle_if_due(self) -> None:
+        if not self._settling.isActive():
+            self._settle()
+
+    def _settle(self) -> None:
+        """Deliver the release that was held back: it is real."""
+        release, self._release = self._release, None
+        if release is None:
+            return
+        self._receivers.pop(release.key, None)
+        window = QGuiApplication.focusWindow()
+        self.changed.emit(window, release.event)
+        if window is not None:
+            self._send(window, release.event)
+
+    def _send(self, window: QObject, event: QKeyEvent) -> None:
+        self._sent = event
+        QGuiApplication.sendEvent(window, event)
+        self._sent = None
+
+
+def key_presses() -> KeyPresses:
+    """Return the filter of the application, made on first use."""
+    application = QGuiApplication.instance()
+    assert isinstance(application, QGuiApplication)  # noqa: S101  # windows need one
+    return application.findChild(KeyPresses) or KeyPresses(application)
+
+
+def ignores_clicks(page: QWidget) -> bool:
+    """Return whether ``page`` appeared so recently that a click was meant for the page before it."""
+    return page.testAttribute(SHIELD)
+
+
+def digit_of(event: QKeyEvent) -> int | None:
+    """Return the digit of a key, also of the digit row of a layout that types digits with Shift; None of others."""
+    if Qt.Key.Key_0 <= event.key() <= Qt.Key.Key_9:
+        return event.key() - Qt.Key.Key_0
+    first = 2 if QGuiApplication.platformName() == "windows" else 10  # scan code of the key 1: PC, X11 and Wayland
+    place = event.nativeScanCode() - first
+    return (place + 1) % 10 if 0 <= place < 10 and not event.modifiers() & SHIFTING else None
+
+
+def _physical_key(event: QKeyEvent) -> int:
+    """Return what identifies a key while modifiers change; the key's meaning if no keyboard made the event."""
+    return event.nativeScanCode() or -event.key()
+
+
+def _takes_text(receiver: QObject) -> bool:
+    return isinstance(receiver, QWidget) and receiver.testAttribute(Qt.WidgetAttribute.WA_InputMethodEnabled)
+
+
+def _marked_repeat(event: QKeyEvent) -> QKeyEvent:
+    made = QKeyEvent(
+        event.type(), event.key(), event.modifiers(), event.nativeScanCode(), event.nativeVirtualKey(),
+        event.nativeModifiers(), event.text(), True, event.count(),
+    )  # fmt: skip
+    made.setTimestamp(event.timestamp())
+    return made

@@ -1,0 +1,194 @@
+"""Texts that are still in another language than the one that the study states for them.
+
+Nothing marks a copied text. It is recognised by comparison: with the texts that ship with the program (studies,
+templates, standard questionnaires), with the other languages of the study, and with the other studies of the workspace.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache, lru_cache
+from pathlib import Path as File
+from typing import Any, Final, NamedTuple
+
+from study_app.errors import SessionError, StudyError
+from study_app.number_text import counted
+from study_app.protocol.checks.cross_references import TEXTS, as_read
+from study_app.protocol.load import read_document
+from study_app.protocol.questionnaires import FOLDER as INSTRUMENTS
+from study_app.protocol.source.document import Path, entries, value_at
+from study_app.protocol.source.files import shipped_studies
+from study_app.protocol.wording.languages import language_name, languages_of
+from study_app.workspace import workspace
+
+SAME_WORDS: Final[Mapping[str, frozenset[str]]] = {
+    "de": frozenset({"anders", "baseline", "frustration", "hand", "neutral", "performance"}),
+    "fr": frozenset({"effort", "frustration", "performance"}),
+    "nl": frozenset({"baseline", "begin", "hand"}),
+}
+"""Shipped texts of another language that are right in this language, too."""
+SENTENCE_WORDS: Final = 3
+"""Texts of so many words are not the same in two languages by chance."""
+PLACES_LISTED: Final = 5
+_PLACEHOLDER: Final = re.compile(r"new [a-z0-9 ]+")
+"""What the designer writes into a new element, in English: "New question"."""
+_PARAGRAPHS: Final = re.compile(r"\n\s*\n")
+_OF_INSTRUMENTS: Final = ("title", "intro", "scales.*.labels", "scales.*.cannot_judge",
+                          *(f"items.*.{key}" for key in ("text", "short", "low", "high")))  # fmt: skip
+
+
+class UntranslatedText(NamedTuple):
+    """A text that should be in ``language`` and is in ``source``, the codes of two languages.
+
+    It ``ships`` with the program in ``source``; otherwise it is the same as in another language or study.
+    """
+
+    path: Path
+    language: str
+    source: str
+    ships: bool
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether participants read the text: short texts are for tables, the study's title is for the operator."""
+        return self.path[-1] != "short" and self.path != ("study", "title")
+
+
+def untranslated_texts(document: Mapping[str, Any]) -> tuple[UntranslatedText, ...]:
+    """Return the texts of a study's document that are in another language than the study states."""
+    languages = languages_of(document)
+    return tuple(
+        text for pattern in TEXTS for path, value in entries(document, pattern)
+        for text in untranslated_at(document, path, value, languages)
+    )  # fmt: skip
+
+
+def untranslated_at(
+    document: Mapping[str, Any], path: Path, value: Any, languages: Sequence[str]
+) -> Iterator[UntranslatedText]:
+    """Yield the languages in which the text at ``path`` is not translated."""
+    first = languages[0]
+    texts = value if isinstance(value, Mapping) else {first: value}
+    for code in languages:
+        parts = _parts(texts.get(code))
+        if (source := _source(parts, code, _shipped_texts())) is not None:
+            yield UntranslatedText(path, code, source, ships=True)
+        elif parts and code != first and texts.get(code) == texts.get(first):
+            yield UntranslatedText(path, code, first, ships=False)
+        else:
+            sentences = [part for part in parts if len(part.split()) >= SENTENCE_WORDS]
+            if (source := _source(sentences, code, _workspace_texts(document))) is not None:
+                yield UntranslatedText(path, code, source, ships=False)
+
+
+def describe_untranslated(document: Mapping[str, Any], *, lists_places: bool) -> Iterator[str]:
+    """Yield a warning for each language with untranslated texts; ``lists_places`` adds where the first ones are."""
+    texts, only_one = untranslated_texts(document), len(languages_of(document)) == 1
+    for (language, source), count in Counter((text.language, text.source) for text in texts).items():
+        told, wanted = language_name(source), language_name(language)
+        what = f"{counted(count, 'text')} to translate to {wanted}, as in {told} so far"
+        if only_one:
+            are = f"{counted(count, 'text')} {'is' if count == 1 else 'are'}"
+            what = f"{are} still in {told} although the study's only language is {wanted}"
+        of_these = [text for text in texts if (text.language, text.source) == (language, source)]
+        yield f"study.languages: {what}{f': {listed_places(of_these)}' if lists_places else ''}"
+
+
+def untranslated_on_pages(document: Mapping[str, Any]) -> tuple[UntranslatedText, ...]:
+    """Return the untranslated texts that participants may read: they choose among all languages of the study."""
+    return tuple(text for text in untranslated_texts(document) if text.is_shown)
+
+
+def check_translated(document: Mapping[str, Any]) -> None:
+    """Refuse (SessionError) sessions whose pages would show texts that ship with the program in another language."""
+    shipped = [text for text in untranslated_on_pages(document) if text.ships]
+    if texts := [text for text in shipped if text.language == shipped[0].language]:
+        language, source = language_name(texts[0].language), language_name(texts[0].source)
+        count = f"{counted(len(texts), 'text')} on {language} pages {'is' if len(texts) == 1 else 'are'}"
+        raise SessionError(
+            f"{count} still in {source}: {listed_places(texts)}; translate what the designer lists under Languages, or "
+            "run a pilot session"
+        )
+
+
+def listed_places(texts: Sequence[UntranslatedText]) -> str:
+    """Return where the first texts are in the file, and how many more there are."""
+    names = [".".join(map(str, text.path)) for text in texts[:PLACES_LISTED]]
+    more = len(texts) - len(names)
+    return ", ".join(names) + (f" and {more} more" if more else "")
+
+
+@lru_cache(maxsize=4096)  # the texts of a study are compared after each edit: 1 to 2 ms instead of 10 to 40
+def _parts(text: Any) -> tuple[str, ...]:
+    """Return the paragraphs of a text, or the labels of a scale, as they are compared; those without a letter not."""
+    parts = text if isinstance(text, tuple) else _PARAGRAPHS.split(text) if isinstance(text, str) else ()
+    read = (as_read(part) for part in parts if isinstance(part, str))
+    return tuple(part for part in read if any(map(str.isalpha, part)))
+
+
+def _source(parts: Sequence[str], code: str, known: Mapping[str, frozenset[str]]) -> str | None:
+    """Return the language of the first part that is known in another language alone; None if there is none."""
+    for part in parts:
+        if code != "en" and _PLACEHOLDER.fullmatch(part):
+            return "en"
+        sources = known.get(part, frozenset())
+        if sources and code not in sources and part not in _same_words(code):
+            return min(sources)
+    return None
+
+
+def _same_words(code: str) -> frozenset[str]:
+    return SAME_WORDS.get(code, frozenset())
+
+
+@cache
+def _shipped_texts() -> Mapping[str, frozenset[str]]:
+    """Return every text that ships with the program, with the languages in which it does."""
+    studies = ((_read_table(file), TEXTS) for file in shipped_studies())
+    instruments = ((_read_table(file), _OF_INSTRUMENTS) for file in sorted(INSTRUMENTS.glob("*.toml")))
+    return _languages_by_text((*studies, *instruments))
+
+
+def _workspace_texts(document: Mapping[str, Any]) -> Mapping[str, frozenset[str]]:
+    """Return the texts of the other studies of the workspace, with the languages that these state."""
+    files = []
+    for file in workspace().own_protocols():
+        try:
+            status = file.stat()
+        except OSError:
+            continue  # it was deleted meanwhile
+        files.append((file, status.st_size, status.st_mtime_ns))
+    return _texts_of_files(tuple(files), str(value_at(document, ("study", "name"))))
+
+
+@lru_cache(maxsize=2)
+def _texts_of_files(files: tuple[tuple[File, int, int], ...], but: str) -> Mapping[str, frozenset[str]]:
+    tables = (_read_own(*file) for file in files)
+    others = [(table, TEXTS) for table in tables if value_at(table, ("study", "name")) != but]
+    shipped = _shipped_texts()
+    return {text: codes for text, codes in _languages_by_text(others).items() if text not in shipped}
+
+
+@lru_cache(maxsize=256)
+def _read_own(file: File, _size: int, _changed_ns: int) -> Mapping[str, Any]:
+    try:
+        return _read_table(file)
+    except (StudyError, OSError):
+        return {}  # `check` of that file says what is wrong with it
+
+
+def _read_table(file: File) -> Mapping[str, Any]:
+    return read_document(file.read_bytes(), file.name)[0]
+
+
+def _languages_by_text(tables: Sequence[tuple[Mapping[str, Any], Sequence[str]]]) -> Mapping[str, frozenset[str]]:
+    """Return the parts of all texts of documents, each with the languages that they are stated to be in."""
+    found: dict[str, set[str]] = {}
+    for table, patterns in tables:
+        first = languages_of(table)[0]
+        for pattern in patterns:
+            for _, value in entries(table, pattern):
+                for code, text in (value if isinstance(value, Mapping) else {first: value}).items():
+                    for part in _parts(text):
+                        found.setdefault(part, set()).add(code)
+    return {text: frozenset(codes) for text, codes in found.items()}

@@ -1,0 +1,157 @@
+"""How many trials would not be delivered because the safety layer withholds too much force, predicted for a delay.
+
+A simulated participant does each task `MOTIONS` times in what a trial or an interval presents. A trial of intervals is
+missing if each of its presentations has an interval in which more is withheld than `limits.withheld_percent`; another
+trial is out of limits.
+"""
+
+from collections.abc import Iterator, Mapping
+from math import prod
+from statistics import mean
+from typing import Final
+
+from study_app.devices.hand import hand_of
+from study_app.devices.rig import Rig, study_settings
+from study_app.devices.simulated import ScriptedDevice
+from study_app.haptics.model.scene import Scene
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
+from study_app.protocol.blocks import Block
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.block_orders import orders_of
+from study_app.protocol.orders.durations import variants
+from study_app.protocol.orders.schedule import stream
+from study_app.protocol.presented.presented_levels import ends
+from study_app.protocol.tracks import design_of
+from study_app.protocol.trials.tasks import AnyTask
+from study_app.session.preflight import PredictedDelivery
+from study_app.session.simulated.observers import task_path
+
+MOTIONS: Final = 5
+LONGEST_S: Final = 4.0
+"""So much of a long task is simulated."""
+REST_S: Final = 1.0
+"""Between two motions, without force, while the hand goes to where the next one begins."""
+READ_S: Final = 0.5
+
+
+def predicted_delivery(protocol: Protocol, delay_ticks: int) -> PredictedDelivery:
+    """Return how many main trials a simulated participant would miss on a device with this delay [ticks].
+
+    Of sessions that differ, such as those of groups, it is the one that loses most trials.
+    """
+    with late_rig(protocol, delay_ticks) as rig:
+        failing = _FailingScenes(protocol, rig)
+        shares = {block.id: _lost_share(protocol, block, failing) for block in protocol.main_blocks}
+    return max(
+        (_in_session(one.protocol, shares) for one in variants(protocol)), key=lambda one: (one.missing, one.out)
+    )
+
+
+def _in_session(protocol: Protocol, shares: Mapping[str, float]) -> PredictedDelivery:
+    """Return what one kind of session loses; ``shares`` are those of the trials that each main block loses."""
+    counts: dict[bool, float] = {True: 0.0, False: 0.0}
+    trials: dict[bool, int] = {True: 0, False: 0}
+    for block in orders_of(protocol).blocks:
+        if block.id in shares:
+            has_intervals = protocol.blocks[block.id].design is not None
+            counts[has_intervals] += block.trials * shares[block.id]
+            trials[has_intervals] += block.trials
+    return PredictedDelivery(
+        missing=round(counts[True]),
+        asked=trials[True],
+        out=round(counts[False]),
+        judged=trials[False],
+        limit_percent=protocol.limits.withheld_percent,
+    )
+
+
+def late_rig(protocol: Protocol, delay_ticks: int) -> Rig:
+    """Return a simulated hand whose device is late by ``delay_ticks``, and its servo on a virtual clock."""
+    settings = study_settings(protocol, stream(0, "predicted/hand"))
+    x_m, y_m, z_m = (size / 2 for size in settings.workspace_m)
+    device = ScriptedDevice(settings.random, workspace_m=(x_m, y_m, z_m), force_limit_n=settings.force_limit_n)
+    device.state.handle.delay = delay_ticks
+    return Rig(device, Servo(device, clock=VirtualClock(), rate_hz=settings.rate_hz, elements=settings.elements))
+
+
+def withheld_shares(
+    rig: Rig, scene: Scene, task: AnyTask, workspace_m: tuple[float, float, float]
+) -> tuple[float, ...]:
+    """Return the share of a scene's force that is withheld in each of `MOTIONS` simulated motions of a task.
+
+    Parameters
+    ----------
+    rig : Rig
+        That of `late_rig`.
+    scene : Scene
+        The liquid.
+    task : AnyTask
+        What the simulated hand does in it.
+    workspace_m : tuple of float
+        Full sizes of the tank [m, hand frame].
+    """
+    servo, hand = rig.servo, hand_of(rig.device)
+    assert hand is not None  # noqa: S101 - a scripted device has one
+    reader, shares = servo.telemetry.reader(), list[float]()
+    for seed in range(MOTIONS):
+        path_s, path_m = task_path(task, workspace_m, min(task.expected_s, LONGEST_S), seed)
+        hand.reach_to(*path_m[0].tolist())
+        servo.advance(round(REST_S * servo.rate_hz))
+        serial = servo.load(scene)
+        hand.follow(path_s, path_m)
+        reader.read()
+        permitted_n = withheld_n = 0.0
+        for _ in range(round(path_s[-1] / READ_S)):
+            servo.advance(round(READ_S * servo.rate_hz))
+            samples = reader.read()
+            felt = samples[samples["scene"] == serial]
+            permitted_n += float(felt["permitted_n"].sum())
+            withheld_n += float(felt["withheld_n"].sum())
+        servo.rest()
+        shares.append(withheld_n / permitted_n if permitted_n > 0.0 else 0.0)
+    return tuple(shares)
+
+
+class _FailingScenes:
+    """How often a simulated motion of a task in a scene breaks the limit, each simulated once."""
+
+    def __init__(self, protocol: Protocol, rig: Rig) -> None:
+        self._protocol, self._rig = protocol, rig
+        self._known: dict[tuple[Scene, str], float] = {}
+
+    def share(self, scene: Scene, task: str) -> float:
+        """Return the share of the motions of a task in which more is withheld than the limit permits."""
+        if (known := self._known.get((scene, task))) is not None:
+            return known
+        protocol, limit = self._protocol, self._protocol.limits.withheld_percent / 100
+        shares = withheld_shares(self._rig, scene, protocol.tasks[task], protocol.device.workspace_m)
+        self._known[scene, task] = mean(share > limit for share in shares)
+        return self._known[scene, task]
+
+
+def _lost_share(protocol: Protocol, block: Block, scenes: _FailingScenes) -> float:
+    """Return the probability that a trial of a block is missing, or, without intervals, that it is out of limits."""
+
+    def failing(scene: Scene) -> float:
+        return scenes.share(scene, block.task)
+
+    if block.design is None:
+        return mean(failing(protocol.scene_for(name)) for name in block.conditions)
+    design, attempts = design_of(protocol, block), protocol.limits.attempts or 1
+
+    def missing(standard: float, comparison: float) -> float:
+        delivered = [prod(1 - (comparison if held else standard) for held in one) for one in design.arrangements]
+        return mean((1 - one) ** attempts for one in delivered)
+
+    if block.standard is None:
+        return mean(missing(0.0, failing(scene)) for scene in _scenes(protocol, block))
+    standard = failing(protocol.scene_for(block.standard))
+    others = (protocol.scene_for(name) for name in block.conditions if name != block.standard)
+    return mean(missing(standard, failing(scene)) for scene in others)
+
+
+def _scenes(protocol: Protocol, block: Block) -> Iterator[Scene]:
+    """Yield the scenes of the strongest and the weakest level of each standard; of delays that of the condition."""
+    scenes = [scene for _, _, scene in ends(protocol, block)]
+    yield from scenes or map(protocol.scene_for, protocol.conditions_in(block.id))

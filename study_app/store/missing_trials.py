@@ -1,0 +1,106 @@
+"""Trials that were not delivered: the plan asks for them, and every presentation broke a limit, so nobody answered.
+
+`progress.Progress` finds them in a journal. Windows, commands, tables, the report and exports take them from there.
+"""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+MISSING_PERCENT: Final = "missing_percent"
+"""The key in ``[limits]`` of the share of a session's trials that may be missing."""
+REASONS: Final[Mapping[str, str]] = {
+    "lateness_ms": "the servo was late",
+    "worst_gap_ms": "the servo missed ticks",
+    "delay_error_ms": "the visual delay was not kept",
+    "frame_gap_ms": "frames were late or missing",
+    "withheld_percent": "the safety layer withheld too much force",
+    "targets_percent": "too few targets were reached",
+    "level_error_percent": "the force was not as requested",
+    "level_error_ms": "the delays did not differ as requested",
+    "pace_error_percent": "the hand did not keep the pace",
+    "force_limit_n": "the force limit was reached",
+}
+"""Why a presentation was invalid, by the key of the limit that it broke."""
+_UNITS: Final = {"percent": "%", "ms": "ms", "n": "N"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MissingTrial:
+    """A main trial that nobody answered; ``broken`` are the limits that its presentations broke, by their keys."""
+
+    trial: int
+    block: str
+    code: str
+    broken: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MissingTrials:
+    """The missing trials of a session, of ``asked`` main trials of intervals that are over.
+
+    ``limits`` are the study's, as the session recorded them. One that an earlier version of the program recorded does
+    not state how many trials may be missing, and is never incomplete.
+    """
+
+    missing: tuple[MissingTrial, ...] = ()
+    asked: int = 0
+    limits: Mapping[str, float]
+
+    @property
+    def count(self) -> int:
+        """How many trials are missing."""
+        return len(self.missing)
+
+    @property
+    def exceed(self) -> bool:
+        """Whether more trials are missing than the study permits."""
+        permitted = self.limits.get(MISSING_PERCENT)
+        return permitted is not None and 100 * self.count > permitted * self.asked
+
+    @property
+    def reasons(self) -> dict[str, int]:
+        """The number of missing trials that broke each limit, by its key, the most frequent first."""
+        return dict(Counter(limit for one in self.missing for limit in one.broken).most_common())
+
+    @property
+    def tracks(self) -> dict[tuple[str, str], int]:
+        """The number of missing trials of each block and code, in the order of the trials."""
+        return dict(Counter((one.block, one.code) for one in self.missing))
+
+    @property
+    def brief(self) -> str:
+        """How many trials are missing, for a narrow place: "26 of 40 not delivered"; empty if none is."""
+        return f"{self.count} of {self.asked} not delivered" if self.missing else ""
+
+    def __str__(self) -> str:
+        """Return how many trials are missing, and why, as a sentence without a full stop; empty if none is."""
+        return missing_words(self.count, self.asked, self.reasons, self.limits) if self.missing else ""
+
+
+def missing_words(count: int, asked: int, reasons: Mapping[str, int], limits: Mapping[str, float]) -> str:
+    """Return "26 of 40 trials were not delivered: the safety layer withheld too much force (limit 25 %)".
+
+    Parameters
+    ----------
+    count, asked : int
+        How many trials are missing, of how many.
+    reasons : mapping of str to int
+        The number of missing trials that broke each limit, by its key.
+    limits : mapping of str to float
+        The limits of the study, by their keys.
+    """
+    each = (
+        f"{limit_words(limit, limits)}{f' in {of_limit}' if len(reasons) > 1 else ''}"
+        for limit, of_limit in reasons.items()
+    )
+    was = "trial was" if asked == 1 else "trials was" if count == 1 else "trials were"
+    return f"{count} of {asked} {was} not delivered: {', '.join(each)}"
+
+
+def limit_words(limit: str, limits: Mapping[str, float]) -> str:
+    """Return why a presentation that broke a limit was invalid, with the limit: "frames were late (limit 250 ms)"."""
+    words = REASONS.get(limit, limit)
+    unit = _UNITS.get(limit.rpartition("_")[2], "")
+    return f"{words} (limit {limits[limit]:g} {unit})" if limit in limits else words

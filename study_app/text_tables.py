@@ -1,0 +1,183 @@
+"""Tables of numbers that people and instruments write as text: their encoding, separator, fields and decimal sign.
+
+A table is read if this can be done in one way. Columns are separated by commas, semicolons or tabs; a decimal comma is
+read if no number has a decimal point. Everything else is refused with the first line that has it.
+"""
+
+import codecs
+import csv
+import io
+import math
+import re
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from typing import Final, NamedTuple
+
+from study_app.number_text import counted, readings_of, unclear_number
+
+SHOWN: Final = 200  # characters of a bad value shown in messages
+_SEPARATORS: Final = (",", ";", "\t")
+_NUMBER: Final = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+_UTF_16: Final = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+
+
+class Line(NamedTuple):
+    """The fields of a row, and the number of the line of the file on which it begins (from 1)."""
+
+    number: int
+    fields: tuple[str, ...]
+
+
+class TextTable(NamedTuple):
+    """The names of the columns, and the rows of which not all fields are empty."""
+
+    names: tuple[str, ...]
+    lines: tuple[Line, ...]
+
+
+def decoded(content: bytes, first_line: int = 1) -> str:
+    """Return text in UTF-8, without its byte order mark; ``first_line`` is the number of its first line in the file.
+
+    Raises
+    ------
+    ValueError
+        It has another encoding.
+    """
+    if content.startswith(_UTF_16) or b"\0" in content:
+        raise ValueError("it is not UTF-8 text but seems to be UTF-16: save it as CSV in UTF-8")
+    try:
+        return content.removeprefix(codecs.BOM_UTF8).decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = first_line + content.count(b"\n", 0, error.start)
+        raise ValueError(f"it is not UTF-8 text in line {line}: save it as CSV in UTF-8") from error
+
+
+def separator_of(header: str, names: Collection[str]) -> str:
+    """Return the separator with which a header has most of these names; the comma if all have equally many."""
+    return max(_SEPARATORS, key=lambda separator: len({*fields_of(header, separator)} & {*names}))
+
+
+def names_of(header: str, separator: str) -> tuple[str, ...]:
+    """Return the names in a header, without empty columns at its end."""
+    names = fields_of(header, separator)
+    while names and not names[-1]:
+        names = names[:-1]
+    return names
+
+
+def fields_of(line: str, separator: str) -> tuple[str, ...]:
+    """Return the fields of one line, without spaces around them."""
+    return tuple(field.strip() for field in next(csv.reader([line], delimiter=separator), []))
+
+
+def split(text: str, names: Collection[str], *, comment: str = "") -> TextTable:
+    """Return the rows of a table; the names that its columns may have tell the separator.
+
+    Lines that begin with ``comment`` are left out.
+
+    Raises
+    ------
+    ValueError
+        A quotation mark is not closed, or stands within a field.
+    """
+    kept = ["\n" if comment and line.startswith(comment) else line for line in io.StringIO(text, newline="")]
+    header = next((line for line in kept if line.strip()), "")
+    separator = separator_of(header, names)
+    reader = csv.reader(kept, delimiter=separator, strict=True)
+    lines: list[Line] = []
+    begin = 1
+    try:
+        for row in reader:
+            if any(fields := tuple(field.strip() for field in row)):
+                lines.append(Line(begin, fields))
+            begin = reader.line_num + 1
+    except csv.Error as error:
+        raise ValueError(f"line {begin} is not CSV ({error})") from error
+    return TextTable(names_of(header, separator), tuple(lines[1:]))
+
+
+def wrong_length(fields: Sequence[str], columns: int) -> str:
+    """Return what is wrong with the number of a row's fields, "" if nothing is; empty ones at its end do not count."""
+    if len(fields) < columns:
+        return f"has {counted(len(fields), 'field')}, fewer than the {columns} of the header"
+    if any(fields[columns:]):
+        hint = "write decimal points" if len(fields) == 2 * columns else "remove the surplus or name its columns"
+        return f"has {len(fields)} fields, more than the {columns} of the header: {hint}"
+    return ""
+
+
+def decimal_sign_of(lines: Iterable[Line], places: Collection[int]) -> str:
+    """Return the decimal sign of the numbers in these columns.
+
+    Raises
+    ------
+    ValueError
+        There are decimal commas and points, or only commas that could separate thousands.
+    """
+    fields = [(line.number, field) for line in lines for field in _at(line.fields, places)]
+    commas = [(number, field) for number, field in fields if "," in field and readings_of(field)]
+    if not commas:
+        return "."
+    for number, field in fields:
+        if "." in field and readings_of(field):
+            other, comma = commas[0]
+            raise ValueError(f"line {number}: {_shown(field)} has a point, and {_shown(comma)} in line {other} a comma")
+    if all(len(readings_of(field)) == 2 for _, field in commas):
+        number, field = commas[0]
+        raise ValueError(f"line {number}: {unclear_number(field)}")
+    return ","
+
+
+def number_in(field: str, decimal_sign: str = ".") -> float | None:
+    """Return the finite number that a field holds, or None."""
+    plain = field if decimal_sign == "." else field.replace(decimal_sign, ".")
+    if _NUMBER.fullmatch(plain) is None:
+        return None
+    return value if math.isfinite(value := float(plain)) else None
+
+
+def numbers_at(line: Line, places: Sequence[int], columns: int, decimal_sign: str = ".") -> list[float]:
+    """Return the numbers of a row at these places.
+
+    Raises
+    ------
+    ValueError
+        The row has not as many fields as there are ``columns``, or one of these fields is not a finite number.
+    """
+    if wrong := wrong_length(line.fields, columns):
+        raise ValueError(f"line {line.number}: {wrong}")
+    numbers = []
+    for field in _at(line.fields, places):
+        if (number := number_in(field, decimal_sign)) is None:
+            hint = "write a decimal point" if "," in field else "correct it or remove the row"
+            raise ValueError(f"line {line.number}: {_shown(field)} is not a finite number; {hint}")
+        numbers.append(number)
+    return numbers
+
+
+def rows_of(table: TextTable, places: Sequence[int]) -> list[list[float]]:
+    """Return the numbers of all rows at these places.
+
+    Raises
+    ------
+    ValueError
+        The first row that cannot be used, or numbers whose decimal sign is not clear.
+    """
+    columns, sign = len(table.names), "."
+    for line in table.lines:
+        if wrong := wrong_length(line.fields, columns):
+            raise ValueError(f"line {line.number}: {wrong}")
+    if table.lines:
+        first = table.lines[0]
+        if not any(map(readings_of, _at(first.fields, places))):
+            texts = ", ".join(map(_shown, _at(first.fields, places)))
+            raise ValueError(f"line {first.number}: {texts}: not a number; remove a row of units, and use SI units")
+        sign = decimal_sign_of(table.lines, places)
+    return [numbers_at(line, places, columns, sign) for line in table.lines]
+
+
+def _at(fields: Sequence[str], places: Iterable[int]) -> Iterator[str]:
+    return (fields[place] for place in places)
+
+
+def _shown(field: str) -> str:
+    return repr(field[:SHOWN])

@@ -1,0 +1,99 @@
+"""Groups are randomised or pre-existing: what `check` warns of and refuses, and what texts say of them."""
+
+import pytest
+
+from study_app.analysis.planning.preregistration import preregistration
+from study_app.errors import ProtocolError
+from study_app.protocol.checks.warnings import warnings
+from study_app.protocol.describe import describe
+from study_app.protocol.groups import next_group
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.balance import balances, numbered
+from tests.protocol.groups.grouped import grouped
+
+ALIKE = """
+[groups.experts]
+sequence = ["hello", "thin", "thick"]
+
+[groups.novices]
+sequence = ["hello", "thin", "thick"]
+
+[analysis]
+participants = 16
+"""
+
+
+def experts(assignment: str = "") -> Protocol:
+    """Return a study of experts and novices whose two main blocks are counterbalanced."""
+    head = f'study.name = "grouped"\nstudy.block_order = "balanced"\n{assignment}'
+    return grouped(('study.name = "grouped"\n', head), groups=ALIKE)
+
+
+PREEXISTING = 'study.group_assignment = "pre-existing"\n'
+
+
+ATTRIBUTES = """
+    experts novice patients healthy_controls musicians non_musicians older_adults age_60plus young old
+    amputees men women students left_handed righthanders dominant_hand experienced low_experience surgeons
+    linkshandigen ouderen ervaren vrouwen frauen laien anfaenger aeltere gauchers femmes etudiants debutants
+"""
+"""Names of what people are."""
+TREATMENTS = """
+    trained untrained control experimental training placebo thin_first left_hand short_strokes manual
+    no_feedback late long_delay old_recipe blinded group_a a image intervention hard
+"""
+"""Names of what can be randomised."""
+
+
+def test_names_that_suggest_an_attribute_are_warned_of_and_no_others() -> None:
+    names = [*ATTRIBUTES.split(), *TREATMENTS.split()]
+    tables = "".join(f'[groups.{name}]\nsequence = ["hello", "thin", "thick"]\n' for name in names)
+    said = [one for one in warnings(grouped(groups=f"\n{tables}"), simulates=False) if one.startswith("groups.")]
+    assert [one.partition(":")[0].removeprefix("groups.") for one in said] == ATTRIBUTES.split()
+
+
+def test_only_randomised_groups_are_warned_of() -> None:
+    said = [sentence for sentence in warnings(experts()) if sentence.startswith("groups.")]
+    assert [sentence.partition(":")[0] for sentence in said] == ["groups.experts", "groups.novices"]
+    assert all("groups are randomised" in sentence for sentence in said)
+    assert not [sentence for sentence in warnings(experts(PREEXISTING)) if sentence.startswith("groups.")]
+    assert not [sentence for sentence in warnings(grouped()) if sentence.startswith("groups.")]
+
+
+def test_an_assignment_without_groups_is_refused() -> None:
+    edit = ('format = 2\nstudy.name = "grouped"\n', f'format = 2\n{PREEXISTING}study.name = "grouped"\n')
+    with pytest.raises(ProtocolError) as refused:
+        grouped(edit, groups='sequence = ["hello", "thin", "thick"]\n')
+    assert "the study has no groups" in str(refused.value.problems)
+
+
+def test_check_states_the_balance_of_each_group() -> None:
+    """16 participants are 8 per group, and each of the two orders comes 4 times there."""
+    for study, assignment in ((experts(), "randomised in permuted"), (experts(PREEXISTING), "pre-existing: entered")):
+        text = describe(study)
+        assert text.count("8 participants per group have each block in each place 4 times") == 2
+        assert assignment in text
+
+
+@pytest.mark.parametrize("assignment", ["", PREEXISTING])
+def test_design_counts_orders_within_each_group(assignment: str) -> None:
+    judged = list(balances(experts(assignment), numbered(16, "P005"), 1))
+    assert [one.participants for one in judged] == [8, 8]
+    assert [one.blocks[-1].evenness.positions for one in judged] == [((4, 4), (4, 4))] * 2
+
+
+def test_the_preregistration_says_how_groups_are_formed() -> None:
+    assert "assigned at random, in permuted blocks, to the groups experts" in preregistration(experts(), "0" * 64)
+    text = preregistration(experts(PREEXISTING), "0" * 64)
+    assert "at random" not in text.partition("## Participants")[0]
+    assert "belong to a group by an existing attribute (experts (share 1), novices (share 1))" in text
+    assert "Groups are not randomised" in text
+    assert "Order of blocks balanced: 2 orders, by the place in the group" in text
+
+
+def test_groups_are_dealt_by_their_shares() -> None:
+    sizes = {"many": 0, "few": 0}
+    for _ in range(9):
+        sizes[next_group({"many": 2, "few": 1}, sizes)] += 1
+    assert sizes == {"many": 6, "few": 3}
+    assert next_group({"a": 1, "b": 1}, {"a": 5}) == "b"

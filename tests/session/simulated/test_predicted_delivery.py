@@ -1,0 +1,155 @@
+"""The trials that the safety layer lets nobody answer: as predicted, as rehearsed, and as everything says so."""
+
+import csv
+import re
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.analysis.data.study_tables import load_study
+from study_app.analysis.export_study import export
+from study_app.cli import commands
+from study_app.gui.sessions.session_facts import sessions, status_chip
+from study_app.gui.sessions.session_page import read_record
+from study_app.protocol.load import load
+from study_app.session.simulated.predicted_delivery import predicted_delivery
+from study_app.session.simulated.rehearsal import rehearse
+from study_app.store.exclusions import MISSING_RULE, exclusions, include
+from study_app.store.folders import StudyFolder
+from study_app.store.unblinding import unblind
+from study_app.store.verification.verify_study import verify
+from tests.compiled import needs_servo
+
+pytestmark = [pytest.mark.slow, needs_servo]
+
+TRIALS = 4
+ABX = """
+format = 2
+study.name = "abx"
+scene.scale = 3
+scene.velocity = {{ kind = "ewma", alpha = 0.1 }}
+scene.body = {{ diameter_m = 0.068, drag_coefficient = 0.47, density_kg_m3 = 1000 }}
+scene.motion = {{ speed_mps = 0.6, acceleration_mps2 = 6 }}
+limits = {{ withheld_percent = 25, attempts = 2 }}
+liquids.water = {{ effects = "auto", density_kg_m3 = 998.2, viscosity_pa_s = 1.0016e-3 }}
+[liquids.slime]
+effects = "auto"
+density_kg_m3 = 1020
+non_newtonian = {{ kind = "maxwell", zero_shear_viscosity_pa_s = 20, relaxation_time_s = 0.3 }}
+[liquids.paste]
+effects = "auto"
+density_kg_m3 = 1400
+non_newtonian = {{ kind = "herschel-bulkley", yield_stress_pa = 120, consistency_pa_sn = 60, flow_index = 0.4 }}
+[tasks.short]
+kind = "explore"
+min_s = 1
+max_s = 2
+instruction = "Explore the liquid."
+[blocks.liquids]
+conditions = ["water", "{other}"]
+standard = "water"
+design = "abx"
+repetitions = 4
+task = "short"
+"""
+SENTENCE = "4 of 4 trials were not delivered: the safety layer withheld too much force (limit 25 %)"
+
+
+def study_of(other: str, folder: Path) -> Path:
+    file = folder / "abx.toml"
+    file.write_text(ABX.format(other=other), encoding="utf-8")
+    return file
+
+
+@pytest.fixture(scope="module")
+def thick(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the file of a study with a liquid that is too thick for the loop."""
+    return study_of("paste", tmp_path_factory.mktemp("thick"))
+
+
+@pytest.fixture
+def told() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def rehearsed(thick: Path, told: list[str], tmp_path: Path) -> Path:
+    return rehearse(thick, participants=1, seed=1, results=tmp_path / "results" / "abx", progress=told.append)
+
+
+@pytest.mark.parametrize("device", ["scripted", "falcon-emulated"])
+def test_all_short_trials_with_slime_are_delivered_as_predicted(device: str, tmp_path: Path) -> None:
+    file = study_of("slime", tmp_path)
+    assert predicted_delivery(load(str(file)), 1).sentences == ()
+    folder = rehearse(file, participants=1, seed=1, results=tmp_path / "results", device=device)
+    (path,) = folder.glob("data/*participants_data.csv")
+    (row,) = csv.DictReader(path.read_text(encoding="utf-8").splitlines())
+    assert (row["status"], row["responses"], row["trials_missing"]) == ("completed", str(TRIALS), "0")
+
+
+def test_every_surface_says_that_no_trial_was_delivered(
+    thick: Path, rehearsed: Path, told: list[str], tmp_path: Path
+) -> None:
+    would = SENTENCE.replace("were", "would").replace("not delivered", "not be delivered")
+    assert predicted_delivery(load(str(thick)), 1).sentences == (would,)
+    checked = CliRunner().invoke(commands, ["check", str(thick)]).output
+    assert f"Note: {would}, predicted for a delay of 1 tick." in checked
+    assert told[0].startswith("P001: 0 responses")
+    assert told[0].endswith(f"; {SENTENCE}")
+    assert [str(one) for one in verify(rehearsed).warnings] == [f"data/sub-P001/ses-01: {SENTENCE}"]
+    assert verify(rehearsed).sound
+    (facts,) = sessions(rehearsed.parent, {})
+    assert (status_chip(facts)[2], str(facts.missing), facts.counts) == ("Incomplete", SENTENCE, False)
+    record = read_record(facts.folder)
+    assert record.limits.startswith(f"{SENTENCE}. Nobody answered them. The study permits 5 % of the trials to be")
+    assert "answers are kept" not in record.limits
+    (row,) = exclusions(rehearsed)
+    assert (row.rule_or_person, row.reason) == (MISSING_RULE, SENTENCE)
+
+
+def test_an_incomplete_session_is_not_analysed_until_a_person_includes_it(rehearsed: Path, tmp_path: Path) -> None:
+    assert load_study(rehearsed).n == 0
+    listed = StudyFolder(rehearsed).exclusions
+    content = listed.read_bytes()
+    listed.unlink()  # as if the program had ended before it wrote the list
+    assert load_study(rehearsed).n == 0
+    listed.write_bytes(content)
+    include(rehearsed, "P001", 1, by="AB", reason="the other trials are enough")
+    assert load_study(rehearsed).n == 1
+    (facts,) = sessions(rehearsed.parent, {})
+    assert (status_chip(facts)[2], facts.counts) == ("Incomplete", True)
+
+
+@pytest.mark.usefixtures("quick_pdf")
+def test_report_and_export_say_who_lost_how_many_trials_of_which_kind(rehearsed: Path, tmp_path: Path) -> None:
+    unblind(rehearsed, "AB", "a test")
+    CliRunner().invoke(commands, ["report", str(rehearsed), "--to", str(tmp_path / "report")], catch_exceptions=False)
+    page = re.sub(r"<[^>]+>", " ", (tmp_path / "report" / "report.html").read_text(encoding="utf-8"))
+    words = " ".join(page.split())
+    assert "P001, session 1 4 of 4" in words
+    assert "paste: 4 the safety layer withheld too much force (limit 25 %) not counted" in words
+    assert "1 incomplete. Counted: 0 participants." in words
+    for path in export(rehearsed, tmp_path / "tables"):
+        if path.name.endswith(("trials_data.csv", "intervals_data.csv")):
+            rows = list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
+            assert {(row["session_status"], row["trials_missing"]) for row in rows} == {("incomplete", "4")}
+
+
+def test_a_study_that_states_so_completes_a_session_without_a_single_trial(thick: Path, tmp_path: Path) -> None:
+    file = tmp_path / "abx.toml"
+    file.write_text(thick.read_text(encoding="utf-8").replace("attempts = 2", "attempts = 2, missing_percent = 100"))
+    folder = rehearse(file, participants=1, seed=1, results=tmp_path / "results" / "abx")
+    (facts,) = sessions(folder.parent, {})
+    assert (status_chip(facts)[2], str(facts.missing), exclusions(folder)) == ("Complete", SENTENCE, ())
+
+
+def test_the_shipped_slime_is_delivered_by_the_emulated_falcon(tmp_path: Path) -> None:
+    folder = rehearse("slime", participants=1, seed=1, results=tmp_path / "slime", device="falcon-emulated")
+    unblind(folder, "AB", "a test")
+    (path,) = folder.rglob("*trials_data.csv")
+    rows = list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
+    shares = [float(row["withheld_share"]) for row in rows]
+    assert len(rows) == 6
+    assert max(shares) < 0.15
+    assert {row["valid"] for row in rows} == {"true"}

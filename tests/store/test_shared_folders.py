@@ -1,0 +1,94 @@
+"""Results in folders that operating systems, git and programs that share files also write to."""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from datetime import datetime
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.cli import commands
+from study_app.session.simulated.rehearsal import rehearse
+from study_app.store.verification.verify_study import verify
+
+pytestmark = pytest.mark.slow
+
+OF_SYSTEMS = (
+    "desktop.ini", "Thumbs.db", "~$x.xlsx", "x (AB's conflicted copy 2026-01-02).csv", "x (conflicted copy).csv",
+    "receipt.sync-conflict-20260101-101010-ABCDEFG.json", "receipt-DESKTOP-AB12CD3.json",
+)  # fmt: skip
+HIDDEN = (".DS_Store", "._journal.jsonl", ".dropbox.attr", ".~lock.x.csv#")
+
+
+@pytest.fixture(scope="module")
+def rehearsed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return rehearse("demo", participants=1, seed=1, results=tmp_path_factory.mktemp("shared") / "study")
+
+
+@pytest.fixture
+def study(rehearsed: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(rehearsed, tmp_path / "study"))
+
+
+def session_of(study: Path) -> Path:
+    return study / "data" / "sub-P001" / "ses-01"
+
+
+def test_files_of_systems_are_noted_and_leave_the_fingerprint(study: Path) -> None:
+    for name in (*OF_SYSTEMS, *HIDDEN):
+        (session_of(study) / name).write_bytes(b"\0")
+    found = verify(study)
+    assert found.errors == ()
+    assert {Path(one.place).name for one in found.warnings} == set(OF_SYSTEMS)
+    (session_of(study) / "more.csv").write_bytes(b"1\n")
+    assert any(one.place.endswith("more.csv") and "was added" in one.message for one in verify(study).errors)
+
+
+def test_a_file_of_a_system_that_the_list_has_belongs_to_the_fingerprint(tmp_path: Path) -> None:
+    study = tmp_path / "study"
+    rehearse("demo", participants=1, seed=1, results=study)
+    sums = session_of(study) / "checksums.sha256"
+    (session_of(study) / "desktop.ini").write_bytes(b"[.ShellClassInfo]\n")
+    sums.write_text(f"{sums.read_text()}{'0' * 64}  desktop.ini\n", encoding="utf-8")
+    assert any(one.place.endswith("desktop.ini") and "has changed" in one.message for one in verify(study).errors)
+
+
+def test_line_endings_that_git_changed_are_named(study: Path) -> None:
+    for path in session_of(study).glob("*.*"):
+        if path.suffix != ".sha256":
+            path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
+    said = [one.message for one in verify(study).errors]
+    assert any("line endings were changed to CR LF, as git does with core.autocrlf" in message for message in said)
+    assert not any("another line" in message for message in said)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="paths are Unicode")
+def test_results_below_a_folder_that_is_not_utf_8_are_exported(study: Path, tmp_path: Path) -> None:
+    folder = tmp_path / os.fsdecode(b"donn\xe9es")
+    folder.mkdir()
+    there = study.rename(folder / "study")
+    for words in (["verify"], ["export", "--to", str(folder / "tables")], ["report", "--to", str(folder / "report")]):
+        command = [sys.executable, "-m", "study_app", words[0], there, *words[1:]]
+        done = subprocess.run(command, check=False, capture_output=True)
+        assert (done.returncode, done.stderr) == (0, b"")
+    assert list((folder / "tables").glob("*_data.csv"))
+    assert (folder / "report" / "report.html").is_file()
+
+
+@pytest.mark.skipif(not hasattr(time, "tzset"), reason="time zones are set for the process")
+def test_sessions_are_listed_in_local_time(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    said = {}
+    for zone in ("America/New_York", "Asia/Kolkata"):
+        monkeypatch.setenv("TZ", zone)
+        time.tzset()
+        said[zone] = CliRunner().invoke(commands, ["sessions", str(study)], catch_exceptions=False).output.split()
+    monkeypatch.undo()
+    time.tzset()
+    assert said["America/New_York"][2][-6:] in {"-05:00", "-04:00"}
+    assert said["Asia/Kolkata"][2][-6:] == "+05:30"
+    began = {datetime.fromisoformat(f"{words[1]}T{words[2]}") for words in said.values()}
+    assert len(began) == 1
