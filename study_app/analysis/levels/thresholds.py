@@ -221,7 +221,7 @@ def thresholds_compared(
             priors, of_width = group_widths(fits, prior.width_prior)
             shared += 0.0 if alike else of_width / len(of_block) ** 2
             for (person, fit), widths in zip(people.items(), priors, strict=False):
-                found[place].setdefault(person, []).append(fit.flat.with_widths(widths))
+                found[place].setdefault(str(person), []).append(fit.flat.with_widths(widths))
     first_of, second_of = (
         {
             person: ThresholdInU(
@@ -235,7 +235,7 @@ def thresholds_compared(
     return (first_of, second_of), shared
 
 
-def _flat_fits(block: LevelBlock, rows: pd.DataFrame) -> dict[str, PersonFit]:
+def _flat_fits(block: LevelBlock, rows: pd.DataFrame) -> dict[Any, PersonFit]:
     """Return the fit of each participant from the analysed rows of one standard, all widths being equally likely."""
     if (stimulus := block.stimulus) is None or (assumed := block.assumed) is None:
         return {}
@@ -243,7 +243,7 @@ def _flat_fits(block: LevelBlock, rows: pd.DataFrame) -> dict[str, PersonFit]:
     fits = {}
     for person, own in rows.groupby("participant"):
         grid = analysis_grid(stimulus, block.design, assumed, SESSION_SD / math.sqrt(own["session"].nunique()))
-        fits[str(person)] = given_by(stimulus, own).fit(grid, two_intervals=two)
+        fits[person] = given_by(stimulus, own).fit(grid, two_intervals=two)
     return fits
 
 
