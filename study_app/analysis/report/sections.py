@@ -650,7 +650,9 @@ def _missing_sentence(study: Study) -> str:
     asked, count = sum(one.asked for one in known), sum(one.count for one in known)
     if not study.levels or not asked:
         return ""
-    lost = f"{count or 'None'} of {counted(asked, 'main trial')} {'was' if count == 1 else 'were'} lost"
+    if not count:
+        return "All main trials of intervals were delivered within the limits."
+    lost = f"{count} of {counted(asked, 'main trial')} {'was' if count == 1 else 'were'} lost"
     return f"{lost} because no presentation was within the limits."
 
 

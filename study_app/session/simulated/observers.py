@@ -46,6 +46,8 @@ BEFORE_END_S: Final = 0.1
 MOVE_S: Final = 0.8
 STAY_S: Final = 0.2
 """From one target to the next, and how long the ball stays there beyond the dwell time."""
+RETURN_S: Final = 0.25
+"""To the middle after a task: less than the shortest pause between two intervals."""
 _SAMPLE = np.dtype([("time_ns", np.int64), ("position_m", np.float64, 3)])
 
 
@@ -106,18 +108,10 @@ class SensedTrial:
         return 0.0 if rows is None else max(rows * self.period_s, 0.0)
 
 
-def exploration(
-    draw: Draw,
-    half_m: tuple[float, float, float],
-    duration_s: float,
-    start_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
-) -> tuple[Floats, Floats]:
-    """Return a motion of at least ``duration_s`` that begins at ``start_m`` and stays within ``half_m`` of the middle.
-
-    Times are (n,) [s], positions (n, 3) [m, hand frame].
-    """
+def exploration(draw: Draw, half_m: tuple[float, float, float], duration_s: float) -> tuple[Floats, Floats]:
+    """Return a motion of at least ``duration_s`` that begins and stays within ``half_m`` of the middle."""
     reach_m = 0.7 * np.asarray(half_m)
-    pieces = [np.array([start_m])]
+    pieces = [np.zeros((1, 3))]
     coming: list[Figure] = []
     while sum(map(len, pieces)) < duration_s * RATE_HZ:
         coming = coming or list(shuffle(FIGURES, draw))
@@ -210,7 +204,7 @@ class Explorer:
         least_s = task.limit_s if task.least_s is None else task.least_s
         stay_s = least_s + (0.1 + 0.2 * draw()) * max(least_s, 5.0)
         self._leave_s = math.inf if task.least_s is None else now_s + min(stay_s, task.limit_s)
-        device.follow(*exploration(draw, device.workspace_m, stay_s, device.aim_m))
+        device.follow(*exploration(draw, device.workspace_m, stay_s))
 
     def act(self, now_s: float, _view: TankView) -> bool:
         """Return whether the space bar is pressed."""
@@ -293,12 +287,18 @@ def _followed(task: Task, times_s: Floats) -> Floats:
     return np.array([task.target_m(float(time_s)) for time_s in times_s])
 
 
-def rest(task: Task, device: HandOrders) -> None:
-    """Let a simulated hand go back after a task, without force: to where the task begins, or to the middle.
+def rest(task: Task, device: HandOrders, *, returns: bool) -> None:
+    """Let a simulated hand rest after a task: where its next interval begins, if that begins at a place.
 
-    A hand that jumped there when the next trial begins would be pushed as no person is.
+    Otherwise it ``returns`` to the middle, where an exploration begins, or stays, and jumps there as the next trial
+    begins, which asks for forces that no person feels.
     """
-    device.reach_to(*((0.0, 0.0, 0.0) if task.start_m is None else task.start_m))
+    if task.start_m is not None:
+        device.reach_to(*task.start_m)
+    elif returns:
+        device.reach_to(0.0, 0.0, 0.0, RETURN_S)
+    else:
+        device.rest()
 
 
 @dataclass(frozen=True, slots=True)

@@ -333,7 +333,7 @@ class RehearsedSession(SimulatedParticipant):
                 self._set(page, setting, view, samples)
             if wants_to_go_on and page is self.page:
                 self._post(Continue(self._now_s()))
-        rest(page.task, arm)
+        rest(page.task, arm, returns=self._study.format > 1)  # rehearsals of format 1 keep their numbers
         earlier = () if interval is None or interval.number == 1 else self._features_of.get(page.trial, ())
         self._features_of[page.trial] = (*earlier, senses.features())
         if self._tell_features is not None:
