@@ -1,26 +1,33 @@
 """Contrasts: the hypotheses that a study states, tested on one number of each participant.
 
-Within participants the differences between the two settings are tested by Student's t (of thresholds, the differences
-of logarithms, whose mean is a ratio), between groups the participants' numbers by Welch's. Equivalence is shown where
-the interval of 1 − 2·alpha lies within the bound.
+Within participants the differences between the two settings are tested (of thresholds, the differences of logarithms,
+whose mean is a ratio), between groups the participants' numbers: by Student's t together with a bootstrap, see
+`statistics.mean_tests`. Thresholds have the weights of the random-effects mean; those of two blocks with the same
+levels and design have a width in common. Equivalence is tested as everywhere, and corrected over the hypotheses with a
+bound.
 """
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
-from scipy.stats import ttest_1samp, ttest_ind
 
 from study_app.analysis.data.study_tables import Study, group_members
 from study_app.analysis.findings.finding import HOLM, TESTS, BlockAnswers, verdict
-from study_app.analysis.html_page import heading, paragraph, table_of
+from study_app.analysis.html_page import bullets, heading, paragraph, table_of
 from study_app.analysis.levels.answers import Settings
+from study_app.analysis.levels.evaluate import READ
 from study_app.analysis.levels.sensitivities import Sensitivities
 from study_app.analysis.levels.statistic import LevelStatistic
-from study_app.analysis.levels.thresholds import Exponents, Thresholds
+from study_app.analysis.levels.thresholds import Exponents, ThresholdEstimate, Thresholds, thresholds_compared
+from study_app.analysis.levels.tracks import tracks
 from study_app.analysis.results import ContrastResult, LevelsResult, Results, interval, number, p_equals, p_value
-from study_app.analysis.statistics.outcome import SIDES, Interval, holm
+from study_app.analysis.statistics.equivalence import STEPS, p_equivalent, people_beyond
+from study_app.analysis.statistics.mean_tests import SAME, Means, means_of, p_differs, resamples_for
+from study_app.analysis.statistics.outcome import SIDES, Array, Interval, clopper_pearson, holm
+from study_app.analysis.statistics.thresholds import random_effects_weights
 from study_app.protocol.model import Contrast
 
 STATISTICS: Final[Mapping[str, tuple[type[LevelStatistic[Any]], str]]] = {
@@ -34,122 +41,260 @@ STATISTICS: Final[Mapping[str, tuple[type[LevelStatistic[Any]], str]]] = {
 RATIOS: Final = ("threshold", "pse")
 """Measures that are compared as ratios where the levels of all blocks are spaced by ratios."""
 
-Values = Mapping[str, float]
-"""Participant → number, on the scale of the test: its logarithm where a ratio is tested."""
+LEFT_OUT: Final = (
+    "Every participant with both numbers is included, also with a threshold beyond the levels; the report names those "
+    "left out, with the reason."
+)
+"""Who is compared, in power, preregistration and report."""
+WEIGHTED: Final = (
+    "Thresholds are weighted as in the group mean; those of two blocks with the same levels and design are estimated "
+    "with a width of the psychometric function that both have in common, so that their ratio may differ from that of "
+    "the tables. "
+)
+MOST_NAMED: Final = 20
+
+UNTESTED: Final = "fewer than two participants have both numbers, or all differences are equal"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measured:
+    """A number on the scale of the test, its logarithm where a ratio is tested, and the variance of its estimate.
+
+    The variance is 0 where it is not known: participants are then weighted equally.
+    """
+
+    value: float
+    variance: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Compared:
+    """The ascending numbers of each group, or the differences within participants; and why others are left out.
+
+    ``shared`` is the variance of an error that all have in common.
+    """
+
+    samples: tuple[tuple[Measured, ...], ...]
+    left_out: Mapping[str, str]
+    shared: float = 0.0
+
+    @property
+    def values(self) -> tuple[Array, ...]:
+        """The values of each sample."""
+        return tuple(np.array([one.value for one in sample]) for sample in self.samples)
+
+    @property
+    def smallest(self) -> int:
+        """How many participants the smaller sample has."""
+        return min(map(len, self.samples))
+
+    def means(self, alpha: float) -> Means | None:
+        """Return the mean, or the difference of the groups' means; None where a sample has fewer than two numbers."""
+        if self.smallest < 2:
+            return None
+        found = []
+        for group, (sample, values) in enumerate(zip(self.samples, self.values, strict=True)):
+            variances = np.array([one.variance for one in sample])
+            weights = random_effects_weights(values, variances)[0] if variances.all() else None
+            found.append(means_of(values[None], weights, group=group, resamples=resamples_for(alpha)))
+        means = found[0] if len(found) == 1 else found[0] - found[1]
+        return means.widened(self.shared) if self.shared else means
 
 
 def contrast_results(
     study: Study, answers: Sequence[BlockAnswers], levels: Sequence[LevelsResult]
 ) -> tuple[ContrastResult, ...]:
-    """Test the contrasts of a study, corrected together by Holm; none while the key is sealed."""
-    found = [_tested(study, one, answers, levels) for one in study.contrasts]
-    tests = [test for test, _ in found]
-    adjusted = holm([None if test is None else float(test.pvalue) for test in tests])
+    """Test the contrasts of a study, differences and equivalence by Holm each; none while the key is sealed."""
+    alpha = study.decided.alpha
+    tests = [_tested(study, contrast, answers, levels, alpha / len(study.contrasts)) for contrast in study.contrasts]
+    adjusted = holm([None if one.p is None else max(one.p, one.p_bootstrap or 0.0) for one in tests])
+    with_bound = [place for place, one in enumerate(tests) if one.contrast.bound is not None]
+    of_equal = dict(zip(with_bound, holm([tests[place].p_equivalent for place in with_bound]), strict=True))
     return tuple(
-        _result(study, one, levels, test, values, p, len(found))
-        for one, (test, values), p in zip(study.contrasts, found, adjusted, strict=True)
+        _judged(study, one, p, of_equal.get(place)) for place, (one, p) in enumerate(zip(tests, adjusted, strict=True))
     )
 
 
-def _tested(
-    study: Study, one: Contrast, answers: Sequence[BlockAnswers], levels: Sequence[LevelsResult]
-) -> tuple[Any, tuple[np.ndarray[Any, Any], ...]]:
-    """Return the test (None: there is none), and the differences within people or the numbers of both groups."""
-    side = SIDES[one.expected]
-    if one.groups is not None:
-        values = _values(one, one.blocks[0], None, answers, levels)
-        members = group_members(study)
-        groups = tuple(
-            np.array([number for person, number in values.items() if members.get(person) == group])
-            for group in one.groups
-        )
-        enough = min(map(len, groups)) > 1 and any(np.ptp(group) > 0 for group in groups)
-        return ttest_ind(*groups, equal_var=False, alternative=side) if enough else None, groups
-    pairs = [
-        _values(one, block, condition, answers, levels)
+def _judged(study: Study, tested: ContrastResult, p: float | None, p_equal: float | None) -> ContrastResult:
+    """Return a contrast with its corrected p and its verdict."""
+    alpha = study.decided.alpha
+    said: Any = verdict(p, None, alpha, primary=study.decided.binding)
+    equivalent = None if tested.contrast.bound is None else p_equal is not None and p_equal <= alpha
+    if equivalent and said in ("not shown", "not tested"):
+        said = "equivalent"
+    return replace(
+        tested,
+        p_adjusted=p,
+        p_equivalent=p_equal,
+        members=len(study.contrasts),
+        equivalent=equivalent,
+        verdict=said,
+        not_excluded=tested.not_excluded if equivalent else None,
+    )
+
+
+def _compared(
+    study: Study, contrast: Contrast, answers: Sequence[BlockAnswers], levels: Sequence[LevelsResult]
+) -> Compared:
+    """Return the numbers that a contrast compares."""
+    sides: list[Mapping[str, Measured]] = [
+        _values(contrast, block, condition, answers, levels)
         for block, condition in zip(
-            one.blocks if len(one.blocks) == 2 else one.blocks * 2, one.conditions or (None, None), strict=True
+            contrast.blocks if len(contrast.blocks) == 2 else contrast.blocks * 2,
+            contrast.conditions or (None, None),
+            strict=True,
         )
     ]
-    away = np.array([pairs[0][person] - pairs[1][person] for person in pairs[0] if person in pairs[1]])
-    enough = len(away) > 1 and np.ptp(away) > 1e-12
-    return ttest_1samp(away, 0.0, alternative=side) if enough else None, (away,)
+    shared = 0.0
+    spacings = {level.spacing for level in levels if level.block in contrast.blocks}
+    if contrast.measure == "threshold" and len(contrast.blocks) == 2 and len(spacings) == 1:
+        sides, shared = _thresholds_of_two(study, contrast, math.log(10) if spacings == {"log"} else 1.0)
+    members = group_members(study)
+    people = [person for person in study.people if contrast.groups is None or members.get(person) in contrast.groups]
+    measure = contrast.measure.replace("_", " ")
+    what = f"no {measure}" if contrast.measure in STATISTICS else f"an answer to {contrast.measure} is missing"
+    names = contrast.blocks * 2 if contrast.groups is not None else contrast.compared
+    left_out = {
+        person: f"{what} in {name}" for side, name in zip(sides[::-1], names[::-1], strict=True) for person in people
+        if person not in side
+    }  # fmt: skip
+    kept = [person for person in people if person not in left_out]
+    if contrast.groups is not None:
+        samples = tuple(
+            tuple(sides[0][person] for person in kept if members[person] == group) for group in contrast.groups
+        )
+    else:
+        samples = (
+            tuple(
+                Measured(
+                    value=sides[0][person].value - sides[1][person].value,
+                    variance=sides[0][person].variance + sides[1][person].variance,
+                )
+                for person in kept
+            ),
+        )
+    ascending = tuple(tuple(sorted(sample, key=lambda one: one.value)) for sample in samples)
+    return Compared(samples=ascending, left_out=left_out, shared=shared)
+
+
+def _thresholds_of_two(study: Study, contrast: Contrast, per_u: float) -> tuple[list[Mapping[str, Measured]], float]:
+    """Return the thresholds in two blocks, in units of which u has so many, and the variance that widths add."""
+    first, second = (next(one for one in study.levels if one.id == block) for block in contrast.blocks)
+    sides, shared = thresholds_compared(first, second, tracks(study)[list(READ)])
+    return [
+        {person: Measured(value=per_u * one.value, variance=per_u**2 * one.variance) for person, one in side.items()}
+        for side in sides
+    ], per_u**2 * shared
 
 
 def _values(
-    one: Contrast, block: str, condition: str | None, answers: Sequence[BlockAnswers], levels: Sequence[LevelsResult]
-) -> Values:
+    contrast: Contrast,
+    block: str,
+    condition: str | None,
+    answers: Sequence[BlockAnswers],
+    levels: Sequence[LevelsResult],
+) -> Mapping[str, Measured]:
     """Return each participant's number in a block: the mean over standards, or over the conditions of statements."""
-    if one.measure not in STATISTICS:
+    if contrast.measure not in STATISTICS:
         asked = next(found for found in answers if found.block.id == block)
         codes = [setting.code for setting in asked.block.settings if condition in (None, setting.condition)]
-        rows = asked.values[one.measure][:, sorted({asked.block.columns[code] for code in codes})].mean(axis=1)
-        return {person: float(row) for person, row in zip(asked.people, rows, strict=True) if not math.isnan(row)}
+        rows = asked.values[contrast.measure][:, sorted({asked.block.columns[code] for code in codes})].mean(axis=1)
+        return {
+            person: Measured(value=float(row))
+            for person, row in zip(asked.people, rows, strict=True)
+            if not math.isnan(row)
+        }
     found = next(level for level in levels if level.block == block)
-    statistic, attribute = STATISTICS[one.measure]
-    ratio = _is_ratio(one, levels)
-    numbers: dict[str, list[float]] = {}
+    statistic, attribute = STATISTICS[contrast.measure]
+    ratio = _is_ratio(contrast, levels)
+    numbers: dict[str, list[Measured]] = {}
     for row in statistic.own(found):
-        value = getattr(row, attribute)
-        if value is not None and getattr(row, "beyond", None) is None:
-            numbers.setdefault(str(row.participant), []).append(math.log(value) if ratio else value)
-    return {person: float(np.mean(each)) for person, each in numbers.items()}
+        if (value := getattr(row, attribute)) is not None:
+            measured = Measured(value=math.log(value) if ratio else value, variance=_variance(row, found, ratio=ratio))
+            numbers.setdefault(str(row.participant), []).append(measured)
+    return {
+        person: Measured(
+            value=float(np.mean([one.value for one in each])),
+            variance=sum(one.variance for one in each) / len(each) ** 2,
+        )
+        for person, each in numbers.items()
+    }
+
+
+def _variance(row: Any, found: LevelsResult, *, ratio: bool) -> float:
+    """Return the variance of an estimate on the scale of the test; 0 where it is not known."""
+    if not isinstance(row, ThresholdEstimate) or row.variance is None:
+        return 0.0
+    per_u = math.log(10) * (1.0 if ratio else row.threshold) if found.spacing == "log" else 1.0
+    return row.variance * per_u**2
 
 
 def _is_ratio(one: Contrast, levels: Sequence[LevelsResult]) -> bool:
     return one.measure in RATIOS and all(level.spacing == "log" for level in levels if level.block in one.blocks)
 
 
-def _result(
-    study: Study,
-    one: Contrast,
-    levels: Sequence[LevelsResult],
-    test: Any,
-    values: tuple[Any, ...],
-    p_adjusted: float | None,
-    members: int,
+def _tested(
+    study: Study, contrast: Contrast, answers: Sequence[BlockAnswers], levels: Sequence[LevelsResult], strictest: float
 ) -> ContrastResult:
-    ratio, alpha = _is_ratio(one, levels), study.decided.alpha
-    effect = ends = equivalent = None
-    said: Any = verdict(p_adjusted, None, alpha, primary=study.decided.binding)
-    untested = "fewer than two participants have both numbers, or all differences are equal"
-    if test is not None:
-        two_sided = ttest_ind(*values, equal_var=False) if one.groups else ttest_1samp(values[0], 0.0)
-        low, high = (float(end) for end in two_sided.confidence_interval(0.95))
-        mean = float(values[0].mean() - (values[1].mean() if one.groups else 0.0))
-        effect, low, high = (math.exp(end) if ratio else end for end in (mean, low, high))
-        ends = Interval(low=low, high=high, level=0.95, method="Welch's t" if one.groups else "Student's t")
-        if one.bound is not None:
-            reach = abs(math.log(one.bound)) if ratio else one.bound
-            within = two_sided.confidence_interval(1 - 2 * alpha)
-            equivalent = bool(-reach <= within.low and within.high <= reach)
-            said = "equivalent" if equivalent and said == "not shown" else said
-    n = sum(map(len, values))
+    """Return a contrast before the correction, with resamples for an alpha of ``strictest``."""
+    compared = _compared(study, contrast, answers, levels)
+    ratio, means = _is_ratio(contrast, levels), compared.means(strictest)
+    effect = ends = p_equal = p = p_bootstrap = statistic = None
+    method = "none"
+    if means is not None:
+        mean, (low, high) = float(means.mean[0]), (float(end[0]) for end in means.interval(0.95))
+        effect = math.exp(mean) if ratio else mean
+        if contrast.bound is not None:
+            reach, largest = equality_limits(contrast, contrast.bound, ratio=ratio)
+            p_equal = float(p_equivalent(means, reach, compared.smallest, largest)[0])
+        if means.error[0] > SAME:
+            p, p_bootstrap = (float(each[0]) for each in p_differs(means, SIDES[contrast.expected]))
+            statistic = float(means.t()[0])
+            low, high = (math.exp(end) if ratio else end for end in (low, high))
+            ends = Interval(low=low, high=high, level=0.95, method=f"t({means.freedom})")
+            sides = "two-sided" if contrast.expected is None else f"one-sided ({contrast.expected})"
+            method = f"t({means.freedom}), {sides}; bootstrap {p_equals(p_bootstrap)}"
     return ContrastResult(
-        test="contrast, Welch's t" if one.groups else "contrast, paired t",
-        n=n,
-        dropped=study.n - n,
+        test="contrast, t of two groups" if contrast.groups else "contrast, paired t",
+        n=sum(map(len, compared.samples)),
+        dropped=len(compared.left_out),
         statistic_name="t",
-        statistic=None if test is None else float(test.statistic),
-        p=None if test is None else float(test.pvalue),
-        method="none" if test is None else f"t({float(test.df):.4g}), {_sides(one)}",
+        statistic=statistic,
+        p=p,
+        method=method,
         effect_name="ratio" if ratio else "difference",
         effect=effect,
         interval=ends,
-        no_interval=untested if ends is None else "",
-        note=untested if test is None else "",
-        contrast=one,
-        compared=one.words({block.id: block.stimulus.condition for block in study.levels if block.stimulus}),
+        no_interval=UNTESTED if ends is None else "",
+        note=UNTESTED if ends is None else "",
+        contrast=contrast,
+        compared=contrast.words({block.id: block.stimulus.condition for block in study.levels if block.stimulus}),
         ratio=ratio,
-        p_adjusted=p_adjusted,
-        members=members,
-        verdict=said,
-        equivalent=equivalent,
+        p_adjusted=None,
+        members=1,
+        verdict="not tested",
+        equivalent=None,
+        p_bootstrap=p_bootstrap,
+        p_equivalent=p_equal,
+        not_excluded=_not_excluded(contrast, compared, ratio=ratio),
+        higher=None if contrast.groups else int((compared.values[0] > SAME).sum()),
+        left_out=compared.left_out,
     )
 
 
-def _sides(one: Contrast) -> str:
-    return "two-sided" if one.expected is None else f"one-sided ({one.expected})"
+def equality_limits(contrast: Contrast, bound: float, *, ratio: bool) -> tuple[float, float | None]:
+    """Return the bound on the scale of the test, and the largest difference that the scale permits (None: any)."""
+    return abs(math.log(bound)) if ratio else bound, None if contrast.measure in STATISTICS else STEPS
+
+
+def _not_excluded(contrast: Contrast, compared: Compared, *, ratio: bool) -> float | None:
+    """Return the largest share of people that may differ by more than the bound; of groups, that none may belong to."""
+    if contrast.bound is None or not compared.smallest:
+        return None
+    if contrast.groups is not None:
+        return clopper_pearson(0, compared.smallest).high
+    reach, _ = equality_limits(contrast, contrast.bound, ratio=ratio)
+    return people_beyond(compared.values[0], reach).interval.high
 
 
 def question(one: ContrastResult) -> str:
@@ -159,17 +304,43 @@ def question(one: ContrastResult) -> str:
 
 
 def answer(one: ContrastResult) -> str:
-    """Return what is found, in a sentence."""
-    if one.p_adjusted is None:
-        return f"Not tested: {one.note}."
+    """Return what is found, in sentences."""
+    sentences = [f"Not tested: {one.note}." if one.p_adjusted is None else _difference_words(one)]
+    if one.equivalent:
+        people = "of people differ by more" if one.contrast.groups is None else "of a group are not in the sample"
+        sentences.append(
+            "On average it stays within the bound; the data do not exclude that up to "
+            f"{100 * (one.not_excluded or 0.0):.0f} % {people}."
+        )
+    elif one.equivalent is not None:
+        sentences.append("It is not shown to stay within the bound.")
+    if one.left_out:
+        sentences.append(f"Left out: {left_out_words(one)}.")
+    return " ".join(sentences)
+
+
+def _difference_words(one: ContrastResult) -> str:
+    """Return the difference of a contrast that was tested, in a sentence."""
     first, second = one.compared
     what = one.contrast.measure.replace("_", " ").capitalize()
     side = "below" if (one.effect or 0.0) < 0 else "above"
     amount = f"{number(one.effect)} times" if one.ratio else f"{number(abs(one.effect or 0.0))} {side}"
-    near = {None: "", True: " It stays within the bound.", False: " It is not shown to stay within the bound."}
+    higher = "" if one.higher is None else f", higher in {one.higher} of them"
     return (
-        f"{what} in {first} is {amount} that in {second}, 95 % interval {interval(one.interval)}, "
-        f"{p_equals(one.p_adjusted)}, n = {one.n}.{near[one.equivalent]}"
+        f"{what} in {first} is on average {amount} that in {second}, 95 % interval {interval(one.interval)}, "
+        f"{p_equals(one.p_adjusted or 0.0)}, n = {one.n}{higher}."
+    )
+
+
+def left_out_words(one: ContrastResult) -> str:
+    """Return who is left out of a contrast and why."""
+    by_reason: dict[str, list[str]] = {}
+    for person, reason in one.left_out.items():
+        by_reason.setdefault(reason, []).append(person)
+    return "; ".join(
+        f"{', '.join(people[:MOST_NAMED])}{f' and {len(people) - MOST_NAMED} more' * (len(people) > MOST_NAMED)} "
+        f"({reason})"
+        for reason, people in by_reason.items()
     )
 
 
@@ -190,12 +361,17 @@ def contrast_section(results: Results) -> Iterator[str]:
         words=1,
         last=1,
     )
+    weighted = any(one.contrast.measure == "threshold" for one in results.contrasts)
     yield paragraph(
-        "Contrasts that the study file states: t tests of one number of each participant, p adjusted by Holm over "
-        f"{len(results.contrasts)}. Equivalent: the {100 - 200 * results.decided.alpha:g} % interval lies within the "
-        "bound that was stated. Left out: participants without both numbers, or with a threshold beyond the levels.",
+        "Contrasts that the study file states, tested on one number of each participant by t together with a bootstrap "
+        "that adds a participant like the most extreme one; p is the larger of both, adjusted by Holm over "
+        f"{len(results.contrasts)}. Equivalent: both show that the mean lies within the bound that was stated, by "
+        "enough participants, with Holm over the hypotheses that state one. "
+        f"{WEIGHTED if weighted else ''}{LEFT_OUT}",
         "soft",
     )
+    if rows := [one for one in results.contrasts if one.left_out]:
+        yield bullets([f"{question(one)}: left out {left_out_words(one)}." for one in rows])
 
 
 def contrast_rows(results: Results) -> Iterator[dict[str, Any]]:

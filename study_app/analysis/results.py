@@ -11,7 +11,7 @@ from typing import Any, Final, Literal, TypeAlias, TypeVar
 
 from study_app.analysis.data.blocks import Block, Decided, Item, Kind, OwnDynamics, Setting
 from study_app.analysis.data.motion import Performance
-from study_app.analysis.statistics.equivalence import UNSEEN, Equivalence, fewest
+from study_app.analysis.statistics.equivalence import STEPS, Equivalence, fewest, minority
 from study_app.analysis.statistics.outcome import Interval, Outcome
 from study_app.discovery import explained
 from study_app.errors import PlugInError
@@ -250,7 +250,10 @@ class LevelsResult:
 class ContrastResult(Outcome):
     """The test of what is ``compared``; ``ratio``: the effect is first ÷ second, otherwise first − second.
 
-    ``equivalent`` says whether the effect is shown to stay within the study's bound; None where it has none.
+    ``n`` participants are compared; ``left_out`` are the others with the reasons. ``higher`` is how many of those
+    compared have a higher number in the first; None between groups. ``equivalent`` says whether the effect is shown to
+    stay within the study's bound, by a ``p_equivalent`` that is corrected over the hypotheses with one; None where it
+    has none. ``not_excluded`` is then the largest share of people that may differ by more, by its 95 % interval.
     """
 
     contrast: Contrast
@@ -260,6 +263,11 @@ class ContrastResult(Outcome):
     members: int
     verdict: Verdict | Literal["equivalent"]
     equivalent: bool | None
+    p_bootstrap: float | None
+    p_equivalent: float | None
+    not_excluded: float | None
+    higher: int | None
+    left_out: Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -412,16 +420,17 @@ def said_of_presentations(found: BlockResult) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def least(alpha: float) -> str:
-    """Return how many participants equivalence needs at least."""
-    return f"at least {fewest(alpha)} participants"
+def least(alpha: float, bound: float) -> str:
+    """Return how many participants equivalence of statements needs at least."""
+    return f"at least {fewest(alpha, bound)} participants"
 
 
-def enough(alpha: float) -> str:
-    """Return how many participants equivalence needs at least, and why."""
+def enough(alpha: float, bound: float) -> str:
+    """Return how many participants equivalence of statements needs at least, and why."""
+    share = minority(bound, STEPS)
     return (
-        f"{least(alpha)}: more than {percent(alpha)} of smaller samples contain no one from a group of one person in "
-        f"{NUMBERS[round(1 / UNSEEN)]}"
+        f"{least(alpha, bound)}: more than {percent(alpha)} of smaller samples contain no member of a minority of "
+        f"{100 * share:.1f} % who differ by {bound / share:.2g} points, which shifts the mean by the bound"
     )
 
 

@@ -10,7 +10,6 @@ from study_app.analysis.data.motion import OF_REACHES
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.findings.finding import (
     FOUND,
-    MANY,
     NO_EVIDENCE,
     Absent,
     Answer,
@@ -84,14 +83,14 @@ def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
     first = against[0].found
     yield (
         f"Two one-sided t tests with a bound of ±{first.bound:g}, intervals of {percent(1 - 2 * first.alpha)}. "
-        "Equivalent: the t tests, changes of signs, signed ranks and the bootstrap-t all show that the mean lies "
-        f"within the bound, with {enough(first.alpha)}. Inconclusive: they do not, which is no evidence of a "
+        "Equivalent: the t tests and the bootstrap both show that the mean lies within the bound, with "
+        f"{enough(first.alpha, first.bound)}. Inconclusive: they do not, which is no evidence of a "
         "difference: that is what the test of a trend asks. Out of reach: no answers of so many participants could "
         "have shown it."
     )
     disagree = sum(one.found.checks_agree is False for one in against)
     if disagree:
-        yield f"*: p with and without normality decide differently ({disagree}); equivalent is only what all show."
+        yield f"*: t tests and bootstrap decide differently ({disagree}); equivalent is only what both show."
 
 
 VERDICTS: Final = ("equivalent", "inconclusive", "out of reach")
@@ -111,7 +110,7 @@ def by_delay(found: BlockResult) -> list[list[str]]:
 
 def _said_of(found: BlockResult, delay_ms: float, here: Sequence[ContrastWithControl]) -> str:
     if all(one.verdict == "equivalent" for one in here):
-        return "Mean answers to these statements stay within the bound; single people may notice the delay."
+        return f"Mean answers to these statements stay within the bound; {not_excluded([one.found for one in here])}."
     claim = f"“delays up to {ms(delay_ms)} do not matter”"
     if reasons := evidence_up_to(found, delay_ms):
         return f"These data speak against {claim}: {'; '.join(reasons)}."
@@ -164,14 +163,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
             values = answers.values[item.id]
             for place, delay_ms in enumerate(delays_ms[1:], start=1):
                 differences = values[:, place] - values[:, 0]
-                tested = tost(
-                    differences,
-                    bound,
-                    alpha=answers.decided.alpha,
-                    seed=answers.seed,
-                    checks=answers.n <= MANY,
-                    verdict_only=answers.verdicts_only,
-                )
+                tested = tost(differences, bound, alpha=answers.decided.alpha, seed=answers.seed)
                 compared.append(ContrastWithControl(item.id, delay_ms, delays_ms[0], tested))
         return tuple(compared), ()
 
@@ -210,7 +202,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
             ("interval", lambda one: interval(one.found.interval)),
             ("people beyond the bound", lambda one: beyond(one.found)),
             ("p equivalent", lambda one: p_value(one.found.p)),
-            ("p without normality", lambda one: p_value(one.found.p_without_normality)),
+            ("p, bootstrap", lambda one: p_value(one.found.p_bootstrap)),
             ("Verdict", lambda one: one.verdict + (" *" if one.found.checks_agree is False else "")),
             words=2,
             last=1,
@@ -221,8 +213,8 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
 
     def limits(self) -> Iterator[str]:
         against, found = self.value, self.found
-        if against and found.n < fewest(against[0].found.alpha):
-            yield f"{lead(found)}: equivalence needs {enough(against[0].found.alpha)}. This study has {found.n}."
+        if against and found.n < fewest((first := against[0].found).alpha, first.bound):
+            yield f"{lead(found)}: equivalence needs {enough(first.alpha, first.bound)}. This study has {found.n}."
         undecided = [one for one in against if one.verdict in ("inconclusive", "out of reach")]
         if undecided:
             yield (
@@ -238,8 +230,8 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
             yield (
                 f"Equivalence to {self.found.delays_ms[0]:g} ms was tested by two one-sided t tests on paired "
                 f"differences with a bound of ±{bound:g} {points}{beforehand}, and {level} intervals, and called "
-                "equivalent only where changes of signs, signed ranks and the bootstrap-t agreed, and with "
-                f"{least(self.results.decided.alpha)}, and otherwise inconclusive."
+                "equivalent only if a bootstrap that adds a participant like the most extreme one (Gaffke 2005) "
+                f"agreed, and with {least(self.results.decided.alpha, bound)}; otherwise inconclusive."
             )
 
 
@@ -433,19 +425,26 @@ class NoticedFrom(Finding[None]):
 
     def _shortest(self, items: Sequence[str]) -> str:
         """Return the sentence of the shortest delay that changes one of these statements; empty without any."""
-        lowest = {
-            one.item: one.over_all_ms
-            for one in LowestDelay.of(self.found)
-            if one.over_all_ms is not None and one.item in items
-        }
-        if lowest:
-            at = min(lowest.values())
-            first = [f"“{short(self.found, item)}”" for item, delay in lowest.items() if delay == at]
-            return (
-                f"From {ms(at)} on at the latest {listed(first)} {'changes' if len(first) == 1 else 'change'} with the "
-                "delay; shorter delays may be noticed too."
-            )
-        return ""
+        lowest = [one for one in LowestDelay.of(self.found) if one.over_all_ms is not None and one.item in items]
+        if not lowest:
+            return ""
+        at = min(one.over_all_ms or 0.0 for one in lowest)
+        rated = [
+            f"{'higher' if correlation > 0 else 'lower'} in “{short(self.found, one.item)}” "
+            f"(mean rank correlation {number(correlation)})"
+            for one in lowest
+            if one.over_all_ms == at and (correlation := self._correlation(one, at))
+        ]
+        return (
+            f"From {ms(at)} on at the latest, participants tend to rate longer delays {listed(rated)}. Mean ratings "
+            "may stay the same, and shorter delays may be noticed too."
+        )
+
+    def _correlation(self, lowest: Lowest, up_to_ms: float) -> float:
+        """Return the mean rank correlation of answers to a statement and delays up to one."""
+        step = next(step for step in lowest.steps.steps if step.longest_ms == up_to_ms)
+        falling = self.results.decided.direction(lowest.item) == "decreasing"
+        return (step.trend.effect or 0.0) * (-1 if falling else 1)
 
 
 class UnchangedUpTo(Finding[None]):
@@ -470,8 +469,15 @@ class UnchangedUpTo(Finding[None]):
             )
             return self.answered("not shown", text)
         statements = all_of(len(equivalent_up_to(against)), "statement")
-        text = f"Up to {ms(at)} mean answers to {statements} stay {within}; single people may notice the delay."
+        share = not_excluded([one.found for one in against if one.delay_ms <= at])
+        text = f"Up to {ms(at)} mean answers to {statements} stay {within}; {share}."
         return self.answered("shown", text)
+
+
+def not_excluded(tested: Sequence[Equivalence]) -> str:
+    """Return how many people may differ by more than the bound, by the 95 % interval of their share."""
+    most = max((one.beyond.interval.high for one in tested if one.beyond is not None), default=1.0)
+    return f"the data do not exclude that up to {100 * most:.0f} % of people differ by more"
 
 
 def _within(against: ContrastWithControl) -> str:

@@ -126,7 +126,7 @@ THRESHOLDS: Final[tuple[Column, ...]] = (
     optional(
         "beyond",
         "text",
-        "Whether the threshold lies beyond the levels that were presented; n/a: between them.",
+        "Whether the threshold lies beyond the levels of the stimulus; n/a: within them.",
         levels=(("above", "above the highest"), ("below", "below the lowest")),
     ),
     optional(

@@ -137,7 +137,7 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdEst
     if assumed is None or stimulus is None:
         return
     for standard, at_standard in _answered(block, opened).groupby("standard", dropna=False, sort=True):
-        fits, shared = _fits(block, stimulus, assumed, at_standard[at_standard["analysed"]])
+        fits, shared = _fits(block, assumed, at_standard[at_standard["analysed"]])
         heard = dict(list(at_standard.groupby("participant")))
         own = [_own(block, stimulus, standard, one, heard[one.person]) for one in fits]
         if own:
@@ -173,22 +173,78 @@ class FittedPerson:
         return self.fit.flat.with_widths(self.width_prior)
 
 
-def _fits(
-    block: LevelBlock, stimulus: Stimulus, assumed: Assumed, rows: pd.DataFrame
-) -> tuple[list[FittedPerson], float]:
+def _fits(block: LevelBlock, assumed: Assumed, rows: pd.DataFrame) -> tuple[list[FittedPerson], float]:
     """Return the fit of each participant from the analysed rows of one standard.
 
     Followed by the variance of the group's mean that is due to the width that people share [u²].
     """
+    fits, of_people = _flat_fits(block, rows), dict(list(rows.groupby("participant")))
+    priors, shared = group_widths([one.flat for one in fits.values()], assumed.width_prior) if fits else ((), 0.0)
+    return [
+        FittedPerson(person, of_people[person], fit, prior)
+        for (person, fit), prior in zip(fits.items(), priors, strict=True)
+    ], shared
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ThresholdInU:
+    """A participant's threshold in u, the mean over standards, and the variance of its estimate."""
+
+    value: float
+    variance: float
+
+
+def thresholds_compared(
+    first: LevelBlock, second: LevelBlock, opened: pd.DataFrame
+) -> tuple[tuple[Mapping[str, ThresholdInU], Mapping[str, ThresholdInU]], float]:
+    """Return the thresholds of the participants in two blocks, and the variance that widths add to their difference.
+
+    Blocks with the same levels, design and standards have a width in common: what its prior moves, it moves in both.
+    The width of a block alone is an error that all of its thresholds share.
+    """
+    blocks, of_blocks = (first, second), []
+    for block in blocks:
+        rows = _answered(block, opened)
+        at_standards = rows[rows["analysed"]].groupby("standard", dropna=False, sort=True)
+        of_blocks.append([_flat_fits(block, at_standard) for _, at_standard in at_standards])
+    stimuli = [(one.stimulus and one.stimulus.model_copy(update={"condition": None}), one.assumed) for one in blocks]
+    alike = stimuli[0] == stimuli[1] and first.design == second.design and len(of_blocks[0]) == len(of_blocks[1])
+    found: tuple[dict[str, list[Posterior]], ...] = ({}, {})
+    shared = 0.0
+    for place, of_block in enumerate(of_blocks):
+        prior = blocks[place].assumed
+        for standard, people in enumerate(of_block):
+            others = of_blocks[1 - place][standard] if alike else {}
+            if prior is None or not people:
+                continue
+            fits = [one.flat for one in (*people.values(), *others.values())]
+            priors, of_width = group_widths(fits, prior.width_prior)
+            shared += 0.0 if alike else of_width / len(of_block) ** 2
+            for (person, fit), widths in zip(people.items(), priors, strict=False):
+                found[place].setdefault(str(person), []).append(fit.flat.with_widths(widths))
+    first_of, second_of = (
+        {
+            person: ThresholdInU(
+                value=float(np.mean([one.threshold for one in each])),
+                variance=sum(one.variance for one in each) / len(each) ** 2,
+            )
+            for person, each in of_block.items()
+        }
+        for of_block in found
+    )
+    return (first_of, second_of), shared
+
+
+def _flat_fits(block: LevelBlock, rows: pd.DataFrame) -> dict[Any, PersonFit]:
+    """Return the fit of each participant from the analysed rows of one standard, all widths being equally likely."""
+    if (stimulus := block.stimulus) is None or (assumed := block.assumed) is None:
+        return {}
     two = block.design.kind == "2ifc" and block.has_correct_answer
-    people, fits = [], list[PersonFit]()
+    fits = {}
     for person, own in rows.groupby("participant"):
         grid = analysis_grid(stimulus, block.design, assumed, SESSION_SD / math.sqrt(own["session"].nunique()))
-        people.append((person, own))
-        fits.append(given_by(stimulus, own).fit(grid, two_intervals=two))
-    priors, shared = group_widths([one.flat for one in fits], assumed.width_prior) if fits else ((), 0.0)
-    fitted = zip(people, fits, priors, strict=True)
-    return [FittedPerson(person, own, fit, width_prior) for (person, own), fit, width_prior in fitted], shared
+        fits[person] = given_by(stimulus, own).fit(grid, two_intervals=two)
+    return fits
 
 
 def _own(
@@ -199,7 +255,7 @@ def _own(
     given, grid = fit.given, found.grid
     level_of, threshold, (low, high) = stimulus.level_of, found.threshold, found.interval
     others = found.others
-    psi, shown = fit.expected(found), given.levels[np.isfinite(given.levels)]
+    psi, (lowest, highest) = fit.expected(found), stimulus.domain
     _, first, cells = np.unique([given.places, fit.shifts], axis=1, return_index=True, return_inverse=True)
     decades = fit.change / (1.0 if grid.log else abs(threshold) * math.log(10))
     percent, compared = compared_percent(block.published), math.nan
@@ -216,7 +272,7 @@ def _own(
         lapse=others.lapse,
         guess=others.guess,
         flat_width=level_of(fit.flat.threshold),
-        beyond="above" if threshold > shown.max(initial=-math.inf) else "below" if threshold < shown.min() else None,
+        beyond="above" if threshold > highest else "below" if threshold < lowest else None,
         variance=found.variance,
         fit_p=p_of_fit(np.bincount(cells, given.successes), np.bincount(cells), psi[first]),
         drift=drift(given.successes, psi),
@@ -284,7 +340,7 @@ def psychometric_bands(
         return {}
     u = np.linspace(*ends, PLACES)
     rows = _answered(block, opened)
-    fits, _ = _fits(block, stimulus, assumed, rows[rows["analysed"]])
+    fits, _ = _fits(block, assumed, rows[rows["analysed"]])
     return {str(one.person): np.array([u, *one.posterior.band(u)]) for one in fits if one.person in people}
 
 
@@ -320,7 +376,7 @@ def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[Trac
     rows = _answered(block, opened)
     at_standards = rows[rows["analysed"]].groupby("standard", dropna=False, sort=True)
     fits: list[tuple[Any, FittedPerson]] = [
-        (standard, one) for standard, own in at_standards for one in _fits(block, stimulus, assumed, own)[0]
+        (standard, one) for standard, own in at_standards for one in _fits(block, assumed, own)[0]
     ]
     for standard, fitted in sorted(fits, key=lambda one: one[1].person)[:most]:
         own, ends = fitted.rows, []
@@ -424,8 +480,8 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             f"guesses and lapses{at}: posterior median with an equal-tailed 95 % interval, from all counted answers, "
             f"at the levels delivered to the hand. The width, from 5 to 95 % of the rise, has a log-normal prior; "
             f"the next column is the threshold under a flat one. “Above” and “below” mark thresholds beyond the "
-            "levels presented. Intervals include that a person’s threshold differs between sessions by a factor of "
-            f"{10**SESSION_SD:.2f} (one standard deviation), and a change over the trials. The group is the "
+            "levels of the stimulus. Intervals include that a person’s threshold differs between sessions by a factor "
+            f"of {10**SESSION_SD:.2f} (one standard deviation), and a change over the trials. The group is the "
             "random-effects mean (Paule–Mandel), with the interval of Hartung and Knapp from three participants on. A "
             "variance counts as its geometric mean with their median."
             f"{level}{reversals} Fit: p of the deviance among {SETS} simulated sets of answers. Drift: correlation of "
@@ -462,11 +518,11 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             (shifted, f"the prior of the width shifts a threshold by more than {100 * SHIFT:.0f} %: too few answers"),
             (
                 lambda one: one.beyond == "above",
-                "a threshold lies above the highest level presented; how far is not known",
+                "a threshold lies above the highest level of the stimulus; how far is not known",
             ),
             (
                 lambda one: one.beyond == "below",
-                "a threshold lies below the lowest level presented; how far is not known",
+                "a threshold lies below the lowest level of the stimulus; how far is not known",
             ),
             (lambda one: not one.fits, "the function does not fit the answers, so that a threshold may be biased"),
             (lambda one: one.n < FEW_ANSWERS, f"fewer than {FEW_ANSWERS} answers, so that intervals are wide"),

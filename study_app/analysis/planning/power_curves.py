@@ -21,6 +21,7 @@ from scipy.stats import t as student
 
 from study_app import __version__
 from study_app import figure_style as style
+from study_app.analysis.contrasts import LEFT_OUT
 from study_app.analysis.data.blocks import TRENDS
 from study_app.analysis.data.measures import Array
 from study_app.analysis.page_layout import SMALL, Style
@@ -37,6 +38,7 @@ from study_app.analysis.planning.simulated_studies import (
     people,
 )
 from study_app.analysis.results import enough
+from study_app.analysis.statistics.equivalence import STEPS, fewest
 from study_app.protocol.model import Contrast
 from study_app.psychophysics.grid import Z_95
 from study_app.store.csv_files import Column, csv_bytes, optional
@@ -397,8 +399,13 @@ def _between(found: Powers) -> Iterator[str]:
         rows = [(one.measure, f"{spread:.2f}", spread)]
         yield from smallest_differences(
             one, found.sizes, plan.decided.alphas[-1], len(plan.contrasts) + plan.untested, rows, "statement", said,
-            "±{:.2f}".format, shares, one.bound,
+            "±{:.2f}".format, shares, one.bound, bounds=_bounds(plan), largest=STEPS,
         )  # fmt: skip
+
+
+def _bounds(plan: Plan) -> int:
+    """Return how many hypotheses state a bound of equality."""
+    return sum(one.bound is not None for one in plan.contrasts) + plan.untested_bounds
 
 
 def smallest_differences(
@@ -412,13 +419,17 @@ def smallest_differences(
     written: Callable[[float], str],
     shares: tuple[float, float] | None = None,
     bound: float | None = None,
+    *,
+    bounds: int = 1,
+    largest: float | None = None,
 ) -> Iterator[str]:
     """Yield a table of the smallest difference in a contrast that 80 % of studies show, as Markdown.
 
     It is one of ``members`` hypotheses, and shown by the strictest p of Holm over them. ``rows`` are its first cell,
     below the heading ``first``, and the standard deviation in words and as a number; ``said`` says what that is.
     ``shares`` are those that two groups have of all participants; None: within people. ``bound`` is that of equality,
-    on the scale of the standard deviation.
+    on the scale of the standard deviation, of which ``bounds`` hypotheses state one; ``largest`` is the largest
+    difference of a participant that the scale permits, None without a limit.
     """
     equal = [] if bound is None else [f"shown within the bound {IF_EQUAL}"]
     heads = (first, "participants", "SD", "half the 95 % interval", "smallest difference", *equal)
@@ -427,8 +438,13 @@ def smallest_differences(
     both = "" if shares is None else f" Of the participants {shares[0]:.0%} and {shares[1]:.0%} are in the two groups."
     yield from ("", f"## Contrast: {one.described()}", "")
     at = f"at α = {strictest:.2g}{corrected}, {sides}"
-    within = "" if bound is None else f" Equality: the interval of {1 - 2 * alpha:.3g} lies within the bound."
-    yield f"{said}{both} Smallest difference: what {WANTED:.0%} of studies show {at}.{within}"
+    within = (
+        ""
+        if bound is None
+        else f" Equality takes at least {fewest(alpha / bounds, bound, largest)} participants"
+        f"{' in each group' if shares else ''}, at α = {alpha / bounds:.2g}."
+    )
+    yield f"{said}{both} Smallest difference: what {WANTED:.0%} of studies show {at}.{within} {LEFT_OUT}"
     yield from ("", f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|")
     for name, words, spread in rows:
         for n in sizes:
@@ -437,7 +453,10 @@ def smallest_differences(
             if min(groups) > 1:
                 reached = detectable(*groups, tail=strictest / (2 if one.expected is None else 1))
                 ends = [written(end * spread) for end in reached]
-                ends += [] if bound is None else [f"{shown_equal(bound / spread, *groups, alpha=alpha):.0%}"]
+                if bound is not None:
+                    enough_people = min(groups) >= fewest(alpha / bounds, bound, largest)
+                    share = shown_equal(bound / spread, *groups, alpha=alpha / bounds) if enough_people else 0.0
+                    ends.append(f"{share:.0%}")
             yield f"| {name} | {n} | {words} | {' | '.join(ends)} |"
 
 
@@ -448,20 +467,21 @@ def detectable(n: int, second: int | None = None, *, tail: float) -> tuple[float
     tail that counts as significant.
     """
     root, freedom = _precision(n, second)
-    critical = float(student.isf(tail, freedom))
+    tested = min(n, second or n) - 1  # the report's degrees of freedom are those of the smaller group
+    critical = float(student.isf(tail, tested))
     most = (2 * critical + 10) / root  # of so large a difference more than 80 % show it
     least = float(brentq(lambda size: nct.sf(critical, freedom, size * root) - WANTED, 0.0, most))
-    return float(student.ppf(0.975, freedom)) / root, least
+    return float(student.ppf(0.975, tested)) / root, least
 
 
 def shown_equal(bound: float, n: int, second: int | None = None, *, alpha: float) -> float:
-    """Return the share of studies without a difference whose interval of 1 − 2·alpha lies within ± ``bound`` [SD].
+    """Return the share of studies without a difference whose t tests show that it lies within ± ``bound`` [SD].
 
     Of ``n`` pairs, or of two groups of ``n`` and ``second`` people; the mean over quantiles of the estimated SD.
     """
     root, freedom = _precision(n, second)
     spreads = np.sqrt(chi2.ppf((np.arange(SPREADS) + 0.5) / SPREADS, freedom) / freedom)
-    inside = bound * root - float(student.isf(alpha, freedom)) * spreads
+    inside = bound * root - float(student.isf(alpha, min(n, second or n) - 1)) * spreads
     return float(np.maximum(2 * norm.cdf(inside) - 1, 0.0).mean())
 
 
@@ -504,16 +524,16 @@ def _explained(question: Question, found: Powers) -> list[str]:
                 "bounds the noticeable delay from above."
             ]
         case "equivalence":
+            bound = found.plan.decided.equivalence_bound or STEPS
             return [
-                f"Two one-sided t tests within ±{found.plan.decided.equivalence_bound} points, with which changing "
-                "signs, signed ranks and the bootstrap-t must agree, and with "
-                f"{enough(found.plan.decided.alphas[-1])}. Where the model's difference is near the bound or beyond "
-                "it, finding equivalence would be wrong, and few should."
+                f"Two one-sided t tests within ±{bound} points, with which the bootstrap must agree, and with "
+                f"{enough(found.plan.decided.alphas[-1], bound)}. Where the model's difference is near the bound or "
+                "beyond it, finding equivalence would be wrong, and few should."
             ]
         case "contrast":
             return [
-                "Paired t tests of each participant's mean answers, by Holm over the hypotheses. Equality is shown "
-                f"where the interval of {1 - 2 * found.plan.decided.alphas[-1]:.3g} lies within the bound."
+                "Paired t tests of each participant's mean answers, with which the bootstrap must agree, by Holm over "
+                f"the hypotheses; equality by the report's tests of equivalence. {LEFT_OUT}"
             ]
 
 

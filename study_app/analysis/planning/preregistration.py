@@ -10,20 +10,21 @@ from typing import Final
 from pydantic import TypeAdapter
 
 from study_app import __version__
-from study_app.analysis.contrasts import RATIOS
-from study_app.analysis.data.blocks import SPENDINGS, TRENDS, decisions, spoken
+from study_app.analysis.contrasts import LEFT_OUT, RATIOS, equality_limits
+from study_app.analysis.data.blocks import SPENDINGS, TRENDS, Decided, decisions, spoken
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.html_page import bullets, heading, paragraph
 from study_app.analysis.levels.thresholds import FAMILIES, REMOVED
 from study_app.analysis.planning.simulated_studies import compares_statements
 from study_app.analysis.results import counted, least, listed
+from study_app.analysis.statistics.equivalence import fewest
 from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.statistics.thresholds import FEWEST
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import expected_of, precision_plan, precision_rows, threshold_plan
 from study_app.protocol.describe import describe, limit_rows
-from study_app.protocol.model import Analysis, Protocol
+from study_app.protocol.model import Analysis, Contrast, Protocol
 from study_app.protocol.orders.balance import block_orders_by_group
 from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.table import text_in
@@ -98,10 +99,11 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
         words = contrast.words({block: condition_of(protocol, stimulus) for block, stimulus in stimuli.items()})
         ratio = contrast.measure in RATIOS and all(stimuli[block].spacing == "log" for block in contrast.blocks)
         yield (
-            f"Hypothesis: {contrast.described(words)}. Test: {'Welch' if contrast.groups else 'paired'} t test of "
+            f"Hypothesis: {contrast.described(words)}. Test: {_test_of(contrast)} of "
             f"{'the logarithm of ' if ratio else ''}one number of each participant, "
-            f"{'two-sided' if contrast.expected is None else 'one-sided'}, corrected by Holm over all contrasts."
-            f"{'' if contrast.bound is None else ' Equality: the interval of 1 − 2 alpha lies within the bound.'}"
+            f"{'weighted as in the group mean, ' if contrast.measure == 'threshold' else ''}"
+            f"{'two-sided' if contrast.expected is None else 'one-sided'}, with which the bootstrap must agree, "
+            f"corrected by Holm over all contrasts. {LEFT_OUT}{_equality_of(protocol, contrast)}"
         )
     for block in protocol.main_blocks:
         if block.design is not None:
@@ -110,6 +112,26 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
             yield from _of_statements(protocol, block, language)
     for one in () if protocol.analysis is None else protocol.analysis.published:
         yield f"Published value to compare with: {one.described()}."
+
+
+def _test_of(contrast: Contrast) -> str:
+    """Return the t test of a contrast."""
+    if contrast.groups is None:
+        return "paired t test"
+    return "t test of two groups with unequal variances and the degrees of freedom of the smaller one"
+
+
+def _equality_of(protocol: Protocol, contrast: Contrast) -> str:
+    """Return how equality is tested, and how many participants it takes; nothing without a bound."""
+    if contrast.bound is None or protocol.analysis is None:
+        return ""
+    bounds = sum(one.bound is not None for one in protocol.analysis.contrasts)
+    reach, largest = equality_limits(contrast, contrast.bound, ratio=contrast.measure in RATIOS)
+    alpha = decisions(protocol).alphas[-1] / bounds
+    return (
+        f" Equality: two one-sided t tests and the bootstrap, corrected by Holm over {counted(bounds, 'bound')}, with "
+        f"at least {fewest(alpha, reach, largest)} participants{' in each group' if contrast.groups else ''}."
+    )
 
 
 def _of_intervals(protocol: Protocol, block: Block) -> Iterator[str]:
@@ -200,8 +222,8 @@ def analyses(protocol: Protocol) -> Iterator[str]:
         yield (
             f"Delays: a trend in the population, by {TRENDS[decided.trends]}, one-sided in the stated direction, "
             "otherwise two-sided; where a trend shows, rank correlations are tested again without the longest delay "
-            "until none shows; equivalence to no delay by two one-sided tests, where a bound is given, with "
-            f"{least(decided.alphas[-1])}; the detection threshold from agreement, where it shows a trend."
+            f"until none shows; {_equivalence_words(decided)}the detection threshold from agreement, where it shows a "
+            "trend."
         )
     if others := kinds - {None, "delays"}:
         yield (
@@ -218,6 +240,16 @@ def analyses(protocol: Protocol) -> Iterator[str]:
         "others, exploratory, by Benjamini and Hochberg."
         if protocol.analysis is not None
         else "Nothing is decided (there is no table [analysis]): all results are exploratory."
+    )
+
+
+def _equivalence_words(decided: Decided) -> str:
+    """Return how equivalence of delays is tested; nothing without a bound."""
+    if (bound := decided.equivalence_bound) is None:
+        return ""
+    return (
+        "equivalence to no delay by two one-sided tests, with which the bootstrap must agree, with "
+        f"{least(decided.alphas[-1], bound)}; "
     )
 
 

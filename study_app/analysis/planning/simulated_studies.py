@@ -8,7 +8,6 @@ All of them meet the same random rearrangements of participants' answers; sums o
 matrices of whole numbers, exact in single precision.
 """
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -17,15 +16,15 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
 from scipy.stats import ttest_1samp
 
 from study_app.analysis.data.blocks import Block as StatementBlock
 from study_app.analysis.data.blocks import Decided, Item, Setting, read_decided, spoken
 from study_app.analysis.data.measures import Array
+from study_app.analysis.statistics.equivalence import STEPS, p_equivalent
 from study_app.analysis.statistics.equivalence import equivalent as shows_equivalence
-from study_app.analysis.statistics.equivalence import p_above, sizes
-from study_app.analysis.statistics.outcome import FEW, SIDES, false_discovery, holm, p_of_draws
+from study_app.analysis.statistics.mean_tests import means_of, p_differs, resamples_for
+from study_app.analysis.statistics.outcome import FEW, SIDES, doubled_ranks, false_discovery, holm, p_of_draws
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block
 from study_app.protocol.groups import groups_with
@@ -68,6 +67,7 @@ class Plan:
     """A study that is planned; of its contrasts those of statements within people, and how many others there are.
 
     Those of statements ``between`` groups come with the share of all participants that each of the two groups has.
+    ``untested_bounds`` of the others state a bound of equality.
     """
 
     name: str
@@ -78,6 +78,7 @@ class Plan:
     contrasts: tuple[Contrast, ...] = ()
     untested: int = 0
     between: tuple[tuple[Contrast, tuple[float, float]], ...] = ()
+    untested_bounds: int = 0
 
     @property
     def unknown(self) -> tuple[str, ...]:
@@ -108,6 +109,7 @@ def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
         contrasts=within,
         untested=len(every) - len(within),
         between=tuple((one, shares) for one in stated if (shares := group_shares(protocol, one)) is not None),
+        untested_bounds=sum(one.bound is not None for one in every if one not in within),
     )
 
 
@@ -291,11 +293,28 @@ def signed(answers: Array, rng: np.random.Generator) -> Array:
     return p.reshape(studies, items)
 
 
-def equivalent(differences: Array, bound: float, alpha: float, rng: np.random.Generator) -> NDArray[np.bool_]:
+def sizes(differences: Array) -> Array:
+    """Return the (doubled) ranks of differences (rows, n) among those that are not 0, whose own are 0."""
+    if not len(differences):
+        return differences
+    ranked = doubled_ranks(np.abs(differences)) - 2 * (differences == 0).sum(axis=1, keepdims=True)
+    return np.where(differences == 0, 0, ranked)
+
+
+def p_above(values: Array, positive: NDArray[np.bool_], up: NDArray[np.float32]) -> Array:
+    """Return the one-sided p (rows,) that the ``positive`` of ``values`` (rows, n) outweigh the others.
+
+    ``up`` (draws, n) are the signs that are drawn, 1 for positive.
+    """
+    seen = np.where(positive, values, 0).sum(axis=1).astype(np.float32) * np.float32(1 - 1e-6)
+    drawn = up @ values.T.astype(np.float32)
+    return p_of_draws(drawn, seen)
+
+
+def equivalent(differences: Array, bound: float, alpha: float) -> NDArray[np.bool_]:
     """Return whether equivalence of differences (studies, people, …) within ± ``bound`` is shown as in the report."""
     rows = np.moveaxis(differences, 1, -1)
-    draws = max(PLANNED_DRAWS, math.ceil(2 / alpha))
-    shown = shows_equivalence(rows.reshape(-1, rows.shape[-1]), bound, alpha, rng, draws)
+    shown = shows_equivalence(rows.reshape(-1, rows.shape[-1]), bound, alpha)
     return np.asarray(shown.reshape(rows.shape[:-1]))
 
 
@@ -348,13 +367,16 @@ IF_EQUAL: Final = "if truly equal"
 
 
 def contrasts(plan: Plan, given: Sequence[Array], alpha: float) -> dict[str, NDArray[np.bool_]]:
-    """Return which studies (studies, effects) show each contrast of statements, in words: paired t tests, by Holm.
+    """Return which studies (studies, effects) show each contrast of statements, in words, as in the report.
 
-    With a bound also which would show equality within it, `IF_EQUAL`, by the interval of 1 − 2·alpha. ``given`` are
-    each block's answers (effects, studies, participants, settings, items).
+    With a bound also which would show equality within it, `IF_EQUAL`. Both are corrected by Holm. ``given`` are each
+    block's answers (effects, studies, participants, settings, items).
     """
+    if not plan.contrasts:
+        return {}
     blocks = {block.id: (block, answers) for block, answers in zip(plan.blocks, given, strict=True)}
-    ps, equal = [], dict[str, NDArray[np.bool_]]()
+    ps, of_equal, with_bound = [], [], [one for one in plan.contrasts if one.bound is not None]
+    members = len(plan.contrasts) + plan.untested
     for one in plan.contrasts:
         sides = []
         for name, condition in zip(
@@ -364,20 +386,33 @@ def contrasts(plan: Plan, given: Sequence[Array], alpha: float) -> dict[str, NDA
             rows = [place for place, it in enumerate(block.settings) if condition in (None, it.condition)]
             sides.append(answers[:, :, :, rows, [it.id for it in block.items].index(one.measure)].mean(axis=-1))
         away = sides[0] - sides[1]
-        differ = np.ptp(away, axis=-1) > 0  # equal differences have no t
-        found = np.ones(differ.shape)
-        found[differ] = ttest_1samp(away[differ], 0.0, axis=-1, alternative=SIDES[one.expected]).pvalue
-        ps.append(found.T)
+        ps.append(_p_of_contrast(away, one, alpha / members).T)
         if one.bound is not None:
-            none = away[0] - away[0].mean()
-            reach = float(student.isf(alpha, none.shape[-1] - 1)) * none.std(axis=-1, ddof=1) / none.shape[-1] ** 0.5
-            within = np.abs(none.mean(axis=-1)) + reach <= one.bound
-            equal[f"{one.described()}, {IF_EQUAL}"] = np.repeat(within[:, None], len(away), axis=1)
-    if not ps:
-        return {}
-    family = np.stack([*ps, *[np.ones_like(ps[0])] * plan.untested], axis=-1)
-    adjusted = np.apply_along_axis(lambda each: np.array(holm(each.tolist())), -1, family)
-    return {one.described(): adjusted[..., place] <= alpha for place, one in enumerate(plan.contrasts)} | equal
+            means = means_of(away[0] - away[0].mean(), resamples=resamples_for(alpha / members))
+            of_equal.append(p_equivalent(means, one.bound, away.shape[-1], STEPS))
+    shown = _holm(ps, plan.untested) <= alpha
+    found = {one.described(): shown[..., place] for place, one in enumerate(plan.contrasts)}
+    if with_bound:
+        equal = np.repeat((_holm(of_equal, plan.untested_bounds) <= alpha)[:, None], len(given[0]), axis=1)
+        found |= {f"{one.described()}, {IF_EQUAL}": equal[..., place] for place, one in enumerate(with_bound)}
+    return found
+
+
+def _p_of_contrast(away: Array, one: Contrast, strictest: float) -> Array:
+    """Return the p (effects, studies) of differences (effects, studies, participants); 1 where all are equal."""
+    rows = away.reshape(-1, away.shape[-1])
+    differ = np.ptp(rows, axis=-1) > 0
+    found = np.ones(len(rows))
+    if differ.any():
+        means = means_of(rows[differ], resamples=resamples_for(strictest))
+        found[differ] = np.max(p_differs(means, SIDES[one.expected]), axis=0)
+    return found.reshape(away.shape[:-1])
+
+
+def _holm(ps: Sequence[Array], others: int) -> Array:
+    """Return p (…, contrasts), corrected together with so many ``others`` that show nothing."""
+    family = np.stack([*ps, *[np.ones_like(ps[0])] * others], axis=-1)
+    return np.asarray(np.apply_along_axis(lambda each: np.array(holm(each.tolist())), -1, family))
 
 
 def _counted(found: NDArray[np.bool_], shown: NDArray[np.bool_], effects: int) -> dict[str, NDArray[np.bool_]]:
@@ -413,7 +448,7 @@ def _delays(
     if decided.equivalence_bound is not None:
         here = answers[[0, FULL]]
         away = here[:, :, :, 1:] - here[:, :, :, :1]
-        equal = [equivalent(one, decided.equivalence_bound, decided.alpha, rng) for one in away]
+        equal = [equivalent(one, decided.equivalence_bound, decided.alpha) for one in away]
         counted["equivalent"] = np.array(equal).transpose(1, 0, 3, 2)
     return counted
 

@@ -369,6 +369,7 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
             f"SD{share}: of {whose} by a factor of {BETWEEN_PEOPLE:g}.",
             (lambda end: f"×/÷ {math.exp(end):.2f}") if ratio else "±{:.2f}".format,
             group_shares(precisions.protocol, one), log_bound(precisions.protocol, one) if ratio else one.bound,
+            bounds=sum(each.bound is not None for each in decided.contrasts),
         )  # fmt: skip
 
 

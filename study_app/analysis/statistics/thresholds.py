@@ -284,27 +284,31 @@ class GroupMean:
     between: float
 
 
+def random_effects_weights(estimates: Array, variances: Array) -> tuple[Array, float]:
+    """Return the weights (n,) of estimates in their random-effects mean, and the variance between them."""
+    n, v = len(estimates), np.sqrt(variances * np.median(variances))
+
+    def excess(between: float) -> float:
+        weights = 1.0 / (v + between)
+        mean = float((weights * estimates).sum() / weights.sum())
+        return float((weights * (estimates - mean) ** 2).sum()) - (n - 1)
+
+    between = 0.0
+    if n > 1 and excess(0.0) > 0.0:
+        between = float(brentq(excess, 0.0, float(np.var(estimates, ddof=1)) * n + 1e-12, xtol=1e-14))
+    return 1.0 / (v + between), between
+
+
 def group_mean(estimates: Sequence[float], variances: Sequence[float], shared: float = 0.0) -> GroupMean:
     """Return the random-effects mean of estimates, shape (n,), with their variances, each above zero.
 
     A variance counts as its geometric mean with the median of all: variances are estimates, too, and thresholds that
     are too high have the smaller ones. ``shared`` is the variance of an error that all have in common.
     """
-    y, v = np.asarray(estimates, float), np.asarray(variances, float)
-    n = len(y)
+    y, n = np.asarray(estimates, float), len(estimates)
     if n == 0:
         raise ValueError("a mean needs an estimate")
-    v = np.sqrt(v * np.median(v))
-
-    def excess(between: float) -> float:
-        weights = 1.0 / (v + between)
-        mean = float((weights * y).sum() / weights.sum())
-        return float((weights * (y - mean) ** 2).sum()) - (n - 1)
-
-    between = 0.0
-    if n > 1 and excess(0.0) > 0.0:
-        between = float(brentq(excess, 0.0, float(np.var(y, ddof=1)) * n + 1e-12, xtol=1e-14))
-    weights = 1.0 / (v + between)
+    weights, between = random_effects_weights(y, np.asarray(variances, float))
     mean = float((weights * y).sum() / weights.sum())
     if n < FEWEST:
         return GroupMean(n=n, mean=mean, low=None, high=None, between=between)

@@ -18,7 +18,7 @@ from tests.analysis.conftest import Results
 CALM = [1, 1, 0, 0, -1] * 6
 AWAY = [3, 4, 3, 4, 3] * 6
 SCATTERED = [3, -3, 2, -2, 0]
-DOUBTED = [5] + [0] * 14
+DOUBTED = [5] + [0] * 16
 """By t equivalent (p = .033) within a point; by the bootstrap-t not."""
 
 

@@ -29,7 +29,7 @@ Said = Callable[[int, int, str, str], int]
 
 
 def of_delays(answer: Said, decided: Decided = DECIDED) -> Results:
-    return evaluate(study(delays(DELAYS), list(everybody(delays(DELAYS), 16, answer)), decided))
+    return evaluate(study(delays(DELAYS), list(everybody(delays(DELAYS), 20, answer)), decided))
 
 
 def of_liquids(answer: Said, people: int = 12, decided: Decided = DECIDED) -> Results:
@@ -58,7 +58,7 @@ def ordered(people: int, **decided: Any) -> Results:
 def primary_later() -> Results:
     """Return a study whose primary statement changes from 150 ms on, and the exploratory one from 50 ms on."""
     high = {("D4", "harder"), ("D2", "different"), ("D3", "different"), ("D4", "different")}
-    noise = np.random.default_rng(1).integers(0, 2, (16, 4, 2))
+    noise = np.random.default_rng(1).integers(0, 2, (20, 4, 2))
 
     def answer(person: int, _session: int, code: str, item: str) -> int:
         up = 4 * ((code, item) in high)

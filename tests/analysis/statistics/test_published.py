@@ -43,13 +43,13 @@ def test_the_smallest_p_of_so_many_people_who_agree(test: str, n: int) -> None:
 @pytest.mark.parametrize(
     ("differences", "verdict"),
     [
-        ([2.0] * 14, "inconclusive"),
-        ([0.0] * 14, "equivalent"),
-        ([1.0] * 14, "inconclusive"),  # on the bound: not within it
-        ([0.0] * 13, "out of reach"),
+        ([2.0] * 17, "inconclusive"),
+        ([0.0] * 17, "equivalent"),
+        ([1.0] * 17, "inconclusive"),  # on the bound: not within it
+        ([0.0] * 16, "out of reach"),
         ([2.0] * 5, "out of reach"),
-        ([0.0, 1.0, 0.0, -1.0] * 3 + [0.0], "out of reach"),
-        ([0.0, 1.0, 0.0, -1.0] * 3 + [0.0, 1.0], "equivalent"),  # one in five who notice would be seen: 0.8**14 < 0.05
+        ([0.0, 1.0, 0.0, -1.0] * 4, "out of reach"),
+        ([0.0, 1.0, 0.0, -1.0] * 4 + [0.0], "equivalent"),  # of one in six some are in it: (5 / 6)**17 < 0.05
     ],
 )
 def test_equivalence_needs_enough_people_and_no_spread(differences: list[float], verdict: str) -> None:

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.analysis.statistics import equivalence, outcome, rank_tests, recognition, thresholds, trend
+from study_app.analysis.planning import simulated_studies
+from study_app.analysis.statistics import equivalence, mean_tests, outcome, rank_tests, recognition, thresholds, trend
 from study_app.errors import AnalysisError
 from tests.analysis.outputs import GOLDEN
 from tests.golden import compare
@@ -105,14 +106,12 @@ def of_equivalence() -> Iterator[str]:
     cases = {name: np.asarray(one, float) for name, one in DIFFERENCES.items()}
     for bound, alpha in ((1.0, 0.05), (0.5, 0.05), (3.0, 0.2)):
         yield from results(equivalence.tost, cases, bound, alpha=alpha)
-    yield from results(equivalence.tost, {"small": cases["small"]}, 1.0, checks=False)
-    yield from results(equivalence.tost, cases, 1.0, verdict_only=True)
-    yield from results(equivalence.fewest, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01)})
-    yield from results(equivalence.resamples_for, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01, 0.001, 1e-5)})
+    limits = {f"{alpha} {bound}": (alpha, bound) for alpha in (0.2, 0.05, 0.01) for bound in (0.5, 1.0, 3.0)}
+    yield from results(equivalence.fewest, limits)
+    yield from results(mean_tests.resamples_for, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01, 0.001, 1e-5)})
     rows = {name: one[None] for name, one in cases.items() if len(one) > 2 and not np.isnan(one).any()}
-    yield from results(equivalence.p_within, rows, 1.0, 3, 200)
-    yield from results(equivalence.sizes, rows)
-    yield from results(equivalence.equivalent, rows, 1.0, 0.05, np.random.default_rng(1), 200)
+    yield from results(simulated_studies.sizes, rows)
+    yield from results(equivalence.equivalent, rows, 1.0, 0.05)
 
 
 def of_thresholds() -> Iterator[str]:

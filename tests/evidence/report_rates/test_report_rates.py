@@ -123,7 +123,7 @@ def test_another_estimator_of_noticed_delays_and_other_intervals_are_noticed(
         return replace(found, interval=Interval(low=low, high=high, level=0.95, method="other"))
 
     monkeypatch.setattr(studies, "noticed", other)
-    rates = count_single(("one threshold for all", 12), 1, 0, 600 if reach > 1 else 150)
+    rates = count_single(("one threshold for all", 12), 1, 0, 150 if reach == 1 else 800)
     assert [one.holds for one in rates if one.what == what] == ["no"] * bool(what)
     assert what or "no" not in [one.holds for one in rates]
 

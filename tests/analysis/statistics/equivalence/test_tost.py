@@ -2,14 +2,10 @@ from itertools import product
 
 import numpy as np
 import pytest
-from scipy.stats import binom, wilcoxon
+from scipy.stats import binom
 
 from study_app.analysis.statistics.equivalence import tost
 from study_app.errors import AnalysisError
-
-# Hours of sleep gained by ten patients with two drugs (Student 1908; R, sleep).
-FIRST = np.array([0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0, 2.0])
-SECOND = np.array([1.9, 0.8, 1.1, 0.1, -0.1, 4.4, 5.5, 1.6, 4.6, 3.4])
 
 
 @pytest.mark.slow
@@ -27,24 +23,43 @@ def test_where_a_few_notice_strongly_equivalence_is_seldom_shown(n: int, others:
     assert shown <= binom.ppf(0.999, 400, 0.05)
 
 
-def test_the_permutation_check_goes_through_all_signs() -> None:
-    differences = np.array([0.5, -0.5, 0.0, 1.0, 0.5, 0.0])
-    result = tost(differences, 1.0)
-
-    def p(shifted: np.ndarray) -> float:
-        every = [np.dot(signs, shifted) for signs in product((1, -1), repeat=len(shifted))]
-        return float(np.mean(np.array(every) >= shifted.sum() - 1e-9))
-
-    assert result.p_permutation == pytest.approx(max(p(differences + 1), p(1 - differences)))
+def test_the_bootstrap_counts_a_further_participant_like_the_most_extreme() -> None:
+    """Of one at 5 among zeros and a further one the weight is Beta(2, n − 1): at least q as often as B(n, q) ≤ 1."""
+    n, bound = 20, 1.0
+    found = tost([5.0] + [0.0] * (n - 1), bound)
+    assert found.p_bootstrap == pytest.approx(binom.cdf(1, n, bound / 5), abs=0.02)
+    # Of 2, 1, 0 and a further 2, less 1, the weights of two outweigh that of one in three of four draws.
+    assert tost([2.0, 1.0, 0.0], 1.0).p_bootstrap == pytest.approx(0.75, abs=0.03)
 
 
-def test_the_rank_check_shifts_by_the_bound_to_both_sides() -> None:
-    differences = FIRST - SECOND + 0.01 * np.arange(10)
-    below = wilcoxon(differences + 2, alternative="greater", method="exact").pvalue
-    above = wilcoxon(differences - 2, alternative="less", method="exact").pvalue
-    assert tost(differences, 2.0).p_ranks == pytest.approx(max(below, above))
-    # One of three lies on the bound and two about it.
-    assert tost([0.0, 1.0, 2.0], 1.0).p_ranks == pytest.approx(0.75)
+@pytest.mark.parametrize(("bound", "n"), [(0.5, 35), (1.0, 17), (1.5, 14), (3.0, 14)])
+def test_the_fewest_participants_depend_on_the_bound(bound: float, n: int) -> None:
+    """A share bound / 6 of people who differ by six points shifts the mean by the bound; 5 % of samples have none."""
+    assert (1 - min(1 / 5, bound / 6)) ** n <= 0.05 < (1 - min(1 / 5, bound / 6)) ** (n - 1)
+    calm = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, bound / 4] * 6
+    assert tost(calm[:n], bound).verdict == "equivalent"
+    fewer = tost(calm[: n - 1], bound)
+    assert (fewer.verdict, fewer.note) == (
+        "out of reach",
+        f"too few participants to call it equivalent: {n} are needed",
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("share", "bound", "n"),
+    [(1 / 6, 1.0, 14), (1 / 6, 1.0, 30), (1 / 12, 0.5, 14), (1 / 12, 0.5, 30), (1 / 12, 0.5, 40)],
+)
+@pytest.mark.parametrize("others", [(0,), (-1, 0, 0, 1)])
+def test_a_minority_that_differs_by_the_whole_scale_is_seldom_missed(
+    share: float, bound: float, n: int, others: tuple[int, ...]
+) -> None:
+    rng = np.random.default_rng(n)
+    shown = [
+        tost(np.where(rng.random(n) < share, 6.0, rng.choice(others, n)), bound).verdict == "equivalent"
+        for _ in range(400)
+    ]
+    assert sum(shown) <= binom.ppf(0.999, 400, 0.05)
 
 
 @pytest.mark.parametrize("bound", [0, -1, np.nan, np.inf])
@@ -58,5 +73,5 @@ def test_a_bound_that_means_nothing_is_refused(bound: float) -> None:
 def test_published_power_at_no_difference(n: int, power: float) -> None:
     # Paired differences of whole answers whose spread is 2.36 points; the bound is 1.
     rng = np.random.default_rng(n)
-    shown = [tost(rng.normal(0, 2.36, n), 1.0, checks=False).verdict == "equivalent" for _ in range(1000)]
+    shown = [(tost(rng.normal(0, 2.36, n), 1.0).p or 0.0) <= 0.05 for _ in range(1000)]
     assert np.mean(shown) == pytest.approx(power, abs=0.05)

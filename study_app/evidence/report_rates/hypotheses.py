@@ -1,0 +1,259 @@
+"""How often verdicts on hypotheses, recognition, equivalence and trends are wrong, on numbers that are drawn directly.
+
+Each trial draws one study whose truth is known and calls the statistic that the report calls: who is in it, how it is
+worded and where it stands is covered by tests.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from typing import Final, TypeAlias
+
+import numpy as np
+from scipy.optimize import brentq
+
+from study_app.analysis.contrasts import Compared, Measured
+from study_app.analysis.findings.recognition import RecognitionResult, recognised
+from study_app.analysis.results import Verdict
+from study_app.analysis.statistics.equivalence import STEPS, p_equivalent, tost
+from study_app.analysis.statistics.mean_tests import means_of, p_differs
+from study_app.analysis.statistics.outcome import Array, holm
+from study_app.analysis.statistics.recognition import recognition
+from study_app.analysis.statistics.trend import trend
+from study_app.protocol.checks.expected_precision import ThresholdPlan
+from study_app.protocol.trials.designs import ForcedChoice
+from study_app.protocol.trials.methods import UpDown
+from study_app.protocol.trials.stimuli import Stimulus
+from study_app.psychophysics.people import BETWEEN_PEOPLE
+
+ALPHA: Final = 0.05
+
+Trial: TypeAlias = Callable[[np.random.Generator], bool]
+Drawn: TypeAlias = Callable[[np.random.Generator, int], Array]
+"""Draws the numbers of so many participants."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrawnStudies:
+    """Studies of so many ``participants``, of which ``trial`` draws one and says whether it makes the ``claim``."""
+
+    name: str
+    participants: int
+    claim: str
+    trial: Trial
+
+
+SHOWN: Final = "shown"
+EQUIVALENT: Final = "called equivalent"
+
+
+def false_claims() -> Iterator[DrawnStudies]:
+    """Yield studies whose claims are false."""
+    yield from _thresholds()
+    yield from _recognition()
+    yield from _equivalence()
+    yield from _contrasts()
+    yield from _trends()
+
+
+def powers() -> Iterator[DrawnStudies]:
+    """Yield studies whose claims are true."""
+    yield DrawnStudies(
+        name="thresholds of two blocks, 1.5 : 1, 3-down-1-up, 60 trials",
+        participants=12,
+        claim=SHOWN,
+        trial=_compares_thresholds(12, 1.5),
+    )
+
+
+def _shows(*samples: Array, alternative: str = "two-sided") -> bool:
+    """Return whether the test of a contrast shows a difference from 0, or between two groups."""
+    means, *others = (means_of(sample[None], group=group) for group, sample in enumerate(samples))
+    for other in others:
+        means = means - other
+    return bool(means.error[0] > 0 and max(float(p[0]) for p in p_differs(means, alternative)) <= ALPHA)
+
+
+LEVELS: Final = (0.02, 0.6)
+DESIGN: Final = ForcedChoice()
+METHOD: Final = UpDown(rule="3down1up", trials=30, tracks=2)
+
+
+def _thresholds() -> Iterator[DrawnStudies]:
+    yield DrawnStudies(
+        name="thresholds of two blocks, equal, 3-down-1-up, 60 trials",
+        participants=12,
+        claim=SHOWN,
+        trial=_compares_thresholds(12, 1.0),
+    )
+
+
+def _compares_thresholds(n: int, ratio: float) -> Trial:
+    """Return a trial that compares thresholds of the same people in two blocks, the first ``ratio`` times higher."""
+    plan = ThresholdPlan(Stimulus(vary="damping_nspm", levels=LEVELS), DESIGN, METHOD, catch=0, standards=1)
+
+    def trial(rng: np.random.Generator) -> bool:
+        middle = sum(plan.stimulus.domain) / 2
+        spread = math.log10(BETWEEN_PEOPLE) / math.sqrt(2)  # the difference has that of `power`
+        own = middle + spread * rng.normal(size=n)
+        fits = [
+            fit
+            for shift in (math.log10(ratio), 0.0)
+            for fit in plan.fits(plan.answers(own + spread * rng.normal(size=n) + shift, rng))
+        ]
+        found = plan.grouped(fits, 2 * n)  # both blocks have a width in common
+        values, variances = found.medians[:n] - found.medians[n:], found.variances[:n] + found.variances[n:]
+        sample = tuple(Measured(value=values[k], variance=variances[k]) for k in np.argsort(values))
+        means = Compared(samples=(sample,), left_out={}).means(ALPHA)
+        return means is not None and max(float(p[0]) for p in p_differs(means, "two-sided")) <= ALPHA
+
+    return trial
+
+
+LIQUIDS: Final = ("water", "honey", "oil")
+
+
+def _recognition() -> Iterator[DrawnStudies]:
+    for n in (12, 24, 60):
+        for share in (0.5, 0.8):
+            name = f"honey known, water and oil both called water in {100 * share:.0f} %"
+            yield DrawnStudies(
+                name=name, participants=n, claim="water or oil recognised", trial=_recognises(n, share, known=(1,))
+            )
+        yield DrawnStudies(
+            name="all three liquids guessed",
+            participants=n,
+            claim="a liquid recognised",
+            trial=_recognises(n, 0.5, known=()),
+        )
+
+
+def _recognises(n: int, share: float, known: tuple[int, ...]) -> Trial:
+    """Return a trial of liquids that are called the first or the last at random, but for those ``known``."""
+
+    def trial(rng: np.random.Generator) -> bool:
+        names = np.where(rng.random((n, 3)) < share, 0, 2) if known else rng.integers(0, 3, (n, 3))
+        names[:, list(known)] = known
+        found = recognition(names, [0, 1, 2], 3, seed=None)
+        verdict: Verdict = "shown" if found.p is not None and found.p <= ALPHA else "not shown"
+        named = RecognitionResult(LIQUIDS, LIQUIDS, LIQUIDS, found, verdict)
+        return bool({*recognised(named, ALPHA)} - {*known})
+
+    return trial
+
+
+def _equivalence() -> Iterator[DrawnStudies]:
+    for bound in (0.5, 1.0):
+        share = bound / STEPS
+        for words, others in (("0", (0.0,)), ("−1, 0 or 1", (-1.0, 0.0, 0.0, 1.0))):
+            name = f"one in {1 / share:.0f} differs by 6 points, the others by {words}, bound {bound:g}"
+            for n in (14, 20, 30, 40):
+                yield DrawnStudies(name=name, participants=n, claim=EQUIVALENT, trial=_misses(n, share, others, bound))
+    for members in (1, 4, 6):
+        words = "one hypothesis" if members == 1 else f"{members} hypotheses"
+        yield DrawnStudies(
+            name=f"{words} at the bound, normal",
+            participants=20,
+            claim=f"any {EQUIVALENT}",
+            trial=_calls_equivalent(20, members),
+        )
+
+
+def _misses(n: int, share: float, others: tuple[float, ...], bound: float) -> Trial:
+    def trial(rng: np.random.Generator) -> bool:
+        differences = np.where(rng.random(n) < share, STEPS, rng.choice(others, n))
+        return tost(differences, bound).verdict == "equivalent"
+
+    return trial
+
+
+def _calls_equivalent(n: int, members: int) -> Trial:
+    def trial(rng: np.random.Generator) -> bool:
+        means = means_of(rng.normal(1.0, 1.0, (members, n)))
+        ps = holm(p_equivalent(means, 1.0, n, STEPS).tolist())
+        return min(p for p in ps if p is not None) <= ALPHA
+
+    return trial
+
+
+def _contrasts() -> Iterator[DrawnStudies]:
+    for n in (8, 12, 30):
+        for ratio in (1, 3, 6):
+            name = f"two groups, sizes 1 : 2, SDs {ratio} : 1"
+            yield DrawnStudies(
+                name=name, participants=n, claim=SHOWN, trial=_compares_groups(round(n / 3), n - round(n / 3), ratio)
+            )
+    for n in (8, 12, 20, 30):
+        yield DrawnStudies(
+            name="paired, one in six 5 points higher, the others 1 lower",
+            participants=n,
+            claim=SHOWN,
+            trial=_compares_pairs(n, _one_in_six),
+        )
+    yield DrawnStudies(
+        name="paired, exponential",
+        participants=30,
+        claim=SHOWN,
+        trial=_compares_pairs(30, lambda rng, n: rng.exponential(size=n) - 1),
+    )
+
+
+def _compares_groups(n: int, other: int, ratio: float) -> Trial:
+    return lambda rng: _shows(ratio * rng.normal(size=n), rng.normal(size=other))
+
+
+def _compares_pairs(n: int, drawn: Drawn) -> Trial:
+    return lambda rng: _shows(drawn(rng, n))
+
+
+def _one_in_six(rng: np.random.Generator, n: int) -> Array:
+    return np.where(rng.random(n) < 1 / 6, 5.0, -1.0)
+
+
+DELAYS: Final = np.linspace(-1.0, 1.0, 7)
+SLOPE: Final = 1.2
+NOISE: Final = 0.7
+MANY: Final = 20_000
+
+
+def _trends() -> Iterator[DrawnStudies]:
+    """Yield trends of people's own that are skewed: of mean 0, so that ranks fall, and of rank correlation 0."""
+    for n in (12, 30):
+        yield DrawnStudies(
+            name="own trends, skewed, mean 0: ranks fall",
+            participants=n,
+            claim="a rise shown",
+            trial=_follows(n, 0.0, "rise"),
+        )
+        name = "own trends, skewed, mean rank correlation 0"
+        yield DrawnStudies(
+            name=name, participants=n, claim="a trend shown", trial=_follows(n, _shift_without_trend(), "either")
+        )
+
+
+def _follows(n: int, shift: float, claim: str) -> Trial:
+    def trial(rng: np.random.Generator) -> bool:
+        found = trend(_answers(rng, n, shift), None, seed=None)
+        claimed = found.p is not None and found.p <= ALPHA
+        return claimed and (claim == "either" or (found.effect or 0.0) > 0)
+
+    return trial
+
+
+def _answers(rng: np.random.Generator, n: int, shift: float) -> Array:
+    """Return answers (participants, delays) of people whose slopes are exponential with mean ``shift``."""
+    slopes = SLOPE * (rng.exponential(size=(n, 1)) - 1 + shift)
+    return np.clip(np.round(4 + slopes * DELAYS + NOISE * rng.normal(size=(n, len(DELAYS)))), 1, 7)
+
+
+@cache
+def _shift_without_trend() -> float:
+    """Return the mean of skewed slopes at which the mean rank correlation is 0, found from many people."""
+
+    def correlation(shift: float) -> float:
+        return trend(_answers(np.random.default_rng(0), MANY, shift), None, seed=None).effect or 0.0
+
+    return float(brentq(correlation, 0.0, 1.0, xtol=1e-3))
