@@ -78,12 +78,14 @@ def tost(
     ----------
     differences : (participants,) array
         NaN where an answer is missing: dropped.
-    bound, largest : float
-        In points of the scale: the bound, and the largest difference of a participant that the scale permits.
+    bound : float
+        In points of the scale.
     alpha : float
         Level of each one-sided test.
     seed : int
         Of the resamples.
+    largest : float
+        Largest difference of a participant that the scale permits, in points.
     """
     if not (bound > 0.0 and math.isfinite(bound)):
         raise AnalysisError(f"a bound of equivalence of {bound} means nothing; give one above 0 in points of the scale")

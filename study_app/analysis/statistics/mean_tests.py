@@ -106,6 +106,8 @@ def means_of(
         Of the participants in the means; by default all are equal.
     seed, group : int
         Of the resamples; groups that are compared need different numbers.
+    resamples : int
+        How many are drawn.
     """
     n, values = values.shape[1], np.sort(values, axis=1)
     weights = np.ones(n) if weights is None else weights / weights.mean()
