@@ -101,6 +101,7 @@ class FalconDevice(FramedDevice):
             delay_s=round_trip_s,
             count_m=mechanics.count_at(mechanism, geometry.centre_m),
             mass_kg=exchange.LEAST_MASS_KG,
+            force_error_n=mechanics.rounding_n(mechanism),
         )
         self.memory[:] = exchange.new_exchange(connection.calls(), mechanism, geometry, self.force_limit_n)
         self._start_guard(connection.name)

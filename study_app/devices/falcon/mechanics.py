@@ -19,6 +19,7 @@ outside. Forward: Newton's method on the three g for p, from the position before
 Jacobian was derived for this program: the widely used one has a wrong column for z.
 """
 
+import itertools
 import math
 from dataclasses import dataclass
 from typing import Any, Final
@@ -252,6 +253,16 @@ def count_at(mechanism: Any, z_m: float) -> float:
     inverse(mechanism, position_m, theta)
     jacobian(mechanism, theta, position_m, rates)
     return float(np.linalg.norm(np.linalg.inv(rates), 2) * mechanism.rad_per_count)
+
+
+def rounding_n(mechanism: Any) -> float:
+    """Return the most by which whole motor units change a force in the reach of the grip [N]: half a unit per motor."""
+    theta, rates, sums = np.zeros(3), np.zeros((3, 3)), []
+    for corner_m in itertools.product(*SAFE_BOX_M):
+        if inverse(mechanism, np.array(corner_m), theta) == REACHED:
+            jacobian(mechanism, theta, np.array(corner_m), rates)
+            sums.append(np.linalg.norm(rates, axis=1).sum())
+    return float(0.5 / mechanism.units_per_nm * max(sums))
 
 
 @kernel

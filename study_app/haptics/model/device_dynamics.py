@@ -19,6 +19,7 @@ class Dynamics(NamedTuple):
     encoder count at the handle [m], ``mass_kg`` the least effective mass there [kg]. ``velocity_lag_s`` is the mean lag
     of the velocity that the device measures and gives with every new sample [s]; None if it measures none.
     ``assumed`` names those of ``count_m`` and ``mass_kg`` that neither the device reports nor a bench measured.
+    ``force_error_n`` is the most by which the force sent may exceed the force asked, because the device rounds it [N].
     """
 
     delay_s: float | None = None
@@ -26,6 +27,7 @@ class Dynamics(NamedTuple):
     mass_kg: float = 0.1
     velocity_lag_s: float | None = None
     assumed: tuple[str, ...] = ()
+    force_error_n: float = 0.0
 
     def delay_ticks(self, rate_hz: float) -> int:
         """Return the delay in whole ticks, rounded up; `ASSUMED_TICKS` where it is not measured."""
@@ -37,7 +39,11 @@ class Dynamics(NamedTuple):
         return (*(("delay_s",) if self.delay_s is None else ()), *self.assumed)
 
     def describe(self) -> dict[str, Any]:
-        return {**self._asdict(), "assumed": list(self.assumed)}
+        """Return the dynamics for a receipt; ``force_error_n`` only of a device that rounds."""
+        described = {**self._asdict(), "assumed": list(self.assumed)}
+        if not self.force_error_n:
+            del described["force_error_n"]
+        return described
 
 
 UNKNOWN: Final = Dynamics(assumed=("count_m", "mass_kg"))

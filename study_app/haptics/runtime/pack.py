@@ -291,7 +291,7 @@ def _fill_constants(
     parameters.compression_law = _COMPRESSIONS[scene.knee.law]
     parameters.compression_threshold_mps = scene.knee.threshold_mps
     parameters.slope_limit_nspm = [limit.drag_nspm / scene.scale for limit in limits]
-    parameters.force_limit_n = scene.force_limit_n
+    parameters.force_limit_n = max(scene.force_limit_n - dynamics.force_error_n, 0.0)
     parameters.fade_s = scene.fade_s
     parameters.slew_n = slew_limit_n(1 / scene.rate_hz, dynamics, scene.velocity)
     parameters.count_m = dynamics.count_m

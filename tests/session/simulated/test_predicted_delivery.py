@@ -152,4 +152,6 @@ def test_the_shipped_slime_is_delivered_by_the_emulated_falcon(tmp_path: Path) -
     shares = [float(row["withheld_share"]) for row in rows]
     assert len(rows) == 6
     assert max(shares) < 0.15
+    peaks_n = [float(row["force_peak_n"]) for row in rows]
+    assert 7.9 < max(peaks_n) <= load("slime").device.force_limit_n  # whole motor units do not exceed it
     assert {row["valid"] for row in rows} == {"true"}

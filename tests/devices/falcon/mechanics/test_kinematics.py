@@ -21,6 +21,7 @@ from study_app.devices.falcon.mechanics import (
     jacobian,
     motor_units,
     new_mechanism,
+    rounding_n,
     torques,
 )
 from study_app.errors import DeviceError
@@ -166,6 +167,16 @@ class TestForces:
         assert np.abs(units).max() <= MOST_TORQUE
         share = min(1.0, MOST_TORQUE / max(np.abs(wanted).max(), 1e-9))
         assert np.abs(units - wanted * share).max() <= 0.5 + 1e-9
+
+    @given(position_m=inside, force_n=forces)
+    def test_whole_units_exceed_a_force_by_no_more_than_the_stated_error(self, mechanism, position_m, force_n):
+        assume(reachable(mechanism, position_m))
+        torque_nm = torques_for(mechanism, position_m, force_n)
+        assume(np.abs(torque_nm).max() * UNITS_PER_NM < MOST_TORQUE)
+        units = np.zeros(3, np.int64)
+        motor_units(mechanism, torque_nm, units)
+        sent_n = -units / UNITS_PER_NM @ jacobian_at(mechanism, position_m)
+        assert np.linalg.norm(sent_n) <= np.linalg.norm(force_n) + rounding_n(mechanism) + 1e-9
 
     @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
     def test_a_torque_that_is_no_number_gives_none_at_all(self, mechanism, bad):
