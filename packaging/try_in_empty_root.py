@@ -44,7 +44,7 @@ import sys, time
 began, worked = time.perf_counter(), time.process_time()
 from pathlib import Path
 from PySide6.QtCore import QEventLoop, QTimer
-from study_app.app.session.timing import collecting_here
+from study_app.app.timing import collecting_here
 from study_app.app.session.live_session import LiveSession
 from study_app.gui.application import application_here
 from study_app.gui.theme.theme import LIGHT

@@ -174,7 +174,7 @@ def pytest_runtest_call() -> Iterator[None]:
 def pytest_runtest_teardown() -> None:
     """Collect what is due; what a full collection leaves, mostly modules, is not looked at again."""
     if QT_IS_HERE:
-        from study_app.app.session.timing import collect_if_due
+        from study_app.app.timing import collect_if_due
 
         if collect_if_due() == 2:
             gc.freeze()

@@ -3,6 +3,8 @@
 ``main_controller`` owns the main window and makes its places, two of which take long to load;
 ``session.live_session`` begins or resumes a session and runs it to the closed journal, ``session.bridge`` between its
 two windows; read these first.
+
+Reading order: timing; failures; lab_controller, session; delay_session, main_controller.
 """
 
 import gc

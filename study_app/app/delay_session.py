@@ -27,7 +27,7 @@ from study_app.app.session.bridge import (
     make_participant_window,
     show_windows,
 )
-from study_app.app.session.timing import collecting_here
+from study_app.app.timing import collecting_here
 from study_app.devices.hand import hand_of
 from study_app.devices.rig import open_rig, study_settings
 from study_app.errors import SessionError, StudyError

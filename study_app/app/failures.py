@@ -19,7 +19,7 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal, SignalInstance
 from PySide6.QtGui import QGuiApplication, QSessionManager
 from PySide6.QtWidgets import QGraphicsItem, QStyledItemDelegate, QWidget
 
-from study_app.app.session.timing import end_at_once
+from study_app.app.timing import end_at_once
 from study_app.errors import SessionError
 from study_app.haptics.runtime.clocks.grants import allow_suspension, refuse_suspension
 

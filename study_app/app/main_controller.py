@@ -14,7 +14,7 @@ from PySide6.QtGui import QGuiApplication, QKeySequence, QShortcut
 
 from study_app.app.failures import BY_SIGNAL_S, Patience, UncaughtExceptions, ended_from_outside, guard_painting
 from study_app.app.session.live_session import BUG, OPENING_PATIENCE_S, LiveSession
-from study_app.app.session.timing import collecting_here
+from study_app.app.timing import collecting_here
 from study_app.devices.registry import descriptor_of
 from study_app.errors import DeviceError, StoreError
 from study_app.gui.application import application_here

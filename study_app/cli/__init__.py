@@ -3,6 +3,8 @@
 0 done · 1 a bug (with traceback) · 2 a mistake the user can correct (one line) · 3 a check found a problem.
 Each command imports what it needs when it runs, so that ``--help`` loads neither Qt nor the compiler. Read ``options``
 (what commands share), ``study`` (run, rehearse, check) and ``data`` (verify, report, export) first.
+
+Reading order: options; data, demo, devices, evidence, model, power, study; reference.
 """
 
 import atexit

@@ -15,9 +15,9 @@ from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.layout import LIMITERS
 from study_app.outlets.markers import CODES
 from study_app.protocol import questions
-from study_app.protocol.checks import delayed_force
 from study_app.protocol.questionnaires import instrument, instruments
 from study_app.protocol.trials import designs, methods
+from study_app.protocol.warnings import delayed_force
 
 PROGRAM = "liquid-study"
 LEAST_DELAY_MS = 10

@@ -65,8 +65,8 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
     else:
         import time
 
-        from study_app.protocol.checks.untranslated import describe_untranslated
         from study_app.protocol.source.files import find
+        from study_app.protocol.warnings.untranslated import describe_untranslated
         from study_app.session.simulated.paced_levels import undelivered_levels
         from study_app.session.simulated.predicted_delivery import predicted_delivery
         from study_app.store import workstation

@@ -2,4 +2,7 @@
 
 ``document.document`` holds the text and the list of undos (without Qt), ``form.card`` shows the form of an element, and
 ``controller`` connects the rooms; read these first. The text is authoritative: an edit changes only its bytes.
+
+Reading order: parts, templates; document; editing, outline, prompts, version_rows; problems; measures; form; file;
+header; new_study_page; window; measures_controller, participant, versions; saving; controller.
 """

@@ -2,6 +2,9 @@
 
 ``descriptor`` says what a device is, ``driver`` opens, guards and closes one, and ``rig`` opens device and servo
 together; read these first. ``descriptors`` lists the devices of the program.
+
+Reading order: base, doctor, guard, hand; bench, descriptor, simulated; descriptors, spacemouse; registry;
+doctor_worker, driver, rig; falcon, force_dimension, inverse3; emulators.
 """
 
 from typing import Final

@@ -2,4 +2,7 @@
 
 ``table`` is the form of all evidence: read it first, then ``cost`` (time per tick) and ``accuracy.comparison`` (error
 of forces) as examples.
+
+Reading order: appraisal, computer, cost, reference_model, table, thesis_figures; appraisal_measurement,
+reference_solutions, report_rates, soak, thresholds, timing; cfd, expected_error, outlets, stability; accuracy.
 """

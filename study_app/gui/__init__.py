@@ -2,4 +2,7 @@
 
 Windows show frozen values and emit signals; they open no file and compute no statistics. Read ``kit.fields`` (what is
 edited), ``kit.commands`` (actions) and ``theme.themed`` (colours) first, then a folder as an example, such as ``home``.
+
+Reading order: display, key_presses, theme; application, widgets; help, kit, participant; devices, lab, settings,
+watch; sessions; home, operator, preflight, results.
 """

@@ -2,4 +2,6 @@
 
 ``live`` is device and servo with a scene that is edited, ``ab_comparison`` the two settings, ``estimation.estimator``
 the fit of a liquid while force is measured; read these first. ``identify`` fits liquids to files of measurements.
+
+Reading order: estimation, parameters, programmed_paths; ab_comparison, identify; presets, shadow; live.
 """

@@ -12,8 +12,6 @@ from study_app.haptics.model.overrides import override
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import slope_limit, steady
 from study_app.number_text import counted
-from study_app.protocol.checks.expected_precision import precision_rows
-from study_app.protocol.checks.warnings import warnings
 from study_app.protocol.groups import sessions_differ
 from study_app.protocol.model import Block, Condition, Limits, Protocol
 from study_app.protocol.orders.balance import block_order_words, planned_participants
@@ -38,6 +36,8 @@ from study_app.protocol.tracks import (
 from study_app.protocol.trials.methods import Adjustment
 from study_app.protocol.trials.stimuli import DELAY, OF_LINK
 from study_app.protocol.trials.tasks import Follow
+from study_app.protocol.warnings.expected_precision import precision_rows
+from study_app.protocol.warnings.study_warnings import warnings
 
 LEVELS = {"weber": "Weber fraction", "difference": "difference", "value": "value"}
 BLINDINGS = {

@@ -3,4 +3,7 @@
 ``start`` claims or reopens a session, ``transitions.table`` decides what follows an event, and ``runner`` carries it
 out; read these first. ``tasks`` says when a trial ends, ``trial`` records and measures it, and ``simulated`` runs whole
 sessions with simulated participants.
+
+Reading order: pages, preflight, replay, resume, tasks; ports, transitions; device_buttons, preflight_measurements,
+trial, watch; runner, start; simulated.
 """

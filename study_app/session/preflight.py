@@ -19,11 +19,11 @@ from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
 from study_app.number_text import counted
 from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.checks.force_limits import beyond_slope_limit, by_stimulus
-from study_app.protocol.checks.untranslated import UntranslatedText, listed_places
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import recordings_of
 from study_app.protocol.presented.presented_levels import highest_damping
 from study_app.protocol.sequences import enrolment
+from study_app.protocol.warnings.untranslated import UntranslatedText, listed_places
 from study_app.protocol.wording.languages import language_name
 from study_app.store.blinded.sealing import FRAMES_BYTES_PER_S, SAMPLE_BYTES, sealed_bytes
 from study_app.store.missing_trials import limit_words

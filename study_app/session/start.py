@@ -15,12 +15,12 @@ from study_app.devices.registry import check_options, descriptor_of
 from study_app.devices.rig import Rig
 from study_app.errors import SessionError
 from study_app.outlets.session_outlets import Outlets, OutletStatus
-from study_app.protocol.checks.untranslated import check_translated, untranslated_on_pages
 from study_app.protocol.load import parse, protocol_hash, read_document, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.sequences import enrolment
 from study_app.protocol.source.files import find
+from study_app.protocol.warnings.untranslated import check_translated, untranslated_on_pages
 from study_app.session.preflight import Masking, Measurements, Screen
 from study_app.session.resume import find_protocol, source_to_resume
 from study_app.store import workstation

@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 
 from study_app.errors import ProtocolError, StoreError
-from study_app.protocol.checks.warnings import liquid_warnings
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, load_scenes, parse
 from study_app.protocol.orders.block_orders import block_codes
 from study_app.protocol.orders.schedule import Trial, build_schedule, stream
 from study_app.protocol.source.files import protocol_hash, source_bytes, unbundled
+from study_app.protocol.warnings.study_warnings import liquid_warnings
 from study_app.session.pages import TaskPage
 from study_app.session.replay import replay
 from study_app.session.simulated import rehearsal

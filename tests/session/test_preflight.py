@@ -14,9 +14,9 @@ from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.servo import Servo
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.outlets.session_outlets import OutletStatus
-from study_app.protocol.checks.untranslated import untranslated_on_pages
 from study_app.protocol.load import load, parse, protocol_hash, read_document, source_bytes
 from study_app.protocol.model import Protocol
+from study_app.protocol.warnings.untranslated import untranslated_on_pages
 from study_app.session import preflight_measurements
 from study_app.session.preflight import Measurements, PredictedDelivery, Screen, checks, refused
 from study_app.session.preflight_measurements import measure

@@ -10,7 +10,7 @@ from typing import Final
 
 from PySide6.QtCore import QtMsgType, qInstallMessageHandler
 
-from study_app.app.session.timing import collecting_here
+from study_app.app.timing import collecting_here
 from study_app.gui.application import application_here
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.user_folder import FOLDER_VARIABLE

@@ -21,7 +21,10 @@ from study_app.analysis.planning.simulated_studies import group_shares
 from study_app.analysis.statistics.outcome import student_interval
 from study_app.analysis.statistics.thresholds import FEWEST, group_mean
 from study_app.errors import AnalysisError
-from study_app.protocol.checks.expected_precision import (
+from study_app.protocol.model import Contrast, Protocol
+from study_app.protocol.table import text_in
+from study_app.protocol.tracks import stimulus_of, tracks_of
+from study_app.protocol.warnings.expected_precision import (
     EstimationPlan,
     MeanPlan,
     RatingPlan,
@@ -29,9 +32,6 @@ from study_app.protocol.checks.expected_precision import (
     ThresholdPlan,
     precision_plan,
 )
-from study_app.protocol.model import Contrast, Protocol
-from study_app.protocol.table import text_in
-from study_app.protocol.tracks import stimulus_of, tracks_of
 from study_app.psychophysics.people import BETWEEN_PEOPLE, ESTIMATE_NOISE, Estimates, Person
 from study_app.store.csv_files import Column, csv_bytes, optional
 

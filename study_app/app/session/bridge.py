@@ -19,7 +19,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtWidgets import QWidget
 
 from study_app.app.failures import PAINTING, ThreadExceptions, UncaughtExceptions, guarded_session_slot
-from study_app.app.session.timing import FrameBudget, ThreadPriority, freeze_garbage, unfreeze_garbage
+from study_app.app.timing import FrameBudget, ThreadPriority, freeze_garbage, unfreeze_garbage
 from study_app.devices.hand import HandOrders, hand_of
 from study_app.devices.registry import descriptor_of
 from study_app.discovery import explained

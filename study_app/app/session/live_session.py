@@ -21,7 +21,7 @@ from PySide6.QtGui import QScreen
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.app.failures import BY_SIGNAL_S, CrashTrace, ended_from_outside
-from study_app.app.session.timing import collecting_here, unfreeze_garbage
+from study_app.app.timing import collecting_here, unfreeze_garbage
 from study_app.devices import DEFAULT_DEVICE
 from study_app.devices.registry import descriptor_of
 from study_app.devices.rig import Rig, open_rig, study_settings

@@ -33,10 +33,10 @@ from study_app.designer.form.rows import (
 from study_app.designer.measures.study_facts import copied_texts, texts_by_language
 from study_app.designer.outline import icon_of
 from study_app.number_text import capitalised
-from study_app.protocol.checks.untranslated import untranslated_at
 from study_app.protocol.formats import is_second
 from study_app.protocol.groups import ASSIGNMENT, sequences_in
 from study_app.protocol.source.document import Path, Places, names, places_of, value_at
+from study_app.protocol.warnings.untranslated import untranslated_at
 from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
 
 ENTRIES: Final = "In this order"

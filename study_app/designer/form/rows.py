@@ -7,8 +7,8 @@ from typing import Any, Final
 from study_app.designer.document.fields import Choice, Row, label_of, singular
 from study_app.designer.document.steps import Request
 from study_app.designer.document.study import Study
-from study_app.protocol.checks.untranslated import UntranslatedText
 from study_app.protocol.source.document import Path, value_at
+from study_app.protocol.warnings.untranslated import UntranslatedText
 from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
 
 ICONS: Final = {"rating": "scale", "slider": "slider", "number": "number", "choice": "list", "text": "letter"}

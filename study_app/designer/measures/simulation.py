@@ -15,12 +15,12 @@ from study_app.designer.document.elements import SEQUENCE
 from study_app.designer.document.study import Study
 from study_app.designer.measures.study_facts import text_keys
 from study_app.protocol.blocks import Block
-from study_app.protocol.checks.expected_precision import ObserverAnswers, ThresholdPlan, imprecise, threshold_plan
 from study_app.protocol.model import Contrast, Protocol
 from study_app.protocol.orders.balance import Evenness, balances, numbered
 from study_app.protocol.presented.presented_levels import clipping
 from study_app.protocol.sequences import row_count
 from study_app.protocol.source.document import Path, value_at
+from study_app.protocol.warnings.expected_precision import ObserverAnswers, ThresholdPlan, imprecise, threshold_plan
 from study_app.psychophysics.families import Floats
 from study_app.psychophysics.people import BETWEEN_PEOPLE, Person
 from study_app.workers.client import WorkerClient

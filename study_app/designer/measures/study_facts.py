@@ -14,8 +14,6 @@ from study_app.designer.document.study import Study
 from study_app.designer.document.toml_edits import Set, Unset, meaning
 from study_app.designer.document.toml_text import Refused
 from study_app.haptics.model.slope_limits import HAND_MPS, steady
-from study_app.protocol.checks.untranslated import describe_untranslated, untranslated_texts
-from study_app.protocol.checks.warnings import warnings
 from study_app.protocol.json_schema import schema
 from study_app.protocol.load import examined
 from study_app.protocol.model import Protocol
@@ -23,6 +21,8 @@ from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s, step_duration_s
 from study_app.protocol.source.document import Path, frozen, has, value_at
 from study_app.protocol.source.problems import Fault
+from study_app.protocol.warnings.study_warnings import warnings
+from study_app.protocol.warnings.untranslated import describe_untranslated, untranslated_texts
 from study_app.protocol.wording.languages import languages_of
 from study_app.store.verification.leaks import Telltales
 from study_app.store.workstation import device_without_force

@@ -1,1 +1,4 @@
-"""The Novint Falcon."""
+"""The Novint Falcon.
+
+Reading order: constants; bulk, failures, mechanics, replies; calibration, exchange, transport; boot; device.
+"""

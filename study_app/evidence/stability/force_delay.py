@@ -19,7 +19,7 @@ from study_app.evidence.reference_solutions import without_buoyancy
 from study_app.evidence.stability.bench import Bench, sine_path
 from study_app.evidence.stability.stability_cases import Case, scene_of, scenes
 from study_app.evidence.table import Evidence, Table, run
-from study_app.protocol.checks.delayed_force import Entry
+from study_app.protocol.warnings.delayed_force import Entry
 
 LIQUIDS: Final = (
     "water",
@@ -49,7 +49,7 @@ def measure(
 
 
 def evidence(entries: Sequence[Entry], file: str) -> Evidence:
-    """Return the shares left [%] as a table, and the file that ``protocol.checks.delayed_force`` reads.
+    """Return the shares left [%] as a table, and the file that ``protocol.warnings.delayed_force`` reads.
 
     The table has a line for each liquid, estimator and hand, a column for each delay.
     """

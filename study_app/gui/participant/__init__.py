@@ -1,1 +1,4 @@
-"""The participant's window."""
+"""The participant's window.
+
+Reading order: pages; forms, intervals; tank; tank_widget; window.
+"""

@@ -26,10 +26,10 @@ from PySide6.QtWidgets import QWidget
 
 from study_app.gui.display.screens import place
 from study_app.gui.key_presses import ignores_clicks, key_presses
+from study_app.gui.participant.forms.questionnaire import QuestionnaireWidget
 from study_app.gui.participant.forms.questions_page import FormWidget
 from study_app.gui.participant.intervals.answer_page import ChoiceWidget, FeedbackWidget, NumberWidget, SettingControls
 from study_app.gui.participant.pages.page_widget import PageContext, PageWidget
-from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant.pages.text_page import NoticeWidget, PauseWidget, ReadingPage, TextWidget
 from study_app.gui.participant.tank_widget import TankWidget, paint_ahead
 from study_app.gui.theme.theme import PARTICIPANT, font, load_fonts, stylesheet

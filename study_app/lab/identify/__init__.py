@@ -1,1 +1,4 @@
-"""Parameters of a liquid from measured motion and force."""
+"""Parameters of a liquid from measured motion and force.
+
+Reading order: measured_force, parameters; search; estimates; fit; figures; preset.
+"""

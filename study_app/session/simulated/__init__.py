@@ -1,1 +1,4 @@
-"""Simulated participants: observers, exploration, rehearsals."""
+"""Simulated participants: observers, exploration, rehearsals.
+
+Reading order: observers, paced_levels; participant, predicted_delivery; rehearsal; answers_only, rehearsal_worker.
+"""

@@ -1,1 +1,4 @@
-"""Verification of sessions and studies."""
+"""Verification of sessions and studies.
+
+Reading order: leaks, proofs, reproduction, verify_session; recorded_streams, verify_study.
+"""

@@ -10,9 +10,9 @@ from click.testing import CliRunner
 from study_app.analysis.planning.threshold_studies import BATCH, Precisions, plans, sweep, threshold_markdown
 from study_app.cli import commands
 from study_app.errors import AnalysisError
-from study_app.protocol.checks.expected_precision import expected_mean, mean_plan
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
+from study_app.protocol.warnings.expected_precision import expected_mean, mean_plan
 
 TEXT = """
 format = 2
@@ -62,7 +62,7 @@ def test_thresholds_become_more_precise_with_trials_and_groups_with_participants
 
 @pytest.mark.slow
 def test_the_errors_are_those_that_check_expects() -> None:
-    from study_app.protocol.checks.expected_precision import expected, threshold_plan
+    from study_app.protocol.warnings.expected_precision import expected, threshold_plan
 
     protocol = study(("trials = 20", "trials = 50"))
     found = swept(protocol, (), (20,), 20).found["thicker", 50]

@@ -15,13 +15,13 @@ from study_app.designer.measures import simulation
 from study_app.designer.measures.simulation import balance_of, focus_of, measurable, observe
 from study_app.designer.measures.study_facts import facts, revealing, text_keys, texts_by_language, valid_part
 from study_app.haptics.model.slope_limits import slope_limit
-from study_app.protocol.checks.expected_precision import ThresholdPlan, expected, threshold_plan
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s
 from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule
 from study_app.protocol.presented.presented_levels import LevelLimits, clipping, level_limits, levels, standard_of
 from study_app.protocol.source.files import shipped, shipped_file
+from study_app.protocol.warnings.expected_precision import ThresholdPlan, expected, threshold_plan
 from tests.designer.document.grown import PROTOCOLS
 from tests.protocol.edited_studies import FAULTY, Case
 

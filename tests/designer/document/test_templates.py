@@ -14,11 +14,11 @@ from study_app.designer.document.study import read
 from study_app.designer.new_study_page import KnownAnswer, known_answers
 from study_app.designer.templates import FOLDER, QUESTIONS, templates
 from study_app.errors import StudyError
-from study_app.protocol.checks.expected_precision import threshold_plan
-from study_app.protocol.checks.warnings import level_warnings
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
+from study_app.protocol.warnings.expected_precision import threshold_plan
+from study_app.protocol.warnings.study_warnings import level_warnings
 from study_app.psychophysics.people import BETWEEN_PEOPLE
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.folders import StudyFolder

@@ -11,8 +11,8 @@ from study_app.designer.document.toml_edits import Set
 from study_app.designer.measures.study_facts import copied_texts, facts
 from study_app.designer.templates import templates
 from study_app.errors import SessionError
-from study_app.protocol.checks.untranslated import SAME_WORDS, check_translated, describe_untranslated
 from study_app.protocol.source.files import shipped, shipped_file
+from study_app.protocol.warnings.untranslated import SAME_WORDS, check_translated, describe_untranslated
 from study_app.session.start import NewSession, check
 from study_app.workspace import workspace
 

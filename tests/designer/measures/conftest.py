@@ -15,7 +15,7 @@ from study_app.designer.measures.simulation import (
     Simulation,
     hypotheses_of,
 )
-from study_app.protocol.checks.expected_precision import threshold_plan
+from study_app.protocol.warnings.expected_precision import threshold_plan
 
 QUANTILES = (0.1, 0.15, 0.2, 0.25, 0.3)
 

@@ -23,9 +23,9 @@ from study_app.designer.measures.simulation import (
     simulation_of,
     start_measure_worker,
 )
-from study_app.protocol.checks.expected_precision import imprecise, threshold_plan
 from study_app.protocol.load import load
 from study_app.protocol.source.files import shipped_file
+from study_app.protocol.warnings.expected_precision import imprecise, threshold_plan
 from study_app.workers.server import Crashed, Stopped
 from tests.designer.measures.conftest import Worker, jnd, shown
 

@@ -6,7 +6,7 @@ import pytest
 from study_app.evidence.stability.bench import Bench
 from study_app.evidence.stability.force_delay import delayed_trace, measure
 from study_app.evidence.stability.stability_cases import Case, parse
-from study_app.protocol.checks.delayed_force import table
+from study_app.protocol.warnings.delayed_force import table
 from tests.haptics.scenes import COMPILED
 
 compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")

@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from study_app.gui.participant.questions import FIELDS
+from study_app.gui.participant.forms.questions import FIELDS
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.protocol.questions import ChoiceView, ItemView, NumberView, RatingView, SliderView

@@ -4,7 +4,7 @@ import pytest
 from PySide6.QtGui import QInputMethodEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.gui.participant.questions import TextField
+from study_app.gui.participant.forms.questions import TextField
 from study_app.protocol.questions import Context, Text, TextView
 from study_app.protocol.wording.languages import LANGUAGES
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from study_app.protocol.checks.warnings import warnings
 from study_app.protocol.load import load, parse
 from study_app.protocol.source.files import source_bytes
+from study_app.protocol.warnings.study_warnings import warnings
 
 
 @pytest.mark.parametrize(

@@ -4,11 +4,11 @@ import pytest
 
 from study_app.analysis.planning.preregistration import preregistration
 from study_app.errors import ProtocolError
-from study_app.protocol.checks.warnings import warnings
 from study_app.protocol.describe import describe
 from study_app.protocol.groups import next_group
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.balance import balances, numbered
+from study_app.protocol.warnings.study_warnings import warnings
 from tests.protocol.groups.grouped import grouped
 
 ALIKE = """

@@ -1,1 +1,1 @@
-"""Pages of questions of several kinds: a form, its parts, and what the widgets of questions share."""
+"""Pages of questions: statements on scales, and forms with questions of several kinds."""

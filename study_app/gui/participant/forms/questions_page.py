@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QLabel, QLayout, QPushButton, QStyle, QWidget
 from study_app.discovery import by_name
 from study_app.gui.key_presses import key_presses
 from study_app.gui.participant.forms.question_field import MARGIN, QuestionField, question_of, target_px
+from study_app.gui.participant.forms.questions import FIELDS
 from study_app.gui.participant.pages.page_widget import (
     GoButton,
     PageContext,
@@ -22,7 +23,6 @@ from study_app.gui.participant.pages.page_widget import (
     key_size,
     page_painter,
 )
-from study_app.gui.participant.questions import FIELDS
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.theme.themed import remove_widget

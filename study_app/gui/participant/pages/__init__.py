@@ -1,1 +1,1 @@
-"""The participant's pages: one widget for each kind of page value."""
+"""The participant's pages: what they share, and pages of text."""

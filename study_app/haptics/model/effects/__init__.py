@@ -1,4 +1,7 @@
-"""The effects: one descriptor per module, found by importing every module of this folder."""
+"""The effects: one descriptor per module, found by importing every module of this folder.
+
+Reading order: added_mass, buoyancy, current, drag, history, non_newtonian, surface, wake; local_wake, unsteady_drag.
+"""
 
 from importlib import import_module
 from pkgutil import iter_modules

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias, TypeVar
+from typing import Annotated, Any, Literal, Protocol, Self, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -20,10 +20,25 @@ from study_app.haptics.model.effect import (
 )
 from study_app.haptics.model.ranges import Decay, Exponent, Frozen, TailLength, TailScaling, within
 
-if TYPE_CHECKING:
-    from study_app.haptics.model.effects import local_wake
-
 BIT = 1 << 1
+
+
+class Tail(Protocol):
+    """What `Wake` and `local_wake.LocalWake` share."""
+
+    @property
+    def length(self) -> int: ...
+    @property
+    def scaling(self) -> float: ...
+    @property
+    def exponent(self) -> float: ...
+    @property
+    def decay(self) -> float: ...
+    @property
+    def axes(self) -> Literal["xz", "xyz"]: ...
+
+
+W = TypeVar("W", bound=Tail)
 
 
 class Wake(Frozen):
@@ -66,10 +81,6 @@ class Wake(Frozen):
         return within_scaling(self)
 
 
-Tail: TypeAlias = "Wake | local_wake.LocalWake"
-W = TypeVar("W", bound=Tail)
-
-
 def within_scaling(wake: W) -> W:
     """Return a wake."""
     if wake.length > wake.scaling:
@@ -95,7 +106,7 @@ def fill_tail(record: Any, wake: Tail, rate_hz: float, row: int) -> None:
     record.vertical = 1.0 if wake.axes == "xyz" else 0.0
 
 
-def tail_bound_n(extremes: Extremes, wake: "Tail | None") -> float | None:
+def tail_bound_n(extremes: Extremes, wake: Tail | None) -> float | None:
     """Return F(v + u) − F(v), with u = v (N/S)^y the greatest speed of the wake.
 
     The laws are convex, so this exceeds the force that a wake removes.

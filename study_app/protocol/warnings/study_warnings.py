@@ -12,10 +12,7 @@ from study_app.haptics.model.gate import met_mps
 from study_app.haptics.model.slope_limits import HAND_MPS, Steady, steady
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.consistency import LEAST_N, force_n
-from study_app.protocol.checks.delayed_force import delay_warnings
-from study_app.protocol.checks.expected_precision import imprecise
 from study_app.protocol.checks.force_limits import PACED, clipped_unpaced, fastest_hz
-from study_app.protocol.checks.group_names import suggests_attribute
 from study_app.protocol.model import Follow, Protocol, Published, Reach
 from study_app.protocol.orders.durations import variants
 from study_app.protocol.presented.presented_levels import highest_damping
@@ -23,6 +20,9 @@ from study_app.protocol.questionnaires import instrument
 from study_app.protocol.questions import POINTS
 from study_app.protocol.tracks import design_of, has_correct_answer, method_of, stimulus_of, tracks_of
 from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK
+from study_app.protocol.warnings.delayed_force import delay_warnings
+from study_app.protocol.warnings.expected_precision import imprecise
+from study_app.protocol.warnings.group_names import suggests_attribute
 
 TELLING = 0.39
 """Twice the difference of viscosity that people just tell, 19 % (Jones, Hunter & Lafontaine 1997): what two liquids

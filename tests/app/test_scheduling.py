@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from study_app.app.session import timing
-from study_app.app.session.timing import (
+from study_app.app import timing
+from study_app.app.timing import (
     MOST_PERIODS,
     MOST_SHARE,
     FrameBudget,

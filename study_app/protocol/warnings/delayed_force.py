@@ -47,7 +47,7 @@ class Entry(NamedTuple):
 @cache
 def table() -> tuple[Entry, ...]:
     """Return the table as it ships."""
-    with (resources.files("study_app.protocol.checks") / "delayed_force.csv").open(encoding="utf-8") as file:
+    with (resources.files("study_app.protocol.warnings") / "delayed_force.csv").open(encoding="utf-8") as file:
         return tuple(
             Entry(
                 liquid=row["liquid"],

@@ -3,7 +3,6 @@
 import pytest
 
 from study_app.haptics.model.scene import PROMPT_LINK, ForceLink
-from study_app.protocol.checks.delayed_force import STIRRED, delay_warnings
 from study_app.protocol.checks.force_limits import longest_ms, returned_j
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, parse
@@ -11,6 +10,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.presented.presentation import delays_force, link_seed, scene_of
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tasks import Stroke
+from study_app.protocol.warnings.delayed_force import STIRRED, delay_warnings
 from study_app.store.verification.leaks import telltales
 from tests.protocol.edited_studies import text_of
 

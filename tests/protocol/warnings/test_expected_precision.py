@@ -5,15 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from study_app.protocol.checks.expected_precision import (
+from study_app.protocol.load import examined, parse, read_document
+from study_app.protocol.trials.stimuli import SESSION_SD
+from study_app.protocol.warnings.expected_precision import (
     ThresholdPlan,
     expected,
     imprecise,
     precision_rows,
     threshold_plan,
 )
-from study_app.protocol.load import examined, parse, read_document
-from study_app.protocol.trials.stimuli import SESSION_SD
 
 TEXT = """
 format = 2

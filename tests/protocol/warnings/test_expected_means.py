@@ -9,7 +9,12 @@ from scipy.stats import norm
 
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.levels.sensitivities import sensitivities
-from study_app.protocol.checks.expected_precision import (
+from study_app.protocol.load import load, parse
+from study_app.protocol.model import Protocol
+from study_app.protocol.trials.designs import Rated, default_design
+from study_app.protocol.trials.methods import Constant
+from study_app.protocol.trials.stimuli import Stimulus
+from study_app.protocol.warnings.expected_precision import (
     EstimationPlan,
     MeanPlan,
     RatingPlan,
@@ -17,11 +22,6 @@ from study_app.protocol.checks.expected_precision import (
     expected_mean,
     mean_plan,
 )
-from study_app.protocol.load import load, parse
-from study_app.protocol.model import Protocol
-from study_app.protocol.trials.designs import Rated, default_design
-from study_app.protocol.trials.methods import Constant
-from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.detection import NORMAL, two_intervals
 from study_app.psychophysics.people import ESTIMATE_NOISE
 
