@@ -6,6 +6,8 @@ needs is imported when it is called. A wrong value is a `StudyError` that says w
 
 from __future__ import annotations
 
+import signal
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -445,7 +447,8 @@ def open_force(
 ) -> Iterator[ForceLoop]:
     """Open a device with the servo and its safety layer, at zero force until `ForceLoop.set_liquid`.
 
-    Whatever ends the block, the last force is zero; open it in the main thread, where signals end the block.
+    Whatever ends the block, the last force is zero. Open it in the main thread, where signals end the block; in another
+    thread it is refused unless the program handles SIGTERM.
 
     Parameters
     ----------
@@ -469,6 +472,11 @@ def open_force(
     from study_app.protocol.load import load_scenes
     from study_app.protocol.streams import stream
 
+    if threading.current_thread() is not threading.main_thread() and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+        raise StudyError(
+            "a force loop cannot be opened in a thread, where a request to end the program (SIGTERM) would leave the "
+            "force on: open it in the main thread, or first set a handler of SIGTERM there"
+        )
     scenes = load_scenes(scene)
     first = next(iter(scenes.values()))
     if force_limit_n is not None and not 0 < force_limit_n <= first.force_limit_n:

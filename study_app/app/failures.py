@@ -20,6 +20,7 @@ from PySide6.QtGui import QGuiApplication, QSessionManager
 from PySide6.QtWidgets import QGraphicsItem, QStyledItemDelegate, QWidget
 
 from study_app.app.timing import end_at_once
+from study_app.ending_signals import ENDING_SIGNALS
 from study_app.errors import SessionError
 from study_app.haptics.runtime.clocks.grants import allow_suspension, refuse_suspension
 
@@ -225,9 +226,7 @@ def ended_from_outside(end: Callable[[int], None]) -> Iterator[None]:
             end_at_once()
             end(HANG_UP)
 
-    names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
-    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
-    before = {number: signal.signal(number, hear) for number in numbers}
+    before = {number: signal.signal(number, hear) for number in ENDING_SIGNALS}
     logging_off = log_off_signal()
     refuse_suspension(heard)
     logging_off.connect(log_off, Qt.ConnectionType.DirectConnection)

@@ -16,6 +16,7 @@ from contextlib import suppress
 from types import TracebackType
 from typing import IO, Final, Self
 
+from study_app.ending_signals import ENDING_SIGNALS
 from study_app.errors import DeviceError
 from study_app.haptics.runtime.clocks.grants import allow_suspension, refuse_suspension
 
@@ -169,9 +170,8 @@ def _close(child: subprocess.Popen[bytes]) -> None:
 
 def watch(name: str, ends_force: str, *arguments: str) -> int:
     """Wait for the end of the standard input; without ``WORD`` in it, end the device's force. Return an exit code."""
-    for number in ("SIGINT", "SIGTERM", "SIGHUP"):
-        if hasattr(signal, number):
-            signal.signal(getattr(signal, number), signal.SIG_IGN)  # it ends when the program has ended
+    for number in ENDING_SIGNALS:
+        signal.signal(number, signal.SIG_IGN)  # it ends when the program has ended
     end_force = pkgutil.resolve_name(ends_force)
     sys.stdout.buffer.write(READY)
     sys.stdout.flush()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import atexit
+import weakref
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 from study_app.devices.registry import open_device
 from study_app.errors import DeviceError
@@ -19,7 +21,17 @@ if TYPE_CHECKING:
     from study_app.haptics.runtime.servo import Servo
 
 
-@dataclass(frozen=True, slots=True)
+_open: Final = weakref.WeakSet["Rig"]()
+
+
+@atexit.register
+def _stop_open_rigs() -> None:
+    """Stop the rigs that a program left open at its end, such as that of a ``with`` block that it never left."""
+    for rig in tuple(_open):
+        rig.stop()
+
+
+@dataclass(frozen=True, slots=True, weakref_slot=True, eq=False)
 class Rig:
     """Device and servo; as a context manager it stops them at the end."""
 
@@ -49,6 +61,7 @@ class Rig:
 
     def stop(self) -> None:
         """Send zero force, then close the device."""
+        _open.discard(self)
         try:
             self.servo.stop()
         finally:
@@ -140,6 +153,7 @@ def open_rig(
         _check_wanted(name, cancelled)
         rig = Rig(device, Servo(device, clock=clock, rate_hz=settings.rate_hz, elements=settings.elements))
         if clock is None or clock.runs:
+            _open.add(rig)
             rig.servo.start()
     except BaseException:
         device.close()

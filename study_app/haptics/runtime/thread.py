@@ -13,6 +13,7 @@ from functools import cached_property
 from types import FrameType
 from typing import Any
 
+from study_app.ending_signals import ENDING_SIGNALS
 from study_app.errors import DeviceError, ServoFault
 from study_app.haptics.kernels.c_functions import Driver
 from study_app.haptics.kernels.compiled import entry_of
@@ -252,9 +253,8 @@ def _leave_by_the_exit() -> None:
     """Handle signals that would kill the process at once like ``sys.exit``; keep handlers already set."""
     if threading.current_thread() is not threading.main_thread():
         return
-    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK"):
-        number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) is signal.SIG_DFL:
+    for number in ENDING_SIGNALS:
+        if signal.getsignal(number) is signal.SIG_DFL:
             signal.signal(number, _leave)
 
 

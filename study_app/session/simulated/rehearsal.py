@@ -28,6 +28,7 @@ import numpy as np
 from study_app.devices.hand import hand_of
 from study_app.devices.registry import all_devices, descriptor_of
 from study_app.devices.rig import Rig, open_rig, study_settings
+from study_app.ending_signals import ENDING_SIGNALS
 from study_app.errors import SessionError, StoreError
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.protocol.blocks import Block
@@ -133,8 +134,7 @@ class HeldSignals:
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
-            numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-            handlers = {number: signal.getsignal(number) for number in numbers}
+            handlers = {number: signal.getsignal(number) for number in ENDING_SIGNALS}
             self._before = {number: it for number, it in handlers.items() if it not in {signal.SIG_IGN, None}}
             for number in self._before:
                 signal.signal(number, self._hold)

@@ -137,7 +137,7 @@ def test_what_ends_a_program_does_not_end_its_guard(server):
     guard.start()
     child = guard.child
     assert os.getsid(child.pid) != os.getsid(0)
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         child.send_signal(number)
     guard.release()
     assert child.returncode == 0

@@ -89,6 +89,7 @@ from tests.haptics.scenes import HONEY
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # who runs the tests may have switched signals off
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
+signal.signal(signal.SIGQUIT, signal.SIG_DFL)
 memory = np.memmap(sys.argv[1], dtype=PROBE, mode="r+", shape=(1,)).view(np.recarray)
 servo = Servo(Probe(memory=memory))
 servo.start()
@@ -99,6 +100,7 @@ ways = {
     "SIGTERM": lambda: os.kill(os.getpid(), signal.SIGTERM),
     "SIGINT": lambda: os.kill(os.getpid(), signal.SIGINT),
     "SIGHUP": lambda: os.kill(os.getpid(), signal.SIGHUP),
+    "SIGQUIT": lambda: os.kill(os.getpid(), signal.SIGQUIT),
     "exception": lambda: 1 / 0,
     "exit": lambda: sys.exit(3),
     "end": lambda: None,
@@ -114,7 +116,15 @@ if sys.argv[2].startswith("SIG"):
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize(
     ("way", "code"),
-    [("SIGTERM", 143), ("SIGINT", -signal.SIGINT), ("SIGHUP", 129), ("exception", 1), ("exit", 3), ("end", 0)],
+    [
+        ("SIGTERM", 143),
+        ("SIGINT", -signal.SIGINT),
+        ("SIGHUP", 129),
+        ("SIGQUIT", 131),
+        ("exception", 1),
+        ("exit", 3),
+        ("end", 0),
+    ],
 )
 def test_however_the_process_ends_the_last_force_is_zero(tmp_path, way, code):
     Servo(Probe()).prepare()  # compile here, where the time limit is the test's

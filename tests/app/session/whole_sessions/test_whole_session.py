@@ -79,7 +79,7 @@ class Manager:
         self.hint = hint
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP, None], ids=str)
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, None], ids=str)
 def test_a_signal_or_a_log_off_leaves_the_session_unfinished_and_resumable(short_demo, results, monkeypatch, number):
     class Application(QObject):
         asked = Signal(object)
