@@ -1,4 +1,4 @@
 """Verification of sessions and studies.
 
-Reading order: leaks, proofs, reproduction, verify_session; recorded_streams, verify_study.
+Reading order: leaks, reproduction, time_stamps, verify_session; proofs, recorded_streams; verify_study.
 """

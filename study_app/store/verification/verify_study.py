@@ -268,7 +268,8 @@ def _copy(
             continue
         erased |= {*own, *(line for line in kept if line[1] == f"{study.exclusions.name}/sub-{participant}")}
         if (told_of := proof_of_withdrawal(tombstone)) not in kept:
-            advice = f"if {participant} asked for it, add the line: {checked_line(*told_of)}"
+            add = "write a new proof" if proof.told else f"add the line: {checked_line(*told_of)}"
+            advice = f"if {participant} asked for it, {add}"
             found.error(study.withdrawals, f"the withdrawal of {participant} is not in {path}: {advice}")
     copy = [line for line in kept if line not in erased]
     for record, place in copy:

@@ -1,5 +1,6 @@
 """Proofs that leave the room: which of twenty forgeries each of them tells, by the table of docs/files.md."""
 
+import base64
 import json
 import re
 import shutil
@@ -16,7 +17,7 @@ from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.store import workstation
 from study_app.store.folders import StudyFolder
-from study_app.store.verification import proofs
+from study_app.store.verification import time_stamps
 from study_app.store.verification.proofs import leave, proof_text, read_proof
 from study_app.store.verification.verify_study import verify
 from tests.store.verification.played_studies import proved
@@ -119,6 +120,17 @@ def test_a_signature_tells_a_changed_copy_and_another_key(study: Path, key_store
         verify(study, kept)
 
 
+@pytest.mark.parametrize("forged", ["aaaa-aaaa-aaaa-aa withdrawals.jsonl/sub-P002", "P003", "# a comment"])
+def test_a_line_below_a_signature_is_refused(study: Path, key_store: Path, forged: str) -> None:
+    kept = study.parent / "signed.txt"
+    kept.write_text(proof_text(StudyFolder(study), sign=True))
+    lines = len(kept.read_text().splitlines())
+    with kept.open("a") as file:
+        file.write(f"\n{forged}\n")
+    with pytest.raises(StoreError, match=rf"signed.txt, line {lines + 2} is below the signature or stamp"):
+        verify(study, kept)
+
+
 def wait_for_proofs() -> None:
     for thread in threading.enumerate():
         if thread.name == "proof":
@@ -204,13 +216,65 @@ def test_a_server_that_gives_no_stamp_is_named_and_the_program_goes_on(study: Pa
     assert re.search(r"proof.txt: http://127.0.0.1:9 gave no time stamp \(.*refused.*\): try again later", line)
 
 
+@pytest.mark.parametrize(
+    ("status", "headers", "answer", "reason"),
+    [
+        (200, {}, bytes.fromhex("30053003020102"), "the server refused: status 2"),
+        (200, {}, bytes.fromhex("30053003020100"), "Missing"),
+        (200, {}, b"<html>no</html>", ""),
+        (302, {"Location": "http://127.0.0.2/"}, b"", "HTTP Error 302"),
+    ],
+    ids=["rejection", "no token", "HTML", "redirect"],
+)
+def test_an_answer_that_grants_no_stamp_is_refused_at_once(
+    study: Path, status: int, headers: dict[str, str], answer: bytes, reason: str
+) -> None:
+    pytest.importorskip("rfc3161_client", reason="the optional extra proofs is not installed")
+
+    class Refuses(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            self.send_response(status)
+            for name, value in headers.items():
+                self.send_header(name, value)
+            self.end_headers()
+            self.wfile.write(answer)
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Refuses) as serving:
+        threading.Thread(target=serving.serve_forever).start()
+        port = serving.server_address[1]
+        with pytest.raises(StoreError) as refused:
+            time_stamps.stamped("a line\n", f"http://127.0.0.1:{port}/")
+        serving.shutdown()
+    assert re.match(rf"http://127.0.0.1:{port}/ gave no time stamp \(.*{reason}", str(refused.value))
+
+
+def test_a_message_shows_no_login_of_a_server() -> None:
+    pytest.importorskip("rfc3161_client", reason="the optional extra proofs is not installed")
+    with pytest.raises(StoreError, match=r"^http://127.0.0.1:9/tsr gave no time stamp"):
+        time_stamps.stamped("a line\n", "http://lab:secret@127.0.0.1:9/tsr")
+
+
+def test_a_stamp_of_another_request_is_refused(study: Path, server: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    client = pytest.importorskip("rfc3161_client", reason="the optional extra proofs is not installed")
+    old = base64.b64decode(time_stamps.stamped("a line\n", server).split()[1])
+    request = client.TimestampRequestBuilder().data(b"a line\n").build()
+    with pytest.raises(ValueError, match="answers another request"):
+        time_stamps.check_granted(old, request)
+    other = client.TimestampRequestBuilder().data(b"another line\n").build()
+    with pytest.raises(ValueError, match="is of another text"):
+        time_stamps.check_granted(old, other)
+
+
 def test_no_other_program_in_place_of_a_server_of_stamps_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("rfc3161_client", reason="the optional extra proofs is not installed")
-    monkeypatch.setattr(proofs, "WAITS_S", 1.0)
+    monkeypatch.setattr(time_stamps, "WAITS_S", 1.0)
 
     def client(port: int) -> str:
         with pytest.raises(StoreError) as refused:
-            proofs.stamped("a line\n", f"http://127.0.0.1:{port}/")
+            time_stamps.stamped("a line\n", f"http://127.0.0.1:{port}/")
         return str(refused.value)
 
     said = ends_with_each(client)

@@ -1,0 +1,122 @@
+"""Time stamps (RFC 3161) of the lines of a proof: asked of a server, and verified against its root certificate."""
+
+import base64
+import queue
+import threading
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Final
+from urllib.error import HTTPError
+from urllib.parse import urlsplit
+
+from study_app.errors import StoreError
+from study_app.store import workstation
+from study_app.store.atomic import read_regular
+
+EXTRA: Final = "needs the optional extra proofs: pip install 'liquid-study[proofs]'"
+WAITS_S: Final = 10.0
+LONGEST: Final = 1_000_000
+"""Bytes of an answer of a server of time stamps."""
+_EXAMPLE: Final = "https://freetsa.org/tsr"
+
+
+def optional_library(name: str) -> Any:
+    """Import a library of the extra ``proofs``; StoreError says how to install it."""
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise StoreError(f"a proof with {name.partition('.')[0]} {EXTRA}") from error
+
+
+def stamped(lines: str, server: str) -> str:
+    """Return a time stamp of lines, as a line, from a server (URL).
+
+    The answer must grant a token over exactly these lines, with the nonce of the request, and come from the configured
+    root certificate, if there is one.
+
+    Raises
+    ------
+    StoreError
+        The server gives no such stamp within `WAITS_S`.
+    """
+    client = optional_library("rfc3161_client")
+    request = client.TimestampRequestBuilder().data(lines.encode()).build()
+    if not server.startswith(("http://", "https://")):
+        raise StoreError(f"{without_login(server)} is not a server of time stamps: give a URL such as {_EXAMPLE}")
+    answers = queue.SimpleQueue[bytes | Exception]()
+    threading.Thread(target=_ask, args=(server, request.as_bytes(), answers), daemon=True).start()
+    try:
+        answer = answers.get(timeout=WAITS_S)  # the time-out of a connection is for each packet alone
+        if not isinstance(answer, Exception):
+            check_granted(answer, request)
+            if workstation.load_or_default()[0].stamp_root is not None:
+                _verify_stamp(answer, lines)
+    except queue.Empty:
+        answer = TimeoutError(f"not within {WAITS_S:g} s")
+    except (client.VerificationError, ValueError, OSError) as error:
+        answer = error
+    if isinstance(answer, Exception):
+        reason = f"{without_login(server)} gave no time stamp ({str(answer)[:100]!r}): try again later"
+        raise StoreError(reason) from answer
+    return f"stamp {base64.b64encode(answer).decode()}\n"
+
+
+def without_login(url: str) -> str:
+    """Return a URL without user name and password."""
+    parts = urlsplit(url)
+    return parts._replace(netloc=parts.netloc.rpartition("@")[2]).geturl()
+
+
+def check_granted(answer: bytes, request: Any) -> None:
+    """Raise ValueError unless an answer of a server grants a token over the request's digest with its nonce."""
+    client = optional_library("rfc3161_client")
+    response = client.decode_timestamp_response(answer)
+    if response.status != client.PKIStatus.GRANTED:
+        raise ValueError(f"the server refused: status {response.status} {' '.join(response.status_string)}".strip())
+    token = response.tst_info
+    if token.message_imprint.message != request.message_imprint.message:
+        raise ValueError("the token is of another text")
+    if token.nonce != request.nonce:
+        raise ValueError("the token answers another request")
+
+
+def _ask(server: str, question: bytes, answers: queue.SimpleQueue[bytes | Exception]) -> None:
+    """Put the answer of a server, up to the greatest length of a stamp, or the error of asking; follow no redirect."""
+    import urllib.request as network  # noqa: PLC0415 - loads the network's modules: only where a stamp is asked for
+
+    opener = network.OpenerDirector()
+    kinds = (network.ProxyHandler, network.HTTPHandler, network.HTTPSHandler, network.HTTPDefaultErrorHandler)
+    for kind in (*kinds, network.HTTPErrorProcessor):
+        opener.add_handler(kind())
+    try:
+        request = network.Request(  # noqa: S310 - http or https, as checked
+            server, question, {"Content-Type": "application/timestamp-query"}
+        )
+        with opener.open(request, timeout=WAITS_S) as answer:
+            answers.put(answer.read(LONGEST))
+    except Exception as error:  # noqa: BLE001 - raised where the answer is waited for
+        if isinstance(error, HTTPError):
+            error.close()
+        answers.put(error)
+
+
+def checked_stamp(path: Path, lines: str, token: str) -> str:
+    """Return when the lines of a file were stamped, in words; StoreError if the stamp is not of these lines."""
+    client = optional_library("rfc3161_client")
+    if workstation.load_or_default()[0].stamp_root is None:
+        raise StoreError(f"{path} is stamped: name the server's root certificate, liquid-study proof --root FILE")
+    try:
+        answer = _verify_stamp(base64.b64decode(token), lines)
+    except (client.VerificationError, ValueError, OSError) as error:
+        raise StoreError(f"{path} is not what was stamped, or by another server ({error}): it was changed") from error
+    return f"was stamped at {answer.tst_info.gen_time.isoformat()}"
+
+
+def _verify_stamp(token: bytes, lines: str) -> Any:
+    """Return a decoded stamp after its signature by the configured root, and its lines, were verified."""
+    client, x509 = optional_library("rfc3161_client"), optional_library("cryptography.x509")
+    answer = client.decode_timestamp_response(token)
+    root = read_regular(Path(str(workstation.load_or_default()[0].stamp_root)))
+    verifier = client.VerifierBuilder().add_root_certificate(x509.load_pem_x509_certificate(root))
+    verifier.build().verify_message(answer, lines.encode())
+    return answer
