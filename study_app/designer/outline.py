@@ -53,7 +53,7 @@ from study_app.gui.kit.commands import key_cap, keys_of, tip, with_key
 from study_app.gui.theme.icons import draw_icon, icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Coloured, Themed
-from study_app.gui.widgets.accessible import say
+from study_app.gui.widgets.accessible import plain_tip, say
 from study_app.gui.widgets.boxes import add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, fill_rounded
 from study_app.gui.widgets.controls import ActionButton
@@ -323,7 +323,7 @@ class AddList(Themed, QFrame):
         for one in fitting:
             item = QListWidgetItem(icon(one.icon, self.theme.text2, 18), one.words)
             item.setData(Qt.ItemDataRole.UserRole, one)
-            item.setToolTip(one.help)
+            item.setToolTip(plain_tip(one.help))
             item.setData(Qt.ItemDataRole.AccessibleDescriptionRole, one.help)
             item.setSizeHint(QSize(WIDTH - 40, ADD_ROW_PX))
             self.list.addItem(item)
@@ -640,7 +640,7 @@ class OutlineCard(Coloured, Card):
                 item = QStandardItem(row.title)
                 item.setData(row, ROW_ROLE)
                 item.setData(row.name, Qt.ItemDataRole.AccessibleTextRole)
-                item.setToolTip(row.title)  # it may be cut
+                item.setToolTip(plain_tip(row.title))  # it may be cut
                 if not row.path:
                     item.setFlags(Qt.ItemFlag.ItemIsEnabled)
                 depth = max(row.depth - 1, 0)

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from study_app.gui.theme.theme import TypeRole, font
 from study_app.gui.theme.themed import Themed, remove_widget
+from study_app.gui.widgets.accessible import plain_tip
 from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.controls import ActionButton, PressedByEnter
 from study_app.gui.widgets.labels import Elided, Ink
@@ -64,7 +65,7 @@ class Segments(Themed, QWidget):
         for button, (value, words) in zip(self.buttons, values, strict=False):
             button.show_words(words)
             button.setChecked(value == chosen)
-            button.setToolTip(self.tips.get(value, ""))
+            button.setToolTip(plain_tip(self.tips.get(value, "")))
             button.update()
         self.setFocusProxy(next((button for button in self.buttons if button.isChecked()), self.buttons[0]))
 

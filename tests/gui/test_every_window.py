@@ -4,8 +4,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QAccessible
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QLabel
 
 from tests.gui.walk import cut, dead, misnamed, settle, unnamed, unreached
 from tests.gui.windows import WINDOWS, two_screens
@@ -37,5 +38,7 @@ def test_nothing_is_cut_everything_has_a_name_and_no_button_is_dead(qtbot: Any, 
     assert misnamed(window) == []
     assert unreached(window) == []
     assert dead(window) == []
+    guessing = [each for each in window.findChildren(QLabel) if each.textFormat() is Qt.TextFormat.AutoText]
+    assert [each.text() for each in guessing] == [], "Qt would take <b> in a study's text for markup"
     if name.startswith(("opening", "preflight")):
         assert QAccessible.queryAccessibleInterface(window).role() == QAccessible.Role.Window

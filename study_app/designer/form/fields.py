@@ -24,6 +24,7 @@ from study_app.designer.parts import FIELD_PX, Segments, cut_text, dense, small_
 from study_app.gui.kit.commands import keys_of, with_key
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.accessible import plain_tip
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButton, Toggle
 from study_app.gui.widgets.labels import Elided, label, set_property
@@ -561,7 +562,7 @@ class ChecksField(Field):
             made = Check(choice_words(choice, None))
             made.setFont(font("label", weight=400))
             made.setAccessibleName(f"{row.label}, {made.text()}")
-            made.setToolTip(choice.sentence)
+            made.setToolTip(plain_tip(choice.sentence))
             made.clicked.connect(self._take)
             self.checks[str(choice.value)] = made
             self.box.addWidget(made)
@@ -632,7 +633,7 @@ class LanguagesField(Field):
             made = (TypedText if several else typed_in)(name)
             if len(row.languages) > 1:
                 made.setPlaceholderText(f"Missing in {language}")
-                made.setToolTip(language)
+                made.setToolTip(plain_tip(language))
             if is_right_to_left(code):
                 made.setLayoutDirection(Qt.LayoutDirection.RightToLeft)
             made.typed.connect(lambda text, code=code: self.asked.emit(SetText(self.row.path, code, text)))

@@ -33,6 +33,7 @@ from study_app.designer.parts import FIELD_PX, dense, small_button
 from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.theme import TypeRole, font
 from study_app.gui.theme.themed import Themed, remove_widget
+from study_app.gui.widgets.accessible import plain_tip
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Chip, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
@@ -231,7 +232,7 @@ class BalanceChip(Extra, Chip):
     def show_facts(self, facts: Any) -> None:
         state, sentence = facts
         self.show_state(*state)
-        self.setToolTip(sentence)
+        self.setToolTip(plain_tip(sentence))
         self.setAccessibleDescription(sentence)
 
 
@@ -316,7 +317,7 @@ class QuestionsField(Field):
         self.rows = QuestionRows()
         self.rows.asked.connect(self.asked)
         self.add = add_button(f"Add to {row.label}", "Question")
-        self.add.setToolTip(with_key("Add a question", "add"))
+        self.add.setToolTip(plain_tip(with_key("Add a question", "add")))
         self.add.clicked.connect(lambda: self.asked.emit(AddElement(self.row.path)))
         self.box.addWidget(self.rows)
         self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QGridLayout, QSizePolicy, QWidget
 from study_app.designer.parts import cut_text
 from study_app.gui.theme.theme import Tone, font
 from study_app.gui.theme.themed import Themed, remove_widget
+from study_app.gui.widgets.accessible import plain_tip
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.boxes import grid as grid_of
 from study_app.gui.widgets.cards import Bar, Card, Icon, Rule, fill_rounded, smooth_painter
@@ -192,7 +193,7 @@ class Strip(Themed, QWidget):
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         listed = [one.words for one in segments]
         self.setAccessibleName("Session, in order: " + ", ".join(listed))
-        self.setToolTip("\n".join((*listed, "Click a step to open it")))
+        self.setToolTip(plain_tip("\n".join((*listed, "Click a step to open it"))))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() != Qt.MouseButton.LeftButton:
@@ -333,7 +334,7 @@ def _lines(shown: Lines) -> QWidget:
         grid.addWidget(number, at, 2, Qt.AlignmentFlag.AlignRight)
         if icon:
             mark = Icon(icon, INKS[tone], 16)
-            mark.setToolTip(words)
+            mark.setToolTip(plain_tip(words))
             mark.setAccessibleName(f"{line.title}: {words}")
             grid.addWidget(mark, at, 3)
     if len(shown.lines) > MOST_LINES:

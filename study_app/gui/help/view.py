@@ -34,6 +34,7 @@ from study_app import documentation
 from study_app.documentation import anchor_of, plain
 from study_app.gui.theme.theme import SHADOW, Theme, font
 from study_app.gui.theme.themed import Coloured
+from study_app.gui.widgets.accessible import plain_tip
 from study_app.gui.widgets.boxes import add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton
@@ -366,7 +367,7 @@ class HelpPlace(Place):
                 item = QListWidgetItem(row.title)
                 item.setData(PAGE, row.page)
                 item.setData(ANCHOR, row.anchor)
-                item.setToolTip(row.title)
+                item.setToolTip(plain_tip(row.title))
                 item.setFont(font("label", weight=600 if row.heads else 400))
                 item.setSizeHint(QSize(LIST_WIDTH - 60, HEAD_PX if row.heads else ROW_PX))
                 self.list.addItem(item)

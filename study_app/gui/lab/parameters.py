@@ -10,6 +10,7 @@ from study_app.gui.lab.lab_state import SIDES, Choices, LabView
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed, give_ground, replace_inside
+from study_app.gui.widgets.accessible import plain_tip
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Card, Icon, MaskedPanel, Rule, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Cap, Choice, CompactStop, IconButton, Toggle
@@ -81,7 +82,7 @@ class Segment(Themed, QPushButton):
         self._shown = shown
         words = self.fontMetrics().elidedText(name, Qt.TextElideMode.ElideRight, WIDEST - BADGE - 30)
         self.setText(words.replace("&", "&&"))
-        self.setToolTip(name)
+        self.setToolTip(plain_tip(name))
         picture = QPixmap((QSizeF(self.iconSize()) * self.devicePixelRatioF()).toSize())
         picture.setDevicePixelRatio(self.devicePixelRatioF())
         picture.fill(Qt.GlobalColor.transparent)
@@ -559,7 +560,7 @@ class FormPanel(Card):
         self.said.show_text(view.said)
         self.said.setVisible(bool(view.said))
         self.back.setVisible(bool(view.study))
-        self.back.setToolTip(f"{view.study} is open in the study designer")
+        self.back.setToolTip(plain_tip(f"{view.study} is open in the study designer"))
         setting = bench.in_hand
         if setting != self._setting or bench.presented != self._side:
             refused = self._side != bench.presented

@@ -17,6 +17,7 @@ from study_app.gui.operator.operator_view import NOTES_SHOWN, OperatorView
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.accessible import plain_tip
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Icon
 from study_app.gui.widgets.controls import ActionButton
@@ -143,7 +144,7 @@ class NotesCard(Card):
         self._head.setVisible(most == NOTES_SHOWN)
         self._list.setVisible(most > 0)
         self.hint.setVisible(most == NOTES_SHOWN)
-        self.field.setToolTip("" if most == NOTES_SHOWN else self.hint.text())
+        self.field.setToolTip(plain_tip("" if most == NOTES_SHOWN else self.hint.text()))
         if self._view is not None:
             self.show_view(self._view)
 
@@ -307,4 +308,4 @@ class DeviceCard(Card):
             value.show_text(said)
             for part in (name, value):
                 part.setVisible(index < self._most)
-        self.setToolTip("\n".join(f"{word}: {said}" for word, said in device.rows[self._most :]))
+        self.setToolTip(plain_tip("\n".join(f"{word}: {said}" for word, said in device.rows[self._most :])))

@@ -9,6 +9,7 @@ from study_app.gui.operator.operator_view import OperatorView, State, StepRow
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Tone, TypeRole, font
 from study_app.gui.theme.themed import Themed, give_ground
+from study_app.gui.widgets.accessible import plain_tip
 from study_app.gui.widgets.boxes import STRETCH, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Bar, Card, Chip, Icon, Logo, Rule, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, CompactStop, IconButton
@@ -261,7 +262,7 @@ class Tally(QWidget):
             value.setText(count)
         self.beyond.setVisible(bool(view.beyond))
         self.beyond.setText(f"{view.beyond[0]}." if view.beyond else "")
-        self.beyond.setToolTip("\n".join(view.beyond) if len(view.beyond) > 1 else "")
+        self.beyond.setToolTip(plain_tip("\n".join(view.beyond) if len(view.beyond) > 1 else ""))
         self.track.setVisible(bool(view.track))
         self.track.setText("  ·  ".join(view.track))
 
@@ -318,7 +319,7 @@ class StepLine(Themed, QWidget):
         set_ink(self.note, "accent" if row.state == "now" else "text2")
         note = "" if row.note == row.state else row.note
         self.setAccessibleName(f"{row.label}, {row.state} {note}".strip())
-        self.setToolTip(f"{row.label}  ·  {row.note}" if row.note else row.label)
+        self.setToolTip(plain_tip(f"{row.label}  ·  {row.note}" if row.note else row.label))
         self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:

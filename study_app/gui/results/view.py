@@ -50,6 +50,7 @@ from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.sessions.sessions_table import SessionsTable
 from study_app.gui.theme.theme import SHADOW, Theme, font
 from study_app.gui.theme.themed import remove_widget
+from study_app.gui.widgets.accessible import plain_tip
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Chip, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
@@ -483,7 +484,7 @@ class ResultsPlace(Place):
             self.chips = []
             for tone, icon, words, tip in chips:
                 chip = Chip(tone, icon, words)  # type: ignore[arg-type]  # the tones above
-                chip.setToolTip(tip)
+                chip.setToolTip(plain_tip(tip))
                 self._chips.addWidget(chip)
                 self.chips.append(chip)
             self._arrange()

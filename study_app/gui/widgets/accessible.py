@@ -1,6 +1,9 @@
 """What screen readers receive beyond Qt's own roles: headings, plots, the participant's window."""
 
+import html
+
 import shiboken6
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QAccessible, QAccessibleAnnouncementEvent
 from PySide6.QtWidgets import QAccessibleWidget, QLabel, QWidget
 
@@ -28,7 +31,36 @@ def describe_plot(plot: QWidget, name: str, sentence: str) -> None:
     give_role(plot, QAccessible.Role.Chart)
 
 
-class HeadingLabel(QLabel):
+class PlainLabel(QLabel):
+    """A label that shows its text as it is: "<b>" and "&" of a study are no markup."""
+
+    def __init__(
+        self,
+        text: str = "",
+        parent: QWidget | None = None,
+        *,
+        wraps: bool = False,
+        alignment: Qt.AlignmentFlag | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.setTextFormat(Qt.TextFormat.PlainText)
+        self.setWordWrap(wraps)
+        if alignment is not None:
+            self.setAlignment(alignment)
+        self.setText(text)
+
+
+def button_text(text: str) -> str:
+    """Return a text for a button that shows it as it is; Qt takes a single "&" as the mark of a shortcut."""
+    return text.replace("&", "&&")
+
+
+def plain_tip(text: str) -> str:
+    """Return a text for a tooltip that shows it as it is, also if Qt would take it for markup."""
+    return f"<qt>{html.escape(text).replace(chr(10), '<br>')}</qt>" if "<" in text else text
+
+
+class HeadingLabel(PlainLabel):
     """A label that is a heading to a screen reader."""
 
     def __init__(self, text: str, parent: QWidget | None = None) -> None:

@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
     QAbstractButton,
     QCheckBox,
     QComboBox,
-    QLabel,
     QPushButton,
     QRadioButton,
     QSizePolicy,
@@ -33,6 +32,7 @@ from PySide6.QtWidgets import (
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.accessible import PlainLabel, plain_tip
 from study_app.gui.widgets.cards import smooth_painter
 
 STOP_HEIGHT = 44
@@ -197,7 +197,7 @@ class IconButton(Themed, PressedByEnter):
             self.setProperty("dense", "true")
         self.setFixedSize(size, size)
         self.setAccessibleName(name)
-        self.setToolTip(tip or name)
+        self.setToolTip(plain_tip(tip or name))
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
     def minimumSizeHint(self) -> QSize:
@@ -220,7 +220,7 @@ class Choice(Themed, QComboBox):
 
     def __init__(self) -> None:
         super().__init__()
-        self._named = QLabel()
+        self._named = PlainLabel()
         self.setItemDelegate(QStyledItemDelegate(self))  # the theme gives the list's lines their height
 
     def setAccessibleName(self, name: str) -> None:
@@ -256,7 +256,7 @@ class Choice(Themed, QComboBox):
         shown = self.fitted(whole, room)
         option.currentText = shown  # type: ignore[attr-defined]  # missing in the stubs
         painter.drawControl(QStyle.ControlElement.CE_ComboBoxLabel, option)
-        self.setToolTip(whole if shown != whole else "")
+        self.setToolTip(plain_tip(whole if shown != whole else ""))
         draw_icon(
             painter, "chevron_down", QRectF(self.width() - 30, self.height() / 2 - 8, 16, 16), self.theme.text2, 2.0
         )

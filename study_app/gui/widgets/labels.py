@@ -7,7 +7,7 @@ from PySide6.QtGui import QAccessible, QFont, QFontMetrics, QFontMetricsF, QResi
 from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
 from study_app.gui.theme.theme import TypeRole, font
-from study_app.gui.widgets.accessible import HeadingLabel, give_role
+from study_app.gui.widgets.accessible import HeadingLabel, PlainLabel, give_role, plain_tip
 
 HEADINGS: frozenset[TypeRole] = frozenset({"display", "title", "title_dense", "card"})
 """The type roles of headings, for people who see them and for screen readers."""
@@ -28,8 +28,7 @@ def label(
 
     ``tabular`` figures share one width.
     """
-    made = HeadingLabel(text) if (role in HEADINGS if heading is None else heading) else QLabel(text)
-    made.setTextFormat(Qt.TextFormat.PlainText)
+    made = HeadingLabel(text) if (role in HEADINGS if heading is None else heading) else PlainLabel(text)
     made.setFont(font(role, weight=weight, tabular=tabular))
     made.setProperty("role", ink)
     made.setWordWrap(wraps)
@@ -79,7 +78,7 @@ class Elided(QLabel):
     def _elide(self) -> None:
         shown = self.fontMetrics().elidedText(self.whole, Qt.TextElideMode.ElideRight, self.width())
         self.setText(shown)
-        self.setToolTip(self.whole if shown != self.whole else "")
+        self.setToolTip(plain_tip(self.whole if shown != self.whole else ""))
 
 
 class Clamped(QLabel):
@@ -120,7 +119,7 @@ class Clamped(QLabel):
         self.setText("\n".join(lines))
         if not self._steady:
             self.setFixedHeight(max(1, len(lines)) * self.fontMetrics().lineSpacing() + 2)
-        self.setToolTip(self.whole if lines and lines[-1].endswith("…") else "")
+        self.setToolTip(plain_tip(self.whole if lines and lines[-1].endswith("…") else ""))
 
 
 def clamped(text: str, most: int, font: QFont, width: int) -> list[str]:

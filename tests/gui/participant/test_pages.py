@@ -1,16 +1,19 @@
 """Pages to read: what they say, which keys go on, breaks that last, long texts, languages to choose from."""
 
 from collections.abc import Callable
+from dataclasses import fields, replace
 from typing import Any
 
 import pytest
-from PySide6.QtGui import QPointingDevice
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeySequence, QPointingDevice, QTextDocument
+from PySide6.QtWidgets import QAbstractButton, QLabel
 
 from study_app.protocol.wording.languages import LANGUAGES, words
 from study_app.session.pages import PausePage
 from study_app.session.transitions.events import Continue, EndRequested, LanguageChosen, ResumeRequested
 from tests.gui.participant.driver import KEY, Participant, tap
-from tests.gui.small import text_page
+from tests.gui.small import QUESTIONS, choice, form, number, questionnaire, text_page
 
 Opening = Callable[..., Participant]
 FULL = (1366, 768)
@@ -46,3 +49,36 @@ def test_texts_languages_and_a_pause_work_by_touch(opening: Opening, finger: QPo
     seen.show(PausePage(force_off=False))
     tap(finger, seen.page.button)
     assert seen.kinds == [LanguageChosen, Continue, ResumeRequested]
+
+
+MARKUP = "<b>&amp;</b> <img src=x> & _"
+
+
+def with_markup(page: Any) -> Any:
+    """Return a page with markup after each of its texts and those of its questions."""
+    if isinstance(page, str):
+        return f"{page} {MARKUP}"
+    if isinstance(page, tuple):
+        return tuple(with_markup(part) for part in page)
+    names = {"title", "intro", "text", "paragraphs", "button", "item", "items", "unit", "low", "high", "labels"}
+    changed = {each.name: getattr(page, each.name) for each in fields(page) if each.name in names}
+    marked = {name: with_markup(value) for name, value in changed.items() if value is not None}
+    if hasattr(page, "options"):
+        marked["options"] = tuple((value, with_markup(text)) for value, text in page.options)
+    return replace(page, **marked)
+
+
+@pytest.mark.parametrize("page", [choice(4), number(), text_page(), questionnaire(), form(*QUESTIONS)])
+def test_markup_in_texts_of_a_study_is_shown_as_it_is(opening: Opening, page: Any) -> None:
+    seen = opening(with_markup(page), FULL)
+    labels = [label for label in seen.page.findChildren(QLabel) if "img" in label.text()]
+    for label in labels:
+        plain = label.textFormat() is Qt.TextFormat.PlainText
+        document = QTextDocument()
+        (document.setPlainText if plain else document.setHtml)(label.text())
+        assert MARKUP in document.toPlainText()
+    buttons = seen.page.findChildren(QAbstractButton)
+    assert [button.text() for button in buttons if not QKeySequence.mnemonic(button.text()).isEmpty()] == []
+    shown = [button.text().replace("&&", "&") for button in buttons if "img" in button.text()]
+    assert all(MARKUP in text for text in shown)
+    assert labels or shown or seen.page.accessibleName().count(MARKUP)

@@ -7,7 +7,7 @@ from typing import ClassVar, Final
 
 from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFocusEvent, QFontMetricsF, QKeyEvent, QMouseEvent, QPaintEvent, QPen, QWheelEvent
-from PySide6.QtWidgets import QLabel, QLineEdit, QPlainTextEdit, QPushButton, QSizePolicy, QSlider, QWidget
+from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QPushButton, QSizePolicy, QSlider, QWidget
 
 from study_app.gui.participant.forms.question_field import (
     ENTER,
@@ -23,7 +23,7 @@ from study_app.gui.participant.forms.question_field import (
 )
 from study_app.gui.participant.pages.page_widget import DigitPad, page_painter, point_at
 from study_app.gui.theme.theme import PARTICIPANT, font
-from study_app.gui.widgets.accessible import say
+from study_app.gui.widgets.accessible import PlainLabel, say
 from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
 from study_app.gui.widgets.labels import set_property
 from study_app.gui.widgets.numbers import read_number, write_number
@@ -139,11 +139,11 @@ class NumberField(TypedField):
         self.entry.setAccessibleName(" ".join(filter(None, (view.text, view.unit))))
         self.entry.setMaxLength(20)
         self.entry.textChanged.connect(self._edit)
-        self._unit = QLabel(view.unit)
+        self._unit = PlainLabel(view.unit)
         self._unit.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
         more = (*(() if view.whole else (words.decimal_sign,)), *self._signs())
         self._pad = DigitPad(self.entry, more, ACROSS, words.delete_digit, self)
-        self._wrong = QLabel(wordWrap=True)
+        self._wrong = PlainLabel(wraps=True)
         self._wrong.setStyleSheet(f"color: {PARTICIPANT.warn}; background: transparent;")
         self._wrong.hide()
         self._row = hbox(self.entry, self._unit, (STRETCH, 1), self._pad)
@@ -275,7 +275,7 @@ class RatingField(ScaleField):
         if self.judge is not None:
             self.row.addWidget(self.judge, JUDGE_SHARE, Qt.AlignmentFlag.AlignBottom)
         self.put(area)
-        self._names = [QLabel() for _ in self._columns()]
+        self._names = [PlainLabel() for _ in self._columns()]
         for (first, last), label, side in zip(self._columns(), self._names, self._sides(), strict=True):
             label.setWordWrap(True)
             label.setAlignment(side | Qt.AlignmentFlag.AlignAbsolute | Qt.AlignmentFlag.AlignBottom)
@@ -459,7 +459,7 @@ class SliderField(QuestionField):
         self.line = Line(view.steps, area)
         self.line.setAccessibleName(view.text)
         self.line.set_to.connect(lambda step: self.give(view.at(step)))
-        self._ends = (QLabel(view.low), QLabel(words.no_answer_yet), QLabel(view.high))
+        self._ends = (PlainLabel(view.low), PlainLabel(words.no_answer_yet), PlainLabel(view.high))
         for end, side in zip(self._ends, (Qt.AlignmentFlag.AlignLeft, None, Qt.AlignmentFlag.AlignRight), strict=True):
             end.setWordWrap(side is not None)
             end.setAlignment((side or Qt.AlignmentFlag.AlignHCenter) | ABSOLUTE | Qt.AlignmentFlag.AlignTop)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QRect, QRectF, Qt, QTimer
 from PySide6.QtGui import QAccessible, QColor, QFont, QFontMetrics, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QLabel, QLayout, QPushButton, QStyle, QWidget
+from PySide6.QtWidgets import QLayout, QPushButton, QStyle, QWidget
 
 from study_app.discovery import by_name
 from study_app.gui.key_presses import key_presses
@@ -26,7 +26,7 @@ from study_app.gui.participant.pages.page_widget import (
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.theme.themed import remove_widget
-from study_app.gui.widgets.accessible import HeadingLabel, give_role, say
+from study_app.gui.widgets.accessible import HeadingLabel, PlainLabel, give_role, say
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.protocol.questions import ItemView, shown
 from study_app.protocol.wording.languages import Words
@@ -185,7 +185,7 @@ class QuestionsPage(PageWidget):
         self.setAccessibleName(page.title)
         self.setAccessibleDescription(page.intro)
         self._progress = ProgressLine(page.progress, context.words, ANSWERING, self)
-        self._title, self._intro = HeadingLabel(page.title, self), QLabel(page.intro, self)
+        self._title, self._intro = HeadingLabel(page.title, self), PlainLabel(page.intro, self)
         self._intro.setWordWrap(True)
         self._intro.setVisible(bool(page.intro))
         for label, ink in ((self._title, PARTICIPANT.text), (self._intro, PARTICIPANT.text2)):

@@ -7,7 +7,7 @@ from typing import Final
 
 from PySide6.QtCore import QEvent, QObject, QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QKeyEvent, QPainter, QPen, QShowEvent, QWheelEvent
-from PySide6.QtWidgets import QLabel, QLineEdit, QPushButton, QWidget
+from PySide6.QtWidgets import QLineEdit, QPushButton, QWidget
 
 from study_app.gui.key_presses import digit_of
 from study_app.gui.participant.pages.page_widget import (
@@ -20,7 +20,7 @@ from study_app.gui.participant.pages.page_widget import (
 )
 from study_app.gui.participant.pages.text_page import Badge
 from study_app.gui.theme.theme import PARTICIPANT, font
-from study_app.gui.widgets.accessible import HeadingLabel, say
+from study_app.gui.widgets.accessible import HeadingLabel, PlainLabel, button_text, say
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.numbers import read_number
 from study_app.protocol.questions import Value, plain_number
@@ -41,7 +41,7 @@ class AnswerPage(PageWidget):
         self.page = page
         self._answered = False
         self._progress = ProgressLine(page.progress, context.words, ASKING, self)
-        self.question = QLabel(page.item.text, self, wordWrap=True, alignment=Qt.AlignmentFlag.AlignCenter)
+        self.question = PlainLabel(page.item.text, self, wraps=True, alignment=Qt.AlignmentFlag.AlignCenter)
         self.setAccessibleName(page.item.text)
         self._column = vbox(self._progress, (STRETCH, 2), self.question, 36, parent=self)
 
@@ -89,13 +89,13 @@ class ChoiceWidget(AnswerPage):
         self.buttons: list[QPushButton] = []
         self._values = [value for value, _ in page.item.options]
         for value, text in page.item.options:
-            button = QPushButton(text, self, autoDefault=False)
+            button = QPushButton(button_text(text), self, autoDefault=False)
             button.setAccessibleName(text)
             button.setAccessibleDescription(page.item.text)
             button.pressed.connect(lambda value=value: self.answer(value))
             button.installEventFilter(self)
             self.buttons.append(button)
-        self._cap, self._hint = KeyCap(self), QLabel(self._words.key_answer, self)
+        self._cap, self._hint = KeyCap(self), PlainLabel(self._words.key_answer, self)
         self._hint.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
         row = hbox(STRETCH, *self.buttons, STRETCH, spacing=CHOICE_GAP_PX)
         add_parts(self._column, row, 28, hbox(STRETCH, self._cap, self._hint, STRETCH), (STRETCH, 3))
@@ -231,7 +231,7 @@ class NumberWidget(AnswerPage):
         self.field = QLineEdit(self, maxLength=LONGEST, alignment=Qt.AlignmentFlag.AlignCenter)
         self.field.setAccessibleName(page.item.text)
         self.field.setAccessibleDescription(self._words.number_wanted)
-        self.wrong = QLabel("", self)
+        self.wrong = PlainLabel("", self)
         self.wrong.setStyleSheet(f"color: {PARTICIPANT.warn}; background: transparent;")
         self.field.textChanged.connect(lambda _text: self.wrong.clear())
         self._pad = DigitPad(self.field, (self._words.decimal_sign,), ACROSS, self._words.delete_digit, self)

@@ -26,6 +26,7 @@ from PySide6.QtWidgets import QAbstractButton, QGroupBox, QLineEdit, QPushButton
 from study_app.gui.key_presses import digit_of
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
+from study_app.gui.widgets.accessible import button_text
 from study_app.gui.widgets.boxes import grid
 from study_app.gui.widgets.cards import fill_rounded
 from study_app.protocol.wording.languages import Words, words
@@ -320,7 +321,8 @@ class GoButton(LitButton, QPushButton):
     """The filled button of a participant's page, with the key that presses it; never disabled."""
 
     def __init__(self, text: str, key: str, parent: QWidget | None = None) -> None:
-        super().__init__(text, parent)
+        super().__init__(button_text(text), parent)
+        self._label = text
         self._key = key
         self._scale = 1.0
         self.setCursor(Qt.CursorShape.PointingHandCursor)
@@ -336,7 +338,7 @@ class GoButton(LitButton, QPushButton):
 
     def sizeHint(self) -> QSize:
         scale = self._scale
-        label = QFontMetricsF(self.font()).horizontalAdvance(self.text())
+        label = QFontMetricsF(self.font()).horizontalAdvance(self._label)
         cap, _ = key_size(self._key, scale)
         width = max(150 * scale, label + cap + (36 + 12 + 28) * scale)
         return QSize(round(width + 2 * RING), round(48 * scale + 2 * RING))
@@ -353,13 +355,13 @@ class GoButton(LitButton, QPushButton):
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.setPen(QPen(QColor(theme.text), 2))
             painter.drawRoundedRect(body.adjusted(-3, -3, 3, 3), radius + 3, radius + 3)
-        label = QFontMetricsF(self.font()).horizontalAdvance(self.text())
+        label = QFontMetricsF(self.font()).horizontalAdvance(self._label)
         cap, _ = key_size(self._key, scale)
         start = body.center().x() - (label + 12 * scale + cap) / 2
         words_at, cap_at = (start + cap + 12 * scale, start) if flip else (start, start + label + 12 * scale)
         painter.setFont(self.font())
         painter.setPen(QColor(theme.on_accent))
-        painter.drawText(QRectF(words_at - 1, body.top(), label + 2, body.height()), CENTRE, self.text())
+        painter.drawText(QRectF(words_at - 1, body.top(), label + 2, body.height()), CENTRE, self._label)
         ink = theme.on_accent
         draw_key(painter, cap_at, body.center().y(), self._key, scale, ink=ink, edge=ink, strength=0.5)
         painter.end()

@@ -20,7 +20,7 @@ from study_app.gui.participant.pages.page_widget import (
 )
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, font
-from study_app.gui.widgets.accessible import HeadingLabel, say
+from study_app.gui.widgets.accessible import HeadingLabel, PlainLabel, say
 from study_app.gui.widgets.boxes import STRETCH, vbox
 from study_app.session.pages import EndPage, PausePage, TextPage, TroublePage
 from study_app.session.transitions.events import Continue, EndRequested, LanguageChosen, ResumeRequested
@@ -232,7 +232,7 @@ class TextWidget(ReadingPage):
         column = (ICONS[page.kind], page.title, page.paragraphs, PARTICIPANT.accent)
         super().__init__(column, context, (page.button, key), progress)
         self._stays_until_s = page.stays_until_s
-        self.count_label = QLabel(self)
+        self.count_label = PlainLabel("", self)
         self.count_label.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
         self._ticker = QTimer(self, interval=TICK_MS)
         self._ticker.timeout.connect(self.tick)
