@@ -23,6 +23,7 @@ from study_app.protocol.source.files import (
     FOOTAGE_TABLE,
     TABLE,
     at_hand,
+    check_size,
     is_footage,
     is_utf16,
     protocol_hash,
@@ -248,6 +249,7 @@ def _holds_study(document: Mapping[str, Any]) -> bool:
 
 def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
     """Return the tables of a text, arrays as tuples, and the lines they stand on (ProtocolError if it is no TOML)."""
+    check_size(source, name)
     if is_utf16(source):
         raise ProtocolError(name, (Problem("file", "is UTF-16 text", hint="save it as UTF-8"),))
     try:

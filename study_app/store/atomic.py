@@ -329,6 +329,11 @@ def read_own(path: Path, root: Path) -> bytes:
         raise cannot_read(path, error) from error
 
 
+def read_own_if_there(path: Path, root: Path) -> bytes | None:
+    """Return the content of a file that must lie under ``root``, None where there is none."""
+    return read_own(path, root) if os.path.lexists(path) else None
+
+
 def parse_json(content: bytes | str) -> Any:
     """Return the value in ``content``.
 

@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 
 from study_app.errors import StoreError
-from study_app.store.atomic import append_line, parse_json, read_if_there, write_file
+from study_app.store.atomic import append_line, parse_json, read_own_if_there, write_file
 from study_app.store.columns import EXCLUSIONS
 from study_app.store.csv_files import MISSING, csv_bytes, header, unguarded
 from study_app.store.folder_lock import open_alone
@@ -155,7 +155,7 @@ def exclusions(folder: Path) -> tuple[Exclusion, ...]:
         The list cannot be read, or a row of it is invalid.
     """
     path = StudyFolder(folder).exclusions
-    content = read_if_there(path)
+    content = read_own_if_there(path, folder)
     if content is None:
         return ()
     columns = header(EXCLUSIONS)
@@ -182,7 +182,7 @@ def reversals(folder: Path) -> tuple[Exclusion, ...]:
 def dated_reversals(folder: Path) -> tuple[tuple[Exclusion, str], ...]:
     """Return each reversed exclusion with the time of its reversal."""
     path = StudyFolder(folder).reversed_exclusions
-    lines = (read_if_there(path) or b"").split(b"\n")  # a reason may contain other line endings
+    lines = (read_own_if_there(path, folder) or b"").split(b"\n")  # a reason may contain other line endings
     return tuple(_reversed(path, number, line) for number, line in enumerate(lines, start=1) if line.strip())
 
 

@@ -1,6 +1,7 @@
 """Which files a study names as its liquids, however the key is written."""
 
 import os
+import time
 from pathlib import Path
 
 import pytest
@@ -222,3 +223,15 @@ def test_the_fade_belongs_to_format_2(tmp_path: Path) -> None:
     assert scene.fade_s == 0.3
     assert load_scene(written(tmp_path / "again.toml", scene_text(scene)), "water") == scene
     assert "fade_s" not in scene_text(override(scene, "fade_s", 0.05))
+
+
+@pytest.mark.parametrize("content", [b"x = 1\n" * 300_000, b"# a comment\n" * 100_000, b"a." * 600_000 + b"a = 1"])
+def test_a_file_that_is_larger_than_any_study_is_refused_at_once(tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / "large.toml"
+    file.write_bytes(content)
+    begun_s = time.monotonic()
+    with pytest.raises(ProtocolError, match=r"has 1\.\d MB; a study has at most 1 MB"):
+        load(str(file))
+    with pytest.raises(ProtocolError, match="check that it is a study file"):
+        parse(content, "large")
+    assert time.monotonic() - begun_s < 2.0

@@ -121,3 +121,13 @@ def test_a_list_with_an_endless_cell_is_named(folder: Path) -> None:
     (folder / "exclusions.csv").write_bytes(b"x" * 200_000)
     with pytest.raises(StoreError, match=r"is not CSV \(field larger than field limit"):
         exclusions(folder)
+
+
+@pytest.mark.parametrize("name", ["exclusions.csv", "exclusions_reversed.jsonl"])
+def test_a_list_that_a_link_leads_out_of_the_folder_is_refused(tmp_path: Path, name: str) -> None:
+    study, outside = tmp_path / "study", tmp_path / "outside"
+    study.mkdir()
+    outside.write_bytes(b"")
+    (study / name).symlink_to(outside)
+    with pytest.raises(StoreError, match="leads by a link out of"):
+        (exclusions if name.endswith("csv") else reversals)(study)

@@ -27,6 +27,8 @@ TABLE: Final = "liquid_files"
 FOOTAGE_TABLE: Final = "footage_files"
 _FOOTAGE_HEADER: Final = f"\n\n# The SHA-256 of the footage of this study.\n[{FOOTAGE_TABLE}]\n".encode()
 _HEADER: Final = f"\n\n# The liquid files of this study, as they were read.\n[{TABLE}]\n".encode()
+MOST_BYTES: Final = 1_000_000
+"""Size of a study with its liquid files [bytes]; one with 200 statements has 50,000."""
 DRAWN_OR_LIVE: Final = ("tank", "camera")
 """Views of a condition that are no file."""
 
@@ -209,9 +211,18 @@ def source_bytes(name_or_path: str | Path) -> bytes:
     """Return a protocol's file, followed by the liquid files it names (`with_liquid_files`)."""
     path = find(name_or_path)
     try:
-        return with_liquid_files(path.read_bytes(), path.parent)
+        source = path.read_bytes()
+        check_size(source, str(name_or_path))
+        return with_liquid_files(source, path.parent)
     except OSError as error:
         raise _not_found(name_or_path, f"cannot be read: {error.strerror}", "check its permissions") from error
+
+
+def check_size(source: bytes, name: str) -> None:
+    """Reject a source that is larger than any study, before it is parsed."""
+    if len(source) > MOST_BYTES:
+        size = f"has {len(source) / 1e6:.1f} MB; a study has at most {MOST_BYTES / 1e6:g} MB"
+        raise ProtocolError(name, (Problem("file", size, hint="check that it is a study file"),))
 
 
 def protocol_hash(source: bytes) -> str:
