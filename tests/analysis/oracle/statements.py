@@ -1,239 +1,346 @@
-"""Recompute the report of a study of statements from its exported tables, with pandas and scipy alone.
+"""Recompute the blocks of statements of a report: counts, effects, and tests of settings, pairs, names and delays."""
 
-Nothing of the program is imported: an error that it makes in every place is not made here.
-"""
-
-import json
 import math
-import re
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations, permutations, product
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy import stats
+from statsmodels.stats.inter_rater import cohens_kappa
 
-Floats = NDArray[np.float64]
-TOLERANCE = 1e-6
-TIED = 1e-9
-"""Sums of ranks that differ by less are equal."""
+from tests.analysis.oracle.recomputed import (
+    SESSION,
+    TIED,
+    Compared,
+    Floats,
+    Numbers,
+    adjusted,
+    exact_share,
+    named,
+    numbered,
+    quartiles,
+    share_of_signs,
+    signed_ranks,
+    student,
+)
+
+BH = "fdr_bh"
 
 
 @dataclass
-class Compared:
-    """The numbers of a report that were recomputed, by place, and those that differ: (place, report, recomputed)."""
+class Block:
+    """A block of statements: its place in the report, its answers that count, and each person's medians by item."""
 
-    report: dict[str, Any]
-    places: set[str] = field(default_factory=set)
-    differences: list[tuple[str, Any, Any]] = field(default_factory=list)
+    compared: Compared
+    place: str
+    found: Numbers
+    codes: list[str]
+    delays: list[float]
+    answers: pd.DataFrame
+    wide: dict[str, pd.DataFrame]
+    gate: float = 0.0
 
-    def check(self, place: str, reported: Any, recomputed: dict[str, Any]) -> None:
-        """Compare the named numbers of a part of the report; None and NaN are the same."""
-        for name, number in recomputed.items():
-            path, value = f"{place}.{name}", reported
-            for key in name.split("."):
-                value = value[int(key)] if isinstance(value, list) else value[key]
-            self.places.add(path)
-            told, own = (math.nan if it is None else float(it) for it in (value, number))
-            both_missing = math.isnan(told) and math.isnan(own)
-            if not both_missing and not math.isclose(told, own, rel_tol=TOLERANCE, abs_tol=1e-9):
-                self.differences.append((path, value, number))
+    def is_primary(self, item: str) -> bool:
+        """Return whether a test of a statement was decided on before the study."""
+        decided = self.compared.results["decided"]
+        return bool(decided["made"] and (not decided["primary"] or item in decided["primary"]))
 
-    @property
-    def share(self) -> float:
-        """The share of the report's numbers that were recomputed."""
-        numbers = set(leaves(self.report))
-        return len(numbers & self.places) / len(numbers)
+    def direction(self, item: str) -> str | None:
+        """Return the direction in which a delay was expected to move the answers."""
+        decided = self.compared.results["decided"]
+        return "greater" if item in decided["rising"] else "less" if item in decided["falling"] else None
 
-    def missing(self) -> Counter[str]:
-        """Return how many numbers of each name were not recomputed."""
-        return Counter(re.sub(r"\.\d+", "", place) for place in leaves(self.report) if place not in self.places)
+    def record(self, name: str, recomputed: Numbers, question: str, item: str = "", comparison: str = "") -> None:
+        """Compare a test in report.json, and keep it for tests.csv."""
+        self.compared.check(f"{self.place}.{name}", recomputed)
+        own = {key.removeprefix("tested.").removeprefix("outcome."): value for key, value in recomputed.items()}
+        self.compared.rows[self.found["id"], question, item, comparison] = own
 
-
-def leaves(value: Any, place: str = "") -> Iterator[str]:
-    """Yield the places of all numbers in a report."""
-    if isinstance(value, dict | list):
-        for key, part in value.items() if isinstance(value, dict) else enumerate(value):
-            yield from leaves(part, f"{place}.{key}" if place else str(key))
-    elif isinstance(value, int | float) and not isinstance(value, bool):
-        yield place
-
-
-def compare(folder: Path) -> Compared:
-    """Recompute the numbers of ``report.json`` from the tables next to it."""
-    compared = Compared(json.loads((folder / "report.json").read_text(encoding="utf-8")))
-    answers, trials = (_table(folder, name) for name in ("responses", "trials"))
-    answers["response"] = pd.to_numeric(answers["response"], errors="coerce")
-    answers, trials = answers[answers["counted"]], trials[trials["counted"]]
-    results = compared.report["results"]
-    for number, block in enumerate(results["blocks"]):
-        own = answers[answers["block"] == block["id"]]
-        place = f"results.blocks.{number}"
-        _measures(compared, place, block, own, trials[trials["block"] == block["id"]])
-        wide = {item["id"]: _by_participant(own, item["id"], block) for item in block["items"]}
-        _effects(compared, place, block, wide)
-        _friedman(compared, place, block, wide)
-        _pairs(compared, place, block, wide)
-        _equivalence(compared, place, block, wide)
-    _motion(compared, results["performance"]["moved"], trials)
-    _delivered(compared, results["delivered"], trials)
-    return compared
+    def record_family(self, name: str, question: str, outcomes: dict[str, Numbers], *, explored: bool = False) -> None:
+        """Record tests of statements: primary ones by Holm, others by Benjamini and Hochberg, none below the gate."""
+        corrected = {}
+        for primary, method in ((True, "holm"), (False, BH)):
+            items = [item for item in outcomes if (self.is_primary(item) and not explored) == primary]
+            for item, p in zip(items, adjusted([outcomes[item]["p"] for item in items], method), strict=True):
+                corrected[item] = {"p_adjusted": np.maximum(p, self.gate), "members": len(items)}
+        for number, (item, outcome) in enumerate(outcomes.items()):
+            self.record(f"{name}.{number}", named("outcome", outcome) | corrected[item], question, item)
 
 
-def _table(folder: Path, name: str) -> pd.DataFrame:
-    (path,) = folder.glob(f"*_description-{name}_data.csv")
-    return pd.read_csv(path, na_values=["n/a"], keep_default_na=False, low_memory=False)
+def compare_statements(compared: Compared, answers: pd.DataFrame, trials: pd.DataFrame) -> None:
+    """Recompute the numbers of all blocks of statements."""
+    answers = answers[answers["kind"] == "statement"] if "kind" in answers else answers
+    answers = answers.assign(response=pd.to_numeric(answers["response"], errors="coerce"))
+    found = compared.results["blocks"]
+    gates = adjusted([(block["overall"] or {}).get("p") for block in found])
+    for number, (own, gate) in enumerate(zip(found, gates, strict=True)):
+        settings = next(one["settings"] for one in compared.codebook["blocks"] if one["id"] == own["id"])
+        counting = answers[(answers["block"] == own["id"]) & answers["counts"]]
+        codes, wide = [setting["code"] for setting in settings], {}
+        for item in (one["id"] for one in own["items"]):
+            medians = counting[counting["item"] == item].groupby(["participant", "code"])["response"].median()
+            wide[item] = medians.unstack("code").reindex(sorted(counting["participant"].unique()))[codes]
+            conditions = {setting["code"]: setting["condition"] for setting in settings}
+            compared.values[own["id"], item] = wide[item].rename(columns=conditions)
+        delays = [setting["delay_ms"] for setting in settings]
+        block = Block(compared, f"results.blocks.{number}", own, codes, delays, counting, wide, gate)
+        _measures(block, trials[trials["block"] == own["id"]])
+        for recompute in (_effects, _settings_differ, _mixed, _pairs, _recognition):
+            recompute(block)
+        if own["kind"] == "delays":
+            for recompute in (_trends, _equivalence, _noticed):
+                recompute(block)
 
 
-def _by_participant(answers: pd.DataFrame, item: str, block: dict[str, Any]) -> pd.DataFrame:
-    """Return each participant's median answer to a statement, a column for each setting."""
-    of_item = answers[answers["item"] == item]
-    medians = of_item.groupby(["participant", "code"])["response"].median().unstack("code")
-    return medians.reindex(columns=[setting["code"] for setting in block["settings"]])
+def _measures(block: Block, trials: pd.DataFrame) -> None:
+    given = block.answers.dropna(subset="response")
+    times = given.groupby(["item", "participant", "code"]).size()
+    own = {"n": block.answers["participant"].nunique(), **numbered("presentations", [times.min(), times.max()])}
+    own |= numbered("sessions", sorted(given["session"].unique()))
+    block.compared.check(block.place, own | {f"settings.{at}.delay_ms": ms for at, ms in enumerate(block.delays)})
+    last = trials[trials["here"]].sort_values("attempt").drop_duplicates([*SESSION, "trial"], keep="last")
+    for number, (code, item) in enumerate(product(block.codes, block.wide)):
+        of_item = block.answers[(block.answers["code"] == code) & (block.answers["item"] == item)]
+        values, cannot_judge = of_item["response"].dropna(), int(of_item["cannot_judge"].eq(True).sum())
+        presented = int((trials["counts"] & (trials["code"] == code)).sum())
+        own = {"n": len(values), "participants": of_item.loc[values.index, "participant"].nunique()}
+        own |= {"presented": presented, "presented_excluded": (~last["kept"] & (last["code"] == code)).sum()}
+        own |= {"cannot_judge": cannot_judge, "missing": presented - len(values) - cannot_judge, **quartiles(values)}
+        own |= {f"count_{level}": (values == level).sum() for level in range(1, 8)}
+        block.compared.check(f"{block.place}.measures.{number}", own | {"agree_percent": 100 * (values >= 5).mean()})
 
 
-def _quartiles(values: pd.Series) -> dict[str, float]:
-    return {"q1": values.quantile(0.25), "median": values.median(), "q3": values.quantile(0.75)}
+def _effects(block: Block) -> None:
+    for number, (item, code) in enumerate(product(block.wide, block.codes[1:])):
+        differences = (block.wide[item][code] - block.wide[item][block.codes[0]]).dropna()
+        recomputed = {"n": len(differences), "mean": differences.mean(), **student(differences)}
+        block.compared.check(f"{block.place}.effects.{number}", recomputed)
 
 
-def _measures(
-    compared: Compared, place: str, block: dict[str, Any], answers: pd.DataFrame, trials: pd.DataFrame
-) -> None:
-    for number, measure in enumerate(block["measures"]):
-        own = answers[(answers["code"] == measure["code"]) & (answers["item"] == measure["item"])]
-        values, cannot_judge = own["response"].dropna(), int(own["cannot_judge"].astype(bool).sum())
-        presented = int((trials["code"] == measure["code"]).sum())
-        recomputed = {
-            "n": len(values),
-            "participants": own.loc[values.index, "participant"].nunique(),
-            "presented": presented,
-            "presented_excluded": 0,
-            "cannot_judge": cannot_judge,
-            "missing": presented - len(values) - cannot_judge,
-            "agree_percent": 100 * (values >= 5).mean(),
-            **{f"count_{level}": (values == level).sum() for level in range(1, 8)},
-            **_quartiles(values),
-        }
-        compared.check(f"{place}.measures.{number}", measure, recomputed)
+def _settings_differ(block: Block) -> None:
+    """Test each statement, and all at once: there p is drawn, and the smallest p follows from the number of draws."""
+    whole = {item: answers.dropna() for item, answers in block.wide.items()}
+    people, k = set[str]().union(*(answers.index for answers in whole.values())), len(block.codes)
+    tested = [(_friedman(answers), len(answers)) for answers in whole.values() if answers.nunique(axis=1).max() > 1]
+    method = block.found["overall"]["method"].split()
+    draws = int(method[3]) if "draws," in method else math.inf
+    own = {"n": len(people), "dropped": len(block.wide[next(iter(whole))]) - len(people), "items": len(tested)}
+    own |= {"statistic": sum(statistic for statistic, _ in tested)}
+    own |= {"effect": np.mean([statistic / n / (k - 1) for statistic, n in tested])}
+    own |= {"incomplete": len(people) * len(whole) - sum(map(len, whole.values()))}
+    own |= {"smallest_p": max(1 / (1 + draws), math.factorial(k) ** (1.0 - len(people)))}
+    block.record("overall", own, "settings differ, all statements")
+    if block.found["kind"] != "delays":
+        block.record_family("omnibus", "settings differ", {item: _alike(one) for item, one in block.wide.items()})
 
 
-def _effects(compared: Compared, place: str, block: dict[str, Any], wide: dict[str, pd.DataFrame]) -> None:
-    for number, effect in enumerate(block["effects"]):
-        answered = wide[effect["item"]]
-        differences = (answered[effect["code"]] - answered.iloc[:, 0]).dropna()
-        recomputed = {"n": len(differences), "mean": differences.mean()}
-        if differences.nunique() > 1:
-            mean, error = differences.mean(), stats.sem(differences)
-            low, high = stats.t.interval(0.95, len(differences) - 1, mean, error)
-            recomputed |= {"low": low, "high": high}
-        compared.check(f"{place}.effects.{number}", effect, recomputed)
+def _friedman(complete: pd.DataFrame) -> float:
+    """Return Friedman's chi-square, corrected for ties."""
+    ranks, (n, k) = complete.rank(axis=1).to_numpy(), complete.shape
+    return float((k - 1) * ((ranks.sum(0) - n * (k + 1) / 2) ** 2).sum() / ((ranks - (k + 1) / 2) ** 2).sum())
 
 
-def _friedman(compared: Compared, place: str, block: dict[str, Any], wide: dict[str, pd.DataFrame]) -> None:
-    for number, tested in enumerate(block.get("omnibus") or []):
-        complete, outcome = wide[tested["item"]].dropna(), tested["outcome"]
-        if outcome["test"] != "Friedman" or outcome["statistic"] is None:
-            continue
-        n, k = complete.shape
-        found = stats.friedmanchisquare(*complete.to_numpy().T)
-        ranks = complete.rank(axis=1).mean()
-        recomputed = {
-            "n": n,
-            "dropped": compared.report["study"]["participants"] - n,
-            "df": k - 1,
-            "statistic": found.statistic,
-            "p_chi2": found.pvalue,
-            "effect": found.statistic / n / (k - 1),
-            **{f"mean_ranks.{place_}": rank for place_, rank in enumerate(ranks)},
-        }
-        compared.check(f"{place}.omnibus.{number}.outcome", outcome, recomputed)
+def _alike(answers: pd.DataFrame) -> Numbers:
+    complete = answers.dropna()
+    n, k = complete.shape
+    if k == 2:
+        return signed_ranks(answers.iloc[:, 0] - answers.iloc[:, 1])
+    ranks, statistic, freedom = complete.rank(axis=1), stats.friedmanchisquare(*complete.to_numpy().T), k - 1 - 2 / n
+    w = statistic.statistic / n / (k - 1)
+    f = (n - 1) * w / (1 - w)
+    tails = _rank_sums(tuple(sorted(tuple(sorted(row)) for row in ranks.to_numpy().tolist())))
+    reached = [p for squares, p in tails if squares >= ((ranks.sum() - n * (k + 1) / 2) ** 2).sum() - TIED]
+    own = {"n": n, "dropped": len(answers) - n, "df": k - 1, "statistic": statistic.statistic, "effect": w, "f": f}
+    own |= {"p": reached[-1], "smallest_p": tails[0][1], "p_chi2": statistic.pvalue}
+    return own | {"p_f": stats.f.sf(f, freedom, (n - 1) * freedom), **numbered("mean_ranks", ranks.mean())}
 
 
-def _pairs(compared: Compared, place: str, block: dict[str, Any], wide: dict[str, pd.DataFrame]) -> None:
-    """Wilcoxon's signed ranks with the distribution of all signs, zeros left out."""
-    for number, pair in enumerate(block.get("pairs") or []):
-        answered, outcome = wide[pair["tested"]["item"]], pair["tested"]["outcome"]
-        differences = (answered[pair["first"]] - answered[pair["second"]]).dropna()
-        nonzero = differences[differences != 0].to_numpy()
-        ranks = stats.rankdata(np.abs(nonzero))
-        statistic = ranks[nonzero > 0].sum()
-        recomputed = {
-            "n": len(differences),
-            "dropped": len(answered) - len(differences),
-            "zeros": len(differences) - len(nonzero),
-            "statistic": statistic,
-            "effect": (2 * statistic - ranks.sum()) / ranks.sum(),
-            "p": min(1.0, 2 * _share_at_least(ranks, max(statistic, ranks.sum() - statistic))),
-        }
-        compared.check(f"{place}.pairs.{number}.tested.outcome", outcome, recomputed)
+@lru_cache
+def _rank_sums(patterns: tuple[tuple[float, ...], ...]) -> list[tuple[float, float]]:
+    """Return the sums of squared rank sums that all orders of all ranks give, largest first, and P of at least each."""
+    k, counts = len(patterns[0]), {(0.0,) * len(patterns[0]): 1.0}
+    for pattern in patterns:
+        orders, further = list(permutations(pattern)), Counter[tuple[float, ...]]()
+        for (sums, weight), order in product(counts.items(), orders):
+            further[tuple(sorted(map(sum, zip(sums, order, strict=True))))] += weight / len(orders)  # type: ignore[assignment]
+        counts = dict(further)
+    middle, shares = len(patterns) * (k + 1) / 2, Counter[float]()
+    for sums, weight in counts.items():
+        shares[sum((one - middle) ** 2 for one in sums)] += weight  # type: ignore[assignment]
+    support = sorted(shares, reverse=True)
+    return list(zip(support, np.cumsum([shares[one] for one in support]), strict=True))
 
 
-def _share_at_least(ranks: Floats, statistic: float) -> float:
-    """Return the share of all choices of signs whose sum of positive ranks is at least ``statistic``."""
-    sums = np.zeros(1)
-    for rank in ranks:
-        sums = np.concatenate([sums, sums + rank])
-    return float((sums >= statistic - TIED).mean())
+def _mixed(block: Block) -> None:
+    """Fit each person's least-squares slopes; Student's t tests one slope, Hotelling's T² several."""
+    delays = block.found["kind"] == "delays"
+    design = np.array(block.delays)[:, None] / 100 if delays else np.eye(len(block.codes))[:, 1:]
+    outcomes = {item: _slopes(answers, design, block.direction(item)) for item, answers in block.wide.items()}
+    block.record_family("mixed", "settings differ, mixed model", outcomes, explored=True)
 
 
-def _equivalence(compared: Compared, place: str, block: dict[str, Any], wide: dict[str, pd.DataFrame]) -> None:
+def _slopes(answers: pd.DataFrame, design: Floats, direction: str | None) -> Numbers:
+    complete, k = answers.dropna(), design.shape[1]
+    n, found = len(complete), {"n": len(complete), "dropped": len(answers) - len(complete)}
+    own = np.linalg.lstsq(np.column_stack([np.ones(len(design)), design]), complete.T, rcond=None)[0][1:].T
+    covariance = np.atleast_2d(np.cov(own.T))
+    if n < max(10, k + 1) or np.linalg.matrix_rank(covariance, tol=1e-9) < k:
+        return found | dict.fromkeys(("statistic", "p"), math.nan)
+    intervals = [student(slopes) | {"level": 0.95} for slopes in own.T]
+    if k == 1:
+        tested = stats.ttest_1samp(own[:, 0], 0, alternative=direction or "two-sided")
+        found |= {"statistic": tested.statistic, "p": tested.pvalue, "effect": own.mean()}
+        found |= named("interval", intervals[0])
+    else:
+        f = n * own.mean(0) @ np.linalg.inv(covariance) @ own.mean(0) * (n - k) / (k * (n - 1))
+        found |= {"statistic": f, "p": stats.f.sf(f, k, n - k)}
+    for number, ends in enumerate(intervals):
+        found |= named(f"intervals.{number}", ends)
+    return found | numbered("slopes", own.mean(0)) | numbered("sds", own.std(0, ddof=1))
+
+
+def _pairs(block: Block) -> None:
+    """Compare settings two by two in the statements that differ; one Holm family."""
+    if not block.found["pairs"]:
+        return
+    opened = [one["item"] for one in block.found["omnibus"] if (one["p_adjusted"] or 0) <= 0.05]
+    pairs = [(item, *two) for item in opened for two in combinations(block.codes, 2)]
+    outcomes = [signed_ranks(block.wide[item][first] - block.wide[item][second]) for item, first, second in pairs]
+    names = dict(zip(block.codes, block.found["names"], strict=True))
+    for number, p in enumerate(adjusted([outcome["p"] for outcome in outcomes])):
+        item, first, second = pairs[number]
+        own = named("tested.outcome", outcomes[number]) | {"tested.p_adjusted": max(p, block.gate)}
+        comparison = f"{names[first]} − {names[second]}"
+        block.record(f"pairs.{number}", own | {"tested.members": len(pairs)}, "two settings differ", item, comparison)
+
+
+def _recognition(block: Block) -> None:
+    """Recompute which name was rated highest, its hits among all exchanges of settings, and McNemar's tests."""
+    if block.found["named"] is None:
+        return
+    labels, truth = block.found["named"]["labels"], [one.get("label") for one in block.found["settings"]]
+    ratings = np.stack([block.wide[label].to_numpy() for label in labels], axis=2)
+    names = [[_highest(cell, labels) for cell in person] for person in ratings]
+    used = [person for person in names if set(person) != {"unanswered"}]
+    given = [pair for person in used for pair in zip(truth, person, strict=True)]
+    hits, chance = sum(right == name for right, name in given), np.ones(1)
+    for person in used:
+        answered = [pair for pair in zip(truth, person, strict=True) if pair[1] != "unanswered"]
+        orders = permutations([name for _, name in answered])
+        counts = [sum(right == name for (right, _), name in zip(answered, order, strict=True)) for order in orders]
+        chance = np.convolve(chance, np.bincount(counts) / len(counts))
+    table = pd.crosstab(*zip(*[pair for pair in given if pair[1] in labels], strict=True))  # type: ignore[call-overload]
+    columns = [*labels, "undecided", "unanswered"]
+    own = {"n": len(used), "dropped": len(names) - len(used), "statistic": hits, "p": chance[hits:].sum()}
+    own |= {"smallest_p": np.trim_zeros(chance, "b")[-1], "expected": chance @ np.arange(len(chance))}
+    own |= {"effect": cohens_kappa(table.reindex(index=labels, columns=labels, fill_value=0), return_results=False)}
+    own |= {name: [name for _, name in given].count(name) for name in columns[-2:]}
+    own["decided"] = len(given) - own["undecided"] - own["unanswered"]
+    for number, column in enumerate(zip(*used, strict=True)):
+        own |= numbered(f"table.{number}", map(column.count, columns))
+    rates = [_rate(used, setting, truth) for setting, label in enumerate(truth) if label is not None]
+    for number, (rate, p) in enumerate(zip(rates, adjusted([rate["p"] for rate in rates]), strict=True)):
+        own |= named(f"rates.{number}", rate | {"p_adjusted": p})
+    block.record("named.found", own, "liquids are recognised")
+
+
+def _highest(ratings: Floats, labels: Sequence[str]) -> str:
+    highest = [label for label, rating in zip(labels, ratings, strict=True) if rating == ratings.max()]
+    return "unanswered" if np.isnan(ratings).any() else highest[0] if len(highest) == 1 else "undecided"
+
+
+def _rate(used: Sequence[Sequence[str]], setting: int, truth: Sequence[str | None]) -> Numbers:
+    """Return how often a setting was named rightly, and McNemar's exact p against the setting that rivals it most."""
+    label, ps = truth[setting], {}
+    answered = [person for person in used if person[setting] != "unanswered"]
+    hits, n = sum(person[setting] == label for person in answered), len(answered)
+    for other in (other for other, name in enumerate(truth) if name != label):
+        both = [(one[setting] == label, one[other] == label) for one in answered if one[other] != "unanswered"]
+        more, less = both.count((True, False)), both.count((False, True))
+        ps[other] = stats.binomtest(more, more + less, alternative="greater").pvalue if more + less else 1.0
+    rival = max(ps, key=lambda other: ps[other])
+    own = {"setting": setting, "hits": hits, "n": n, "rate": hits / n, "rival": rival, "p": ps[rival]}
+    return own | named("interval", exact_share(hits, n) | {"level": 0.95})
+
+
+def _trends(block: Block) -> None:
+    """Test the trend of each statement; where it is shown, again without the longest delay, as long as it is."""
+    outcomes = {item: _trend(answers, block.direction(item)) for item, answers in block.wide.items()}
+    block.record_family("trends", "answers follow the delay", outcomes)
+    for number, item in enumerate(one["item"] for one in block.found["lowest"]):
+        answers, place, shown = block.wide[item], f"lowest.{number}.steps", math.nan
+        for step, last in enumerate(range(len(block.codes), 1, -1)):
+            own = _trend(answers.where(answers.notna().all(axis=1)).iloc[:, :last], block.direction(item))
+            longest = {"longest_ms": block.delays[last - 1]}
+            block.compared.check(f"{block.place}.{place}.steps.{step}", longest)
+            words = ("answers follow the delay, stepping down", item, f"up to {longest['longest_ms']:g} ms")
+            block.record(f"{place}.steps.{step}.trend", own, *words)
+            if own["p"] > 0.05:
+                break
+            shown = longest["longest_ms"]
+        own = {"steps.lowest_ms": shown, "steps.alpha": 0.05, "members": sum(map(block.is_primary, block.wide))}
+        block.compared.check(f"{block.place}.lowest.{number}", own)
+
+
+def _trend(answers: pd.DataFrame, direction: str | None) -> Numbers:
+    """Change the signs of the participants' correlations of rank and place; Page's p permutes their answers."""
+    complete = answers.dropna()
+    n, k = complete.shape
+    ranks = (-complete if direction == "less" else complete).rank(axis=1).to_numpy()
+    scores = ranks @ np.arange(1, k + 1)
+    away = scores - k * (k + 1) ** 2 / 4
+    sizes, above = np.abs(away[away != 0]), away[away > 0].sum()
+    tail, sides = (max(above, sizes.sum() - above), 2) if direction is None else (above, 1)
+    own = {"n": n, "dropped": len(answers) - n, "statistic": scores.sum()}
+    own |= {"effect": away.mean() / (k * (k * k - 1) / 12), "smallest_p": min(1.0, sides * 0.5 ** len(sizes))}
+    own |= {"p": min(1.0, sides * share_of_signs(sizes, tail))}
+    chance = np.ones(1)
+    for row in ranks:
+        chance = np.convolve(chance, _page_scores(tuple(sorted(row))))
+    return own if direction is None else own | {"p_page": chance[round(2 * scores.sum()) :].sum()}
+
+
+@lru_cache
+def _page_scores(pattern: tuple[float, ...]) -> Floats:
+    """Return the distribution of twice Σ place · rank over all orders of the ranks."""
+    scores = 2 * np.array(list(permutations(pattern))) @ np.arange(1, len(pattern) + 1)
+    return np.bincount(np.rint(scores).astype(int)) / len(scores)
+
+
+def _equivalence(block: Block) -> None:
     """Two one-sided t tests, and the share of participants who differ by more than the bound."""
-    codes = {setting["delay_ms"]: setting["code"] for setting in block["settings"]}
-    for number, against in enumerate(block.get("against") or []):
-        answered, found = wide[against["item"]], against["found"]
-        differences = (answered[codes[against["delay_ms"]]] - answered[codes[against["control_ms"]]]).dropna()
-        n, mean, bound = len(differences), differences.mean(), found["bound"]
-        recomputed = {"n": n, "dropped": len(answered) - n, "effect": mean, "sd": differences.std()}
+    bound, alpha = (block.compared.results["decided"][name] for name in ("equivalence_bound", "alpha"))
+    for number, (item, place) in enumerate(product(block.wide, range(1, len(block.codes))) if bound else ()):
+        answers, delay, control = block.wide[item], block.delays[place], block.delays[0]
+        differences = (answers[block.codes[place]] - answers[block.codes[0]]).dropna()
+        n, count = len(differences), int((differences.abs() > bound).sum())
+        own = {"n": n, "dropped": len(answers) - n, "effect": differences.mean(), "sd": differences.std()}
+        own |= {"bound": bound, "alpha": alpha, "largest": 6, "p_unseen": (1 - min(0.2, bound / 6)) ** n}
+        beyond = {"count": count, "n": n, "share": count / n}
+        own |= named("beyond", beyond | named("interval", exact_share(count, n) | {"level": 0.95}))
         if differences.nunique() > 1:
             lower = stats.ttest_1samp(differences, -bound, alternative="greater")
             upper = stats.ttest_1samp(differences, bound, alternative="less")
-            level = found["interval"]["level"]
-            low, high = stats.t.interval(level, n - 1, mean, stats.sem(differences))
-            recomputed |= {
-                "t_lower": lower.statistic,
-                "t_upper": upper.statistic,
-                "p_lower": lower.pvalue,
-                "p_upper": upper.pvalue,
-                "p": max(lower.pvalue, upper.pvalue),
-                "interval.low": low,
-                "interval.high": high,
-                "interval.level": 1 - 2 * found["alpha"],
-            }
-        if found.get("beyond"):
-            count = int((differences.abs() > bound).sum())
-            exact = stats.binomtest(count, n).proportion_ci(0.95, "exact")
-            recomputed |= {
-                "beyond.count": count,
-                "beyond.n": n,
-                "beyond.share": count / n,
-                "beyond.interval.low": exact.low,
-                "beyond.interval.high": exact.high,
-            }
-        compared.check(f"{place}.against.{number}.found", found, recomputed)
+            own |= {"t_lower": lower.statistic, "p_lower": lower.pvalue, "t_upper": upper.statistic}
+            own |= {"p_upper": upper.pvalue, "p": max(lower.pvalue, upper.pvalue)}
+            own |= {"statistic": min(lower.statistic, -upper.statistic)}
+            own |= named("interval", student(differences, 1 - 2 * alpha) | {"level": 1 - 2 * alpha})
+        words = ("a delay is equivalent", item, f"{delay:g} ms − {control:g} ms")
+        block.record(f"against.{number}.found", own, *words)
+        block.compared.check(f"{block.place}.against.{number}", {"delay_ms": delay, "control_ms": control})
 
 
-def _motion(compared: Compared, moved: list[dict[str, Any]], trials: pd.DataFrame) -> None:
-    """Quartiles over participants of their medians, from the columns of the trials."""
-    ticks = trials["ticks"].replace(0, np.nan)
-    measured = trials.assign(path_m=trials["path_length_m"], at_limit_percent=100 * trials["limiter_norm"] / ticks)
-    for number, row in enumerate(moved):
-        if row["measure"] not in measured.columns:
-            continue  # of reaches: they are in the recordings, not in the tables
-        own = measured[(measured["block"] == row["block"]) & (measured["code"] == row["code"])]
-        medians = own.groupby("participant")[row["measure"]].median().dropna()
-        recomputed = {"n": len(medians), **_quartiles(medians)}
-        compared.check(f"results.performance.moved.{number}", row, recomputed)
-
-
-def _delivered(compared: Compared, delivered: list[dict[str, Any]], trials: pd.DataFrame) -> None:
-    """How many trials kept to the protocol's limits, and the error of the delay."""
-    for number, row in enumerate(delivered):
-        own = trials[(trials["block"] == row["block"]) & (trials["code"] == row["code"])]
-        recomputed = {"trials": len(own), "judged": own["valid"].notna().sum(), "valid": own["valid"].eq(True).sum()}
-        if row["error_mean_ms"] is not None:
-            recomputed["error_mean_ms"] = own["delay_error_mean_ms"].mean()
-        compared.check(f"results.delivered.{number}", row, recomputed)
+def _noticed(block: Block) -> None:
+    """Count who agreed at each delay; the curve is fitted."""
+    if block.found["threshold"] is None:
+        return
+    item = block.compared.results["decided"]["noticed"]
+    given = block.answers[block.answers["item"] == item].dropna(subset="response")
+    by_delay = given["response"].groupby(given["code"].map(dict(zip(block.codes, block.delays, strict=True))))
+    own = {"n": given["participant"].nunique()} | numbered("levels", sorted(by_delay.groups))
+    own |= numbered("yes", by_delay.apply(lambda points: (points >= 5).sum())) | numbered("asked", by_delay.size())
+    block.record("threshold", own | {"dropped": len(block.wide[item]) - own["n"]}, "a delay is noticed")
