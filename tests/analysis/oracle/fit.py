@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from scipy import optimize, special, stats
 
-from tests.analysis.oracle.recomputed import SESSION, Floats, Numbers
+from tests.analysis.oracle.recomputed import Floats, Numbers
 
 Z_95 = stats.norm.ppf(0.975)
 KAPPA = math.log10(math.log(20) / math.log(20 / 19))
@@ -109,7 +109,7 @@ class Fit:
         errors = np.sqrt(np.diag(np.linalg.inv((causes.T * hazard * (hazard + agreed)) @ causes + np.eye(2))))
         return np.asarray(towards * np.round(causes @ np.where(abs(mode) > 2 * errors, mode, 0.0), 1))
 
-    def in_u(self, prior: Floats) -> tuple[Floats, float]:
+    def under(self, prior: Floats) -> tuple[Floats, float]:
         """Return the weights under a prior on the width, and the variance of the threshold."""
         weights = self.weights * prior[:, None, None] / (self.weights * prior[:, None, None]).sum()
         marginal = weights.sum(axis=(1, 2, 3))
@@ -117,7 +117,7 @@ class Fit:
 
     def numbers(self, prior: Floats, percent: float | None) -> Numbers:
         """Return what a report states, under a prior on the width; ``compared`` is the level at ``percent``."""
-        weights, variance = self.in_u(prior)
+        weights, variance = self.under(prior)
         (threshold, width, lapse, guess), psi = self.medians(weights), self.expected(weights)
         ends = [math.hypot(self.quantile(weights, end) - threshold, Z_95 * self.sd) for end in (0.025, 0.975)]
         residuals = np.sign(self.success - psi) * np.sqrt(-2 * np.log(np.where(self.success, psi, 1 - psi)))
@@ -171,4 +171,4 @@ def random_effects(estimates: Floats, variances: Floats) -> Mean:
 
     weights = 1 / (smoothed + (optimize.brentq(excess, 0, 100, xtol=1e-14) if excess(0) > 0 else 0.0))
     mean = float(np.average(estimates, weights=weights))
-    return Mean(mean, math.sqrt(weights @ (estimates - mean) ** 2 / ((n - 1) * weights.sum())))
+    return Mean(mean=mean, error=math.sqrt(weights @ (estimates - mean) ** 2 / ((n - 1) * weights.sum())))

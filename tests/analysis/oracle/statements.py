@@ -11,23 +11,12 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 from statsmodels.stats.inter_rater import cohens_kappa
+from statsmodels.stats.multitest import multipletests
 
-from tests.analysis.oracle.recomputed import (
-    SESSION,
-    TIED,
-    Compared,
-    Floats,
-    Numbers,
-    adjusted,
-    exact_share,
-    named,
-    numbered,
-    quartiles,
-    share_of_signs,
-    signed_ranks,
-    student,
-)
+from tests.analysis.oracle.recomputed import Compared, Floats, Numbers, exact_share, named, numbered, quartiles, student
 
+TIED = 1e-9
+"""Sums of ranks that differ by less are equal."""
 BH = "fdr_bh"
 
 
@@ -96,13 +85,50 @@ def compare_statements(compared: Compared, answers: pd.DataFrame, trials: pd.Dat
                 recompute(block)
 
 
+def adjusted(ps: Sequence[float | None], method: str = "holm") -> list[float]:
+    """Return adjusted p; a test without p is a member of the family."""
+    known = np.array([math.nan if p is None else p for p in ps], float)
+    found = multipletests(np.nan_to_num(known, nan=1.0), method=method)[1] if len(known) else known
+    return list(np.where(np.isnan(known), math.nan, found))
+
+
+def share_of_signs(sizes: Floats, total: float) -> float:
+    """Return the share of all choices among ``sizes`` whose sum is at least ``total``."""
+    sums = np.zeros(1)
+    for size in sizes:
+        sums = np.concatenate([sums, sums + size])
+    return float((sums >= total - TIED).mean())
+
+
+def signed_ranks(all_differences: pd.Series) -> Numbers:
+    """Return Wilcoxon's signed ranks with the distribution of all signs, zeros left out."""
+    differences = all_differences.dropna()
+    nonzero = differences[differences != 0].to_numpy()
+    ranks, n = stats.rankdata(np.abs(nonzero)), len(nonzero)
+    statistic, total = ranks[nonzero > 0].sum(), ranks.sum()
+    found = {"n": len(differences), "dropped": len(all_differences) - len(differences), "zeros": len(differences) - n}
+    found |= {"superiority": np.sign(differences).mean(), "median_difference": differences.median()}
+    if not n:
+        return found | dict.fromkeys(("statistic", "effect", "p", "smallest_p"), math.nan)
+    effect, tail = (2 * statistic - total) / total, max(statistic, total - statistic)
+    found |= {"statistic": statistic, "effect": effect, "p": min(1.0, 2 * share_of_signs(ranks, tail))}
+    found["smallest_p"] = min(1.0, 2 * share_of_signs(ranks, total))
+    if n >= 6 and abs(effect) < 1:
+        reach = stats.norm.ppf(0.975) * math.sqrt((2 * n**3 + 3 * n**2 + n) / 6) / (n * (n + 1) / 2)
+        ends = {"low": math.tanh(math.atanh(effect) - reach), "high": math.tanh(math.atanh(effect) + reach)}
+        found |= named("interval", ends | {"level": 0.95})
+    return found
+
+
 def _measures(block: Block, trials: pd.DataFrame) -> None:
     given = block.answers.dropna(subset="response")
     times = given.groupby(["item", "participant", "code"]).size()
     own = {"n": block.answers["participant"].nunique(), **numbered("presentations", [times.min(), times.max()])}
     own |= numbered("sessions", sorted(given["session"].unique()))
     block.compared.check(block.place, own | {f"settings.{at}.delay_ms": ms for at, ms in enumerate(block.delays)})
-    last = trials[trials["here"]].sort_values("attempt").drop_duplicates([*SESSION, "trial"], keep="last")
+    last = (
+        trials[trials["here"]].sort_values("attempt").drop_duplicates(["participant", "session", "trial"], keep="last")
+    )
     for number, (code, item) in enumerate(product(block.codes, block.wide)):
         of_item = block.answers[(block.answers["code"] == code) & (block.answers["item"] == item)]
         values, cannot_judge = of_item["response"].dropna(), int(of_item["cannot_judge"].eq(True).sum())
