@@ -167,10 +167,10 @@ def _blank(columns: tuple[Column, ...]) -> dict[str, Any]:
     return row | {name: value for name, value in known.items() if name in row}
 
 
-def make_results(folder: Path, protocol: Protocol, *, simulated: bool = True) -> Results:
+def make_results(folder: Path, protocol: Protocol, *, simulated: bool = True, key_seed: int = 3) -> Results:
     """Return an empty study folder with its sealed key, drawn from a fixed seed."""
     folder.mkdir()
-    key = blinding.open_or_draw_key(folder, protocol, random.Random(3).random)  # noqa: S311 - reproducible
+    key = blinding.open_or_draw_key(folder, protocol, random.Random(key_seed).random)  # noqa: S311 - reproducible
     return Results(folder, protocol, key, simulated)
 
 

@@ -18,7 +18,9 @@ def compare_conduct(compared: Compared, answers: pd.DataFrame, trials: pd.DataFr
     sessions = trials.groupby(SESSION)[["here", "excluded_session"]].any()
     left_out = (~sessions["here"] & ~sessions["excluded_session"]).sum()
     own = {"participants": trials[trials["here"]]["participant"].nunique(), "sessions": len(sessions)}
-    compared.check("study", own | {"sessions_left_out": left_out, "sessions_excluded": sessions["excluded_session"].sum()})
+    compared.check(
+        "study", own | {"sessions_left_out": left_out, "sessions_excluded": sessions["excluded_session"].sum()}
+    )
     for number, (_, session) in enumerate(sessions.index):
         compared.check(f"sessions.{number}", {"session": session})
     counting, number = trials[trials["counts"]], 0

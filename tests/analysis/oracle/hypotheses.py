@@ -16,7 +16,7 @@ TABLES = {"d_prime": "sensitivities", "exponent": "exponents"}
 def compare_hypotheses(compared: Compared, trials: pd.DataFrame, study: Numbers) -> None:
     """Recompute the hypotheses that the study's file states; p of the bootstrap is taken from the report."""
     told, contrasts = compared.results.get("contrasts", []), study["analysis"].get("contrasts", [])
-    rows = read_csv(compared.folder / "tests.csv").fillna("")
+    rows = read_csv(compared.folder / "tests.csv").astype(object).fillna("")
     tested = [_tested(compared, contrast, trials[trials["here"]]) for contrast in contrasts]
     ps = adjusted([max(own["p"], one["p_bootstrap"]) for own, one in zip(tested, told, strict=True)])
     bounded = [number for number, own in enumerate(tested) if "_equivalent" in own]

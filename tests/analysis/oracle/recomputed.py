@@ -57,7 +57,7 @@ class Compared:
 
     def check_tests(self) -> None:
         """Compare the rows of tests.csv with what was recomputed."""
-        for row in read_csv(self.folder / "tests.csv").fillna("").to_dict("records"):
+        for row in read_csv(self.folder / "tests.csv").astype(object).fillna("").to_dict("records"):
             key = tuple(str(row[name]) for name in ("block", "question", "item", "comparison"))
             for name, value in self.rows.get(key, {"n": None}).items():
                 if (column := name.removeprefix("interval.")) in OF_TESTS:

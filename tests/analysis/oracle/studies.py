@@ -1,45 +1,158 @@
 """Studies for the oracle: their sessions are simulated, and every measured column has drawn values, all different."""
 
 import csv
+import json
+import random
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from study_app.store.columns import DELIVERED, INTERVALS, TRIALS_2
+from study_app.analysis.report import write_report
+from study_app.protocol.load import load
+from study_app.session.simulated.answers_only import rehearse_answers
+from study_app.store.columns import INTERVALS, RESPONSES, TRIALS_2
+from study_app.store.exclusions import exclude
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.unblinding import unblind
+from tests.analysis.conftest import CANNOT_JUDGE, Answer, make_results
+from tests.analysis.oracle.conduct import compare_captions, compare_conduct
+from tests.analysis.oracle.hypotheses import compare_hypotheses
+from tests.analysis.oracle.levels import compare_levels
+from tests.analysis.oracle.recomputed import Compared, read_table
+from tests.analysis.oracle.statements import compare_statements
+from tests.analysis.outputs import figures_as_lines
+from tests.studies import made_up
 
-NOT_DRAWN = frozenset("part of targets setting standard level video_frames video_frames_late video_frames_lost".split())
-MEASURED = {one.name: one.kind for one in (*INTERVALS, *TRIALS_2, *DELIVERED) if one.name not in NOT_DRAWN}
+FILES = {
+    "rek2024": Path("protocols/rek2024.toml"),
+    **{name: Path(__file__).parent / f"{name}.toml" for name in ("levels", "groups")},
+}
+ROOT = Path(__file__).resolve().parents[3]
+NOT_MEASURED = frozenset({"part", "intervals", "targets", "setting", "standard", "level", "catch", "response", "value"})
+MEASURED = {
+    one.name: one.kind
+    for one in (*TRIALS_2, *INTERVALS, *RESPONSES)
+    if one.may_miss and one.kind in ("integer", "number", "flag") and one.name not in NOT_MEASURED
+}
 SPREAD = 0.05
 """Standard deviation of the logarithm of what is delivered of a number."""
 
 
+@dataclass(frozen=True)
+class Written:
+    """A study's folder, its report, and its file."""
+
+    study: Path
+    report: Path
+    file: Path
+
+    def compared(self) -> Compared:
+        """Return the report with what the oracle recomputed of it."""
+        compared, study = Compared(self.report), tomllib.loads((ROOT / self.file).read_text("utf-8"))
+        names = ["responses", "trials", *(["intervals"] if [*self.report.glob("*intervals_data.csv")] else [])]
+        answers, trials, *intervals = (read_table(self.report, name, self.study) for name in names)
+        compare_statements(compared, answers, trials)
+        compare_conduct(compared, answers, trials)
+        if intervals:
+            compare_levels(compared, answers, intervals[0], study)
+        compare_hypotheses(compared, trials, study)
+        compared.check_tests()
+        compare_captions(compared, trials)
+        return compared
+
+
+def write(name: str, study: Path, to: Path, *, figures: bool = False) -> Written:
+    """Write the report of a study, its figures as texts alone or not at all."""
+    with pytest.MonkeyPatch.context() as patched, figures_as_lines():
+        if not figures:
+            for pictures in ("pictures", "level_pictures", "question_pictures"):
+                patched.setattr(write_report, pictures, lambda *_, **__: ())
+        write_report.report(study, to, failed=pytest.fail)
+    return Written(study, to, FILES[name])
+
+
+def statements(folder: Path, name_of: Callable[[int], str] = "P{:03d}".format, key_seed: int = 3) -> Path:
+    """Return the thesis' study of twelve people who notice delays; answers depend on person, condition and item alone."""
+    results = make_results(folder / "study", load("rek2024"), key_seed=key_seed)
+    for number in range(1, 13):
+
+        def answer(condition: str, item: str, number: int = number) -> Answer:
+            draw = random.Random(f"{number} {condition} {item}")  # noqa: S311 - reproducible
+            if draw.random() < 0.03:
+                return CANNOT_JUDGE
+            if condition.startswith("delay_"):
+                level = 2 + int(condition.removeprefix("delay_")) / 60
+            else:
+                level = 5 if item == f"like_{condition}" else 3 + 0.3 * len(condition)
+            return max(1, min(7, round(draw.gauss(level, 1.2))))
+
+        results.add(name_of(number), answer)
+    results.exclude(name_of(4), trial=results.trial(name_of(4), "honey"))
+    results.open()
+    draw_measurements(results.folder)
+    return results.folder
+
+
+def levels(folder: Path) -> Path:
+    """Return a study of thresholds of two groups."""
+    study = rehearse_answers(FILES["levels"], participants=8, seed=4, results=folder / "study", features={})
+    unblind(study, "AB", "to analyse")
+    draw_measurements(study)
+    return study
+
+
+def groups(folder: Path) -> Path:
+    """Return a study of statements of two groups, with forms; a session and a trial are excluded, and one is left."""
+    file = FILES["groups"]
+    study = rehearse_answers(file, participants=14, seed=4, results=folder / "study", features=made_up(str(file)))
+    exclude(study, "P003", 1, by="AB", reason="asleep")
+    exclude(study, "P005", 1, trial=2, by="AB", reason="cough")
+    unblind(study, "AB", "to analyse")
+    draw_measurements(study)
+    withdraw(StudyFolder(study).session("P008", 1))
+    return study
+
+
+def withdraw(session: SessionFolder, trials: int = 3) -> None:
+    """Let a participant have withdrawn after so many trials."""
+    known = json.loads(session.receipt.read_text("utf-8"))
+    session.receipt.write_text(json.dumps(known | {"status": "withdrawn"}), "utf-8")
+    for path in session.path.glob("*_data.csv"):
+        head, *rows = list(csv.reader(path.read_text("utf-8").splitlines()))
+        kept = [row for row in rows if row[head.index("trial")] in ("n/a", *map(str, range(1, trials + 1)))]
+        write_rows(path, [dict(zip(head, row, strict=True)) for row in kept])
+
+
 def draw_measurements(study: Path, seed: int = 1) -> None:
-    """Draw what was not measured in trials and intervals; delivered numbers are near the requested ones."""
+    """Draw all that is measured in trials, intervals and answers; delivered numbers are near the requested ones."""
     draw = np.random.default_rng(seed)
     for path in sorted((study / "data").rglob("*_data.csv")):
-        if not path.name.endswith(("trials_data.csv", "intervals_data.csv")):
-            continue
         with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
         for row in rows:
-            drawn = {
-                name: _drawn(MEASURED[name], draw) for name, cell in row.items() if cell == "n/a" and name in MEASURED
-            }
+            for name in (name for name in row if name in MEASURED):
+                row[name] = _drawn(MEASURED[name], draw)
             if "value_delivered" in row:
-                drawn["value_delivered"] = repr(_requested(row) * float(np.exp(SPREAD * draw.normal())))
-            row.update({name: value for name, value in drawn.items() if value is not None})
-        with path.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(rows)
+                row["value_delivered"] = repr(_requested(row) * float(np.exp(SPREAD * draw.normal())))
+        write_rows(path, rows)
 
 
-def _drawn(kind: str, draw: np.random.Generator) -> str | None:
+def write_rows(path: Path, rows: list[dict[str, str]]) -> None:
+    """Write a table as the program does."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _drawn(kind: str, draw: np.random.Generator) -> str:
     if kind == "flag":
         return "true" if draw.random() < 0.8 else "false"
-    if kind == "integer":
-        return str(draw.integers(1, 10**9))
-    return repr(float(draw.uniform(0.01, 0.99))) if kind == "number" else None
+    return str(draw.integers(1, 10**9)) if kind == "integer" else repr(float(draw.uniform(0.01, 0.99)))
 
 
 def _requested(row: dict[str, str]) -> float:

@@ -1,0 +1,214 @@
+"""Three studies whose reports are recomputed from their tables by code that shares nothing with the program."""
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.analysis import contrasts
+from study_app.analysis.data import motion, session_files, study_tables
+from study_app.analysis.findings import delays, finding
+from study_app.analysis.statistics import rank_tests, trend
+from study_app.psychophysics import detection
+from tests.analysis.oracle import studies
+from tests.analysis.oracle.recomputed import read_csv
+from tests.analysis.oracle.studies import MEASURED, ROOT, Written, write
+from tests.studies import once
+
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
+
+STUDIES = {"rek2024": studies.statements, "levels": studies.levels, "groups": studies.groups}
+RECOMPUTED = 0.95
+"""Least share of the numbers of a report."""
+PROPERTIES = "tests/analysis/oracle/test_properties.py::"
+NOT_RECOMPUTED = {
+    r"format|results\.seed|results\.decided\..*|sessions\.seed|exclusions\..*": "given, not computed",
+    r"sessions\.trials_missing": "tests/store/test_missing_trials.py",
+    r"results\.performance\.(trials|recorded)": "tests/analysis/tables/test_own_dynamics.py::"
+    "test_reaches_are_those_that_the_session_decided_and_absent_recordings_are_told",
+    r".*\.p_bootstrap|results\.contrasts\.p_equivalent": f"{PROPERTIES}test_p_of_the_bootstrap_is_that_of_other_draws",
+    r"results\.blocks\.overall\.p": f"{PROPERTIES}test_p_over_all_statements_is_that_of_other_draws",
+    r"results\.blocks\.(trends\.outcome|named\.found)\.interval\..*": (
+        f"{PROPERTIES}test_intervals_of_resampled_people_are_those_of_other_draws"
+    ),
+    r"results\.blocks\.threshold\..*": f"{PROPERTIES}test_the_detection_threshold_is_that_of_the_people",
+    r"results\.levels\.thresholds\.fit_p": "tests/analysis/statistics/psychometrics/test_threshold.py::"
+    "test_p_of_fit_is_uniform_where_the_function_is_true",
+    r"results\.levels\.thresholds\.reversal_mean": "tests/psychophysics/test_tables_of_cases.py",
+}
+"""The names of numbers that are not recomputed, and the test that proves them."""
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Written]:
+    """Return the study of a name with its report."""
+
+    def make(name: str) -> Written:
+        def fill(folder: Path) -> None:
+            write(name, STUDIES[name](folder), folder / "report", figures=name != "levels")
+
+        folder = once(tmp_path_factory, f"oracle-{name}", fill)
+        return Written(folder / "study", folder / "report", studies.FILES[name])
+
+    return make
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_no_number_differs_and_most_are_recomputed(name: str, written: Callable[[str], Written]) -> None:
+    compared = written(name).compared()
+    lines = [
+        f"{name}: {100 * compared.share:.1f} % of {len(compared.numbers)} numbers were recomputed; these were not:"
+    ]
+    for missing, count in compared.missing().most_common():
+        proved = [test for pattern, test in NOT_RECOMPUTED.items() if re.fullmatch(pattern, missing)]
+        lines.append(f"{count:6d} {missing}: {proved[0] if proved else 'NOTHING PROVES IT'}")
+    print("\n".join(lines))  # noqa: T201 - pytest shows it with -s, or if the test fails
+    assert compared.differences == []
+    assert compared.share >= RECOMPUTED
+    assert not [line for line in lines if line.endswith("NOTHING PROVES IT")]
+
+
+@pytest.mark.parametrize("test", [test for test in NOT_RECOMPUTED.values() if "::" in test or test.endswith(".py")])
+def test_the_tests_that_prove_other_numbers_exist(test: str) -> None:
+    file, _, name = test.partition("::")
+    assert f"def {name or 'test_'}" in (ROOT / file).read_text("utf-8")
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_measured_columns_have_different_values(name: str, written: Callable[[str], Written]) -> None:
+    for path in written(name).study.rglob("*_data.csv"):
+        table = read_csv(path)
+        for column in table.columns.intersection([one for one, kind in MEASURED.items() if kind != "flag"]):
+            values = table[column].dropna()
+            assert values.is_unique, f"{path.name}: {column}"
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        ("blocks", 0, "measures", 3, "q1"),
+        ("blocks", 1, "against", 2, "found", "p_upper"),
+        ("blocks", 1, "against", 2, "found", "interval", "low"),
+        ("performance", "moved", 4, "median"),
+    ],
+)
+def test_a_number_that_is_off_by_a_thousandth_is_found(
+    written: Callable[[str], Written], tmp_path: Path, path: tuple[str | int, ...]
+) -> None:
+    of_study = written("rek2024")
+    for file in of_study.report.iterdir():
+        (tmp_path / file.name).symlink_to(file)
+    report = tmp_path / "report.json"
+    changed = json.loads(report.read_text("utf-8"))
+    part = changed["results"]
+    for key in path[:-1]:
+        part = part[key]
+    part[path[-1]] += 1e-3 * max(1.0, abs(part[path[-1]]))
+    report.unlink()
+    report.write_text(json.dumps(changed), encoding="utf-8")
+    differences = replace(of_study, report=tmp_path).compared().differences
+    assert [place for place, _, _ in differences] == ["results." + ".".join(map(str, path))]
+
+
+Planted = tuple[str, Callable[[pytest.MonkeyPatch], None], str]
+"""A study, what plants a fault in the program, and where the oracle finds it."""
+
+
+def quartile_as_median(patched: pytest.MonkeyPatch) -> None:
+    def swapped(values: Any, of: Callable[[Any], Any] = motion.quartiles_or_none) -> Any:
+        return of(values)._replace(median=of(values).q1)
+
+    patched.setattr(motion, "quartiles_or_none", swapped)
+
+
+def control_exchanged_with_delay(patched: pytest.MonkeyPatch) -> None:
+    def negated(differences: Any, *bound: Any, of: Callable[..., Any] = delays.tost, **more: Any) -> Any:
+        return of(-differences, *bound, **more)
+
+    patched.setattr(delays, "tost", negated)
+
+
+def conditions_exchanged(patched: pytest.MonkeyPatch) -> None:
+    def swapped(contrast: Any, block: str, condition: Any, *rest: Any, of: Any = contrasts._values) -> Any:
+        other = (
+            {condition: condition} if condition is None else dict(zip(contrast.conditions, contrast.conditions[::-1]))
+        )
+        return of(contrast, block, other[condition], *rest)
+
+    patched.setattr(contrasts, "_values", swapped)
+
+
+def exclusions_forgotten(patched: pytest.MonkeyPatch) -> None:
+    of = session_files.with_excluded
+    patched.setattr(study_tables, "with_excluded", lambda table, _listed: of(table, ()))
+
+
+def excluded_trials_forgotten(patched: pytest.MonkeyPatch) -> None:
+    of = session_files._about
+    patched.setattr(session_files, "_about", lambda listed, person, session, _trial: of(listed, person, session, None))
+
+
+def withdrawn_sessions_counted(patched: pytest.MonkeyPatch) -> None:
+    patched.setattr(study_tables, "REACHED_END", ("completed", "incomplete", "withdrawn"))
+
+
+def p_of_pairs_one_sided(patched: pytest.MonkeyPatch) -> None:
+    patched.setattr(rank_tests, "signed_p", partial(rank_tests.signed_p, alternative="greater"))
+
+
+def p_of_trends_two_sided(patched: pytest.MonkeyPatch) -> None:
+    patched.setattr(trend, "signed_p", lambda ranks, v, _side: rank_tests.signed_p(ranks, v))
+
+
+def p_of_hypotheses_one_sided(patched: pytest.MonkeyPatch) -> None:
+    patched.setitem(contrasts.SIDES, None, "greater")  # type: ignore[arg-type]
+
+
+def rates_of_false_discovery_for_primary_statements(patched: pytest.MonkeyPatch) -> None:
+    patched.setattr(finding, "holm", finding.false_discovery)
+
+
+def first_answer_for_the_median(patched: pytest.MonkeyPatch) -> None:
+    patched.setattr(finding, "medians", lambda values: values[..., 0])
+
+
+def d_prime_of_one_interval(patched: pytest.MonkeyPatch) -> None:
+    patched.setattr(detection, "two_intervals", detection.yes_no)
+
+
+FAULTS: tuple[Planted, ...] = (
+    ("rek2024", quartile_as_median, r"results\.performance\.moved\.\d+\.median"),
+    ("rek2024", quartile_as_median, r"motion\.csv \d+ median"),
+    ("rek2024", control_exchanged_with_delay, r"results\.blocks\.1\.against\.\d+\.found\.effect"),
+    ("rek2024", p_of_trends_two_sided, r"results\.blocks\.1\.trends\.\d+\.outcome\.p"),
+    ("rek2024", rates_of_false_discovery_for_primary_statements, r"results\.blocks\.0\.omnibus\.\d+\.p_adjusted"),
+    ("groups", conditions_exchanged, r"results\.contrasts\.0\.effect"),
+    ("groups", exclusions_forgotten, r"study\.participants"),
+    ("groups", excluded_trials_forgotten, r"results\.blocks\.1\.measures\.\d+\.n"),
+    ("groups", withdrawn_sessions_counted, r"study\.participants"),
+    ("groups", p_of_pairs_one_sided, r"results\.blocks\.0\.pairs\.\d+\.tested\.outcome\.p"),
+    ("groups", p_of_hypotheses_one_sided, r"results\.contrasts\.1\.p"),
+    ("groups", first_answer_for_the_median, r"results\.blocks\.0\.effects\.\d+\.mean"),
+    ("levels", d_prime_of_one_interval, r"results\.levels\.0\.sensitivities\.\d+\.d_prime"),
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "plant", "where"), FAULTS, ids=[f"{plant.__name__}-{where[9:30]}" for _, plant, where in FAULTS]
+)
+def test_a_planted_fault_is_found(
+    name: str,
+    plant: Callable[[pytest.MonkeyPatch], None],
+    where: str,
+    written: Callable[[str], Written],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    plant(monkeypatch)
+    differences = write(name, written(name).study, tmp_path / "report").compared().differences
+    assert [place for place, _, _ in differences if re.fullmatch(where, place)], differences[:9]
