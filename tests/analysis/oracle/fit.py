@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -69,13 +68,11 @@ class Fit:
         return np.asarray(weights / weights.sum())
 
     def quantile(self, weights: Floats, share: float) -> float:
-        """Return a quantile of the threshold, between the edges of the cells."""
         half = (self.thresholds[1] - self.thresholds[0]) / 2
         edges = np.append(self.thresholds[0] - half, self.thresholds + half)
         return float(np.interp(share, np.append(0, np.cumsum(weights.sum(axis=(1, 2, 3)))), edges))
 
     def medians(self, weights: Floats) -> list[float]:
-        """Return the medians of threshold, width, lapse and guess rate."""
         found = [self.quantile(weights, 0.5)]
         for axis, values in ((1, WIDTHS), (2, LAPSES), (3, GUESSES[self.design])):
             of_axis = weights.sum(axis=tuple({0, 1, 2, 3} - {axis}))
@@ -92,11 +89,7 @@ class Fit:
     def _preferences(self, rows: pd.DataFrame, weights: Floats) -> Floats:
         """Return how far preferences move each decision: the mode of a probit regression with a normal prior."""
         towards = rows["order"].map({"cs": 1.0, "sc": -1.0}).to_numpy()
-        said, (_, _, lapse, _), self.shifts = (
-            np.where(self.success, towards, -towards),
-            self.medians(weights),
-            0 * self.u,
-        )
+        said, lapse, self.shifts = np.where(self.success, towards, -towards), self.medians(weights)[2], 0 * self.u
         sensed = towards * special.ndtri(np.clip((self.expected(weights) - lapse) / (1 - 2 * lapse), 0.5, 0.999))
         causes = np.column_stack([np.ones(len(said)), rows["before"]])
 
@@ -115,8 +108,7 @@ class Fit:
         marginal = weights.sum(axis=(1, 2, 3))
         return weights, float(marginal @ (self.thresholds - marginal @ self.thresholds) ** 2) + self.sd**2
 
-    def numbers(self, prior: Floats, percent: float | None) -> Numbers:
-        """Return what a report states, under a prior on the width; ``compared`` is the level at ``percent``."""
+    def numbers(self, prior: Floats) -> Numbers:
         weights, variance = self.under(prior)
         (threshold, width, lapse, guess), psi = self.medians(weights), self.expected(weights)
         ends = [math.hypot(self.quantile(weights, end) - threshold, Z_95 * self.sd) for end in (0.025, 0.975)]
@@ -124,9 +116,6 @@ class Fit:
         own = {"n": len(psi), "threshold": 10**threshold, "width": width, "lapse": lapse, "guess": guess}
         own |= {"low": 10 ** (threshold - ends[0]), "high": 10 ** (threshold + ends[1]), "variance": variance}
         own |= {"flat_width": 10 ** self.quantile(self.weights, 0.5), "change": 10**self.change - 1}
-        if percent is not None:
-            share = (percent / 100 - guess) / (1 - guess - lapse)
-            own["compared"] = 10 ** (threshold + width * math.log10(-math.log1p(-share) / math.log(2)) / KAPPA)
         return own | {"drift": np.corrcoef(np.arange(len(psi)), residuals)[0, 1]}
 
 
@@ -154,16 +143,10 @@ def width_priors(fits: Sequence[Fit]) -> tuple[Floats, float]:
     return of_others @ own, float(of_all @ (means - of_all @ means) ** 2)
 
 
-class Mean(NamedTuple):
-    """A mean and its standard error."""
-
-    mean: float
-    error: float
-
-
-def random_effects(estimates: Floats, variances: Floats) -> Mean:
-    """Return the random-effects mean (Paule and Mandel), with the error of Hartung and Knapp."""
-    n, smoothed = len(estimates), np.sqrt(variances * np.median(variances))
+def random_effects(sample: pd.DataFrame) -> tuple[float, float]:
+    """Return the mean of value and variance by Paule and Mandel, and its standard error by Hartung and Knapp."""
+    estimates, variances = sample["value"].to_numpy(), sample["variance"].to_numpy()
+    smoothed, n = np.sqrt(variances * np.median(variances)), len(sample)
 
     def excess(between: float) -> float:
         mean = np.average(estimates, weights=1 / (smoothed + between))
@@ -171,4 +154,4 @@ def random_effects(estimates: Floats, variances: Floats) -> Mean:
 
     weights = 1 / (smoothed + (optimize.brentq(excess, 0, 100, xtol=1e-14) if excess(0) > 0 else 0.0))
     mean = float(np.average(estimates, weights=weights))
-    return Mean(mean=mean, error=math.sqrt(weights @ (estimates - mean) ** 2 / ((n - 1) * weights.sum())))
+    return mean, math.sqrt(weights @ (estimates - mean) ** 2 / ((n - 1) * weights.sum()))

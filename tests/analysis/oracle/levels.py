@@ -1,4 +1,4 @@
-"""Recompute the blocks of levels of a report: answers, sensitivity, thresholds, exponents, catch trials and delivery."""
+"""Recompute the blocks of levels of a report, from answers to exponents, and the hypotheses of any study."""
 
 import math
 from collections.abc import Sequence
@@ -9,51 +9,36 @@ from scipy import stats
 
 from tests.analysis.oracle.fit import Z_95, Fit, random_effects, width_priors
 from tests.analysis.oracle.recomputed import SESSION, TRIAL, Compared, Numbers, exact_share, named, quartiles, student
+from tests.analysis.oracle.statements import adjusted
 
 ANSWERS = {"2ifc": {"cs": "first", "sc": "second"}, "yesno": {"c": "yes", "s": "no"}}
 """Correct answers by what the intervals present: the standard (s) or the comparison (c)."""
-TARGETS = {"updown": {"target_percent": 80.35}}
-"""Percentage to which weighted 2-down-1-up tracks converge (García-Pérez 1998, Vision Research 38, 1861)."""
+TABLES = {"d_prime": "sensitivities", "exponent": "exponents"}
 MEASURED = ["pace_mps", "apparent_mass_kg"]
 
 
 def compare_levels(compared: Compared, answers: pd.DataFrame, intervals: pd.DataFrame, study: Numbers) -> None:
     """Recompute the numbers of all blocks of levels of a study, given by its file."""
     for number, found in enumerate(compared.results["levels"]):
-        place, key, design, block = (
-            f"results.levels.{number}",
-            found["block"],
-            found["design"],
-            study["blocks"][found["block"]],
-        )
-        stimulus, method = study["stimuli"][block["stimulus"]], study["methods"][block["method"]]["kind"]
+        place, key, design = f"results.levels.{number}", found["block"], found["design"]
+        block = study["blocks"][key]
+        stimulus, wrong = study["stimuli"][block["stimulus"]], block.get("catch", {}).get("wrong_most")
         here = [rows[(rows["block"] == key) & rows["counts"]] for rows in (intervals, answers)]
         rows = _trials(*here, design, stimulus.get("level", "weber"))
         compared.check(place, {"guess_rate": 0.5 if design == "2ifc" else math.nan})
         for which, times in enumerate(found["times"]):
             seconds = rows.loc[rows["code"] == times["code"], "response_s"]
             compared.check(f"{place}.times.{which}.numbers", {"n": len(seconds), **quartiles(seconds)})
-        published = [one for one in study["analysis"].get("published", ()) if one["block"] == key]
-        for which, value in enumerate(published):
-            compared.check(f"{place}.published.{which}", {name: value[name] for name in ("value", "percent", "n")})
         parts = {"answers": _answers(rows, design), "conduct": _delivery(rows)}
-        caught = rows[rows["catch"].eq(True)].groupby(SESSION) if "catch" in block else ()
-        wrong = block.get("catch", {}).get("wrong_most")
+        caught = rows[rows["catch"].eq(True)].groupby(SESSION)["right"] if wrong else ()
         parts["catches"] = [
-            {"session": session, "n": len(one), "wrong": (~one["right"]).sum(), "most": wrong}
-            for (_, session), one in caught
+            {"session": session, "n": len(right), "wrong": (~right).sum(), "most": wrong}
+            for (_, session), right in caught
         ]
         if design in ANSWERS:
-            fits = compared.values[key, "fits"] = {
-                standard: {
-                    person: Fit(own, design, stimulus["levels"]) for person, own in of_standard.groupby("participant")
-                }
-                for standard, of_standard in rows.groupby("standard")
-            }
-            parts["sensitivities"] = _sensitivities(rows, design)
-            parts["thresholds"] = _thresholds(
-                fits, published[0]["percent"] if published else None, TARGETS.get(method, {})
-            )
+            people = rows.groupby(["standard", "participant"])
+            fits = compared.values[key, "fits"] = {of: Fit(own, design, stimulus["levels"]) for of, own in people}
+            parts |= {"sensitivities": _sensitivities(rows, design), "thresholds": _thresholds(fits)}
         parts["exponents"] = _exponents(parts.get("thresholds", parts["answers"]))
         for name, lines in parts.items():
             assert len(lines) == len(found[name]), f"{place}.{name}: {len(found[name])} rows, recomputed {len(lines)}"
@@ -123,14 +108,11 @@ def _sensitivities(rows: pd.DataFrame, design: str) -> list[Numbers]:
         own = []
         for person, one in here.groupby("participant"):
             sides = [one.loc[one["order"] == order, "response"] == said for order in ANSWERS[design]]
-            rates, n = (
-                np.array([*map(count, sides)]) for count in (lambda side: (side.sum() + 0.5) / (len(side) + 1), len)
-            )
+            n = np.array([*map(len, sides)])
+            rates = (np.array([*map(sum, sides)]) + 0.5) / (n + 1)
             z = stats.norm.ppf(rates)
-            d_prime, reach = (
-                (z[0] - z[1]) / root,
-                Z_95 * np.sqrt((rates * (1 - rates) / n / stats.norm.pdf(z) ** 2).sum()) / root,
-            )
+            variance, d_prime = (rates * (1 - rates) / n / stats.norm.pdf(z) ** 2).sum(), (z[0] - z[1]) / root
+            reach = Z_95 * math.sqrt(variance) / root
             shares = {answer: (one["response"] == answer).mean() for answer in ANSWERS[design].values()}
             found = {"d_prime": d_prime, "low": d_prime - reach, "high": d_prime + reach, "criterion": -z.mean()}
             own.append(found | named("shares", shares) | {"n": len(one), "standard": standard, "_person": person})
@@ -139,23 +121,18 @@ def _sensitivities(rows: pd.DataFrame, design: str) -> list[Numbers]:
     return lines
 
 
-def _thresholds(fits: dict[float, dict[str, Fit]], percent: float | None, target: Numbers) -> list[Numbers]:
-    """Return the thresholds of all and of each."""
+def _thresholds(fits: dict[tuple[float, str], Fit]) -> list[Numbers]:
     lines = []
-    for standard, people in fits.items():
+    for standard in dict.fromkeys(standard for standard, _ in fits):
+        people = {person: fit for (at, person), fit in fits.items() if at == standard}
         priors, shared = width_priors([*people.values()])
-        own = [fit.numbers(prior, percent) for fit, prior in zip(people.values(), priors, strict=True)]
-        group = {"n": len(own), "standard": standard}
-        for name, low, high in (("threshold", "low", "high"), ("compared", "compared_low", "compared_high")):
-            if name in own[0]:
-                logs, variances = np.log10([one[name] for one in own]), np.array([one["variance"] for one in own])
-                mean, error = random_effects(logs, variances)
-                reach = math.hypot(stats.t.ppf(0.975, len(own) - 1) * error, Z_95 * math.sqrt(shared))
-                group |= {name: 10**mean, low: 10 ** (mean - reach), high: 10 ** (mean + reach)}
-        lines += [
-            group,
-            *(one | target | {"standard": standard, "_person": who} for who, one in zip(people, own, strict=True)),
-        ]
+        own = [fit.numbers(prior) | {"standard": standard} for fit, prior in zip(people.values(), priors, strict=True)]
+        table = pd.DataFrame(own)
+        mean, error = random_effects(table.assign(value=np.log10(table["threshold"])))
+        reach = math.hypot(stats.t.ppf(0.975, len(own) - 1) * error, Z_95 * math.sqrt(shared))
+        group = {"threshold": 10**mean, "low": 10 ** (mean - reach), "high": 10 ** (mean + reach)}
+        lines += [group | {"n": len(own), "standard": standard}]
+        lines += [one | {"_person": person} for person, one in zip(people, own, strict=True)]
     return lines
 
 
@@ -170,3 +147,67 @@ def _exponents(lines: Sequence[Numbers]) -> list[Numbers]:
             own.append({"exponent": slope, "n": len(one), "_person": person})
     slopes = [one["exponent"] for one in own]
     return [{"exponent": np.mean(slopes), "n": len(own), **student(slopes)}, *own] if own else []
+
+
+def compare_hypotheses(compared: Compared, trials: pd.DataFrame, study: Numbers) -> None:
+    """Recompute the hypotheses that the study's file states; p of the bootstrap is taken from the report."""
+    told, contrasts = compared.results.get("contrasts", []), study["analysis"].get("contrasts", [])
+    rows = compared.tests()
+    tested = [_tested(compared, contrast, trials[trials["here"]]) for contrast in contrasts]
+    ps = adjusted([max(own["p"], one["p_bootstrap"]) for own, one in zip(tested, told, strict=True)])
+    for number, (own, p) in enumerate(zip(tested, ps, strict=True)):
+        own |= {"p_adjusted": p, "members": len(contrasts)}
+        compared.check(f"results.contrasts.{number}", own, 1e-4)
+        compared.rows[tuple(rows.loc[number, ["block", "question", "item", "comparison"]])] = own
+
+
+def _tested(compared: Compared, contrast: Numbers, trials: pd.DataFrame) -> Numbers:
+    groups, ratio = contrast.get("groups"), contrast["measure"] == "threshold"
+    members = trials.groupby("participant")["group"].first()
+    members = members[members.isin(groups)] if groups else members
+    sides = (_in_ln if ratio else _numbers)(compared, contrast)
+    if groups:
+        samples = [sides[0][sides[0].index.map(members) == group].dropna() for group in groups]
+    else:
+        variance = sides[0]["variance"] + sides[1]["variance"]
+        samples = [pd.DataFrame({"value": sides[0]["value"] - sides[1]["value"], "variance": variance}).dropna()]
+    means, errors = zip(*map(random_effects if ratio else _mean, samples), strict=True)
+    mean, error, freedom = means[0] - sum(means[1:]), math.hypot(*errors), min(map(len, samples)) - 1
+    t, scale = stats.t(freedom), math.exp if ratio else float
+    above, below, reach = t.sf(mean / error), t.cdf(mean / error), t.ppf(0.975) * error
+    p = {"higher": above, "lower": below}.get(contrast.get("expected", ""), 2 * min(above, below))
+    n = sum(map(len, samples))
+    own = {"n": n, "dropped": len(members) - n, "statistic": mean / error, "p": p, "effect": scale(mean)}
+    own |= named("interval", {"low": scale(mean - reach), "high": scale(mean + reach), "level": 0.95})
+    own |= {} if groups else {"higher": (samples[0]["value"] > 0).sum()}
+    return own
+
+
+def _numbers(compared: Compared, contrast: Numbers) -> list[pd.DataFrame]:
+    """Return each person's numbers: means over standards, or over the conditions of a statement."""
+    blocks, measure, sides = contrast["blocks"] * (2 // len(contrast["blocks"])), contrast["measure"], []
+    for block, condition in zip(blocks, contrast.get("conditions", [None, None]), strict=True):
+        if measure in TABLES:
+            value = compared.values[block, TABLES[measure]].groupby("_person")[measure].mean()
+        else:
+            wide = compared.values[block, measure]
+            value = wide.mean(axis=1, skipna=False) if condition is None else wide[condition]
+        sides.append(pd.DataFrame({"value": value, "variance": 0.0}))
+    return sides
+
+
+def _mean(sample: pd.DataFrame) -> tuple[float, float]:
+    return sample["value"].mean(), stats.sem(sample["value"])
+
+
+def _in_ln(compared: Compared, contrast: Numbers) -> list[pd.DataFrame]:
+    """Return ln thresholds, means over standards, in blocks of the same levels: their widths are in common."""
+    fits, lines = [compared.values[block, "fits"] for block in contrast["blocks"]], []
+    for standard in {standard for standard, _ in fits[0]}:
+        people = [(side, who, fit) for side, own in enumerate(fits) for (at, who), fit in own.items() if at == standard]
+        for (side, person, fit), prior in zip(people, width_priors([fit for *_, fit in people])[0], strict=True):
+            weights, variance = fit.under(prior)
+            lines.append((side, person, math.log(10) * fit.medians(weights)[0], math.log(10) ** 2 * variance))
+    table = pd.DataFrame(lines, columns=["side", "person", "value", "variance"]).groupby(["side", "person"])
+    means = pd.DataFrame({"value": table["value"].mean(), "variance": table["variance"].sum() / table.size() ** 2})
+    return [means.loc[side] for side in range(len(fits))]

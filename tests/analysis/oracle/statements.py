@@ -2,9 +2,8 @@
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import combinations, permutations, product
 
 import numpy as np
@@ -13,11 +12,9 @@ from scipy import stats
 from statsmodels.stats.inter_rater import cohens_kappa
 from statsmodels.stats.multitest import multipletests
 
-from tests.analysis.oracle.recomputed import Compared, Floats, Numbers, exact_share, named, numbered, quartiles, student
+from tests.analysis.oracle.recomputed import Compared, Floats, Numbers, exact_share, named, quartiles, student
 
 TIED = 1e-9
-"""Sums of ranks that differ by less are equal."""
-BH = "fdr_bh"
 
 
 @dataclass
@@ -31,20 +28,11 @@ class Block:
     delays: list[float]
     answers: pd.DataFrame
     wide: dict[str, pd.DataFrame]
-    gate: float = 0.0
-
-    def is_primary(self, item: str) -> bool:
-        """Return whether a test of a statement was decided on before the study."""
-        decided = self.compared.results["decided"]
-        return bool(decided["made"] and (not decided["primary"] or item in decided["primary"]))
-
-    def direction(self, item: str) -> str | None:
-        """Return the direction in which a delay was expected to move the answers."""
-        decided = self.compared.results["decided"]
-        return "greater" if item in decided["rising"] else "less" if item in decided["falling"] else None
+    primary: list[str]
+    sides: dict[str, str]
+    gate: float
 
     def record(self, name: str, recomputed: Numbers, question: str, item: str = "", comparison: str = "") -> None:
-        """Compare a test in report.json, and keep it for tests.csv."""
         self.compared.check(f"{self.place}.{name}", recomputed)
         own = {key.removeprefix("tested.").removeprefix("outcome."): value for key, value in recomputed.items()}
         self.compared.rows[self.found["id"], question, item, comparison] = own
@@ -52,8 +40,8 @@ class Block:
     def record_family(self, name: str, question: str, outcomes: dict[str, Numbers], *, explored: bool = False) -> None:
         """Record tests of statements: primary ones by Holm, others by Benjamini and Hochberg, none below the gate."""
         corrected = {}
-        for primary, method in ((True, "holm"), (False, BH)):
-            items = [item for item in outcomes if (self.is_primary(item) and not explored) == primary]
+        for primary, method in ((True, "holm"), (False, "fdr_bh")):
+            items = [item for item in outcomes if (item in self.primary and not explored) == primary]
             for item, p in zip(items, adjusted([outcomes[item]["p"] for item in items], method), strict=True):
                 corrected[item] = {"p_adjusted": np.maximum(p, self.gate), "members": len(items)}
         for number, (item, outcome) in enumerate(outcomes.items()):
@@ -61,11 +49,11 @@ class Block:
 
 
 def compare_statements(compared: Compared, answers: pd.DataFrame, trials: pd.DataFrame) -> None:
-    """Recompute the numbers of all blocks of statements."""
     answers = answers[answers["kind"] == "statement"] if "kind" in answers else answers
     answers = answers.assign(response=pd.to_numeric(answers["response"], errors="coerce"))
-    found = compared.results["blocks"]
+    found, decided = compared.results["blocks"], compared.results["decided"]
     gates = adjusted([(block["overall"] or {}).get("p") for block in found])
+    sides = dict.fromkeys(decided["rising"], "greater") | dict.fromkeys(decided["falling"], "less")
     for number, (own, gate) in enumerate(zip(found, gates, strict=True)):
         settings = next(one["settings"] for one in compared.codebook["blocks"] if one["id"] == own["id"])
         counting = answers[(answers["block"] == own["id"]) & answers["counts"]]
@@ -75,14 +63,20 @@ def compare_statements(compared: Compared, answers: pd.DataFrame, trials: pd.Dat
             wide[item] = medians.unstack("code").reindex(sorted(counting["participant"].unique()))[codes]
             conditions = {setting["code"]: setting["condition"] for setting in settings}
             compared.values[own["id"], item] = wide[item].rename(columns=conditions)
-        delays = [setting["delay_ms"] for setting in settings]
-        block = Block(compared, f"results.blocks.{number}", own, codes, delays, counting, wide, gate)
+        delays, primary = [setting["delay_ms"] for setting in settings], decided["primary"] or [*wide]
+        given = (codes, delays, counting, wide, [item for item in wide if item in primary], sides, gate)
+        block = Block(compared, f"results.blocks.{number}", own, *given)
         _measures(block, trials[trials["block"] == own["id"]])
-        for recompute in (_effects, _settings_differ, _mixed, _pairs, _recognition):
-            recompute(block)
+        _settings_differ(block)
+        _pairs(block)
+        if own["named"] is not None:
+            _recognition(block)
         if own["kind"] == "delays":
-            for recompute in (_trends, _equivalence, _noticed):
-                recompute(block)
+            _trends(block)
+            _equivalence(block)
+        if own["threshold"] is not None:
+            noticing = counting[counting["item"] == decided["noticed"]].dropna(subset="response")
+            block.record("threshold", {"n": noticing["participant"].nunique()}, "a delay is noticed")
 
 
 def adjusted(ps: Sequence[float | None], method: str = "holm") -> list[float]:
@@ -92,43 +86,39 @@ def adjusted(ps: Sequence[float | None], method: str = "holm") -> list[float]:
     return list(np.where(np.isnan(known), math.nan, found))
 
 
-def share_of_signs(sizes: Floats, total: float) -> float:
-    """Return the share of all choices among ``sizes`` whose sum is at least ``total``."""
-    sums = np.zeros(1)
-    for size in sizes:
-        sums = np.concatenate([sums, sums + size])
-    return float((sums >= total - TIED).mean())
+def share_of_sums(people: Iterable[Iterable[float]], total: float) -> float:
+    """Return the share of the choices of one value of each person whose sum is at least ``total``, exact to quarters."""
+    chance, least = np.ones(1), 0
+    for values in people:
+        steps = np.rint(4 * np.array([*values])).astype(int)
+        chance, least = np.convolve(chance, np.bincount(steps - steps.min()) / len(steps)), least + steps.min()
+    return float(chance[max(0, round(4 * total) - least) :].sum())
 
 
 def signed_ranks(all_differences: pd.Series) -> Numbers:
-    """Return Wilcoxon's signed ranks with the distribution of all signs, zeros left out."""
     differences = all_differences.dropna()
     nonzero = differences[differences != 0].to_numpy()
     ranks, n = stats.rankdata(np.abs(nonzero)), len(nonzero)
-    statistic, total = ranks[nonzero > 0].sum(), ranks.sum()
-    found = {"n": len(differences), "dropped": len(all_differences) - len(differences), "zeros": len(differences) - n}
-    found |= {"superiority": np.sign(differences).mean(), "median_difference": differences.median()}
-    if not n:
-        return found | dict.fromkeys(("statistic", "effect", "p", "smallest_p"), math.nan)
-    effect, tail = (2 * statistic - total) / total, max(statistic, total - statistic)
-    found |= {"statistic": statistic, "effect": effect, "p": min(1.0, 2 * share_of_signs(ranks, tail))}
-    found["smallest_p"] = min(1.0, 2 * share_of_signs(ranks, total))
+    statistic, total, signs = ranks[nonzero > 0].sum(), ranks.sum(), [(0.0, rank) for rank in ranks]
+    effect = (2 * statistic - total) / total if n else math.nan
+    own = {"n": len(differences), "dropped": len(all_differences) - len(differences), "zeros": len(differences) - n}
+    own |= {"superiority": np.sign(differences).mean(), "median_difference": differences.median(), "effect": effect}
+    own |= {"statistic": statistic, "p": min(1.0, 2 * share_of_sums(signs, max(statistic, total - statistic)))}
+    own |= {"smallest_p": min(1.0, 2 * share_of_sums(signs, total))}
     if n >= 6 and abs(effect) < 1:
         reach = stats.norm.ppf(0.975) * math.sqrt((2 * n**3 + 3 * n**2 + n) / 6) / (n * (n + 1) / 2)
         ends = {"low": math.tanh(math.atanh(effect) - reach), "high": math.tanh(math.atanh(effect) + reach)}
-        found |= named("interval", ends | {"level": 0.95})
-    return found
+        own |= named("interval", ends | {"level": 0.95})
+    return own if n else own | dict.fromkeys(("statistic", "p", "smallest_p"), math.nan)
 
 
 def _measures(block: Block, trials: pd.DataFrame) -> None:
     given = block.answers.dropna(subset="response")
     times = given.groupby(["item", "participant", "code"]).size()
-    own = {"n": block.answers["participant"].nunique(), **numbered("presentations", [times.min(), times.max()])}
-    own |= numbered("sessions", sorted(given["session"].unique()))
+    own = {"n": block.answers["participant"].nunique(), **named("presentations", enumerate([times.min(), times.max()]))}
+    own |= named("sessions", enumerate(sorted(given["session"].unique())))
     block.compared.check(block.place, own | {f"settings.{at}.delay_ms": ms for at, ms in enumerate(block.delays)})
-    last = (
-        trials[trials["here"]].sort_values("attempt").drop_duplicates(["participant", "session", "trial"], keep="last")
-    )
+    last = trials[trials["here"] & (trials["attempt"] == trials["last_attempt"])]
     for number, (code, item) in enumerate(product(block.codes, block.wide)):
         of_item = block.answers[(block.answers["code"] == code) & (block.answers["item"] == item)]
         values, cannot_judge = of_item["response"].dropna(), int(of_item["cannot_judge"].eq(True).sum())
@@ -138,9 +128,6 @@ def _measures(block: Block, trials: pd.DataFrame) -> None:
         own |= {"cannot_judge": cannot_judge, "missing": presented - len(values) - cannot_judge, **quartiles(values)}
         own |= {f"count_{level}": (values == level).sum() for level in range(1, 8)}
         block.compared.check(f"{block.place}.measures.{number}", own | {"agree_percent": 100 * (values >= 5).mean()})
-
-
-def _effects(block: Block) -> None:
     for number, (item, code) in enumerate(product(block.wide, block.codes[1:])):
         differences = (block.wide[item][code] - block.wide[item][block.codes[0]]).dropna()
         recomputed = {"n": len(differences), "mean": differences.mean(), **student(differences)}
@@ -160,12 +147,15 @@ def _settings_differ(block: Block) -> None:
     own |= {"incomplete": len(people) * len(whole) - sum(map(len, whole.values()))}
     own |= {"smallest_p": max(1 / (1 + draws), math.factorial(k) ** (1.0 - len(people)))}
     block.record("overall", own, "settings differ, all statements")
-    if block.found["kind"] != "delays":
+    delays = block.found["kind"] == "delays"
+    design = np.array(block.delays)[:, None] / 100 if delays else np.eye(k)[:, 1:]
+    slopes = {item: _slopes(answers, design, block.sides.get(item)) for item, answers in block.wide.items()}
+    block.record_family("mixed", "settings differ, mixed model", slopes, explored=True)
+    if not delays:
         block.record_family("omnibus", "settings differ", {item: _alike(one) for item, one in block.wide.items()})
 
 
 def _friedman(complete: pd.DataFrame) -> float:
-    """Return Friedman's chi-square, corrected for ties."""
     ranks, (n, k) = complete.rank(axis=1).to_numpy(), complete.shape
     return float((k - 1) * ((ranks.sum(0) - n * (k + 1) / 2) ** 2).sum() / ((ranks - (k + 1) / 2) ** 2).sum())
 
@@ -176,40 +166,27 @@ def _alike(answers: pd.DataFrame) -> Numbers:
     if k == 2:
         return signed_ranks(answers.iloc[:, 0] - answers.iloc[:, 1])
     ranks, statistic, freedom = complete.rank(axis=1), stats.friedmanchisquare(*complete.to_numpy().T), k - 1 - 2 / n
-    w = statistic.statistic / n / (k - 1)
+    w, squares, shares = statistic.statistic / n / (k - 1), ranks.sum() - n * (k + 1) / 2, _rank_sums(ranks.to_numpy())
     f = (n - 1) * w / (1 - w)
-    tails = _rank_sums(tuple(sorted(tuple(sorted(row)) for row in ranks.to_numpy().tolist())))
-    reached = [p for squares, p in tails if squares >= ((ranks.sum() - n * (k + 1) / 2) ** 2).sum() - TIED]
     own = {"n": n, "dropped": len(answers) - n, "df": k - 1, "statistic": statistic.statistic, "effect": w, "f": f}
-    own |= {"p": reached[-1], "smallest_p": tails[0][1], "p_chi2": statistic.pvalue}
-    return own | {"p_f": stats.f.sf(f, freedom, (n - 1) * freedom), **numbered("mean_ranks", ranks.mean())}
+    own |= {"p": shares[shares.index >= (squares**2).sum() - TIED].sum(), "p_chi2": statistic.pvalue}
+    own |= {"smallest_p": shares[shares.index >= max(shares.index) - TIED].sum()}
+    return own | {"p_f": stats.f.sf(f, freedom, (n - 1) * freedom), **named("mean_ranks", enumerate(ranks.mean()))}
 
 
-@lru_cache
-def _rank_sums(patterns: tuple[tuple[float, ...], ...]) -> list[tuple[float, float]]:
-    """Return the sums of squared rank sums that all orders of all ranks give, largest first, and P of at least each."""
-    k, counts = len(patterns[0]), {(0.0,) * len(patterns[0]): 1.0}
-    for pattern in patterns:
-        orders, further = list(permutations(pattern)), Counter[tuple[float, ...]]()
+def _rank_sums(ranks: Floats) -> pd.Series:
+    """Return the shares of the sums of squared rank sums (index) among all orders of all participants' ranks."""
+    counts, middle = {(0.0,) * ranks.shape[1]: 1.0}, ranks.sum() / ranks.shape[1]
+    for row in ranks.tolist():
+        further, orders = Counter[tuple[float, ...]](), [*permutations(row)]
         for (sums, weight), order in product(counts.items(), orders):
-            further[tuple(sorted(map(sum, zip(sums, order, strict=True))))] += weight / len(orders)  # type: ignore[assignment]
+            further[tuple(sorted(map(sum, zip(sums, order, strict=True))))] += weight / len(orders)
         counts = dict(further)
-    middle, shares = len(patterns) * (k + 1) / 2, Counter[float]()
-    for sums, weight in counts.items():
-        shares[sum((one - middle) ** 2 for one in sums)] += weight  # type: ignore[assignment]
-    support = sorted(shares, reverse=True)
-    return list(zip(support, np.cumsum([shares[one] for one in support]), strict=True))
-
-
-def _mixed(block: Block) -> None:
-    """Fit each person's least-squares slopes; Student's t tests one slope, Hotelling's T² several."""
-    delays = block.found["kind"] == "delays"
-    design = np.array(block.delays)[:, None] / 100 if delays else np.eye(len(block.codes))[:, 1:]
-    outcomes = {item: _slopes(answers, design, block.direction(item)) for item, answers in block.wide.items()}
-    block.record_family("mixed", "settings differ, mixed model", outcomes, explored=True)
+    return pd.Series([*counts.values()], [sum((one - middle) ** 2 for one in sums) for sums in counts])
 
 
 def _slopes(answers: pd.DataFrame, design: Floats, direction: str | None) -> Numbers:
+    """Fit each person's least-squares slopes; Student's t tests one slope, Hotelling's T² several."""
     complete, k = answers.dropna(), design.shape[1]
     n, found = len(complete), {"n": len(complete), "dropped": len(answers) - len(complete)}
     own = np.linalg.lstsq(np.column_stack([np.ones(len(design)), design]), complete.T, rcond=None)[0][1:].T
@@ -219,22 +196,20 @@ def _slopes(answers: pd.DataFrame, design: Floats, direction: str | None) -> Num
     intervals = [student(slopes) | {"level": 0.95} for slopes in own.T]
     if k == 1:
         tested = stats.ttest_1samp(own[:, 0], 0, alternative=direction or "two-sided")
-        found |= {"statistic": tested.statistic, "p": tested.pvalue, "effect": own.mean()}
-        found |= named("interval", intervals[0])
+        found |= {"statistic": tested.statistic, "p": tested.pvalue, **named("interval", intervals[0])}
+        found["effect"] = own.mean()
     else:
         f = n * own.mean(0) @ np.linalg.inv(covariance) @ own.mean(0) * (n - k) / (k * (n - 1))
         found |= {"statistic": f, "p": stats.f.sf(f, k, n - k)}
     for number, ends in enumerate(intervals):
         found |= named(f"intervals.{number}", ends)
-    return found | numbered("slopes", own.mean(0)) | numbered("sds", own.std(0, ddof=1))
+    return found | named("slopes", enumerate(own.mean(0))) | named("sds", enumerate(own.std(0, ddof=1)))
 
 
 def _pairs(block: Block) -> None:
     """Compare settings two by two in the statements that differ; one Holm family."""
-    if not block.found["pairs"]:
-        return
-    opened = [one["item"] for one in block.found["omnibus"] if (one["p_adjusted"] or 0) <= 0.05]
-    pairs = [(item, *two) for item in opened for two in combinations(block.codes, 2)]
+    differing = [one["item"] for one in block.found["omnibus"] if (one["p_adjusted"] or 0) <= 0.05]
+    pairs = [(item, *two) for item in differing for two in combinations(block.codes, 2) if block.found["pairs"]]
     outcomes = [signed_ranks(block.wide[item][first] - block.wide[item][second]) for item, first, second in pairs]
     names = dict(zip(block.codes, block.found["names"], strict=True))
     for number, p in enumerate(adjusted([outcome["p"] for outcome in outcomes])):
@@ -246,28 +221,25 @@ def _pairs(block: Block) -> None:
 
 def _recognition(block: Block) -> None:
     """Recompute which name was rated highest, its hits among all exchanges of settings, and McNemar's tests."""
-    if block.found["named"] is None:
-        return
     labels, truth = block.found["named"]["labels"], [one.get("label") for one in block.found["settings"]]
     ratings = np.stack([block.wide[label].to_numpy() for label in labels], axis=2)
     names = [[_highest(cell, labels) for cell in person] for person in ratings]
     used = [person for person in names if set(person) != {"unanswered"}]
     given = [pair for person in used for pair in zip(truth, person, strict=True)]
-    hits, chance = sum(right == name for right, name in given), np.ones(1)
+    hits, people = sum(right == name for right, name in given), []
     for person in used:
         answered = [pair for pair in zip(truth, person, strict=True) if pair[1] != "unanswered"]
         orders = permutations([name for _, name in answered])
-        counts = [sum(right == name for (right, _), name in zip(answered, order, strict=True)) for order in orders]
-        chance = np.convolve(chance, np.bincount(counts) / len(counts))
-    table = pd.crosstab(*zip(*[pair for pair in given if pair[1] in labels], strict=True))  # type: ignore[call-overload]
+        people.append([sum(map(str.__eq__, (str(right) for right, _ in answered), order)) for order in orders])
+    table = pd.crosstab(*zip(*[pair for pair in given if pair[1] in labels], strict=True))
     columns = [*labels, "undecided", "unanswered"]
-    own = {"n": len(used), "dropped": len(names) - len(used), "statistic": hits, "p": chance[hits:].sum()}
-    own |= {"smallest_p": np.trim_zeros(chance, "b")[-1], "expected": chance @ np.arange(len(chance))}
+    own = {"n": len(used), "dropped": len(names) - len(used), "statistic": hits, "p": share_of_sums(people, hits)}
+    own |= {"smallest_p": share_of_sums(people, sum(map(max, people))), "expected": sum(map(np.mean, people))}
     own |= {"effect": cohens_kappa(table.reindex(index=labels, columns=labels, fill_value=0), return_results=False)}
     own |= {name: [name for _, name in given].count(name) for name in columns[-2:]}
     own["decided"] = len(given) - own["undecided"] - own["unanswered"]
     for number, column in enumerate(zip(*used, strict=True)):
-        own |= numbered(f"table.{number}", map(column.count, columns))
+        own |= named(f"table.{number}", enumerate(map(column.count, columns)))
     rates = [_rate(used, setting, truth) for setting, label in enumerate(truth) if label is not None]
     for number, (rate, p) in enumerate(zip(rates, adjusted([rate["p"] for rate in rates]), strict=True)):
         own |= named(f"rates.{number}", rate | {"p_adjusted": p})
@@ -295,12 +267,12 @@ def _rate(used: Sequence[Sequence[str]], setting: int, truth: Sequence[str | Non
 
 def _trends(block: Block) -> None:
     """Test the trend of each statement; where it is shown, again without the longest delay, as long as it is."""
-    outcomes = {item: _trend(answers, block.direction(item)) for item, answers in block.wide.items()}
+    outcomes = {item: _trend(answers, block.sides.get(item)) for item, answers in block.wide.items()}
     block.record_family("trends", "answers follow the delay", outcomes)
     for number, item in enumerate(one["item"] for one in block.found["lowest"]):
         answers, place, shown = block.wide[item], f"lowest.{number}.steps", math.nan
         for step, last in enumerate(range(len(block.codes), 1, -1)):
-            own = _trend(answers.where(answers.notna().all(axis=1)).iloc[:, :last], block.direction(item))
+            own = _trend(answers.where(answers.notna().all(axis=1)).iloc[:, :last], block.sides.get(item))
             longest = {"longest_ms": block.delays[last - 1]}
             block.compared.check(f"{block.place}.{place}.steps.{step}", longest)
             words = ("answers follow the delay, stepping down", item, f"up to {longest['longest_ms']:g} ms")
@@ -308,7 +280,7 @@ def _trends(block: Block) -> None:
             if own["p"] > 0.05:
                 break
             shown = longest["longest_ms"]
-        own = {"steps.lowest_ms": shown, "steps.alpha": 0.05, "members": sum(map(block.is_primary, block.wide))}
+        own = {"steps.lowest_ms": shown, "steps.alpha": 0.05, "members": len(block.primary)}
         block.compared.check(f"{block.place}.lowest.{number}", own)
 
 
@@ -323,18 +295,11 @@ def _trend(answers: pd.DataFrame, direction: str | None) -> Numbers:
     tail, sides = (max(above, sizes.sum() - above), 2) if direction is None else (above, 1)
     own = {"n": n, "dropped": len(answers) - n, "statistic": scores.sum()}
     own |= {"effect": away.mean() / (k * (k * k - 1) / 12), "smallest_p": min(1.0, sides * 0.5 ** len(sizes))}
-    own |= {"p": min(1.0, sides * share_of_signs(sizes, tail))}
-    chance = np.ones(1)
-    for row in ranks:
-        chance = np.convolve(chance, _page_scores(tuple(sorted(row))))
-    return own if direction is None else own | {"p_page": chance[round(2 * scores.sum()) :].sum()}
-
-
-@lru_cache
-def _page_scores(pattern: tuple[float, ...]) -> Floats:
-    """Return the distribution of twice Σ place · rank over all orders of the ranks."""
-    scores = 2 * np.array(list(permutations(pattern))) @ np.arange(1, len(pattern) + 1)
-    return np.bincount(np.rint(scores).astype(int)) / len(scores)
+    own |= {"p": min(1.0, sides * share_of_sums([(0.0, size) for size in sizes], tail))}
+    if direction is not None:
+        scores_of = [np.array([*permutations(row)]) @ np.arange(1, k + 1) for row in ranks]
+        own["p_page"] = share_of_sums(scores_of, scores.sum())
+    return own
 
 
 def _equivalence(block: Block) -> None:
@@ -358,15 +323,3 @@ def _equivalence(block: Block) -> None:
         words = ("a delay is equivalent", item, f"{delay:g} ms − {control:g} ms")
         block.record(f"against.{number}.found", own, *words)
         block.compared.check(f"{block.place}.against.{number}", {"delay_ms": delay, "control_ms": control})
-
-
-def _noticed(block: Block) -> None:
-    """Count who agreed at each delay; the curve is fitted."""
-    if block.found["threshold"] is None:
-        return
-    item = block.compared.results["decided"]["noticed"]
-    given = block.answers[block.answers["item"] == item].dropna(subset="response")
-    by_delay = given["response"].groupby(given["code"].map(dict(zip(block.codes, block.delays, strict=True))))
-    own = {"n": given["participant"].nunique()} | numbered("levels", sorted(by_delay.groups))
-    own |= numbered("yes", by_delay.apply(lambda points: (points >= 5).sum())) | numbered("asked", by_delay.size())
-    block.record("threshold", own | {"dropped": len(block.wide[item]) - own["n"]}, "a delay is noticed")

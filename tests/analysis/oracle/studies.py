@@ -20,8 +20,7 @@ from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.unblinding import unblind
 from tests.analysis.conftest import CANNOT_JUDGE, Answer, make_results
 from tests.analysis.oracle.conduct import compare_captions, compare_conduct
-from tests.analysis.oracle.hypotheses import compare_hypotheses
-from tests.analysis.oracle.levels import compare_levels
+from tests.analysis.oracle.levels import compare_hypotheses, compare_levels
 from tests.analysis.oracle.recomputed import Compared, read_table
 from tests.analysis.oracle.statements import compare_statements
 from tests.analysis.outputs import figures_as_lines
@@ -76,7 +75,7 @@ def write(name: str, study: Path, to: Path, *, figures: bool = False) -> Written
 
 
 def statements(folder: Path, name_of: Callable[[int], str] = "P{:03d}".format, key_seed: int = 3) -> Path:
-    """Return the thesis' study of twelve people who notice delays; answers depend on person, condition and item alone."""
+    """Return the thesis' study of people who notice delays; answers depend on person, condition and statement alone."""
     results = make_results(folder / "study", load("rek2024"), key_seed=key_seed)
     for number in range(1, 13):
 
@@ -99,7 +98,7 @@ def statements(folder: Path, name_of: Callable[[int], str] = "P{:03d}".format, k
 
 def levels(folder: Path) -> Path:
     """Return a study of thresholds of two groups."""
-    study = rehearse_answers(FILES["levels"], participants=8, seed=4, results=folder / "study", features={})
+    study = rehearse_answers(FILES["levels"], participants=6, seed=4, results=folder / "study", features={})
     unblind(study, "AB", "to analyse")
     draw_measurements(study)
     return study

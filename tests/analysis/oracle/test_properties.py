@@ -1,9 +1,8 @@
-"""What is resampled or fitted: other draws give the same, known truths are recovered, and order and names do not matter."""
+"""What is resampled or fitted: other draws give the same, known truths are recovered, order and names do not matter."""
 
 import json
 import math
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +13,11 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from study_app.analysis.levels.thresholds import thresholds_of
+from study_app.analysis.report.write_report import plain
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.mean_tests import means_of, p_differs
 from study_app.analysis.statistics.rank_tests import global_permutation
-from study_app.analysis.statistics.recognition import named, recognition
+from study_app.analysis.statistics.recognition import recognition
 from study_app.analysis.statistics.thresholds import noticed
 from study_app.analysis.statistics.trend import trend
 from study_app.protocol.trials.designs import default_design
@@ -101,7 +101,7 @@ def test_intervals_of_resampled_people_are_those_of_other_draws() -> None:
 LEVELS_MS = (0.0, 50.0, 75.0, 100.0, 125.0, 150.0, 200.0)
 
 
-def noticing(people: int, unit: float = 1.0) -> Floats:
+def noticing(people: int) -> Floats:
     """Return answers of people who notice half of the delays of 110 ms, guess in 5 % and lapse in 10 %."""
     chance = 0.05 + 0.85 * stats.logistic.cdf(np.array(LEVELS_MS), 110, 80 / (2 * math.log(19)))
     return np.where(np.random.default_rng(people).random((people, len(LEVELS_MS))) < chance, 6.0, 2.0)
@@ -123,9 +123,6 @@ def test_the_detection_threshold_is_that_of_the_people() -> None:
 
 
 def numbers_of(found: Any) -> list[float]:
-    """Return the numbers of a result."""
-    from study_app.analysis.report.write_report import plain
-
     return [number for _, number in leaves(plain(found))]
 
 
@@ -146,9 +143,7 @@ def trials(unit: float = 1.0) -> pd.DataFrame:
 
 def test_thresholds_are_those_of_the_people_in_any_order_and_unit() -> None:
     def estimated(rows: pd.DataFrame, unit: float = 1.0) -> dict[str | None, Any]:
-        stimulus = Stimulus(
-            vary="damping_nspm", level="difference", levels=(0.02 * unit, 0.6 * unit), standards=(8.0,)
-        )
+        stimulus = Stimulus(vary="damping_nspm", level="difference", levels=(0.02 * unit, 0.6 * unit), standards=(8.0,))
         return {one.participant: one for one in thresholds_of(rows, stimulus, default_design("2ifc"))}
 
     found = estimated(trials())

