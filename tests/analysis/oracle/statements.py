@@ -87,7 +87,7 @@ def adjusted(ps: Sequence[float | None], method: str = "holm") -> list[float]:
 
 
 def share_of_sums(people: Iterable[Iterable[float]], total: float) -> float:
-    """Return the share of the choices of one value of each person whose sum is at least ``total``, exact to quarters."""
+    """Return the share of choices of one value of each person whose sum is at least ``total``, exact to quarters."""
     chance, least = np.ones(1), 0
     for values in people:
         steps = np.rint(4 * np.array([*values])).astype(int)

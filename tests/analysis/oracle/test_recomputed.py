@@ -35,7 +35,9 @@ PROVED = {
     "test_reaches_are_those_that_the_session_decided_and_absent_recordings_are_told",
     r"results\.orders\..*": "tests/protocol/orders/test_balance.py::test_positions_and_what_follows_what_are_counted",
     r"results\.scores\..*": "tests/protocol/instruments/test_instruments.py::test_published_and_worked_scores",
-    r".*\.p_bootstrap|results\.contrasts\.p_equivalent": PROPERTIES + "test_p_of_the_bootstrap_is_that_of_other_draws",
+    r".*\.p_bootstrap": PROPERTIES + "test_p_of_the_bootstrap_is_that_of_other_draws",
+    r"results\.contrasts\.p_equivalent": "tests/analysis/test_contrasts.py::"
+    "test_equality_is_corrected_over_the_hypotheses_that_state_a_bound",
     r"results\.blocks\.overall\.p": PROPERTIES + "test_p_over_all_statements_is_that_of_other_draws",
     r"results\.blocks\.(trends\.outcome|named\.found)\.interval\..*": PROPERTIES
     + "test_intervals_of_resampled_people_are_those_of_other_draws",
