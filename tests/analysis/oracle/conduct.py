@@ -54,16 +54,16 @@ def _motion(compared: Compared, counting: pd.DataFrame) -> None:
             compared.equal(f"motion.csv {number} {name}", table.loc[number, name], value)
 
 
-def _question(rows: pd.DataFrame, told: Numbers) -> Numbers:
+def _question(rows: pd.DataFrame, reported: Numbers) -> Numbers:
     given, values, cannot = rows["response"].dropna(), rows["value"].dropna(), rows["cannot_judge"].eq(True).sum()
     own = {"n": len(given), "participants": rows.loc[given.index, "participant"].nunique()}
     own |= {"cannot_judge": cannot, "missing": len(rows) - len(given) - cannot}
-    if "counts" in told:
+    if "counts" in reported:
         chosen = [option for response in given.astype(str) for option in response.removesuffix(".0").split()]
-        own |= named("counts", {option: chosen.count(option) for option in told["counts"]})
-    if "values" in told:
+        own |= named("counts", {option: chosen.count(option) for option in reported["counts"]})
+    if "values" in reported:
         own |= {"smallest": values.min(), "largest": values.max(), **named("values", enumerate(sorted(values)))}
-    return own | (quartiles(values) if "median" in told else {})
+    return own | (quartiles(values) if "median" in reported else {})
 
 
 def compare_captions(compared: Compared, trials: pd.DataFrame) -> None:
@@ -81,11 +81,11 @@ def compare_captions(compared: Compared, trials: pd.DataFrame) -> None:
             (r"by (\S+) ms on average \(trials: (\S+) to (\S+) ms", [errors.mean(), errors.min(), errors.max()]),
             (r"Right: (\d+); (\S+) would .* p = (\S+)\)", *hits),
         ):
-            for told in (found.groups() for found in re.finditer(pattern, path.read_text("utf-8"))):
-                if not any(all(map(_is_rounded, told, one)) for one in own):
-                    compared.differences.append((path.name, told, own))
+            for reported in (found.groups() for found in re.finditer(pattern, path.read_text("utf-8"))):
+                if not any(all(map(_is_rounded, reported, one)) for one in own):
+                    compared.differences.append((path.name, reported, own))
 
 
-def _is_rounded(told: str, own: float) -> bool:
-    number = SMALL.index(told) if told in SMALL else float(told.replace("−", "-"))
-    return abs(number - own) <= 0.5000001 * 10.0 ** -len(told.partition(".")[2])
+def _is_rounded(reported: str, own: float) -> bool:
+    number = SMALL.index(reported) if reported in SMALL else float(reported.replace("−", "-"))
+    return abs(number - own) <= 0.5000001 * 10.0 ** -len(reported.partition(".")[2])

@@ -151,10 +151,10 @@ def _exponents(lines: Sequence[Numbers]) -> list[Numbers]:
 
 def compare_hypotheses(compared: Compared, trials: pd.DataFrame, study: Numbers) -> None:
     """Recompute the hypotheses that the study's file states; p of the bootstrap is taken from the report."""
-    told, contrasts = compared.results.get("contrasts", []), study["analysis"].get("contrasts", [])
+    reported, contrasts = compared.results.get("contrasts", []), study["analysis"].get("contrasts", [])
     rows = compared.tests()
     tested = [_tested(compared, contrast, trials[trials["here"]]) for contrast in contrasts]
-    ps = adjusted([max(own["p"], one["p_bootstrap"]) for own, one in zip(tested, told, strict=True)])
+    ps = adjusted([max(own["p"], one["p_bootstrap"]) for own, one in zip(tested, reported, strict=True)])
     for number, (own, p) in enumerate(zip(tested, ps, strict=True)):
         own |= {"p_adjusted": p, "members": len(contrasts)}
         compared.check(f"results.contrasts.{number}", own, 1e-4)

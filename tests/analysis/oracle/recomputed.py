@@ -43,10 +43,10 @@ class Compared:
                 self.places.add(path)
                 self.equal(path, self.numbers.get(path), own, tolerance)
 
-    def equal(self, path: str, told: Any, own: Any, tolerance: float = 1e-6) -> None:
-        values = [math.nan if value is None else float(value) for value in (told, own)]
+    def equal(self, path: str, reported: Any, own: Any, tolerance: float = 1e-6) -> None:
+        values = [math.nan if value is None else float(value) for value in (reported, own)]
         if not all(map(math.isnan, values)) and not math.isclose(*values, rel_tol=tolerance, abs_tol=1e-9):
-            self.differences.append((path, told, own))
+            self.differences.append((path, reported, own))
 
     def tests(self) -> pd.DataFrame:
         return read_csv(self.folder / "tests.csv").astype(object).fillna("")

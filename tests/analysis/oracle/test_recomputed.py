@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from study_app.analysis import contrasts
-from study_app.analysis.data import motion, session_files, study_tables
+from study_app.analysis.data import motion, study_tables
 from study_app.analysis.findings import delays, finding
 from study_app.analysis.statistics import rank_tests, trend
 from study_app.psychophysics import detection
@@ -151,13 +151,17 @@ def conditions_exchanged(patched: pytest.MonkeyPatch) -> None:
 
 
 def exclusions_forgotten(patched: pytest.MonkeyPatch) -> None:
-    of = session_files.with_excluded
+    of = study_tables.with_excluded
     patched.setattr(study_tables, "with_excluded", lambda table, _listed: of(table, ()))
 
 
 def excluded_trials_forgotten(patched: pytest.MonkeyPatch) -> None:
-    of = session_files._about
-    patched.setattr(session_files, "_about", lambda listed, person, session, _trial: of(listed, person, session, None))
+    of = study_tables.with_excluded
+
+    def of_sessions(table: Any, listed: Any) -> Any:
+        return of(table, [exclusion for exclusion in listed if exclusion.trial is None])
+
+    patched.setattr(study_tables, "with_excluded", of_sessions)
 
 
 def withdrawn_sessions_counted(patched: pytest.MonkeyPatch) -> None:
