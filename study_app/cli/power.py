@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from study_app.analysis.planning.threshold_studies import PrecisionPlans, Precisions
     from study_app.protocol.model import Protocol
 
-SIZES = (5, 8, 12, 16, 20, 24)
+SIZES, MOST = (5, 8, 12, 16, 20, 24), 1000
 
 
 TRIALS = (1, 1000)
@@ -52,9 +52,9 @@ def _numbers(value: str, least: int, most: int, what: str) -> tuple[int, ...]:
     "--sizes",
     default=",".join(map(str, SIZES)),
     show_default=True,
-    callback=lambda _context, _option, value: _numbers(value, 2, 1000, "numbers of participants"),
+    callback=lambda _context, _option, value: _numbers(value, 2, MOST, "numbers of participants"),
     metavar="N,N,…",
-    help="Numbers of participants.",
+    help="Numbers of participants; by default also the planned one.",
 )
 @click.option(
     "--trials",
@@ -85,10 +85,11 @@ def power(
     """Estimate the power of the protocol's own tests on simulated studies, and the smallest detectable difference.
 
     Four sessions are rehearsed to obtain the features of each condition; then thousands of participants answer with
-    the rehearsals' answer model, which is plausible but not measured. For a study of thresholds, d′, ratings or
-    magnitude estimation the command prints the standard deviation of one participant, half the group's 95 % interval,
-    and how many studies reach analysis.precision, for each number of participants and of --trials. Ctrl+C ends the
-    command with the results so far.
+    the rehearsals' answer model, which is plausible but not measured. Power is printed for typical people, or those of
+    [simulated_participants], and as a range over consistent, typical and noisy people. For a study of thresholds, d′,
+    ratings or magnitude estimation the command prints the standard deviation of one participant, half the group's 95 %
+    interval, and how many studies reach analysis.precision, for each number of participants and of --trials. Ctrl+C
+    ends the command with the results so far.
     """
     if engine == "processes":
         workers = Workers(workers.count)
@@ -107,10 +108,13 @@ def power(
         )
     if to is not None:
         make_folder(to, waits=False)
+    stated = click.get_current_context().get_parameter_source("sizes") is not ParameterSource.DEFAULT
     if looks := () if study.analysis is None else study.analysis.looks:
-        if click.get_current_context().get_parameter_source("sizes") is not ParameterSource.DEFAULT:
+        if stated:
             raise click.UsageError(f"--sizes: the study plans looks at {', '.join(map(str, looks))}: omit --sizes")
         sizes = looks
+    elif study.analysis is not None and not stated and 1 < (study.analysis.participants or 0) <= MOST:
+        sizes = tuple(sorted({*sizes, study.analysis.participants or 0}))
     found: Powers | Precisions | None = None
     steps: Iterator[Powers] | Iterator[Precisions]
     cancelled = False

@@ -69,7 +69,7 @@ ICONS: Final = {
     "pages": "file", "blocks": "layers", "tasks": "route", "questionnaires": "list", "liquids": "drop",
     "conditions": "columns", "scales": "scale", "stimuli": "pulse", "designs": "columns", "methods": "bars",
     "sequence": "bars", "sequences": "bars", "groups": "people", "study": "file", "device": "device", "scene": "drop",
-    "limits": "check", "analysis": "bars",
+    "limits": "check", "analysis": "bars", "simulated_participants": "people",
 }  # fmt: skip
 """The icon of each section; a section that is not listed has a ring."""
 PAGES: Final[Mapping[Any, str]] = {"consent": "pen", "break": "pause", "debrief": "flag"}
@@ -190,7 +190,9 @@ def _row(study: Study, element: Element, times_s: Mapping[str, float], *, in_ses
     )
 
 
-SECTIONS_OF_TABLES: Final = frozenset(ICONS) - {*OWN, "study", "device", "scene", "limits", "analysis"}
+SECTIONS_OF_TABLES: Final = frozenset(ICONS) - {
+    *OWN, "study", "device", "scene", "limits", "analysis", "simulated_participants"
+}  # fmt: skip
 
 
 HELP: Final = {"designs": "2IFC and other trial designs"}

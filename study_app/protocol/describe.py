@@ -67,6 +67,7 @@ def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force
     if protocol.analysis is not None:
         named = [f"{name} by {one.label}" for name, one in protocol.conditions.items() if one.label]
         decided = list(protocol.analysis.described(named))
+    people = protocol.simulated_participants
     sections = (
         _head(protocol, language),
         *(_session(one, planned_participants(protocol, one.group), language) for one in variants(protocol)),
@@ -76,6 +77,7 @@ def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force
         _titled("Conditions", conditions),
         *(_statements(protocol, name, language) for name in protocol.questionnaires),
         _titled("Decided about the analysis", decided),
+        *([] if people is None else [_titled("Simulated participants", [("Answers", people.described())])]),
         _titled("A trial is valid up to", limit_rows(protocol)),
         *([("Warnings", *warned)] if warned else []),
     )

@@ -51,6 +51,7 @@ NEW_KEYS: Final = (
     "conditions.*.overlay",
     *(f"conditions.*.{key}" for key in OF_LINK),
     *TABLES,
+    "simulated_participants",
     *(f"limits.{key}" for key in LEVEL_LIMITS),
     *(f"blocks.*.{key}" for key in _later(Block)),
     *(f"analysis.{key}" for key in _later(Analysis)),

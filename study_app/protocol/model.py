@@ -28,6 +28,7 @@ from study_app.protocol.blocks import Block, Compared, Kind, OrderOfBlocks
 from study_app.protocol.groups import Group, GroupAssignment, Sequences, Steps, every_step
 from study_app.protocol.questionnaires import Questionnaire
 from study_app.protocol.questions import Scale
+from study_app.protocol.raters import SimulatedParticipants
 from study_app.protocol.table import Body as PageBody
 from study_app.protocol.table import Brief, Description, Id, Language, Localised, Printable, Table, invalid, text_in
 from study_app.protocol.trials.designs import AnyDesign, default_design, question_of
@@ -476,6 +477,9 @@ class Protocol(Table):
     limits: Limits = Field(default_factory=Limits)
     analysis: Analysis | None = Field(
         default=None, description="Decisions about the analysis, made before the first session."
+    )
+    simulated_participants: SimulatedParticipants | None = later(
+        default=None, description="How simulated participants answer statements, in power analyses and rehearsals."
     )
 
     def text(self, value: str | dict[str, str], language: str) -> str:

@@ -31,6 +31,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule, draw_key
 from study_app.protocol.presented.presentation import arrangement_text, next_level, trial_result
 from study_app.protocol.questions import POINTS
+from study_app.protocol.raters import REHEARSED, SimulatedParticipants
 from study_app.protocol.streams import Draw, Key, draw_secret, stream
 from study_app.protocol.tracks import design_of, stimulus_of
 from study_app.protocol.trials.designs import Design, ForcedChoice, Rated
@@ -95,11 +96,17 @@ class Rater:
     threshold_s: float
 
 
-def rater(draw: Draw) -> Rater:
-    """Return a person, drawn with ``draw`` (uniform numbers in [0, 1))."""
+LEAST_NOISE, NOISE_RANGE, MEAN_NOISE = 0.5, 0.3, 0.65
+
+
+def rater(draw: Draw, participants: SimulatedParticipants = REHEARSED) -> Rater:
+    """Return one of the participants, drawn with ``draw`` (uniform numbers in [0, 1)).
+
+    Their noise is uniform from 77 % to 123 % of the mean.
+    """
     return Rater(
-        leaning=0.4 * normal(draw),
-        noise=0.5 + 0.3 * draw(),
+        leaning=participants.bias_sd * normal(draw),
+        noise=participants.noise_sd / MEAN_NOISE * (LEAST_NOISE + NOISE_RANGE * draw()),
         strength=max(0.5, 1 + 0.1 * normal(draw)),
         threshold_s=max(0.06, 0.13 + 0.015 * normal(draw)),
     )
@@ -186,7 +193,7 @@ OPINIONS: Final[dict[str, Callable[[_Impression], float]]] = {
 def simulate_ratings(
     items: Sequence[str], trials: Sequence[Sequence[TrialFeatures]], repetitions: int, person: Rater, random: Generator
 ) -> tuple[Floats, Floats]:
-    """Return what one person thinks of each item in a block, and what else is in the answers.
+    """Return what one person thinks of each item in a block, and the noise of the answers.
 
     Parameters
     ----------
@@ -204,7 +211,7 @@ def simulate_ratings(
     Returns
     -------
     tuple of array
-        Opinions, and leaning with noise, both (repetitions, conditions, items) [points].
+        Opinions, and noise, both (repetitions, conditions, items) [points].
     """
     drawn = random.random((repetitions, len(trials))).tolist()
     thought = [
@@ -212,7 +219,7 @@ def simulate_ratings(
         for parts in drawn
     ]
     noise = random.random((repetitions, len(trials), len(items), UNIFORM)).sum(axis=-1) - UNIFORM / 2
-    return np.array(thought), person.leaning + person.noise * noise
+    return np.array(thought), person.noise * noise
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,12 +1,12 @@
-"""Power by number of participants: curves, tables, figure and files.
+"""Power by number of participants: curves, tables, figure and files, of the main kind of people and as a range.
 
 Of a study with delays the figure has a row for the lowest delay that shows and one for equivalence, a line a delay.
 """
 
 import math
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias
 
@@ -29,8 +29,6 @@ from study_app.analysis.planning.simulated_studies import (
     EFFECTS,
     FULL,
     IF_EQUAL,
-    ODD,
-    ODD_POINTS,
     PLANNED_DRAWS,
     Counts,
     Plan,
@@ -40,6 +38,7 @@ from study_app.analysis.planning.simulated_studies import (
 from study_app.analysis.results import enough
 from study_app.analysis.statistics.equivalence import STEPS, fewest
 from study_app.protocol.model import Contrast
+from study_app.protocol.raters import STATED
 from study_app.psychophysics.grid import Z_95
 from study_app.store.csv_files import Column, csv_bytes, optional
 from study_app.store.output_files import write_files
@@ -78,6 +77,11 @@ class Curve:
     effect: float | None
     detectable: tuple[float | None, ...] | None
 
+    @property
+    def test(self) -> tuple[str | None, ...]:
+        """What identifies the test among those of a study."""
+        return self.block, self.question, self.item, self.over, self.setting
+
     def points(self, place: int) -> float | None:
         """Return ``detectable`` at one of the sizes."""
         return None if self.detectable is None else self.detectable[place]
@@ -93,26 +97,40 @@ class Curve:
 
 @dataclass(frozen=True, kw_only=True)
 class Powers:
-    """What so many simulated studies of each size found."""
+    """What so many simulated studies of each size found, of each kind of people; the main kind comes first."""
 
     plan: Plan
     sizes: tuple[int, ...]
     studies: int
     asked: int
     seed: int
-    curves: tuple[Curve, ...]
+    kinds: Mapping[str, tuple[Curve, ...]]
 
     @property
     def complete(self) -> bool:
         """Whether all studies that were asked for were simulated."""
         return self.studies == self.asked
 
+    @property
+    def curves(self) -> tuple[Curve, ...]:
+        """The curves of the main kind of people."""
+        return next(iter(self.kinds.values()))
 
-def powers(plan: Plan, sizes: Sequence[int], studies: int, asked: int, seed: int, counts: Counts) -> Powers:
-    """Return what ``studies`` of ``asked`` studies found, from their counts."""
-    curves = [curve for block in plan.blocks for curve in _curves(block, counts, studies)]
-    curves += _contrast_curves(plan, counts, studies)
-    return Powers(plan=plan, sizes=tuple(sizes), studies=studies, asked=asked, seed=seed, curves=tuple(curves))
+    def among_kinds(self, curve: Curve) -> tuple[Curve, ...]:
+        """Return the curves of a test for every kind of people, in the order of ``kinds``."""
+        none = replace(curve, power=(0.0,) * len(self.sizes), detectable=None)
+        return tuple(next((one for one in of if one.test == curve.test), none) for of in self.kinds.values())
+
+
+def powers(
+    plan: Plan, sizes: Sequence[int], studies: int, asked: int, seed: int, counts: Mapping[str, Counts]
+) -> Powers:
+    """Return what ``studies`` of ``asked`` studies found, from their counts for each kind of people."""
+    kinds = {}
+    for kind, counted in counts.items():
+        curves = [curve for block in plan.blocks for curve in _curves(block, counted, studies)]
+        kinds[kind] = (*curves, *_contrast_curves(plan, counted, studies))
+    return Powers(plan=plan, sizes=tuple(sizes), studies=studies, asked=asked, seed=seed, kinds=kinds)
 
 
 def interval(share: float, studies: int) -> tuple[float, float]:
@@ -159,7 +177,8 @@ def _curves(block: Planned, counts: Counts, studies: int) -> Iterator[Curve]:
                 else None,
             )
     yield from _lowest_curves(block, counts, studies)
-    yield from _equivalence_curves(block, counts, studies)
+    equivalence = list(_equivalence_curves(block, counts, studies))
+    yield from (*equivalence, *_truly_equal(equivalence))
 
 
 def _contrast_curves(plan: Plan, counts: Counts, studies: int) -> Iterator[Curve]:
@@ -277,6 +296,7 @@ COLUMNS: Final = (
     optional("item", "text", "Id of the statement; n/a where the test is over several."),
     optional("over", "text", "Over what, where not over one statement."),
     optional("setting", "text", "The delay that the test is about; n/a where it is about all."),
+    Column("people", "text", "Kind of the simulated participants."),
     *OF_STUDIES,
     Column("power", "number", "Share of the studies that show it, under the answer model.", minimum=0, maximum=1),
     Column("power_low", "number", "Lower end of the 95 % interval of that share (Wilson).", minimum=0, maximum=1),
@@ -311,7 +331,7 @@ def power_csv(found: Powers) -> bytes:
 
 
 def _csv_rows(found: Powers) -> Iterator[dict[str, Any]]:
-    for curve in found.curves:
+    for curve, kind in ((curve, kind) for kind, curves in found.kinds.items() for curve in curves):
         for place, size in enumerate(found.sizes):
             low, high = interval(curve.power[place], found.studies)
             yield {
@@ -322,6 +342,7 @@ def _csv_rows(found: Powers) -> Iterator[dict[str, Any]]:
                 "item": curve.item,
                 "over": curve.over or None,
                 "setting": curve.setting,
+                "people": kind,
                 "participants": size,
                 "studies": found.studies,
                 "power": round(curve.power[place], 6),
@@ -336,20 +357,20 @@ def _csv_rows(found: Powers) -> Iterator[dict[str, Any]]:
 def power_markdown(found: Powers) -> str:
     """Return the tables in Markdown, with what they rest on and what they cannot tell."""
     lines = [f"# Power of {found.plan.title} ({found.plan.name} {found.plan.version})", "", *_preface(found)]
+    lines += _summary(found)
     for block in found.plan.blocks:
         for question, (head, first) in _HEADS.items():
             curves = [one for one in found.curves if (one.block, one.question) == (block.id, question)]
             if curves:
                 lines += ["", f"## {block.title}: {head[:1].lower()}{head[1:]}", "", *_explained(question, found), ""]
-                shown = [*curves, *_truly_equal(curves)] if question == "equivalence" else curves
-                lines += _markdown_table(shown, found, first, lambda curve, at: f"{curve.power[at]:.0%}", needed=True)
+                lines += _markdown_table(curves, found, first, lambda curve, at: f"{curve.power[at]:.0%}", needed=True)
             if any(one.detectable for one in curves):
                 lines += ["", "The smallest difference of mean answers that 80 % of studies show, in points:", ""]
                 lines += _markdown_table(
                     [one for one in curves if one.detectable],
                     found,
                     first,
-                    lambda curve, at: "beyond" if (points := curve.points(at)) is None else f"{points:.2f}",
+                    lambda curve, at: difference_text(curve.points(at), 2),
                 )
     return "\n".join([*lines, *_between(found)]) + "\n"
 
@@ -366,9 +387,13 @@ def _preface(found: Powers) -> list[str]:
         "",
         f"Tests at α = {decided.alpha:g}{looks}; p from {PLANNED_DRAWS} random rearrangements of each participant's "
         "answers. Statements that the protocol calls primary are corrected by Holm, the others by Benjamini and "
-        f"Hochberg. One answer in {1 / ODD:.0f} is {ODD_POINTS:g} points higher than the model says. "
-        f"Effects of {EFFECTS[1]:g} to {EFFECTS[-1]:g} times the model's were tried. A power of 80 % is uncertain by "
-        f"±{50 * (high - low):.1f} percentage points.",
+        f"Hochberg. Effects of {EFFECTS[1]:g} to {EFFECTS[-1]:g} times the model's were tried. A power of 80 % is "
+        f"uncertain by ±{50 * (high - low):.1f} percentage points.",
+        "",
+        f"Numbers are for {_people(next(iter(found.kinds)))}, and in parentheses the lowest and the highest of all "
+        "kinds of people: "
+        + "; ".join(f"**{kind}**: {people.described()}" for kind, people in found.plan.kinds.items())
+        + f". {SOURCES}",
     ]
     if not found.complete:
         lines += ["", f"**Ended early: {found.studies} of {found.asked} studies.**"]
@@ -387,6 +412,46 @@ def _preface(found: Powers) -> list[str]:
     return lines
 
 
+SOURCES: Final = (
+    "Consistent, typical and noisy people have values from published ratings, in points of a seven-point scale: a "
+    "trained panel (data TVbo, R package lmerTest, Kuznetsova, Brockhoff and Christensen 2017; medians over 15 "
+    "attributes); panelists who rated chocolates (data sensochoc, R package SensoMineR, Lê and Husson 2008; medians "
+    "over 14 descriptors); and the largest of the latter 14 values. Noise: SD between equal trials; slopes: SD between "
+    "people of their effects, as a share of the mean effect."
+)
+"""Where the values of `raters.PUBLISHED` come from."""
+BEYOND: Final = "beyond"
+
+
+def _people(kind: str) -> str:
+    """Return a kind of people in words."""
+    return f"people {kind}" if kind == STATED else f"{kind} people"
+
+
+def _summary(found: Powers) -> Iterator[str]:
+    """Yield the power of the primary tests at the planned number of participants, for each kind of people."""
+    plan, sizes = found.plan, found.sizes
+    place = sizes.index(plan.participants) if plan.participants in sizes else len(sizes) - 1
+    planned = "the planned " if plan.participants in sizes else ""
+    main, consistent, noisy = found.kinds
+    lines = []
+    for curve in found.curves:
+        primary = (
+            curve.item is not None
+            and curve.item not in plan.unknown
+            and (not plan.decided.made or plan.decided.is_primary(curve.item))
+        )
+        if curve.question == "contrast" or (primary and curve.question in ("settings differ", "trend")):
+            shares = dict(zip(found.kinds, (one.power[place] for one in found.among_kinds(curve)), strict=True))
+            about = "" if curve.question == "contrast" else f" ({HEADS[curve.question]})"
+            lines.append(
+                f"- {_name(curve, found).strip('*')}{about}: {shares[consistent]:.0%} of studies find it if people are "
+                f"{consistent}, {shares[main]:.0%} if {main}, and {shares[noisy]:.0%} if {noisy}."
+            )
+    if lines:
+        yield from ("", f"## Power with {planned}{sizes[place]} participants", "", *lines)
+
+
 def _between(found: Powers) -> Iterator[str]:
     """Yield a table for each contrast of a statement between groups; the model knows no difference between groups."""
     plan = found.plan
@@ -394,9 +459,12 @@ def _between(found: Powers) -> Iterator[str]:
     for one, shares in plan.between:
         place = [block.id for block in plan.blocks].index(one.blocks[0])
         item = [it.id for it in plan.blocks[place].items].index(one.measure)
-        spread = float(given[place].answers(1.0)[:, :, item].mean(axis=1).std(ddof=1))
-        said = f"SD: of the mean answers of simulated participants, {spread:.2f} points."
-        rows = [(one.measure, f"{spread:.2f}", spread)]
+        spreads = {
+            name: float(given[place].answers(1.0, kind)[:, :, item].mean(axis=1).std(ddof=1))
+            for name, kind in plan.kinds.items()
+        }
+        said = "SD: of the mean answers of simulated participants, in points."
+        rows = [(f"{one.measure}, {_people(name)}", f"{spread:.2f}", spread) for name, spread in spreads.items()]
         yield from smallest_differences(
             one, found.sizes, plan.decided.alphas[-1], len(plan.contrasts) + plan.untested, rows, "statement", said,
             "±{:.2f}".format, shares, one.bound, bounds=_bounds(plan), largest=STEPS,
@@ -492,7 +560,7 @@ def _precision(n: int, second: int | None) -> tuple[float, int]:
     return math.sqrt(n * second / (n + second)), n + second - 2
 
 
-def _truly_equal(curves: list[Curve]) -> list[Curve]:
+def _truly_equal(curves: Sequence[Curve]) -> list[Curve]:
     """Return for every statement the power of equivalence where no delay makes a difference: the mean over delays."""
     items = {curve.item: [one.alarms for one in curves if one.item == curve.item and one.alarms] for curve in curves}
     return [
@@ -540,15 +608,36 @@ def _explained(question: Question, found: Powers) -> list[str]:
 def _markdown_table(
     curves: list[Curve], found: Powers, first: str, cell: Callable[[Curve, int], str], *, needed: bool = False
 ) -> list[str]:
-    """Return a table of a row a curve and a column a size; ``needed`` adds from which size on the power is 80 %."""
+    """Return a table of a row a curve and a column a size; ``needed`` adds from which size on the power is 80 %.
+
+    A cell has the lowest and highest number over all kinds of people in parentheses.
+    """
     heads = [first, *(f"n = {size}" for size in found.sizes), *(["80 % from"] if needed else [])]
     lines = [f"| {' | '.join(heads)} |", f"|---|{'---:|' * (len(heads) - 1)}"]
     for curve in curves:
-        cells = [_name(curve, found), *(cell(curve, at) for at in range(len(found.sizes)))]
+        kinds = found.among_kinds(curve)
+        cells = [_name(curve, found), *(with_range([cell(one, at) for one in kinds]) for at in range(len(found.sizes)))]
         if needed:
-            cells.append(str(curve.needed(found.sizes) or "–"))
+            cells.append(with_range([str(one.needed(found.sizes) or f"> {found.sizes[-1]}") for one in kinds]))
         lines.append(f"| {' | '.join(cells)} |")
     return lines
+
+
+def difference_text(points: float | None, decimals: int) -> str:
+    """Return a smallest difference in words; None: it is beyond those that were simulated."""
+    return BEYOND if points is None else f"{points:.{decimals}f}"
+
+
+def with_range(numbers: Sequence[str]) -> str:
+    """Return the first of some numbers in words, and the lowest and highest of all in parentheses where they differ."""
+    lowest, *_, highest = sorted(numbers, key=_order)
+    joint = "–" if highest.strip("%").replace(".", "").isdigit() else " to "
+    return numbers[0] if lowest == highest else f"{numbers[0]} ({lowest.strip('%')}{joint}{highest})"
+
+
+def _order(number: str) -> tuple[bool, float]:
+    """Return the place of a number in words: what is beyond all others comes last."""
+    return number == BEYOND or ">" in number, 0.0 if number == BEYOND else float(number.strip("%> "))
 
 
 def _name(curve: Curve, found: Powers) -> str:
@@ -578,7 +667,9 @@ Plot: TypeAlias = tuple[str, Question, tuple[Curve, ...]]
 def _plots(found: Powers, block: Planned) -> Iterator[list[Plot]]:
     """Yield the rows of plots of a block: a plot for each statement and for the test over all."""
     for question in HEADS:
-        curves = [one for one in found.curves if (one.block, one.question) == (block.id, question)]
+        curves = [
+            one for one in found.curves if (one.block, one.question) == (block.id, question) and one.setting != IF_EQUAL
+        ]
         plots: list[Plot] = [
             (item.short, question, mine)
             for item in block.items
@@ -595,7 +686,8 @@ def draw_power(found: Powers, block: Planned) -> Figure:
     figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, 0.7 + 1.45 * len(rows)), layout="constrained")
     figure.suptitle(
         f"{block.title}: share of {found.studies} studies with SIMULATED participants, over their number\n"
-        f"α = {found.plan.decided.alpha:g}; band: Monte Carlo 95 %; dashed: without any effect",
+        f"α = {found.plan.decided.alpha:g}; {_people(next(iter(found.kinds)))}, band: range over all kinds of people; "
+        "dashed: without any effect",
         fontsize=7.5,
     )
     for row, plots in enumerate(rows):
@@ -617,14 +709,15 @@ def draw_power(found: Powers, block: Planned) -> Figure:
 
 
 def _draw_curves(axes: Axes, found: Powers, curves: Sequence[Curve]) -> None:
-    """Draw a curve with its band and without any effect; of several delays a line each."""
+    """Draw a curve, the range over all kinds of people, and that without any effect; of several delays a line each."""
     for place, curve in enumerate(curves):
         if curve.setting is not None:
             share = place / max(len(curves) - 1, 1)
             label: Style = {"label": curve.setting, "gid": "delay", "markersize": 3}
             axes.plot(found.sizes, curve.power, color=DELAYS(share), marker=".", **label)
             continue
-        low, high = zip(*(interval(share, found.studies) for share in curve.power), strict=True)
+        kinds = [one.power for one in found.among_kinds(curve)]
+        low, high = np.min(kinds, axis=0), np.max(kinds, axis=0)
         axes.fill_between(found.sizes, low, high, color=style.BAND, linewidth=0)
         axes.plot(found.sizes, curve.power, color=style.ACCENT, marker=".", markersize=3)
         if curve.alarms is not None:

@@ -1,8 +1,8 @@
 """What a protocol plans, simulated studies of it, and counts of what its tests find in them.
 
-A smaller effect draws the opinions of a person on all settings nearer to their mean; leanings and noise stay. The same
-people with the same noise answer at every size of the effect, and the first of them are the smaller studies, so that
-curves are smooth; the studies are independent of each other.
+A smaller effect draws the opinions of a person on all settings nearer to their mean; response bias and noise stay. The
+same people with the same noise answer at every size of the effect and as every kind of people, and the first of them
+are the smaller studies, so that curves are smooth; the studies are independent of each other.
 
 All of them meet the same random rearrangements of participants' answers; sums over participants are then products of
 matrices of whole numbers, exact in single precision.
@@ -30,6 +30,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.groups import groups_with
 from study_app.protocol.model import Contrast, Protocol
 from study_app.protocol.questions import POINTS, Question
+from study_app.protocol.raters import LAPSE_POINTS, SimulatedParticipants, compared_kinds
 from study_app.protocol.simulated import OPINIONS, TrialFeatures, rater, simulate_ratings
 from study_app.protocol.table import text_in
 
@@ -66,6 +67,8 @@ class Planned(StatementBlock):
 class Plan:
     """A study that is planned; of its contrasts those of statements within people, and how many others there are.
 
+    ``kinds`` are the people whose power is computed, by name, the main kind first; ``participants`` is their planned
+    number.
     Those of statements ``between`` groups come with the share of all participants that each of the two groups has.
     ``untested_bounds`` of the others state a bound of equality.
     """
@@ -75,6 +78,8 @@ class Plan:
     version: str
     blocks: tuple[Planned, ...]
     decided: Decided
+    kinds: Mapping[str, SimulatedParticipants]
+    participants: int | None = None
     contrasts: tuple[Contrast, ...] = ()
     untested: int = 0
     between: tuple[tuple[Contrast, tuple[float, float]], ...] = ()
@@ -106,6 +111,8 @@ def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
         version=protocol.study.version,
         blocks=tuple(_planned(protocol, block, features, language) for block in asked),
         decided=read_decided([table]),
+        kinds=compared_kinds(protocol.simulated_participants),
+        participants=None if protocol.analysis is None else protocol.analysis.participants,
         contrasts=within,
         untested=len(every) - len(within),
         between=tuple((one, shares) for one in stated if (shares := group_shares(protocol, one)) is not None),
@@ -170,48 +177,62 @@ def _statements(protocol: Protocol, block: Block) -> tuple[Question, ...]:
     return () if questionnaire is None else questionnaire.statements
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Opinions:
-    """What people think in a block, and what else is in their answers (participants, repetitions, settings, items)."""
+    """What people think in a block, and what else is in their answers (participants, repetitions, settings, items).
+
+    Response bias and slopes are of participants. Both, and noise, are standardised; an answer is given in error if
+    ``lapse``, from 0 to 1, is below the lapse rate.
+    """
 
     thought: Array
     noise: Array
+    lapse: Array
+    bias: Array
+    slopes: Array
 
-    def answers(self, effect: float) -> Array:
+    def answers(self, effect: float, kind: SimulatedParticipants) -> Array:
         """Return the answers (participants, settings, items) where settings differ ``effect`` times as much.
 
-        The median over repetitions, as everywhere in the analysis.
+        The people are of a ``kind``. The median over repetitions, as everywhere in the analysis.
         """
         middle = self.thought.mean(axis=2, keepdims=True)
-        points = middle + effect * (self.thought - middle) + self.noise
+        slopes, bias = (one[:, None, None, None] for one in (1.0 + kind.slope_sd * self.slopes, self.bias))
+        points = middle + effect * slopes * (self.thought - middle) + kind.bias_sd * bias + kind.noise_sd * self.noise
+        points += LAPSE_POINTS * (self.lapse < kind.lapse_rate)
         given = np.clip(np.floor(points + 0.5), LOWEST, HIGHEST)
         return np.asarray(given[:, 0] if given.shape[1] == 1 else np.median(given, axis=1))
 
 
-ODD: Final = 0.1
-ODD_POINTS: Final = 3.0
-"""So often an answer is so many points higher than the answer model says: people answer in error. [choice]"""
+STANDARD: Final = SimulatedParticipants(noise_sd=1, bias_sd=1)
+OF_SLOPES: Final = 1
+"""The stream of random numbers of slopes, which are drawn apart from everything else."""
 
 
 def people(plan: Plan, participants: int, seed: int, study: int) -> tuple[Opinions, ...]:
     """Return what the participants of simulated study number ``study`` think in each block of the plan."""
     rng = np.random.default_rng([seed, study])
-    found: list[list[tuple[Array, Array]]] = [[] for _ in plan.blocks]
+    slopes = np.random.default_rng([seed, study, OF_SLOPES]).standard_normal(participants)
+    found: list[list[tuple[Array, Array, Array]]] = [[] for _ in plan.blocks]
+    bias = []
     for _ in range(participants):
-        person = rater(rng.random)
+        person = rater(rng.random, STANDARD)
+        bias.append(person.leaning)
         for place, block in enumerate(plan.blocks):
             items = [item.id for item in block.items]
             thought, noise = simulate_ratings(items, block.features, block.repetitions, person, rng)
-            found[place].append((thought, noise + ODD_POINTS * (rng.random(noise.shape) < ODD)))
+            found[place].append((thought, noise, rng.random(noise.shape)))
     return tuple(
-        Opinions(np.array([thought for thought, _ in block]), np.array([noise for _, noise in block]))
-        for block in found
+        Opinions(thought=thought, noise=noise, lapse=lapse, bias=np.array(bias), slopes=slopes)
+        for thought, noise, lapse in (map(np.array, zip(*block, strict=True)) for block in found)
     )
 
 
-def together(studies: Sequence[tuple[Opinions, ...]], place: int, effects: Sequence[float]) -> Array:
-    """Return one block's answers (effects, studies, participants, settings, items)."""
-    return np.array([[one[place].answers(effect) for one in studies] for effect in effects])
+def together(
+    studies: Sequence[tuple[Opinions, ...]], place: int, effects: Sequence[float], kind: SimulatedParticipants
+) -> Array:
+    """Return one block's answers (effects, studies, participants, settings, items) by people of a kind."""
+    return np.array([[one[place].answers(effect, kind) for one in studies] for effect in effects])
 
 
 PLANNED_DRAWS: Final = 1999
@@ -336,10 +357,22 @@ are planned the sizes are theirs, and what counts is shown at one of them or an 
 """
 
 
-def count(plan: Plan, sizes: Sequence[int], seed: int, batch: int, studies: int) -> Counts:
-    """Simulate ``studies`` of the studies of a batch (from 0, of `BATCH`) and count what is found at every size."""
+def count(plan: Plan, sizes: Sequence[int], seed: int, batch: int, studies: int) -> dict[str, Counts]:
+    """Simulate ``studies`` of the studies of a batch (from 0, of `BATCH`) and count what is found at every size.
+
+    Counted for each of the plan's kinds of people.
+    """
     held = [people(plan, max(sizes), seed, batch * BATCH + number) for number in range(studies)]
-    given = [together(held, place, EFFECTS) for place, _ in enumerate(plan.blocks)]
+    return {
+        name: _counted_in(
+            plan, sizes, [together(held, place, EFFECTS, kind) for place, _ in enumerate(plan.blocks)], seed, batch
+        )
+        for name, kind in plan.kinds.items()
+    }
+
+
+def _counted_in(plan: Plan, sizes: Sequence[int], given: Sequence[Array], seed: int, batch: int) -> Counts:
+    """Count what is found at every size in the answers of each block."""
     flat = [answers.reshape(-1, *answers.shape[2:]) for answers in given]
     ranked = [ranks(answers) for answers in flat]
     of_sizes: dict[tuple[str, str], list[NDArray[np.bool_]]] = {}
@@ -492,7 +525,7 @@ def _family(block: Planned, decided: Decided, ps: Array) -> NDArray[np.bool_]:
 
 def sweep(
     plan: Plan, sizes: Sequence[int], studies: int, seed: int, executor: Executor
-) -> Iterator[tuple[int, Counts]]:
+) -> Iterator[tuple[int, dict[str, Counts]]]:
     """Yield after every batch how many studies of each size were simulated so far, and what was counted in them all.
 
     Every batch draws from a stream of its own, so the counts do not depend on the executor.
@@ -500,8 +533,16 @@ def sweep(
     starts = range(0, studies, BATCH)
     sizes_of_batches = [min(BATCH, studies - first) for first in starts]
     counted = executor.map(partial(count, plan, tuple(sizes), seed), range(len(starts)), sizes_of_batches)
-    done, total = 0, Counts()
+    done, total = 0, dict[str, Counts]()
     for many, numbers in zip(sizes_of_batches, counted, strict=True):
         done += many
-        total = {what: total.get(what, 0) + number for what, number in numbers.items()}
+        total = total_counts(total, numbers)
         yield done, total
+
+
+def total_counts(total: Mapping[str, Counts], more: Mapping[str, Counts]) -> dict[str, Counts]:
+    """Return the sums of the counts of each kind of people; ``total`` is empty before the first batch."""
+    return {
+        kind: {what: total.get(kind, {}).get(what, 0) + number for what, number in counts.items()}
+        for kind, counts in more.items()
+    }

@@ -367,6 +367,7 @@ _SENTENCES: Final = re.compile(r"((?:[a-z_0-9-]+, )*[a-z_0-9-]+): ([^;]+?)(?:; |
 
 LABELS: Final = {
     "between_s": "Between trials",
+    "bias_sd": "Response bias (SD)",
     "block_order": "Order of blocks",
     "break_every": "Trials between breaks",
     "code_prefix": "Letter of blind codes",
@@ -378,11 +379,13 @@ LABELS: Final = {
     "feedback_s": "Feedback duration",
     "group_assignment": "Assignment to groups",
     "level_error_ms": "Level error of delays",
+    "noise_sd": "Noise (SD)",
     "obrien-fleming": "O’Brien–Fleming",
     "participants": "Participants planned",
     "replicates": "Equal conditions as one",
     "sequence": "Session order",
     "setting_label": "Neutral name of trials",
+    "slope_sd": "Slopes (SD)",
     "vary": "Varied quantity",
     "wrong_most": "Most wrong catch trials",
 }

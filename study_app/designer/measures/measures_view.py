@@ -386,11 +386,10 @@ def detectable_card(study: Study, block: Block, who: str, simulated: Simulated) 
     for one in found.findings:
         path: Path = ("questionnaires", str(block.questionnaire), "items", places.get(one.item, 0))
         name = title_of(study.document, path)
-        number = UNKNOWN if one.detectable is None else f"{one.detectable:.1f}"
-        lines.append(Line(name, number, (one.detectable or 0.0) / (found.points - 1)))
+        lines.append(Line(name, one.number, (one.detectable or 0.0) / (found.points - 1)))
     model = (
-        f"The smallest difference, in points of {found.points}, that 4 of 5 simulated studies show. The answers are a "
-        "model's, not measured."
+        f"The smallest difference, in points of {found.points}, that 4 of 5 simulated studies show, if people are "
+        f"{found.kind} (range: consistent to noisy). The answers are a model's, not measured."
     )
     note: Verdict = ("neutral", "info", model)
     if not lines:

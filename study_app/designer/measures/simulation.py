@@ -18,6 +18,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.model import Contrast, Protocol
 from study_app.protocol.orders.balance import Evenness, balances, numbered
 from study_app.protocol.presented.presented_levels import clipping
+from study_app.protocol.raters import TYPICAL
 from study_app.protocol.sequences import row_count
 from study_app.protocol.source.document import Path, value_at
 from study_app.protocol.warnings.expected_precision import ObserverAnswers, ThresholdPlan, imprecise, threshold_plan
@@ -135,23 +136,28 @@ class GroupPrecision:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A statement of a block, and the smallest difference that 80 % of studies show [points]; None: none simulated."""
+    """A statement of a block, and the smallest difference that 80 % of studies show [points]; None: none simulated.
+
+    ``number`` is the difference in words, with the range over kinds of people.
+    """
 
     item: str
     detectable: float | None
+    number: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Detectable:
     """The smallest differences that simulated studies of a block show, of each statement that the answer model knows.
 
-    The smallest difference comes first; the scale has so many ``points``.
+    The smallest difference comes first; the scale has so many ``points``, and the main ``kind`` of people answers.
     """
 
     participants: int
     studies: int
     points: int
     findings: tuple[Finding, ...]
+    kind: str = TYPICAL
 
 
 @dataclass(frozen=True, slots=True)
@@ -522,8 +528,8 @@ def _studies(plan: ThresholdPlan, sizes: Sequence[int], check: Check) -> thresho
     return total
 
 
-SHOWN: Final = "{:.0%} of studies of {} show it, if people answer as the model does"
-EQUALITY: Final = "{:.0%} of studies of {} show equality, if there is no difference"
+SHOWN: Final = "{} of studies of {} show it, if people answer as the model does"
+EQUALITY: Final = "{} of studies of {} show equality, if there is no difference"
 
 
 def _ratios(protocol: Protocol, block: str, people: int, check: Check) -> Iterator[tuple[str, str]]:
@@ -550,12 +556,12 @@ def _ratios(protocol: Protocol, block: str, people: int, check: Check) -> Iterat
                 yield one.described(), f"80 % of studies of {people} show a ratio of {math.exp(apart):.2f}"
             elif (bound := log_bound(protocol, one)) is not None:
                 share = shown_equal(bound / spread, *groups, alpha=alpha)
-                yield one.described(), EQUALITY.format(share, people)
+                yield one.described(), EQUALITY.format(f"{share:.0%}", people)
 
 
 def _detectable(order: Simulation, check: Check) -> tuple[Detectable | None, tuple[tuple[str, str], ...]]:
     """Return the smallest differences that studies show, and how many show each hypothesis about statements."""
-    from study_app.analysis.planning.power_curves import powers  # noqa: PLC0415 - loads scipy
+    from study_app.analysis.planning.power_curves import Curve, difference_text, powers, with_range  # noqa: PLC0415
     from study_app.analysis.planning.simulated_studies import (  # noqa: PLC0415 - loads scipy
         BATCH,
         HIGHEST,
@@ -564,26 +570,34 @@ def _detectable(order: Simulation, check: Check) -> tuple[Detectable | None, tup
         compares_statements,
         count,
         plan,
+        total_counts,
     )
 
     if not compares_statements(order.protocol):
         return None, ()
     planned = plan(order.protocol, _features(order, check))
     people = order.controls.participants
-    counts = Counts()
+    counts = dict[str, Counts]()
     for number in range(STUDIES // BATCH):
         check()
-        found = count(planned, (people,), SEED, number, BATCH)
-        counts = {what: counts.get(what, 0) + one for what, one in found.items()}
-    curves = powers(planned, (people,), STUDIES, STUDIES, SEED, counts).curves
+        counts = total_counts(counts, count(planned, (people,), SEED, number, BATCH))
+    power = powers(planned, (people,), STUDIES, STUDIES, SEED, counts)
+
+    def difference_of(curve: Curve) -> str:
+        return with_range([difference_text(one.points(0), 1) for one in power.among_kinds(curve)])
+
     findings = [
-        Finding(one.item, None if one.detectable is None else one.detectable[0])
-        for one in curves
+        Finding(one.item, one.points(0), difference_of(one))
+        for one in power.curves
         if one.block == order.block and one.item is not None and one.question in ("settings differ", "trend")
         and one.item not in planned.unknown
     ]  # fmt: skip
     findings.sort(key=lambda one: (one.detectable is None, one.detectable or 0.0))
-    shares = {one.over: one.power[0] for one in curves if one.question == "contrast"}
+    shares = {
+        one.over: with_range([f"{kind.power[0]:.0%}" for kind in power.among_kinds(one)])
+        for one in power.curves
+        if one.question == "contrast"
+    }
     stated = [(one.described(), one.bound) for one in hypotheses_of(order.protocol, order.block)]
     shown = tuple(
         (
@@ -595,7 +609,10 @@ def _detectable(order: Simulation, check: Check) -> tuple[Detectable | None, tup
         for one, bound in stated
         if one in shares
     )
-    return Detectable(participants=people, studies=STUDIES, points=HIGHEST, findings=tuple(findings)), shown
+    detectable = Detectable(
+        participants=people, studies=STUDIES, points=HIGHEST, findings=tuple(findings), kind=next(iter(power.kinds))
+    )
+    return detectable, shown
 
 
 _features_of: dict[str, ConditionFeatures] = {}

@@ -34,6 +34,7 @@ from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.thresholds import noticed
 from study_app.evidence.report_rates.hypotheses import false_claims, powers
 from study_app.evidence.table import Evidence, Table
+from study_app.protocol.raters import REHEARSED
 
 Generator: TypeAlias = Literal["answer model", "ordinal probit"]
 Extent: TypeAlias = Literal["empty", "own trends", "partial", "full"]
@@ -45,6 +46,8 @@ NO_EFFECT: Final[tuple[Extent, ...]] = ("empty", "own trends")
 LEVELS: Final = np.array([-2.0, -1.2, -0.4, 0.4, 1.2, 2.0])
 """Where the latent answer of the probit model goes from one of the seven levels to the next."""
 
+PEOPLE: Final = REHEARSED.model_copy(update={"lapse_rate": 0.1})
+"""Who answers as the answer model says."""
 LEANING: Final = 0.7
 SLOPE: Final = 0.3
 """Standard deviations between people: of their response bias, and of their sensitivity to an effect."""
@@ -79,14 +82,14 @@ def answers(
 def _opined(block: Block, opinions: Opinions, extent: Extent, rng: np.random.Generator) -> Array:
     """Return the answer model's answers; equal settings have equal effects."""
     if extent == "empty":
-        return opinions.answers(0.0)
+        return opinions.answers(0.0, PEOPLE)
     thought = opinions.thought.copy()
     if extent == "own trends":
         own = _own(block, (len(thought), *thought.shape[2:]), rng)
-        return Opinions(thought.mean(axis=2, keepdims=True) + own[:, None], opinions.noise).answers(1.0)
+        return replace(opinions, thought=thought.mean(axis=2, keepdims=True) + own[:, None]).answers(1.0, PEOPLE)
     for place, other in alike(block, extent).items():
         thought[:, :, place] = thought[:, :, other]
-    return Opinions(thought, opinions.noise).answers(1.0)
+    return replace(opinions, thought=thought).answers(1.0, PEOPLE)
 
 
 def _probit(

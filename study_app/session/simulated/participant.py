@@ -13,6 +13,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, stream
 from study_app.protocol.questions import Value, plain_number
+from study_app.protocol.raters import REHEARSED
 from study_app.protocol.simulated import Comparison, Course, Observer, TrialFeatures, courses_of, observer_of, rater
 from study_app.protocol.tracks import design_of
 from study_app.session.pages import ChoicePage, DesignPage, Page, QuestionnairePage
@@ -74,7 +75,7 @@ class SimulatedParticipant(ABC):
         self._seed, self._who = schedule.seed, schedule.participant
         self._trials = {trial.number: trial for trial in schedule.trials}
         self.observer = observer or observer_of(self._stream("observer"))
-        self._person = rater(self._stream("person"))
+        self._person = rater(self._stream("person"), study.simulated_participants or REHEARSED)
         self._courses = courses_of(schedule)
         self._said: dict[int, str | int | float] = {}
 

@@ -30,9 +30,12 @@ def test_power_of_small_plans(
     protocol = load(name) if text is None else parse(text.encode(), "small.toml")
     planned = plan(protocol, felt_in(protocol))
     counts = count(planned, (3, 7), 1, 0, 3)
-    lines = [f"{' '.join(what)}: {numbers(found)}" for what, found in counts.items()]
+    lines = [f"{kind} {' '.join(what)}: {numbers(found)}" for kind, of in counts.items() for what, found in of.items()]
     rng = np.random.default_rng(5)
-    drawn = {what: one if what[1] == "means" else rng.integers(0, 4, one.shape) for what, one in counts.items()}
+    drawn = {
+        kind: {what: one if what[1] == "means" else rng.integers(0, 4, one.shape) for what, one in of.items()}
+        for kind, of in counts.items()
+    }
     for given, asked in ((counts, 3), (drawn, 40)):
         for path in sorted(write_power(powers(planned, (3, 7), 3, asked, 1, given), tmp_path)):
             if path.suffix not in (".svg", ".pdf"):

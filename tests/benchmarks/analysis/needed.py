@@ -1,8 +1,8 @@
 """Whether a finding shows in 80 % of studies of the size that ``power`` says it takes, by the report's own tests.
 
 Run it by itself: ``python tests/benchmarks/analysis/needed.py [STUDIES] [SIZE …]``. ``power`` plans rek2024 for the
-sizes; then so many other studies of each size that it names are answered, one answer in ten 3 points too high, and
-reported. Exit code 3 if less than 80 % of them show a statement, but for chance.
+sizes and typical people; then so many other studies of each size that it names are answered and reported. Exit code 3
+if less than 80 % of them show a statement, but for chance.
 """
 
 import sys
@@ -19,6 +19,7 @@ from study_app.analysis.planning.simulated_studies import people, plan, sweep
 from study_app.analysis.results import Failures
 from study_app.evidence.report_rates.simulation import report
 from study_app.protocol.load import load
+from study_app.protocol.raters import PUBLISHED, TYPICAL
 from study_app.session.simulated.rehearsal import condition_features
 
 SEED, OTHER = 1, 2
@@ -46,7 +47,7 @@ def main(studies: str = "200", *sizes: str) -> int:
     found: Counter[tuple[int, str, str | None]] = Counter()
     for n in sorted({n for n, _ in wanted.values()}):
         for study in range(asked):
-            given = [np.asarray(one.answers(1.0)) for one in people(planned, n, OTHER, study)]
+            given = [np.asarray(one.answers(1.0, PUBLISHED[TYPICAL])) for one in people(planned, n, OTHER, study)]
             _, results = report(planned, planned.decided, given, study, Failures())
             for block, result in zip(planned.blocks, results, strict=True):
                 tests = (*SettingsDiffer.of(result), *DelayTrend.of(result))

@@ -147,7 +147,10 @@ SIMULATED = {
     "thickness": Simulated(measurable=Measurable(None, ()), failed="The process ended."),
     "physical2": Simulated(
         detectable=Detectable(
-            participants=12, studies=200, points=7, findings=(Finding("thick", 0.5), Finding("wet", None))
+            participants=12,
+            studies=200,
+            points=7,
+            findings=(Finding("thick", 0.5, "0.5 (0.3–0.9)"), Finding("wet", None, "beyond")),
         )
     ),
 }

@@ -52,7 +52,7 @@ def answer_to(wanted: Simulation) -> Simulated:
     controls, warnings = wanted.controls, ("methods.adaptive.trials: more trials",)
     plan = threshold_plan(wanted.protocol, wanted.protocol.blocks[wanted.block]) if wanted.block else None
     if plan is None:
-        found = Finding("feels_liquid", 0.9), Finding("like_honey", None)
+        found = Finding("feels_liquid", 0.9, "0.9 (0.7–1.4)"), Finding("like_honey", None, "beyond")
         return Simulated(
             detectable=Detectable(participants=controls.participants, studies=200, points=7, findings=found)
         )

@@ -1,0 +1,67 @@
+"""How simulated participants answer statements: noise, response bias, spread of slopes, lapses.
+
+The three kinds of people that ``power`` compares have values from published ratings, in points of a seven-point scale,
+as residual SD, SD of random intercepts and SD of random slopes of a linear mixed model of each attribute: ratings by
+the mean of the other assessors. ``tests/benchmarks/analysis/rating_data.py`` computes them from the data:
+
+- consistent: a trained panel. `TVbo`, R package lmerTest 3.1-3 (Kuznetsova, Brockhoff & Christensen 2017, Journal of
+  Statistical Software 82(13)): 8 assessors, 12 products, 2 replicates, scale 0 to 15; medians over 15 attributes.
+- typical: panelists who rate sensory descriptors. `sensochoc`, R package SensoMineR 1.27 (Lê & Husson 2008, Journal of
+  Sensory Studies 23, 14): 29 panelists, 6 chocolates, 2 sessions, scale 0 to 10; medians over 14 descriptors.
+- noisy: the largest of the same 14 values, each by itself.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Final
+
+from pydantic import Field
+
+from study_app.haptics.model.ranges import within
+from study_app.protocol.table import Table
+
+LAPSE_POINTS: Final = 3.0
+"""An answer given in error is so many points higher than the answer model says. [choice]"""
+
+
+class SimulatedParticipants(Table):
+    """How simulated participants answer statements; without this table `power` takes published values."""
+
+    noise_sd: Annotated[float, within(0, 3, "half of the scale of seven points")] = Field(
+        default=1.10,
+        description="SD of a participant's answers to equal trials, in points; the mean over participants.",
+    )
+    bias_sd: Annotated[float, within(0, 3, "half of the scale of seven points")] = Field(
+        default=0.76,
+        description="SD between participants of their response bias, in points, which is added to every answer.",
+    )
+    slope_sd: Annotated[float, within(0, 2, "with 2, three in ten answer the opposite way")] = Field(
+        default=0.50,
+        description="SD between participants of the slope of their answers over the settings, as a share of the mean "
+        "slope; used by power analyses, not by rehearsals.",
+    )
+    lapse_rate: Annotated[float, within(0, 0.5, "more than half of the answers are not given in error")] = Field(
+        default=0.0,
+        description="Share of answers given in error, 3 points too high; used by power analyses, not by rehearsals.",
+    )
+
+    def described(self) -> str:
+        """Return the values in words."""
+        lapses = f", lapse rate {self.lapse_rate:g}" if self.lapse_rate else ""
+        return f"SD of noise {self.noise_sd:g}, of response bias {self.bias_sd:g}, of slopes {self.slope_sd:g}{lapses}"
+
+
+REHEARSED: Final = SimulatedParticipants(noise_sd=0.65, bias_sd=0.4, slope_sd=0)
+"""Participants of rehearsals of a study that does not describe them. [choice]"""
+
+CONSISTENT, TYPICAL, NOISY, STATED = "consistent", "typical", "noisy", "as in the study file"
+PUBLISHED: Final[Mapping[str, SimulatedParticipants]] = {
+    CONSISTENT: SimulatedParticipants(noise_sd=0.63, bias_sd=0.50, slope_sd=0.50),
+    TYPICAL: SimulatedParticipants(),
+    NOISY: SimulatedParticipants(noise_sd=1.25, bias_sd=1.00, slope_sd=0.92),
+}
+
+
+def compared_kinds(stated: SimulatedParticipants | None) -> dict[str, SimulatedParticipants]:
+    """Return the kinds of people whose power is compared, the main kind first: as stated, otherwise typical."""
+    first = {TYPICAL: PUBLISHED[TYPICAL]} if stated is None else {STATED: stated}
+    return first | {kind: PUBLISHED[kind] for kind in (CONSISTENT, NOISY)}
