@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import click
 
-from study_app.cli.options import SCENE_FILE, Target, echo_files, end_if, progress
-from study_app.errors import StudyError
+from study_app.cli.options import SCENE_FILE, Target, echo_files, progress
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, MOST_DELAY
 
 if TYPE_CHECKING:
     from study_app.haptics.model.scene import Scene
-    from study_app.lab.estimation.estimator import Estimate
 
 LIQUID = click.option("--liquid", required=True, metavar="NAME", help="Id of the liquid in that file.")
 INITIAL = click.option(
     "--set", "changes", multiple=True, metavar="NAME=VALUE", help="Initial value, or a fixed parameter."
 )
-POLL_S: Final = 0.03
-SHOWN_S: Final = 1.0
 
 
 @click.command()
@@ -137,95 +132,3 @@ def identify(
             found = fit(chosen, liquid, fitted, motion, read.force_n)
     click.echo(identified.text(found))
     echo_files(identified.write(found, to, measured) if to is not None else ())
-
-
-@click.command()
-@SCENE_FILE
-@click.option(
-    "--measured", type=click.Path(path_type=Path), metavar="CSV", help="Motion and force; the file may still grow."
-)
-@click.option("--lsl", "stream", metavar="NAME", help="A stream of the Lab Streaming Layer instead.")
-@LIQUID
-@click.option(
-    "--fit",
-    "names",
-    default="drag_coefficient",
-    show_default=True,
-    metavar="NAMES",
-    help="Parameters: drag_coefficient, optionally with length, scaling or both, separated by commas.",
-)
-@INITIAL
-@click.option(
-    "--memory",
-    "memory_s",
-    type=click.FloatRange(1, 600),
-    default=10.0,
-    show_default=True,
-    metavar="SECONDS",
-    help="Age at which the weight of a row has decayed to 1/e.",
-)
-@click.option(
-    "--idle",
-    "idle_s",
-    type=click.FloatRange(0),
-    default=5.0,
-    show_default=True,
-    metavar="SECONDS",
-    help="End after this time without new data.",
-)
-def estimate(
-    scene: str,
-    measured: Path | None,
-    stream: str | None,
-    liquid: str,
-    names: str,
-    changes: tuple[str, ...],
-    memory_s: float,
-    idle_s: float,
-) -> None:
-    """Estimate drag and wake of a liquid while force is measured, once per second.
-
-    CSV has columns t_s, x_m, y_m, z_m, fx_n, fy_n, fz_n (scene frame; the liquid's force on the ball), and vx_mps,
-    vy_mps, vz_mps where they are known; the channels of a stream have these labels. Ends with 3 if the motion did not
-    identify the parameters.
-    """
-    from study_app.lab.estimation.estimator import OnlineEstimator
-    from study_app.lab.estimation.fits import prepare
-    from study_app.lab.estimation.sources import GrowingCsv, LslForce
-
-    if (measured is None) == (stream is None):
-        raise StudyError("name either a file (--measured CSV) or a stream (--lsl NAME)")
-    chosen = _changed(scene, liquid, changes)
-    fitted = tuple(name.strip() for name in names.split(","))
-    estimator = OnlineEstimator(chosen, fitted, memory_s=memory_s)
-    source = LslForce(stream or "") if measured is None else GrowingCsv(measured)
-    prepare()
-    rows, computing_s, shown_s, came_s = 0, 0.0, None, time.monotonic()
-    while True:
-        found = source.poll()
-        if len(found) == 0:
-            if time.monotonic() - came_s > (idle_s if rows else max(idle_s, SHOWN_S)):
-                break
-            time.sleep(POLL_S)
-            continue
-        began_s = time.process_time()
-        estimator.take(found)
-        computing_s += time.process_time() - began_s
-        rows, came_s = rows + len(found), time.monotonic()
-        if shown_s is None or found.t_s[-1] - shown_s >= SHOWN_S:
-            shown_s = float(found.t_s[-1])
-            click.echo(_line(estimator.estimate))
-    if rows == 0:
-        raise StudyError(f"nothing came for {max(idle_s, SHOWN_S):g} s from {measured or stream}")
-    last = estimator.estimate
-    click.echo(f"at the end:\n{_line(last)}\n{rows} rows, {1e6 * computing_s / rows:.1f} µs of computing per row")
-    end_if(not last.identified)
-
-
-def _line(found: Estimate) -> str:
-    from study_app.lab.estimation.estimator import value_words
-
-    if not found.identified:
-        return f"{found.seconds:7.1f} s  {found.reason}"
-    values = ", ".join(f"{name} {' '.join(value_words(found, name))}" for name in found.values)
-    return f"{found.seconds:7.1f} s  {values}; residual {found.rms_n:.3f} N"

@@ -1,7 +1,7 @@
 """The liquid lab without its windows: adjustable parameters, two settings side by side, and their forces.
 
-``live`` is device and servo with a scene that is edited, ``ab_comparison`` the two settings, ``estimation.estimator``
-the fit of a liquid while force is measured; read these first. ``identify`` fits liquids to files of measurements.
+``live`` is device and servo with a scene that is edited, ``ab_comparison`` the two settings, ``parameters`` what can be
+adjusted; read these first. ``identify`` fits liquids to files of measurements.
 
-Reading order: estimation, parameters, programmed_paths; ab_comparison, identify; presets, shadow; live.
+Reading order: parameters, programmed_paths; ab_comparison, identify; presets, shadow; live.
 """

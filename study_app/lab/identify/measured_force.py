@@ -11,9 +11,9 @@ from scipy.signal import savgol_filter
 
 from study_app.errors import StudyError
 from study_app.haptics.model.motion import PLACES, VELOCITIES, Floats, Motion, refuse_device
-from study_app.lab.estimation.sources import FORCES
 from study_app.text_tables import decoded, rows_of, split
 
+FORCES: Final = ("fx_n", "fy_n", "fz_n")
 ALONG_A_LINE: Final = ("t_s", "velocity_mps", "force_n")
 FLOW_CURVE: Final = ("shear_rate_per_s", "shear_stress_pa")
 _COLUMNS: Final = (PLACES + FORCES, ALONG_A_LINE, FLOW_CURVE)

@@ -1,1 +1,0 @@
-"""A liquid's drag coefficient and wake, estimated while force is measured."""
