@@ -1,16 +1,20 @@
 """Power of consistent, typical and noisy people, beside an independent simulation with scipy's signed-rank test."""
 
+import re
 from dataclasses import replace
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import PermutationMethod, binom, rankdata, wilcoxon
 
 from study_app.analysis.planning.power_curves import power_csv, power_markdown, powers
 from study_app.analysis.planning.simulated_studies import BATCH, EFFECTS, Counts, Plan, count, plan, total_counts
+from study_app.cli import commands
 from study_app.errors import ProtocolError
 from study_app.protocol.load import parse
 from study_app.protocol.raters import CONSISTENT, NOISY, PUBLISHED, STATED, TYPICAL, SimulatedParticipants
@@ -143,3 +147,26 @@ def test_format_1_has_no_simulated_participants() -> None:
 def test_typical_people_are_the_default_of_the_table() -> None:
     (kind, *_) = planned(TEXT + "[simulated_participants]\nnoise_sd = 1.10\n").kinds.values()
     assert kind == PUBLISHED[TYPICAL]
+
+
+@pytest.mark.slow
+def test_the_command_adds_the_planned_number_of_participants_and_quotes_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    huge = replace(NO_FEATURES, force_mean_n=100.0, speed_rms_mps=0.1)
+    features = {("feel", "heavyzembla"): (huge,), ("feel", "lightquorn"): (NO_FEATURES,)}
+    monkeypatch.setattr("study_app.session.simulated.rehearsal.condition_features", lambda *_, **_named: features)
+    file = tmp_path / "small.toml"
+    file.write_text(f"{TEXT}\n[analysis]\nparticipants = 7\n", encoding="utf-8")
+    asked = ["power", str(file), "--studies", "20", "--workers", "1", "--to", str(tmp_path)]
+    result = CliRunner().invoke(commands, asked)
+    assert result.exit_code == 0, result.output
+    assert "| statement | n = 5 | n = 7 | n = 8 | n = 12 |" in result.output
+    registered = CliRunner().invoke(commands, ["preregister", str(file), "--power", str(tmp_path)]).output
+    (line,) = (line for line in registered.splitlines() if line.startswith("- Smooth (settings differ): "))
+    assert "## Power with the planned 7 participants" in registered
+    assert re.fullmatch(
+        r"- Smooth \(settings differ\): \d+% of studies find it if people are consistent, \d+% if typical, and \d+% if "
+        r"noisy\.",
+        line,
+    )
