@@ -4,6 +4,6 @@
 ``findings.finding`` is the base of what a report states; read these first. ``levels`` analyses blocks with a design,
 ``planning`` simulates studies that do not exist yet.
 
-Reading order: statistics, worker_messages; data; results; page_layout, questions; html_page; levels; export, figures;
-findings; contrasts; evaluate, planning; report; export_study; study_worker.
+Reading order: wording, worker_messages; statistics; data; results; page_layout, questions; html_page; levels; export,
+figures; findings; contrasts; evaluate, planning; report; export_study; study_worker.
 """

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.results import BlockResult, Failure, Failures, Results, counted
+from study_app.analysis.results import BlockResult, Failure, Failures, Results
+from study_app.analysis.wording import counted
 
 MARGIN_PT = 4.0
 SMALL = 7.2
@@ -227,7 +228,7 @@ def picture_of(
 
 def sample_words(study: Study, n: int) -> str:
     """Return what a caption ends with: who took part."""
-    return f"{'SIMULATED participants, no people; ' if study.simulated else ''}{counted(n, 'participant')}."
+    return f"{'SIMULATED participants, not people; ' if study.simulated else ''}{counted(n, 'participant')}."
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,7 +245,7 @@ class Drawing:
     @property
     def simulated(self) -> str:
         """What a caption says of simulated participants."""
-        return "SIMULATED participants, no people; " if self.study.simulated else ""
+        return "SIMULATED participants, not people; " if self.study.simulated else ""
 
     def picture(
         self, title: str, caption: str, draw: Callable[[Look], Sheet], counts: Sequence[str] = ("",)

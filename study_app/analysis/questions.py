@@ -10,7 +10,8 @@ import pandas as pd
 from study_app.analysis.data.blocks import PlacedQuestion, PlacedScore, QuestionPlace
 from study_app.analysis.data.measures import quartiles_or_none
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.results import GroupAnswers, QuestionResult, ScoreResult, number
+from study_app.analysis.results import GroupAnswers, QuestionResult, ScoreResult
+from study_app.analysis.wording import number
 from study_app.discovery import by_name
 from study_app.protocol.questionnaires import instrument, instruments, score
 

@@ -1,10 +1,10 @@
-"""What an evaluation finds, as frozen values, and how numbers and findings are put into words.
+"""What an evaluation finds, as frozen values, and how findings are put into words.
 
 Nothing in them is NaN or infinite: what does not exist is None.
 """
 
 import traceback
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias, TypeVar
@@ -12,7 +12,8 @@ from typing import Any, Final, Literal, TypeAlias, TypeVar
 from study_app.analysis.data.blocks import Block, Decided, Item, Kind, OwnDynamics, Setting
 from study_app.analysis.data.motion import Performance
 from study_app.analysis.statistics.equivalence import STEPS, Equivalence, fewest, minority
-from study_app.analysis.statistics.outcome import Interval, Outcome
+from study_app.analysis.statistics.outcome import Outcome
+from study_app.analysis.wording import listed, ms, number, percent, significant
 from study_app.discovery import explained
 from study_app.errors import PlugInError
 from study_app.protocol.model import Contrast, Published
@@ -136,7 +137,7 @@ class BlockResult:
     row a setting and statement. ``findings`` are the values of what was tested, by the keys of the descriptors in
     ``analysis.findings``. ``presentations`` are the fewest and the most single answers that one participant gave to a
     statement on one setting; ``replicated_ms`` the delays that several conditions present; ``sessions`` the numbers of
-    the sessions.
+    the sessions; ``incomplete`` has of each statement the participants who miss an answer to it, if there are any.
     """
 
     id: str
@@ -154,6 +155,7 @@ class BlockResult:
     presentations: tuple[int, int] = (1, 1)
     replicated_ms: tuple[float, ...] = ()
     sessions: tuple[int, ...] = (1,)
+    incomplete: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def delays_ms(self) -> tuple[float, ...]:
@@ -292,63 +294,16 @@ class Results:
     contrasts: tuple[ContrastResult, ...] = ()
 
 
-_SMALL: Final = "no one two three four five six seven eight nine ten eleven twelve"
-NUMBERS: Final = tuple(_SMALL.split())
+SEALED: Final = "computed after unblinding, because it needs to know which condition each code stands for"
+"""Why what waits for the key is not there."""
 
 VERDICTS_MEAN: Final = (
-    "Shown: adjusted p at most {alpha}. Suggested: the same in a statement that was not decided on before the study, "
-    "which is a reason to look again and no finding. Not shown: these data do not settle it; that is not evidence of "
-    "sameness. Out of reach: however these answers had been arranged within participants, they could not have shown "
-    "it, the other p of the family being what they are: adjusted p depends on those too. No adjusted p of a statement "
-    "is below the p of the one test over all statements, corrected by Holm over the parts of the study."
+    "Shown: the adjusted p is at most {alpha}. Suggested: the same in a statement that was not stated as primary "
+    "before the study; this is a lead, not a finding. Not shown: the adjusted p is above {alpha}, which is not "
+    "evidence that the answers are the same. Out of reach: no rearrangement of these answers within participants could "
+    "have made the adjusted p significant, given the other p values in the family. No adjusted p of a statement is "
+    "below the p of the test over all statements, adjusted by Holm over the blocks of the study."
 )
-
-
-def counted(number: int, noun: str) -> str:
-    """Return "three statements", "1 statement"."""
-    text = NUMBERS[number] if 1 < number < len(NUMBERS) else str(number)
-    return f"{text} {noun}" + ("" if number == 1 else "s")
-
-
-def all_of(number: int, noun: str) -> str:
-    """Return "all three statements", "both statements", "the one statement"."""
-    if number < 3:
-        return f"the one {noun}" if number == 1 else f"both {noun}s"
-    return f"all {counted(number, noun)}"
-
-
-def number(value: float | None, digits: int = 2) -> str:
-    """Return a number with so many decimals and a real minus sign, a dash where there is none."""
-    if value is None:
-        return "–"
-    text = f"{value:.{digits}f}"
-    return "0" + text[2:] if text.strip("-0.") == "" and text.startswith("-") else text.replace("-", "−")
-
-
-def p_value(p: float | None) -> str:
-    """Return a p as journals print it: .023, < .0001; a dash where there is none."""
-    if p is None:
-        return "–"
-    if p < 0.0001:
-        return "< .0001"
-    text = f"{p:.4f}" if p < 0.001 else f"{p:.3f}"
-    return text.removeprefix("0") if p < 0.9995 else "1"
-
-
-def p_equals(p: float) -> str:
-    """Return a p within a sentence: p = .023, p < .0001."""
-    text = p_value(p)
-    return f"p {text}" if text.startswith("<") else f"p = {text}"
-
-
-def interval(ends: Interval | None, digits: int = 2) -> str:
-    """Return an interval in brackets; a dash where there is none."""
-    return "–" if ends is None else f"[{number(ends.low, digits)}, {number(ends.high, digits)}]"
-
-
-def percent(share: float) -> str:
-    """Return a share in percent, with as many decimals as it takes: 90 %, 99.9 %."""
-    return f"{round(100 * share, 6):g} %"
 
 
 def beyond(tested: Equivalence) -> str:
@@ -357,16 +312,6 @@ def beyond(tested: Equivalence) -> str:
         return "–"
     ends = tested.beyond.interval
     return f"{tested.beyond.count} of {tested.beyond.n} [{100 * ends.low:.0f}, {100 * ends.high:.0f}] %"
-
-
-def listed(words: Sequence[str]) -> str:
-    """Return "a, b and c"."""
-    return " and ".join(words) if len(words) < 3 else f"{', '.join(words[:-1])} and {words[-1]}"
-
-
-def ms(delay_ms: float) -> str:
-    """Return a delay with its unit."""
-    return f"{delay_ms:g} ms"
 
 
 def settings_noun(found: BlockResult | Block) -> str:
@@ -404,18 +349,20 @@ def said_of_presentations(found: BlockResult) -> tuple[str, ...]:
     lines = []
     if found.replicated_ms:
         delays = listed([ms(delay) for delay in found.replicated_ms])
-        lines.append(f"Several conditions present {delays}: they are taken as repeated presentations of one delay.")
+        lines.append(
+            f"Several conditions have a delay of {delays}; they are treated as repeated presentations of one delay."
+        )
     if most > 1:
         often = f"{most}" if fewest == most else f"{fewest} to {most}"
+        single = "; the detection threshold uses each single answer" if found.delays_ms else ""
         lines.append(
-            f"A participant answered each statement {often} times for one {settings_noun(found)}: tests of ranks, of "
-            "equivalence and of recognition take the median of these answers; the detection threshold takes every "
-            "single one."
+            f"Each participant rated each {settings_noun(found)} {often} times; the tests use the median of these "
+            f"answers{single}."
         )
     if len(found.sessions) > 1:
         lines.append(
-            f"The answers are of sessions {listed(list(map(str, found.sessions)))}, which are compared with each "
-            "other; the other tests pool them."
+            f"The answers of sessions {listed(list(map(str, found.sessions)))} are compared with each other, and "
+            "pooled in all other tests."
         )
     return tuple(lines)
 
@@ -429,8 +376,9 @@ def enough(alpha: float, bound: float) -> str:
     """Return how many participants equivalence of statements needs at least, and why."""
     share = minority(bound, STEPS)
     return (
-        f"{least(alpha, bound)}: more than {percent(alpha)} of smaller samples contain no member of a minority of "
-        f"{100 * share:.1f} % who differ by {bound / share:.2g} points, which shifts the mean by the bound"
+        f"{least(alpha, bound)}, because a smaller sample has more than a {percent(alpha)} chance of including nobody "
+        f"from a minority of {percent(share)} of all people whose answers differ by {significant(bound / share)} "
+        "points, which shifts the mean by the bound"
     )
 
 
@@ -440,13 +388,32 @@ def test_name(outcome: Outcome) -> str:
         "Friedman": "Friedman's test",
         "Wilcoxon signed ranks": "Wilcoxon's signed ranks",
         "trend over participants": "the test of a trend over participants",
-        "linear mixed model": "a linear mixed model",
+        "t test of slopes": "Student's t test of the participants' own slopes",
     }.get(outcome.test, outcome.test)
 
 
+def incomplete_words(found: BlockResult) -> str:
+    """Return which participants tests over all settings leave out, in a sentence."""
+    statements: dict[str, list[str]] = {}
+    for item, people in found.incomplete.items():
+        for person in people:
+            statements.setdefault(person, []).append(f"“{short(found, item)}”")
+    every = len(found.items)
+    who = [
+        f"{person} ({'all statements' if len(items) == every else listed(items)})"
+        for person, items in sorted(statements.items())
+    ]
+    return f"Left out of tests over all {settings_noun(found)}s, because an answer is missing: {listed(who)}."
+
+
 def missing(found: BlockResult) -> tuple[str, ...]:
-    """Return what is not there, and why, a sentence for each reason."""
+    """Return what was not computed, and why, a sentence for each reason."""
     reasons: dict[str, list[str]] = {}
     for one in found.absent:
         reasons.setdefault(one.why, []).append(one.what)
-    return tuple(f"no {listed(what)}: {why}." for why, what in reasons.items())
+    return tuple(
+        f"{listed([f'the {one}' for one in what])} {'was' if len(what) == 1 else 'were'} not computed: {why}."
+        if why != SEALED
+        else f"{listed([f'the {one}' for one in what])} {'is' if len(what) == 1 else 'are'} {why}."
+        for why, what in reasons.items()
+    )

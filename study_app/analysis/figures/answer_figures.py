@@ -195,11 +195,11 @@ def draw_threshold(found: Threshold, lowest_ms: float | None, look: Look) -> She
     sheet.scale(axes, "x", levels)
     if lowest_ms is not None:
         axes.axvline(lowest_ms, color=style.TEXT_SOFT, linewidth=0.8, dashes=(3, 2), gid="lowest")
-    if found.effect is not None and found.width is not None and found.guess is not None and found.lapse is not None:
+    half = found.half_way
+    if half is not None and found.effect is not None and found.width is not None:
         xs = np.linspace(levels.min(), levels.max(), 200)
-        shares = success("logistic", xs, found.effect, found.width, found.guess, found.lapse)
+        shares = success("logistic", xs, found.effect, found.width, found.guess or 0.0, found.lapse or 0.0)
         axes.plot(xs, shares, color=style.ACCENT, linewidth=1.4, gid="curve")
-        half = (1 + found.guess - found.lapse) / 2
         if found.interval is not None:
             ends = [found.interval.low, found.interval.high]
             axes.plot(ends, [half, half], color=style.BAND, linewidth=4, solid_capstyle="butt", gid="interval")
@@ -301,7 +301,7 @@ def caption(study: Study, block: Block) -> str:
 
 
 def _sentences(study: Study, block: Block) -> Iterator[str]:
-    simulated = "SIMULATED participants, no people; " if study.simulated else ""
+    simulated = "SIMULATED participants, not people; " if study.simulated else ""
     yield (
         f"{'Pilot. ' if study.pilot else ''}Agreement with {counted(len(block.items), 'statement')} on "
         f"{counted(len(block.settings), _noun(block))} ({simulated}{counts(study, block)[0]})."

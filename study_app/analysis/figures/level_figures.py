@@ -32,8 +32,9 @@ from study_app.analysis.levels.thresholds import (
 )
 from study_app.analysis.levels.tracks import tracks
 from study_app.analysis.page_layout import MARGIN_PT, SMALL, Look, Picture, Sheet, attempted, picture_of, sample_words
-from study_app.analysis.results import Failures, LevelsResult, counted
+from study_app.analysis.results import Failures, LevelsResult
 from study_app.analysis.statistics.outcome import Array
+from study_app.analysis.wording import counted
 from study_app.psychophysics.families import Family, success
 
 COLUMNS: Final = 4

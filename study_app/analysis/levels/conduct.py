@@ -11,7 +11,7 @@ import pandas as pd
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.measures import number_or_none
 from study_app.analysis.levels.statistic import LevelStatistic, Shown, between, digits, unit
-from study_app.analysis.results import counted, listed, number
+from study_app.analysis.wording import counted, listed, number
 from study_app.protocol.trials.stimuli import OF_LINK
 from study_app.protocol.warnings.delayed_force import WITHHELD_PERCENT
 

@@ -14,7 +14,8 @@ from study_app.analysis.levels.answers import SUMMARIES, Answers, Settings, choo
 from study_app.analysis.levels.statistic import between, statistics
 from study_app.analysis.levels.tracks import answers_timed, tracks
 from study_app.analysis.page_layout import Picture
-from study_app.analysis.results import GroupAnswers, LevelsResult, number
+from study_app.analysis.results import GroupAnswers, LevelsResult
+from study_app.analysis.wording import number
 from study_app.protocol.quantities import quantity, quantity_words
 
 READ: Final = (

@@ -23,19 +23,31 @@ from study_app.analysis.levels.statistic import (
     unit,
 )
 from study_app.analysis.levels.thresholds import Exponents, Thresholds
-from study_app.analysis.results import LevelsResult, listed, number
+from study_app.analysis.results import LevelsResult
+from study_app.analysis.statistics.outcome import clopper_pearson
+from study_app.analysis.wording import listed, number
 from study_app.protocol.presented.presentation import arrangement_of
-from study_app.psychophysics.detection import Sensitivity, rating
+from study_app.protocol.trials.designs import Design
+from study_app.psychophysics.detection import Model, Sensitivity, d_prime_at, rating
 from study_app.psychophysics.grid import Z_95
 
 MODELS: Final = {
     "differencing": " d′ is that of the differencing model, since standards vary from trial to trial.",
-    "independent": " d′ is that of independent observations; the differencing model is in the table of thresholds.",
+    "independent": " d′ is that of independent observations; the exported table thresholds has that of the "
+    "differencing model, in the column d_prime_other.",
 }
+FROM_SHARE_CORRECT: Final = ("abx", "oddity", "3ifc", "4ifc")
+"""Designs whose d′ follows from the share of correct answers alone."""
 BIASES: Final = {
     "2ifc": " c is above 0 where the second interval is preferred.",
     "yesno": " c is above 0 where “no” is preferred.",
     "samedifferent": " k is the difference above which the answer is “different”.",
+    **dict.fromkeys(
+        FROM_SHARE_CORRECT,
+        " d′ is computed from the share of correct answers, and assumes that no answer is preferred: a preference, "
+        "which shows in unequal shares of the answers, makes d′ too small. Intervals of participants: d′ at the ends "
+        "of the Clopper–Pearson interval of the share correct; none if all answers are correct.",
+    ),
 }
 
 
@@ -44,8 +56,9 @@ class SensitivityEstimate:
     """A participant's sensitivity and bias or, where ``participant`` is None, their means over ``n`` participants.
 
     They are those at a ``standard``, to a condition as ``comparison``, or of ratings at a ``level`` against the lowest.
-    ``shares`` are those of each answer. ``d_prime`` has a 95 % interval where its variance is known, of the group by
-    Student's t; ``criterion`` is c, or k of same–different; ``other`` is d′ under the model that is not ``model``.
+    ``shares`` are those of each answer. ``d_prime`` has a 95 % interval where its variance is known, or from that of
+    the share correct, of the group by Student's t; ``criterion`` is c, or k of same–different; ``other`` is d′ under
+    the model that is not ``model``.
     """
 
     participant: str | None
@@ -127,7 +140,21 @@ def _of_choices(
     found = design.sensitivity(counts, roving=block.standards_rove) if block.has_correct_answer else None
     shares = {answer: given[answer] / len(rows) for answer in design.answers}
     one = SensitivityEstimate(participant=person, n=len(rows), shares=shares, **where)  # type: ignore[arg-type]  # standard or comparison
-    return one if found is None else _measured(one, found)
+    if found is None:
+        return one
+    measured = _measured(one, found)
+    return _with_ends(measured, design, counts, found.model) if design.kind in FROM_SHARE_CORRECT else measured
+
+
+def _with_ends(
+    one: SensitivityEstimate, design: Design, counts: Mapping[tuple[int, str], int], model: Model | None
+) -> SensitivityEstimate:
+    """Return an estimate with d′ at the ends of the interval of the share correct; as it is if all are correct."""
+    correct, n = design.correct_of(counts)
+    if correct == n:
+        return one
+    share, task = clopper_pearson(correct, n), f"{design.kind}{f' {model}' if model else ''}"
+    return replace(one, low=d_prime_at(task, share.low), high=d_prime_at(task, share.high))
 
 
 def _measured(one: SensitivityEstimate, found: Sensitivity) -> SensitivityEstimate:

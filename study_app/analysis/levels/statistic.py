@@ -17,8 +17,9 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.html_page import drawn, heading, paragraph, table_of
 from study_app.analysis.levels.columns import RESULTS
 from study_app.analysis.page_layout import Picture
-from study_app.analysis.results import LevelsResult, listed, number
+from study_app.analysis.results import LevelsResult
 from study_app.analysis.statistics.outcome import student_interval
+from study_app.analysis.wording import listed, number
 from study_app.discovery import modules_of
 
 R = TypeVar("R")

@@ -35,9 +35,10 @@ from study_app.analysis.levels.statistic import (
     with_unit,
 )
 from study_app.analysis.levels.tracks import TRACK, answers_of, setting_of
-from study_app.analysis.results import LevelsResult, counted, listed, number
+from study_app.analysis.results import LevelsResult
 from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.statistics.thresholds import FEWEST, SETS, WORST, GroupMean, drift, group_mean, p_of_fit
+from study_app.analysis.wording import counted, listed, number
 from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES, SESSION_SD, Assumed, Stimulus, analysis_grid
 from study_app.psychophysics.families import level_at

@@ -291,7 +291,7 @@ def trend(ranked: Single, both_ways: NDArray[np.bool_], rng: np.random.Generator
 
 
 def slopes(rising: Array, block: Planned, both_ways: NDArray[np.bool_]) -> Array:
-    """Return the p (studies, items) that slopes over the delay rise; as `trend`, by the mixed model."""
+    """Return the p (studies, items) that slopes over the delay rise; as `trend`, by t of the slopes."""
     delays = np.array(block.delays_ms) - np.mean(np.array(block.delays_ms))
     own = np.einsum("snki,k->sin", rising, delays)
     rising_p, falling_p = np.ones((2, *own.shape[:2]))

@@ -4,7 +4,8 @@ Schuirmann (1987), J. Pharmacokinet. Biopharm. 15, 657–680; Lakens (2017), Soc
 is by Student's t and by the bootstrap of `mean_tests`. No test sees people who are not in the sample: a minority that
 differs as much as the scale permits, and shifts the mean by the bound, must not be missed by chance.
 
-A difference that is not significant is no evidence of equivalence; here it is called inconclusive.
+A difference that is not significant is no evidence of equivalence; here it is called inconclusive. A mean whose whole
+interval lies beyond the bound is not equivalent.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from study_app.analysis.statistics.outcome import Array, Interval, Outcome, chec
 from study_app.errors import AnalysisError
 from study_app.number_text import counted
 
-Verdict: TypeAlias = Literal["equivalent", "inconclusive", "out of reach"]
+Verdict: TypeAlias = Literal["equivalent", "not equivalent", "inconclusive", "out of reach"]
 
 UNSEEN: Final = 1 / 5
 """A group of this share of all people, who differ strongly, must not be missed by chance, however wide the bound."""
@@ -49,9 +50,12 @@ class Equivalence(Outcome):
     is the probability that the sample holds no member of a minority that shifts the mean by the bound if its members
     differ by ``largest``.
 
-    ``verdict`` is "equivalent" where every p is at most alpha; else "out of reach" where no answers of so many
-    participants could have been, else "inconclusive", which is no evidence of a difference. ``beyond`` tells how many
-    single participants differ by more than the bound: equivalent means say nothing about them.
+    ``verdict`` is "equivalent" where every p is at most alpha; "not equivalent" where the whole interval lies beyond
+    the bound (without an interval, where all differences are equal, beyond it, and of so many participants that a sign
+    test is significant); else "out of reach" where no answers of so many participants could have been equivalent, else
+    "inconclusive", which is no evidence of a difference. ``checks_agree`` tells whether the bootstrap supports what t
+    tests decide. ``beyond`` tells how many single participants differ by more than the bound: equivalent means say
+    nothing about them.
     """
 
     bound: float
@@ -151,17 +155,35 @@ def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: 
             t_upper=t_upper,
             p_lower=p_lower,
             p_upper=p_upper,
-            checks_agree=(by_bootstrap <= alpha) == (max(p_lower, p_upper) <= alpha),
         )
     else:
         found = replace(found, method=f"bootstrap, bound ±{bound:g} points: all differences are equal")
     by_tests = max(p_lower, p_upper, by_bootstrap) <= alpha
-    verdict: Verdict = (
-        "equivalent" if by_tests and unseen <= alpha else "out of reach" if unseen > alpha else "inconclusive"
-    )
+    beyond = is_beyond(found, bound, alpha)
+    if found.interval is not None:
+        further = means if found.interval.low > 0 else means.opposite()
+        agrees = by_bootstrap <= alpha, float(further.p_bootstrap(bound)[0]) <= alpha
+        found = replace(found, checks_agree=agrees == (max(p_lower, p_upper) <= alpha, beyond))
+    verdict: Verdict = "out of reach" if unseen > alpha else "equivalent" if by_tests else "inconclusive"
     few = f"too few participants to call it equivalent: {fewest(alpha, bound, largest)} are needed"
     note = "" if verdict == "equivalent" else few if by_tests else "equivalence is not shown"
-    return replace(found, verdict=verdict, note=note)
+    return replace(
+        found,
+        verdict="not equivalent" if beyond else verdict,
+        note="the mean differs by more than the bound" if beyond else note,
+    )
+
+
+def is_beyond(found: Outcome, bound: float, alpha: float) -> bool:
+    """Return whether the whole interval of an effect is further than ``bound`` from 0.
+
+    Without an interval, because all participants differ equally, so many must be beyond it that a sign test shows it.
+    """
+    if found.effect is None:
+        return False
+    few = found.interval is None and 0.5**found.n > alpha
+    low, high = (found.effect, found.effect) if found.interval is None else (found.interval.low, found.interval.high)
+    return not few and (low > bound + SAME or high < -bound - SAME)
 
 
 def _described(kept: Array, bound: float, alpha: float, largest: float) -> Equivalence:

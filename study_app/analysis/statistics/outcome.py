@@ -33,7 +33,7 @@ SAMPLES: Final = 1999
 """Bootstrap samples of an interval."""
 
 FEW: Final = 10
-"""Below so many participants neither a bootstrap interval nor a mixed model is given: see `bootstrap` and `mixed`."""
+"""Below so many participants there is no percentile bootstrap interval and no test of slopes."""
 
 TOO_FEW: Final = f"no interval below {FEW} participants: resampling so few covers far less than it claims"
 NO_VARIATION: Final = "no variation: every participant answered alike under all settings"

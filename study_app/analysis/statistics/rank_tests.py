@@ -33,6 +33,7 @@ from study_app.analysis.statistics.outcome import (
     doubled_ranks,
     drawn_p,
 )
+from study_app.analysis.wording import p_value, significant
 from study_app.errors import AnalysisError
 
 Alternative: TypeAlias = Literal["two-sided", "greater", "less"]
@@ -152,7 +153,10 @@ def _note(n: int, different: int, smallest: float | None, effect: float | None, 
     if smallest is None:
         return f"all {n} pairs are equal"
     if smallest > alpha:
-        return f"cannot reach p ≤ {alpha:g}: {different} pairs that differ can give {smallest:.4g} at least"
+        return (
+            f"cannot reach p ≤ {significant(alpha)}: the smallest p of {different} pairs that differ is "
+            f"{p_value(smallest)}"
+        )
     return f"all {different} pairs that differ went one way" if effect is not None and abs(effect) == 1.0 else ""
 
 
@@ -168,7 +172,7 @@ APPROXIMATE: Final = f"chi-square approximation, corrected for ties, as always a
 TABLED: Final = 7
 """Up to so many settings all their orders fit into a table."""
 
-NO_INTERVAL: Final = "no interval for W: it cannot be negative, so that intervals for it cover less than they claim"
+NO_INTERVAL: Final = "no interval for W: W cannot be negative, so such intervals have less than their nominal coverage"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -20,12 +20,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import binom
 
 from study_app.analysis.statistics.outcome import (
+    SAMPLES,
     Array,
     Interval,
     Lattice,
     Outcome,
     Whole,
-    bootstrap,
     checked,
     clopper_pearson,
     holm,
@@ -108,7 +108,7 @@ def recognition(names: ArrayLike, truth: Sequence[int | None], labels: int, *, s
     """Test whether settings were named for what they were, more often than by chance.
 
     ``names`` (participants, settings) are of `named`, ``truth`` the place of the right one of so many ``labels`` for
-    each setting, None where there is none; ``seed`` is of the bootstrap interval of kappa, from ten participants.
+    each setting, None where there is none; ``seed`` is of the bootstrap interval of kappa, from two participants.
     """
     given = _names(names, truth, labels)
     used = (given != UNANSWERED).any(axis=1)
@@ -167,7 +167,12 @@ def _chance(row: tuple[int, ...], right: tuple[int, ...]) -> Lattice:
 
 
 def _kappa(given: Whole, right: Whole, labels: int, seed: int | None) -> tuple[float | None, Interval | None, str]:
-    """Return kappa over decided answers, its interval by resampling participants, or why there is none."""
+    """Return kappa over decided answers and its interval, or why there is none.
+
+    The interval is that of the share of correct answers by random weights of the participants (Gaffke 2005), with a
+    further one whose answers are all incorrect for the lower end and all correct for the upper end: it does not shrink
+    to a point where everybody agrees. The agreement expected by chance is taken as observed.
+    """
     used = (given >= 0) & (right >= 0)
     tables = np.zeros((len(given), labels, labels))
     people, settings = np.nonzero(used)
@@ -178,11 +183,28 @@ def _kappa(given: Whole, right: Whole, labels: int, seed: int | None) -> tuple[f
         why = "no variation: always the same name for the same thing" if used.any() else "nothing was named"
         return None, None, f"no interval: {why}"
 
-    def resampled(people: Whole) -> Array:
-        times = np.array([np.bincount(row, minlength=len(tables)) for row in people])
-        return kappa(np.tensordot(times, tables, axes=1))
+    if seed is None:
+        return whole, None, "no interval: none was asked for"
+    if (n := len(tables)) < 2:
+        return whole, None, "no interval: the answers of one participant"
+    correct, decided = np.trace(tables, axis1=1, axis2=2), tables.sum(axis=(1, 2))
+    weights = np.random.default_rng(seed).standard_exponential((SAMPLES, n + 1))
+    further = weights[:, n] * decided.max()
+    all_decided = weights[:, :n] @ decided + further
+    lowest, highest = (weights[:, :n] @ correct + more for more in (0.0, further))
+    expected = _expected(tables.sum(axis=0))
+    low, high = (
+        (float(np.quantile(shares / all_decided, end)) - expected) / (1.0 - expected)
+        for shares, end in ((lowest, 0.025), (highest, 0.975))
+    )
+    method = "bootstrap over participants with a further one who is always incorrect, or always correct (Gaffke 2005)"
+    return whole, Interval(low=low, high=high, level=0.95, method=method), ""
 
-    return whole, *bootstrap(len(tables), seed, resampled, "no interval: all participants gave the same names")
+
+def _expected(table: Array) -> float:
+    """Return the agreement by chance of a table of counts."""
+    shares = table / table.sum()
+    return float((shares.sum(axis=0) * shares.sum(axis=1)).sum())
 
 
 def _rates(given: Whole, truth: Sequence[int | None]) -> tuple[HitRate, ...]:
@@ -225,5 +247,5 @@ def _note(n: int, undecided: int, smallest: float) -> str:
     if smallest == 1.0:
         return "no variation: every participant gave all settings the same name or none"
     if undecided:
-        return f"{undecided} undecided answer{'s count' if undecided > 1 else ' counts'} as no hit"
+        return f"{undecided} undecided answer{'s count' if undecided > 1 else ' counts'} as incorrect"
     return ""

@@ -63,6 +63,11 @@ class Threshold(Outcome):
     upper: float | None = None
     dispersion: float | None = None
 
+    @property
+    def half_way(self) -> float | None:
+        """The share of answers that agree at the threshold, by the curve."""
+        return None if self.guess is None or self.lapse is None else (1 + self.guess - self.lapse) / 2
+
 
 def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
     """Return the threshold of raw answers: `NOTICED_FROM` or more means noticed, NaN is missing.

@@ -31,6 +31,7 @@ from study_app.analysis.statistics.outcome import (
     total,
 )
 from study_app.analysis.statistics.rank_tests import Alternative, signed_p
+from study_app.analysis.wording import p_value
 from study_app.errors import AnalysisError
 from study_app.number_text import counted
 
@@ -115,7 +116,7 @@ def trend(values: ArrayLike, direction: Direction | None = "increasing", *, seed
         effect=float(correlations.mean()),
         interval=interval,
         no_interval=reason,
-        note="" if p_page is None else f"Page's p, of no participant having a trend: {p_page:.4g}",
+        note="" if p_page is None else f"Page's p, of no participant having a trend: {p_value(p_page)}",
         p_page=p_page,
     )
 

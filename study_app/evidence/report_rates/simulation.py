@@ -25,7 +25,7 @@ from study_app.analysis.evaluate import evaluate_block
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay, common_ms
 from study_app.analysis.findings.finding import FOUND, BlockAnswers, of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition
-from study_app.analysis.findings.statement_tests import DelayTrend, MixedModel, OverAll, Pairs, SettingsDiffer, gated
+from study_app.analysis.findings.statement_tests import DelayTrend, MeanTests, OverAll, Pairs, SettingsDiffer, gated
 from study_app.analysis.planning.power_curves import interval
 from study_app.analysis.planning.simulated_studies import Opinions, Plan, people
 from study_app.analysis.report.sections import answers as answered
@@ -350,14 +350,14 @@ def report(
 def _claims(found: BlockResult) -> bool:
     """Return whether anything in the section of a block says that settings differ or that a delay is noticed."""
     pairs = [pair.tested for pair in Pairs.of(found)]
-    tests = [*SettingsDiffer.of(found), *DelayTrend.of(found), *MixedModel.of(found), *pairs]
+    tests = [*SettingsDiffer.of(found), *DelayTrend.of(found), *MeanTests.of(found), *pairs]
     low = any(one.over_all_ms is not None for one in LowestDelay.of(found))
     return any(one.verdict in FOUND for one in tests) or low or _recognised(found) or _printed(found)
 
 
 def _modelled(found: BlockResult) -> Iterator[tuple[Event, bool]]:
-    """Yield whether the mixed model finds anything in a statement."""
-    yield ("found by the mixed model", "at most 5 %"), any(one.verdict in FOUND for one in MixedModel.of(found))
+    """Yield whether the test of means finds anything in a statement."""
+    yield ("found by the test of means", "at most 5 %"), any(one.verdict in FOUND for one in MeanTests.of(found))
 
 
 def _in_liquids(asked: BlockAnswers, found: BlockResult, cell: Cell, _truth: Array) -> Iterator[tuple[Event, bool]]:

@@ -7,9 +7,10 @@ from typing import Any, cast
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import norm
+from scipy.stats import binomtest, norm
 
 from study_app.analysis.data.blocks import LevelBlock
+from study_app.analysis.levels.columns import RESULTS
 from study_app.analysis.levels.sensitivities import Sensitivities, SensitivityEstimate, preferences, sensitivities
 from study_app.protocol.presented.presentation import arrangement_text
 from study_app.protocol.trials.designs import Rated, default_design
@@ -109,6 +110,20 @@ def test_designs_without_a_criterion_have_d_prime_from_the_share_correct(design:
     assert one.d_prime == pytest.approx(1.5, abs=5e-3)
     assert one.criterion is None
     assert sum(one.shares.values()) == pytest.approx(1)
+    correct, n = math.ceil(share * 5000) * len(kind.arrangements), 5000 * len(kind.arrangements)
+    ends = binomtest(correct, n).proportion_ci(0.95, method="exact")
+    assert one.low is not None
+    assert one.high is not None
+    assert [proportion_correct(task, end) for end in (one.low, one.high)] == pytest.approx(list(ends))
+
+
+def test_what_is_said_of_abx_names_its_assumption_and_where_the_other_model_is() -> None:
+    one = SensitivityEstimate(participant="P1", n=40, shares={"first": 0.73}, d_prime=0.0, model="independent")
+    of_block = SimpleNamespace(design="abx", vary="damping", summary="share", statistics={Sensitivities.key: (one,)})
+    told = Sensitivities(cast("Any", of_block)).explained()
+    assert "assumes that no answer is preferred" in told
+    assert "exported table thresholds" in told
+    assert "d_prime_other" in {column.name for column in RESULTS["thresholds"].columns}
 
 
 def test_without_a_correct_answer_only_shares_are_known() -> None:

@@ -10,10 +10,10 @@ from scipy.stats import f as variance_ratio
 from scipy.stats import t as student
 
 from study_app.analysis.statistics.equivalence import tost
-from study_app.analysis.statistics.mixed_model import mixed
 from study_app.analysis.statistics.outcome import false_discovery, holm
 from study_app.analysis.statistics.rank_tests import friedman, paired
 from study_app.analysis.statistics.recognition import kappa
+from study_app.analysis.statistics.slope_tests import slope_test
 from study_app.analysis.statistics.thresholds import group_mean
 from study_app.analysis.statistics.trend import trend
 
@@ -69,7 +69,7 @@ def test_statsmodels_models() -> None:
     values = 4 + draw.normal(0, 1, (30, 1)) + draw.normal(0.3, 0.8, (30, 1)) * delays + draw.normal(0, 0.6, (30, 7))
     design = np.tile(np.column_stack([np.ones(7), delays]), (30, 1))
     theirs = models.MixedLM(values.ravel(), design, np.repeat(np.arange(30), 7), exog_re=design).fit(reml=True)
-    ours = mixed(values, delays[:, None])
+    ours = slope_test(values, delays[:, None])
     assert ours.effect == pytest.approx(theirs.params[1], abs=1e-5)
     assert ours.statistic == pytest.approx(theirs.tvalues[1], rel=1e-3)
     assert ours.p == pytest.approx(2 * student.sf(abs(theirs.tvalues[1]), 29), rel=1e-2)  # theirs is normal: too small
@@ -77,19 +77,19 @@ def test_statsmodels_models() -> None:
 
 def test_two_settings_are_students_and_several_hotellings() -> None:
     values = answers(12, 3, seed=9).astype(float)
-    both = mixed(values[:, :2])
+    both = slope_test(values[:, :2])
     assert (both.statistic, both.p) == pytest.approx(tuple(ttest_rel(values[:, 1], values[:, 0])))
     away = values[:, 1:] - values[:, :1]
     t2 = 12 * away.mean(axis=0) @ np.linalg.inv(np.cov(away.T)) @ away.mean(axis=0)
-    assert mixed(values).p == pytest.approx(variance_ratio.sf(t2 * 10 / (2 * 11), 2, 10))
-    assert mixed(values[:, ::-1]).p == pytest.approx(mixed(values).p)  # whichever setting is the first
+    assert slope_test(values).p == pytest.approx(variance_ratio.sf(t2 * 10 / (2 * 11), 2, 10))
+    assert slope_test(values[:, ::-1]).p == pytest.approx(slope_test(values).p)  # whichever setting is the first
 
 
 def test_people_with_slopes_of_their_own_are_no_trend() -> None:
     """A model with random intercepts alone finds one in half of such studies."""
     draw, delays = np.random.default_rng(3), np.arange(7.0)
     own = draw.normal(size=(2000, 12, 1)) * delays + draw.normal(size=(2000, 12, 7))
-    shown = [(one.p or 1.0) <= 0.05 for one in (mixed(study, delays[:, None]) for study in own)]
+    shown = [(one.p or 1.0) <= 0.05 for one in (slope_test(study, delays[:, None]) for study in own)]
     assert sum(shown) <= binom.ppf(0.999, 2000, 0.05)
 
 

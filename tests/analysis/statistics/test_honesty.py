@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from scipy.stats import binom
 
 from study_app.analysis.statistics.equivalence import tost
-from study_app.analysis.statistics.mixed_model import mixed
 from study_app.analysis.statistics.outcome import Outcome
 from study_app.analysis.statistics.rank_tests import friedman, global_permutation, paired
 from study_app.analysis.statistics.recognition import UNANSWERED, UNDECIDED, Recognition, named, recognition
+from study_app.analysis.statistics.slope_tests import slope_test
 from study_app.analysis.statistics.thresholds import noticed
 from study_app.analysis.statistics.trend import step_down, trend
 from study_app.errors import AnalysisError
@@ -46,8 +46,8 @@ TESTS: dict[str, Callable[[np.ndarray], Outcome]] = {
     "tost": lambda values: tost(values[:, 2] - values[:, 0], 1.0),
     "threshold": lambda values: noticed(values, (0, 100, 200)),
     "recognition": lambda values: recognition(named(np.stack([values, values[:, ::-1]], axis=1)), [0, 2], 3),
-    "mixed": mixed,
-    "slope": lambda values: mixed(values, [[0.0], [1.0], [2.0]], "increasing"),
+    "means": slope_test,
+    "slope": lambda values: slope_test(values, [[0.0], [1.0], [2.0]], "increasing"),
 }
 
 
@@ -147,11 +147,11 @@ def test_the_table_counts_everything_once() -> None:
     assert result.table == ((3, 1, 1, 0, 0, 0, 1), (0, 3, 0, 0, 0, 1, 2), (1, 1, 2, 1, 0, 0, 1))
     assert (result.n, result.dropped, result.statistic) == (5, 1, 7)
     assert (result.decided, result.undecided, result.unanswered) == (13, 1, 4)
-    assert result.note == "1 undecided answer counts as no hit"
+    assert result.note == "1 undecided answer counts as incorrect"
     assert [(rate.hits, rate.n) for rate in result.rates] == [(3, 5), (3, 4), (1, 5)]
 
 
-def test_kappa_has_an_interval_from_ten_people() -> None:
+def test_kappa_has_an_interval() -> None:
     rng = np.random.default_rng(0)
     names = np.where(rng.random((24, 3)) < 0.6, [0, 1, 2], rng.integers(0, 3, (24, 3)))
     result = recognition(names, [0, 1, 2], 3)
@@ -159,12 +159,32 @@ def test_kappa_has_an_interval_from_ten_people() -> None:
     assert result.effect is not None
     assert result.interval.low < result.effect < result.interval.high
     assert result == recognition(names, [0, 1, 2], 3)
-    few = recognition(names[:9], [0, 1, 2], 3)
-    assert few.interval is None
-    assert "below 10" in few.no_interval
-    assert (
-        recognition([[0, 1, 2]] * 12, [0, 1, 2], 3).no_interval == "no interval: all participants gave the same names"
-    )
+    assert recognition(names[:1], [0, 1, 2], 3).no_interval == "no interval: the answers of one participant"
+
+
+@pytest.mark.parametrize("n", [3, 12, 30])
+def test_kappa_of_people_who_all_agree_has_a_lower_end_below_1(n: int) -> None:
+    """The lower end of the share of correct answers is that of Clopper and Pearson for n of n participants."""
+    interval = recognition([[0, 1, 2]] * n, [0, 1, 2], 3).interval
+    assert interval is not None
+    share = 0.025 ** (1 / n)
+    assert interval.low == pytest.approx((share - 1 / 3) / (1 - 1 / 3), abs=0.05)
+    assert interval.high == pytest.approx(1.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("n", "known"), [(5, 0.95), (12, 0.95), (20, 0.8), (30, 0.99)])
+def test_intervals_of_kappa_cover_it(n: int, known: float) -> None:
+    """Each of three names is correct with a known probability; wrong names are equally frequent."""
+    rng, studies, covered = np.random.default_rng(n), 200, 0
+    kappa = (known - 1 / 3) / (1 - 1 / 3)
+    for number in range(studies):
+        wrong = (np.arange(3) + rng.integers(1, 3, (n, 3))) % 3
+        names = np.where(rng.random((n, 3)) < known, np.arange(3), wrong)
+        names[rng.random((n, 3)) < 0.1] = UNDECIDED
+        interval = recognition(names, [0, 1, 2], 3, seed=number).interval
+        covered += interval is not None and interval.low <= kappa <= interval.high + 1e-9
+    assert covered >= binom.ppf(0.001, studies, 0.95)
 
 
 @pytest.mark.parametrize(

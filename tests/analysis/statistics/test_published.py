@@ -43,11 +43,16 @@ def test_the_smallest_p_of_so_many_people_who_agree(test: str, n: int) -> None:
 @pytest.mark.parametrize(
     ("differences", "verdict"),
     [
-        ([2.0] * 17, "inconclusive"),
+        ([2.0] * 17, "not equivalent"),
         ([0.0] * 17, "equivalent"),
         ([1.0] * 17, "inconclusive"),  # on the bound: not within it
         ([0.0] * 16, "out of reach"),
-        ([2.0] * 5, "out of reach"),
+        ([2.0] * 12, "not equivalent"),
+        ([2.0] * 5, "not equivalent"),  # 2**-5 < 0.05
+        ([2.0] * 4, "out of reach"),
+        ([-2.0, -3.0] * 5, "not equivalent"),
+        ([1.0, 2.0, 3.0, 2.0] * 5, "not equivalent"),
+        ([1.0, 2.0, 0.0, 2.0] * 5, "inconclusive"),
         ([0.0, 1.0, 0.0, -1.0] * 4, "out of reach"),
         ([0.0, 1.0, 0.0, -1.0] * 4 + [0.0], "equivalent"),  # of one in six some are in it: (5 / 6)**17 < 0.05
     ],

@@ -1,11 +1,11 @@
-"""Linear mixed models of answers, in which each participant has effects of the settings of his or her own.
+"""Tests of mean answers by the participants' own slopes: Student's t of one slope, Hotelling's T² of several.
 
-answer = μ + x·β + (1, x)·b + error, with b, a participant's own intercept and slopes, normal about zero with any
-covariance; Laird & Ware (1982), Biometrics 38, 963–974. Where everybody answered under all settings, the estimate of β
-by restricted likelihood is the mean over participants of their own least-squares slopes, with their covariance over n,
-unless a variance of slopes would be estimated at its bound, 0:
-Student's t tests one slope, Hotelling's T² (1931, Ann. Math. Stat. 2, 360–378) several. People may have trends of their
-own around zero: the test is about the population. Points of the scale are taken as numbers with equal steps.
+Each participant who answered under all settings has least-squares slopes of the answers; the test is whether their mean
+in the population is 0 (Hotelling 1931, Ann. Math. Stat. 2, 360–378). People may have trends of their own around zero.
+Points of the scale are taken as numbers with equal steps. Participants who miss an answer are left out.
+
+Without missing answers the estimate is that of a linear mixed model with random intercepts and slopes by restricted
+likelihood (Laird & Ware 1982, Biometrics 38, 963–974), unless that puts a variance of slopes at 0.
 """
 
 from dataclasses import dataclass, replace
@@ -21,10 +21,12 @@ from study_app.analysis.statistics.trend import Direction
 from study_app.errors import AnalysisError
 
 SURE: Final = 0.95
+T_TEST: Final = "t test of slopes"
+HOTELLING: Final = "Hotelling's T²"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mixed(Outcome):
+class SlopeTest(Outcome):
     """The test of all slopes; ``effect`` is the slope where there is one, otherwise they are in ``slopes``.
 
     ``intervals`` are Student's 95 % intervals of the slopes [points per unit of the column], ``sds`` the standard
@@ -36,7 +38,7 @@ class Mixed(Outcome):
     sds: tuple[float, ...] = ()
 
 
-def mixed(values: ArrayLike, columns: ArrayLike | None = None, direction: Direction | None = None) -> Mixed:
+def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: Direction | None = None) -> SlopeTest:
     """Test whether settings move answers up or down in the population.
 
     Parameters
@@ -49,21 +51,21 @@ def mixed(values: ArrayLike, columns: ArrayLike | None = None, direction: Direct
     direction : "increasing" | "decreasing", optional
         Of a single slope, where it was stated before: the test is then one-sided.
     """
-    rows, dropped = complete(values, at_least=2, why=" for a mixed model")
+    rows, dropped = complete(values, at_least=2, why=" for a test of means")
     design = _design(rows.shape[1], columns)
     n, several = len(rows), design.shape[1]
-    found = Mixed(
-        test="linear mixed model",
+    found = SlopeTest(
+        test=T_TEST if several == 1 else HOTELLING,
         n=n,
         dropped=dropped,
         statistic_name="t" if several == 1 else "F",
-        effect_name="slope" if several == 1 else "slopes",
+        effect_name="slope" if several == 1 else "differences",
     )
     own = rows @ np.linalg.pinv(np.column_stack([np.ones(len(design)), design]))[1:].T
     covariance = np.atleast_2d(np.cov(own, rowvar=False)) if n > 1 else np.zeros((several, several))
     fewest = max(FEW, several + 1)
     if n < fewest or np.linalg.matrix_rank(covariance, tol=1e-12) < several:
-        few = f"no mixed model below {fewest} participants: slopes of so few would have to be normal"
+        few = f"no test of means below {fewest} participants: slopes of so few would have to be normal"
         note = few if n < fewest else NO_SPREAD
         note = NO_VARIATION if n and not np.ptp(rows, axis=1).any() else note
         return replace(found, no_interval=note, note=note)
@@ -84,10 +86,10 @@ def mixed(values: ArrayLike, columns: ArrayLike | None = None, direction: Direct
         found,
         statistic=statistic,
         p=p,
-        method=f"random intercepts and slopes, {freedom}",
+        method=freedom,
         effect=float(means[0]) if several == 1 else None,
         interval=intervals[0] if several == 1 else None,
-        no_interval="" if several == 1 else "no single effect: one slope for each setting",
+        no_interval="" if several == 1 else "no single effect: one difference for each setting",
         slopes=tuple(means.tolist()),
         intervals=intervals,
         sds=tuple(np.sqrt(np.diag(covariance)).tolist()),

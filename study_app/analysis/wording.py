@@ -1,0 +1,92 @@
+"""How numbers, intervals, p values and lists are written in sentences and tables of the report.
+
+Numbers have at most three significant digits, p values three decimals; report.json and tests.csv have all digits.
+"""
+
+from collections.abc import Sequence
+from typing import Final, Protocol
+
+from study_app.number_text import MINUS, exact_text
+
+DIGITS: Final = 3
+"""Significant digits that a sentence or a cell shows."""
+NUMBERS: Final = (
+    *("no", "one", "two", "three", "four", "five", "six"),
+    *("seven", "eight", "nine", "ten", "eleven", "twelve"),
+)
+
+
+class Ends(Protocol):
+    """An interval."""
+
+    @property
+    def low(self) -> float:
+        """Lower end."""
+
+    @property
+    def high(self) -> float:
+        """Upper end."""
+
+
+def counted(number: int, noun: str) -> str:
+    """Return "three statements", "1 statement"."""
+    text = NUMBERS[number] if 1 < number < len(NUMBERS) else str(number)
+    return f"{text} {noun}" + ("" if number == 1 else "s")
+
+
+def all_of(number: int, noun: str) -> str:
+    """Return "all three statements", "both statements", "the one statement"."""
+    if number < 3:
+        return f"the one {noun}" if number == 1 else f"both {noun}s"
+    return f"all {counted(number, noun)}"
+
+
+def number(value: float | None, decimals: int = 2) -> str:
+    """Return a number with so many decimals, fewer beyond `DIGITS` digits, and a real minus sign; a dash for None."""
+    if value is None:
+        return "–"
+    whole = len(f"{abs(value):.0f}") if abs(value) >= 1 else 0
+    text = f"{value:.{max(0, min(decimals, DIGITS - whole))}f}"
+    return "0" + text[2:] if text.strip("-0.") == "" and text.startswith("-") else text.replace("-", "−")
+
+
+def significant(value: float) -> str:
+    """Return a number with at most `DIGITS` significant digits, without trailing zeros: 0.00305, 1.25, 1."""
+    return exact_text(float(f"{value:.{DIGITS}g}")).replace("-", MINUS)
+
+
+def p_value(p: float | None) -> str:
+    """Return a p as journals print it: .023, < .001, > .999; a dash where there is none."""
+    if p is None:
+        return "–"
+    if p < 0.001:
+        return "< .001"
+    return "> .999" if p > 0.999 else f"{p:.3f}".removeprefix("0")
+
+
+def p_equals(p: float) -> str:
+    """Return a p within a sentence: p = .023, p < .001, p > .999."""
+    text = p_value(p)
+    return f"p = {text}" if text.startswith(".") else f"p {text}"
+
+
+def interval(ends: Ends | None, decimals: int = 2) -> str:
+    """Return an interval in brackets; a dash where there is none."""
+    return "–" if ends is None else f"[{number(ends.low, decimals)}, {number(ends.high, decimals)}]"
+
+
+def percent(share: float) -> str:
+    """Return a share in percent with at most `DIGITS` digits, never rounded to 0 or 100: 90 %, 95.8 %, > 99.9 %."""
+    if 0.9995 <= share < 1:
+        return "> 99.9 %"
+    return "< 0.1 %" if 0 < share < 0.0005 else f"{significant(100 * share)} %"
+
+
+def listed(words: Sequence[str]) -> str:
+    """Return "a, b and c"."""
+    return " and ".join(words) if len(words) < 3 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def ms(delay_ms: float) -> str:
+    """Return a delay with its unit."""
+    return f"{delay_ms:g} ms"
