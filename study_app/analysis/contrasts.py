@@ -14,6 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from study_app import number_text
 from study_app.analysis.data.study_tables import Study, group_members
 from study_app.analysis.findings.finding import HOLM, TESTS, BlockAnswers, verdict
 from study_app.analysis.html_page import bullets, heading, paragraph, table_of
@@ -23,11 +24,12 @@ from study_app.analysis.levels.sensitivities import Sensitivities
 from study_app.analysis.levels.statistic import LevelStatistic
 from study_app.analysis.levels.thresholds import Exponents, ThresholdEstimate, Thresholds, thresholds_compared
 from study_app.analysis.levels.tracks import tracks
-from study_app.analysis.results import ContrastResult, LevelsResult, Results, interval, number, p_equals, p_value
-from study_app.analysis.statistics.equivalence import STEPS, p_equivalent, people_beyond
+from study_app.analysis.results import ContrastResult, LevelsResult, Results
+from study_app.analysis.statistics.equivalence import STEPS, is_beyond, p_equivalent, people_beyond
 from study_app.analysis.statistics.mean_tests import SAME, Means, means_of, p_differs, resamples_for
 from study_app.analysis.statistics.outcome import SIDES, Array, Interval, clopper_pearson, holm
 from study_app.analysis.statistics.thresholds import random_effects_weights
+from study_app.analysis.wording import interval, number, p_equals, p_value
 from study_app.protocol.model import Contrast
 
 STATISTICS: Final[Mapping[str, tuple[type[LevelStatistic[Any]], str]]] = {
@@ -47,13 +49,13 @@ LEFT_OUT: Final = (
 )
 """Who is compared, in power, preregistration and report."""
 WEIGHTED: Final = (
-    "Thresholds are weighted as in the group mean; those of two blocks with the same levels and design are estimated "
-    "with a width of the psychometric function that both have in common, so that their ratio may differ from that of "
-    "the tables. "
+    "Thresholds are weighted as in the group mean. Thresholds of two blocks with the same levels and design are "
+    "estimated with a common width of the psychometric function, so their ratio may differ from that of the tables. "
 )
 MOST_NAMED: Final = 20
 
-UNTESTED: Final = "fewer than two participants have both numbers, or all differences are equal"
+TOO_FEW: Final = "fewer than two participants have the numbers that are compared"
+ALIKE: Final = "the numbers do not vary between participants, so that no t test exists"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -240,7 +242,7 @@ def _tested(
     compared = _compared(study, contrast, answers, levels)
     ratio, means = _is_ratio(contrast, levels), compared.means(strictest)
     effect = ends = p_equal = p = p_bootstrap = statistic = None
-    method = "none"
+    method, why = "none", TOO_FEW if means is None else ALIKE
     if means is not None:
         mean, (low, high) = float(means.mean[0]), (float(end[0]) for end in means.interval(0.95))
         effect = math.exp(mean) if ratio else mean
@@ -265,8 +267,8 @@ def _tested(
         effect_name="ratio" if ratio else "difference",
         effect=effect,
         interval=ends,
-        no_interval=UNTESTED if ends is None else "",
-        note=UNTESTED if ends is None else "",
+        no_interval=why if ends is None else "",
+        note=why if ends is None else "",
         contrast=contrast,
         compared=contrast.words({block.id: block.stimulus.condition for block in study.levels if block.stimulus}),
         ratio=ratio,
@@ -306,30 +308,74 @@ def question(one: ContrastResult) -> str:
 def answer(one: ContrastResult) -> str:
     """Return what is found, in sentences."""
     sentences = [f"Not tested: {one.note}." if one.p_adjusted is None else _difference_words(one)]
-    if one.equivalent:
+    if one.contrast.bound is not None and lies_beyond(one, one.contrast.bound):
+        what = "All differences lie" if one.interval is None else "The whole interval lies"
+        sentences.append(f"{what} beyond the bound (not equivalent).")
+    elif one.equivalent:
         people = "of people differ by more" if one.contrast.groups is None else "of a group are not in the sample"
         sentences.append(
-            "On average it stays within the bound; the data do not exclude that up to "
+            "The mean lies within the bound (equivalent); the data do not exclude that up to "
             f"{100 * (one.not_excluded or 0.0):.0f} % {people}."
         )
     elif one.equivalent is not None:
-        sentences.append("It is not shown to stay within the bound.")
+        sentences.append("The mean is not shown to lie within the bound.")
     if one.left_out:
         sentences.append(f"Left out: {left_out_words(one)}.")
     return " ".join(sentences)
 
 
+def lies_beyond(one: ContrastResult, bound: float) -> bool:
+    """Return whether the whole 95 % interval, or the difference that all participants have, lies beyond the bound."""
+    reach, _ = equality_limits(one.contrast, bound, ratio=one.ratio)
+    if one.ratio and one.effect is not None:
+        ends = one.interval
+        logarithms = None if ends is None else replace(ends, low=math.log(ends.low), high=math.log(ends.high))
+        return is_beyond(replace(one, effect=math.log(one.effect), interval=logarithms), reach, 0.05)
+    return is_beyond(one, reach, 0.05)
+
+
 def _difference_words(one: ContrastResult) -> str:
     """Return the difference of a contrast that was tested, in a sentence."""
     first, second = one.compared
-    what = one.contrast.measure.replace("_", " ").capitalize()
-    side = "below" if (one.effect or 0.0) < 0 else "above"
-    amount = f"{number(one.effect)} times" if one.ratio else f"{number(abs(one.effect or 0.0))} {side}"
-    higher = "" if one.higher is None else f", higher in {one.higher} of them"
+    what = number_text.capitalised(one.contrast.measure_words)
+    higher = "" if one.higher is None else f"; higher in {first} in {one.higher} of {one.n} participants"
     return (
-        f"{what} in {first} is on average {amount} that in {second}, 95 % interval {interval(one.interval)}, "
-        f"{p_equals(one.p_adjusted or 0.0)}, n = {one.n}{higher}."
+        f"{what}, {first} {'÷' if one.ratio else '−'} {second}: {'ratio' if one.ratio else 'mean difference'} "
+        f"{number(one.effect)}, 95 % interval {interval(one.interval)}, {p_equals(one.p_adjusted or 0.0)}, "
+        f"n = {one.n}{higher}."
     )
+
+
+def contrast_methods(results: Results) -> Iterator[str]:
+    """Yield the sentences of the methods paragraph about hypotheses; nothing without any."""
+    contrasts = results.contrasts
+    if not contrasts:
+        return
+    for place, one in enumerate(contrasts, start=1):
+        of = " of logarithms" if one.ratio else ""
+        groups = f"a t test{of} of two groups with unequal variances"
+        test = groups if one.contrast.groups else f"a paired t test{of}"
+        sides = "two-sided" if one.contrast.expected is None else "one-sided"
+        label = f"Hypothesis {place}" if len(contrasts) > 1 else "The hypothesis"
+        yield f"{label} ({one.contrast.described(one.compared)}) was tested by {test}, {sides}."
+    if any(one.contrast.groups for one in contrasts):
+        yield "Between groups, t has the degrees of freedom of the smaller group (Hsu 1938)."
+    holm_words = f", adjusted by Holm over {len(contrasts)} hypotheses"
+    yield (
+        "Each participant had one number in each comparison. A bootstrap that adds a participant like the most extreme "
+        f"one (Gaffke 2005) had to agree: p is the larger of both{holm_words * (len(contrasts) > 1)}."
+    )
+    if any(one.contrast.measure == "threshold" for one in contrasts):
+        yield WEIGHTED.rstrip()
+    if bounds := [one for one in contrasts if one.contrast.bound is not None]:
+        adjusted = f", adjusted by Holm over {number_text.counted(len(bounds), 'bound')}" if len(bounds) > 1 else ""
+        yield (
+            "Equivalence was tested by two one-sided t tests with which the same bootstrap had to agree"
+            f"{adjusted}, and requires that the sample is large enough to contain a member of a minority that shifts "
+            "the mean by the bound."
+        )
+    if gone := {f"{question(one)}: {left_out_words(one)}": None for one in contrasts if one.left_out}:
+        yield f"Participants were left out of a hypothesis because a number is missing ({'; '.join(gone)})."
 
 
 def left_out_words(one: ContrastResult) -> str:
@@ -363,10 +409,10 @@ def contrast_section(results: Results) -> Iterator[str]:
     )
     weighted = any(one.contrast.measure == "threshold" for one in results.contrasts)
     yield paragraph(
-        "Contrasts that the study file states, tested on one number of each participant by t together with a bootstrap "
-        "that adds a participant like the most extreme one; p is the larger of both, adjusted by Holm over "
-        f"{len(results.contrasts)}. Equivalent: both show that the mean lies within the bound that was stated, by "
-        "enough participants, with Holm over the hypotheses that state one. "
+        "The study file states these hypotheses. Each was tested on one number of each participant by a t test "
+        "together with a bootstrap that adds a participant like the most extreme one; adjusted p is the larger p, "
+        f"adjusted by Holm over {number_text.counted(len(results.contrasts), 'test')}. Equivalent: both tests show, "
+        "with enough participants, that the mean lies within the stated bound, adjusted by Holm over the bounds. "
         f"{WEIGHTED if weighted else ''}{LEFT_OUT}",
         "soft",
     )

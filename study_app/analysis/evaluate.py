@@ -12,11 +12,12 @@ from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.motion import Performance, performance
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.findings import all_findings
-from study_app.analysis.findings.finding import SEALED, BlockAnswers, block_answers, summarize_block, untested
+from study_app.analysis.findings.finding import BlockAnswers, block_answers, summarize_block, untested
 from study_app.analysis.findings.statement_tests import gated
 from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.questions import question_results, score_results
 from study_app.analysis.results import (
+    SEALED,
     BlockResult,
     Delivered,
     Ended,

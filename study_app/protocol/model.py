@@ -342,6 +342,11 @@ class Contrast(Table):
         first, second = self.conditions or self.groups or self.blocks
         return first, second
 
+    @property
+    def measure_words(self) -> str:
+        """The measure in words: "threshold", "agreement with “thick”"."""
+        return self.measure.replace("_", " ") if self.measure in OF_LEVELS else f"agreement with “{self.measure}”"
+
     def words(self, conditions: Mapping[str, str | None]) -> tuple[str, str]:
         """Return what is compared: blocks with the conditions of their stimuli, by block, where these differ."""
         first, second = self.compared
@@ -355,7 +360,7 @@ class Contrast(Table):
         moves = "differs between" if self.expected is None else f"is {self.expected} in"
         joint = "and" if self.expected is None else "than in"
         near = "" if self.bound is None else f"; equivalent within {self.bound:g}"
-        return f"{self.measure.replace('_', ' ')} {moves} {first} {joint} {second}{where}{near}"
+        return f"{self.measure_words} {moves} {first} {joint} {second}{where}{near}"
 
 
 class Analysis(Table):
@@ -392,7 +397,7 @@ class Analysis(Table):
     trends: Literal["ranks", "slopes"] = later(
         default="ranks",
         description="What tests whether answers follow the delay; ranks: signs of each participant's rank correlation; "
-        "slopes: a linear mixed model with random slopes.",
+        "slopes: Student's t of each participant's own slope.",
     )
     looks: tuple[Annotated[int, Field(ge=2, le=100_000)], ...] = later(
         default=(),

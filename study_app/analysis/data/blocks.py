@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, Self, TypeAlias, get_args
 
+from study_app.analysis.wording import significant
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Compared, Phase
 from study_app.protocol.model import Analysis, Contrast, Protocol, Published
@@ -393,7 +394,7 @@ class Decided:
         """Return the planned alpha, and what is left of it at a look."""
         if self.planned_alpha is None:
             return f"{self.alpha:g}"
-        return f"{self.planned_alpha:g} over all looks, {self.alpha:.2g} at this one"
+        return f"{self.planned_alpha:g} over all looks, {significant(self.alpha)} at this one"
 
     def look_words(self, n: int) -> str:
         """Return which planned look a study of ``n`` participants is at, in sentences; nothing where none is planned.
@@ -404,20 +405,21 @@ class Decided:
             return ""
         planned = f"{' and '.join([', '.join(map(str, self.looks[:-1])), str(self.looks[-1])])} participants"
         if self.look == 0:
-            return f"Looks are planned at {planned}, none of which is reached: everything found is exploratory."
+            return f"Looks are planned at {planned}; none has been reached, so all results are exploratory."
         if n not in self.looks:
             from study_app.analysis.statistics.outcome import error_of_every_report  # noqa: PLC0415 - loads scipy
 
             alpha = self.planned_alpha or self.alpha
             return (
-                f"This look at {n} participants is unplanned: looks are planned at {planned}. An adjusted p of at "
-                f"most {self.alpha:.2g} counts, as at the last planned look. A study that is tested at every "
-                f"participant in this way claims something falsely in "
-                f"{100 * error_of_every_report(self.looks, alpha, self.spending):.1f} % instead of {100 * alpha:g} %."
+                f"This look at {n} participants is unplanned: looks are planned at {planned}. An adjusted p ≤ "
+                f"{significant(self.alpha)} is significant, as at the last planned look. A study without an effect "
+                "that is tested at every number of participants in this way makes a false claim in "
+                f"{100 * error_of_every_report(self.looks, alpha, self.spending):.1f} % of cases instead of "
+                f"{100 * alpha:g} %."
             )
         return (
-            f"This is look {self.look} of {len(self.looks)}, planned at {planned}: an adjusted p of at most "
-            f"{self.alpha:.2g} counts (alpha is shared by {SPENDINGS[self.spending]} spending)."
+            f"This is look {self.look} of {len(self.looks)}, planned at {planned}. An adjusted p ≤ "
+            f"{significant(self.alpha)} is significant (alpha is shared by {SPENDINGS[self.spending]} spending)."
         )
 
     def is_primary(self, item: str) -> bool:
@@ -430,8 +432,8 @@ class Decided:
 
 
 TRENDS: Final = {
-    "ranks": "changing the signs of each participant's rank correlation of answers and delays",
-    "slopes": "linear mixed models with random intercepts and slopes of each participant (t of the mean slope)",
+    "ranks": "a sign-flip permutation test on the participants' rank correlations of answers and delays",
+    "slopes": "Student's t test on the slopes of each participant's own regression of answers on delays",
 }
 """How a trend over the delay is tested, in words."""
 

@@ -164,7 +164,8 @@ class Study:
     ``answered`` has the rows of all questions as they were recorded, of which ``responses`` are those of statements;
     ``own_dynamics`` are the device's, where receipts record a measurement; ``estimator`` names that of the velocity,
     "device" where the device measured it; None where receipts do not say it. ``withdrawn`` is how many participants
-    withdrew, so that their data were erased. ``contrasts`` are the study's hypotheses, once the key is open. ``sites``
+    withdrew, so that their data were erased. ``contrasts`` are the study's hypotheses and ``liquids`` its liquids'
+    tables, once the key is open. ``sites``
     are the names of the sites of a merged study, whose participants are SITE-ID.
     """
 
@@ -191,6 +192,7 @@ class Study:
     withdrawn: int = 0
     sites: tuple[str, ...] = ()
     contrasts: tuple[Contrast, ...] = ()
+    liquids: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @property
     def people(self) -> tuple[str, ...]:
@@ -434,6 +436,7 @@ def _load(folder: Path, *, sealed: bool = False) -> Study:
         others=records[0].others,
         decided=read_decided([session.protocol.get("analysis") for session in records]),
         contrasts=() if key is None else contrasts_of(key),
+        liquids={} if key is None else key.tables["liquids"],
         protocol=records[0].protocol,
         own_dynamics=mean_dynamics(records),
         estimator=estimators_of(records),

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
+from study_app import number_text
 from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.motion import OF_REACHES
 from study_app.analysis.figures import answer_figures
@@ -23,28 +24,12 @@ from study_app.analysis.findings.finding import (
 from study_app.analysis.findings.statement_tests import ONE_DELAY, DelayTrend
 from study_app.analysis.html_page import heading, paragraph, table, table_of
 from study_app.analysis.page_layout import Drawing, Picture
-from study_app.analysis.results import (
-    BlockResult,
-    NotTested,
-    Results,
-    all_of,
-    beyond,
-    counted,
-    enough,
-    interval,
-    lead,
-    least,
-    listed,
-    ms,
-    number,
-    p_value,
-    percent,
-    short,
-)
+from study_app.analysis.results import BlockResult, NotTested, Results, beyond, enough, lead, least, short
 from study_app.analysis.statistics.equivalence import Equivalence, fewest, tost
 from study_app.analysis.statistics.equivalence import Verdict as Nearness
 from study_app.analysis.statistics.thresholds import Threshold, noticed
 from study_app.analysis.statistics.trend import StepDown, step_down
+from study_app.analysis.wording import all_of, counted, interval, listed, ms, number, p_value, percent
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,18 +67,22 @@ def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
     """Yield how the comparisons with the shortest delay were made, and what they could not show."""
     first = against[0].found
     yield (
-        f"Two one-sided t tests with a bound of ±{first.bound:g}, intervals of {percent(1 - 2 * first.alpha)}. "
-        "Equivalent: the t tests and the bootstrap both show that the mean lies within the bound, with "
-        f"{enough(first.alpha, first.bound)}. Inconclusive: they do not, which is no evidence of a "
-        "difference: that is what the test of a trend asks. Out of reach: no answers of so many participants could "
-        "have shown it."
+        f"Two one-sided t tests with an equivalence bound of {_points(first.bound)}, and "
+        f"{percent(1 - 2 * first.alpha)} intervals. Equivalent: both the t tests and the bootstrap show that the mean "
+        f"difference lies within the bound, with {enough(first.alpha, first.bound)}. Not equivalent: the whole "
+        "interval lies beyond the bound; this is not corrected for the number of comparisons. Inconclusive: neither, "
+        "which is not evidence of a difference. Out of reach: too few participants to show equivalence, whatever "
+        "they had answered."
     )
     disagree = sum(one.found.checks_agree is False for one in against)
     if disagree:
-        yield f"*: t tests and bootstrap decide differently ({disagree}); equivalent is only what both show."
+        yield (
+            f"* The t tests and the bootstrap disagree ({disagree} of {len(against)} comparisons). A comparison counts "
+            "as equivalent only if both agree."
+        )
 
 
-VERDICTS: Final = ("equivalent", "inconclusive", "out of reach")
+VERDICTS: Final = ("equivalent", "not equivalent", "inconclusive", "out of reach")
 
 
 def by_delay(found: BlockResult) -> list[list[str]]:
@@ -118,17 +107,27 @@ def _said_of(found: BlockResult, delay_ms: float, here: Sequence[ContrastWithCon
 
 
 def evidence_up_to(found: BlockResult, delay_ms: float) -> tuple[str, ...]:
-    """Return what shows that delays up to this one change answers, with the error rate held over all statements.
+    """Return what shows that delays up to this one change answers.
 
-    That is a trend up to this delay or a shorter one.
+    That is a trend up to this delay or a shorter one, with the error rate held over all statements, or an interval
+    beyond the bound.
     """
     exploratory = {trend.item for trend in DelayTrend.of(found) if not trend.primary}
-    return tuple(
-        f"“{short(found, one.item)}” follows the delay up to {ms(shown_ms)}"
+    trends = (
+        f"agreement with “{short(found, one.item)}” shows a trend over delays up to {ms(shown_ms)}"
         + (" (exploratory)" if one.item in exploratory else "")
         for one in LowestDelay.of(found)
         if (shown_ms := one.over_all_ms) is not None and shown_ms <= delay_ms
     )
+    beyond: dict[float, list[str]] = {}
+    for one in ContrastsWithControl.of(found):
+        if one.verdict == "not equivalent" and one.delay_ms <= delay_ms:
+            beyond.setdefault(one.delay_ms, []).append(f"“{short(found, one.item)}”")
+    differing = (
+        f"at {ms(at)} {listed(items)} differ{'s' * (len(items) == 1)} by more than the bound"
+        for at, items in beyond.items()
+    )
+    return (*trends, *differing)
 
 
 def common_ms(found: BlockResult) -> float | None:
@@ -144,7 +143,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
     key = "against"
     place = 7
     row_place = 10
-    what = "test of equivalence"
+    what = "equivalence test"
     kinds = ("delays",)
     waits = ("delays",)
     empty = ()
@@ -156,7 +155,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         if answers.k < 2:
             return (), (NotTested(cls.what, ONE_DELAY),)
         if bound is None:
-            why = "the protocol decided no bound of equivalence, and one chosen now would be chosen by the answers"
+            why = "the protocol states no equivalence bound, and one chosen now would depend on the answers"
             return (), (NotTested(cls.what, why),)
         compared = []
         for item in answers.block.items:
@@ -214,24 +213,28 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
     def limits(self) -> Iterator[str]:
         against, found = self.value, self.found
         if against and found.n < fewest((first := against[0].found).alpha, first.bound):
-            yield f"{lead(found)}: equivalence needs {enough(first.alpha, first.bound)}. This study has {found.n}."
+            yield (
+                f"{lead(found)}: a comparison can count as equivalent only with {enough(first.alpha, first.bound)}. "
+                f"This study has {found.n}."
+            )
         undecided = [one for one in against if one.verdict in ("inconclusive", "out of reach")]
         if undecided:
             yield (
-                f"{lead(found)}: inconclusive or out of reach: {len(undecided)} of {len(against)} comparisons with "
-                f"{ms(undecided[0].control_ms)}, which do not show that the mean stays within the bound."
+                f"{lead(found)}: {len(undecided)} of {number_text.counted(len(against), 'comparison')} with "
+                f"{ms(undecided[0].control_ms)} {'is' if len(undecided) == 1 else 'are'} undecided: the mean "
+                "difference is not shown to lie within the equivalence bound, nor beyond it."
             )
 
     def methods(self) -> Iterator[str]:
         if self.value:
-            bound, level = self.value[0].found.bound, percent(1 - 2 * self.results.decided.alpha)
-            points = "point" if bound == 1 else "points"
-            beforehand = ", decided before the first session" if self.results.decided.binding else ""
+            first = self.value[0].found
+            beforehand = ", stated before the first session" if self.results.decided.binding else ""
             yield (
-                f"Equivalence to {self.found.delays_ms[0]:g} ms was tested by two one-sided t tests on paired "
-                f"differences with a bound of ±{bound:g} {points}{beforehand}, and {level} intervals, and called "
-                "equivalent only if a bootstrap that adds a participant like the most extreme one (Gaffke 2005) "
-                f"agreed, and with {least(self.results.decided.alpha, bound)}; otherwise inconclusive."
+                f"Each delay was compared with {ms(self.value[0].control_ms)} by two one-sided t tests on paired "
+                f"differences, with an equivalence bound of {_points(first.bound)}{beforehand}, and "
+                f"{percent(1 - 2 * first.alpha)} intervals. A delay was called equivalent only if a bootstrap that "
+                "adds a participant like the most extreme one (Gaffke 2005) agreed, and only with "
+                f"{least(first.alpha, first.bound)}; not equivalent if its whole interval was beyond the bound."
             )
 
 
@@ -264,7 +267,7 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
     key = "lowest"
     place = 6
     row_place = 9
-    what = "lowest delay that shows"
+    what = "lowest delay with a trend"
     kinds = ("delays",)
     waits = ("delays",)
     empty = ()
@@ -279,7 +282,7 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
             steps = step_down(answers.values[one.item], answers.block.delays_ms, direction, alpha=alpha)
             lowest.append(Lowest(one.item, steps, one.members))
         if trends and not showing:
-            why = "no statement shows a trend over all delays; that is not evidence that none is noticed"
+            why = "no statement shows a trend over all delays, which is not evidence that people notice none"
             return (), (NotTested(cls.what, why),)
         return tuple(lowest), ()
 
@@ -294,10 +297,10 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
                 yield row | {"item": lowest.item, "comparison": f"up to {step.longest_ms:g} ms"}
 
     def section(self) -> Iterator[str]:
-        """Yield the lowest delay that shows, by statement."""
+        """Yield the lowest delay with a trend, by statement."""
         if not self.value:
             return
-        yield heading(3, "The lowest delay that shows")
+        yield heading(3, "The lowest delay with a trend")
         yield table_of(
             self.value,
             ("Statement", lambda one: short(self.found, one.item)),
@@ -311,10 +314,11 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
         )
         members = self.value[0].members
         yield paragraph(
-            "Only where a trend is there at all, the longest delay is dropped as long as a trend is left. The order is "
-            f"fixed. The lowest delay is the one whose steps all have p of at most alpha / {members}, so that the "
-            "error rate holds over all statements; uncorrected it holds within one statement alone. The result is an "
-            "upper bound and biased upward: few participants find only long delays.",
+            "If there is a trend, the longest delay is dropped and the trend is tested again; this is repeated until "
+            f"no trend remains. “Lowest” requires p ≤ alpha / {members} at every step, which controls the error rate "
+            f"over {all_of(members, 'statement')}; “uncorrected” requires p ≤ alpha, which controls it only within one "
+            "statement. The lowest delay is an upper bound, and is too long rather than too short: with few "
+            "participants only long delays show a trend.",
             "soft",
         )
 
@@ -335,10 +339,10 @@ class DetectionThreshold(Finding[Threshold | None]):
     def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[Threshold | None, Absent]:
         item = answers.decided.noticed
         if item is None or item not in answers.values:
-            return None, (NotTested(cls.what, "the protocol names no statement that asks for it"),)
+            return None, (NotTested(cls.what, "the protocol states no statement about it (analysis.noticed)"),)
         rising = [one.item for one in DelayTrend.of(found) if one.verdict in FOUND and (one.outcome.effect or 0.0) > 0]
         if item not in rising:
-            return None, (NotTested(cls.what, "noticing is not shown to rise with the delay"),)
+            return None, (NotTested(cls.what, "agreement is not shown to rise with the delay"),)
         return noticed(answers.single[item], answers.block.delays_ms), ()
 
     def rows(self) -> Iterator[Row]:
@@ -351,21 +355,20 @@ class DetectionThreshold(Finding[Threshold | None]):
         threshold = self.value
         if threshold is None:
             return
-        yield heading(3, "From when on is a delay noticed?")
+        yield heading(3, "At which delay do participants notice a difference?")
         counts = ", ".join(
             f"{ms(level)} {yes} of {asked}"
             for level, yes, asked in zip(threshold.levels, threshold.yes, threshold.asked, strict=True)
         )
         if threshold.effect is None:
-            yield paragraph(f"No threshold: {threshold.note}. Noticed: {counts}.")
+            yield paragraph(f"No threshold: {threshold.note}. Answers that agree (5 to 7): {counts}.")
             yield from self.drawn()
             return
         yield paragraph(
-            f"Detection threshold {number(threshold.effect, 0)} ms, 95 % interval {interval(threshold.interval, 0)} "
-            f"ms{f' ({threshold.no_interval})' if threshold.no_interval else ''}; guesses {number(threshold.guess)}, "
-            f"lapses {number(threshold.lapse)}; {threshold.method}; n = {threshold.n}. Noticed: {counts}. "
-            f"{threshold.note[:1].upper()}{threshold.note[1:]}. Agreement is no yes or no: who agrees somewhat with "
-            "“different” may mean little."
+            f"Detection threshold: {number(threshold.effect, 0)} ms, {_threshold_interval(threshold)}, "
+            f"n = {threshold.n}. {_half_way(threshold)} Answers that agree (5 to 7): {counts}. "
+            f"{threshold.note[:1].upper()}{threshold.note[1:]}. Fit: {threshold.method}. Agreement is not a yes/no "
+            "answer: a participant who “somewhat agrees” may have noticed little difference."
         )
         yield from self.drawn()
 
@@ -379,14 +382,12 @@ class DetectionThreshold(Finding[Threshold | None]):
         curve = f"No curve: {threshold.note}."
         if threshold.effect is not None:
             curve = (
-                f"Curve: {threshold.method}; diamond: the detection threshold, {threshold.effect:.0f} ms, on its 95 % "
-                f"interval {interval(threshold.interval, 0)} ms."
+                f"Curve: {threshold.method}; diamond: the detection threshold, {number(threshold.effect, 0)} ms "
+                f"({_threshold_interval(threshold)}). {_half_way(threshold)}"
             )
-        dashed = (
-            "" if lowest is None else f" Dashed: the lowest delay up to which a statement follows it, {lowest:g} ms."
-        )
+        dashed = "" if lowest is None else f" Dashed: the lowest delay with a trend in a statement, {ms(lowest)}."
         caption = (
-            f"Share of answers that noticed the delay, over the delay asked for ({drawing.simulated}n = "
+            f"Proportion of answers that agree (5 to 7), against the requested delay ({drawing.simulated}n = "
             f"{threshold.n}). {curve}{dashed}"
         )
         return drawing.picture(
@@ -396,11 +397,27 @@ class DetectionThreshold(Finding[Threshold | None]):
     def methods(self) -> Iterator[str]:
         if self.value is not None:
             yield (
-                "The detection threshold is the 50 % point between guesses and lapses of a logistic function: the "
-                "posterior median from agreement (5 to 7) in single answers, all participants pooled, with a 95 % "
-                "interval that is scaled by how far participants differ. It is stated only where the statement shows a "
-                "trend, and where it lies among the delays that were presented."
+                "The detection threshold is the delay at which a logistic function, fitted to agreement (5 to 7) in "
+                "the single answers of all participants together, lies halfway between the guess rate and one minus "
+                "the lapse rate (posterior median). Its 95 % interval is widened by how far participants differ. It is "
+                "reported only if the statement shows a trend and if the threshold lies within the presented delays."
             )
+
+
+def _threshold_interval(threshold: Threshold) -> str:
+    """Return the interval of a detection threshold, or why there is none."""
+    if threshold.interval is None:
+        return threshold.no_interval
+    return f"95 % interval {interval(threshold.interval, 0)} ms"
+
+
+def _half_way(threshold: Threshold) -> str:
+    """Return what a detection threshold is, and how many answers agree there, in a sentence."""
+    return (
+        "The threshold is the delay at which the fitted function lies halfway between the guess rate "
+        f"({percent(threshold.guess or 0.0)}) and one minus the lapse rate ({percent(threshold.lapse or 0.0)}): "
+        f"{percent(threshold.half_way or 0.0)} of answers agree there."
+    )
 
 
 class NoticedFrom(Finding[None]):
@@ -418,7 +435,7 @@ class NoticedFrom(Finding[None]):
         for primary, verdict in ((True, "shown"), (False, "suggested")):
             text = self._shortest([item.id for item in self.found.items if decided.is_primary(item.id) == primary])
             if not text and fitted is not None and decided.is_primary(fitted) == primary:
-                text = "More people notice a difference with longer delays, but no single delay is shown to be noticed."
+                text = "Agreement rises with the delay, but no single delay is shown to be noticed."
             if text:
                 return self.answered(verdict, text, claims=True)
         return self.answered("not shown", f"No delay was shown to be noticed. {NO_EVIDENCE}")
@@ -436,8 +453,8 @@ class NoticedFrom(Finding[None]):
             if one.over_all_ms == at and (correlation := self._correlation(one, at))
         ]
         return (
-            f"From {ms(at)} on at the latest, participants tend to rate longer delays {listed(rated)}. Mean ratings "
-            "may stay the same, and shorter delays may be noticed too."
+            f"Over delays of {self.found.delays_ms[0]:g} to {ms(at)} participants already tend to rate longer delays "
+            f"{listed(rated)}. Participants may also notice shorter delays. Mean ratings need not change."
         )
 
     def _correlation(self, lowest: Lowest, up_to_ms: float) -> float:
@@ -459,19 +476,29 @@ class UnchangedUpTo(Finding[None]):
         """Return up to which delay mean answers are equivalent to those at the shortest."""
         against = ContrastsWithControl.of(self.found)
         if not against:
-            why = next((one.why for one in self.found.absent if "equivalence" in one.what), "nothing was compared")
+            why = next((one.why for one in self.found.absent if "equivalence" in one.what), "there was no comparison")
             return self.answered("not tested", f"No answer: {why}.")
         at, within = common_ms(self.found), _within(against[0])
         if at is None:
-            text = (
-                f"For no delay are mean answers to all statements shown to stay {within}. That is not evidence that "
-                "they change."
-            )
-            return self.answered("not shown", text)
+            return self.answered("not shown", f"{NO_DELAY.format(within)} {_beyond_words(against)}")
         statements = all_of(len(equivalent_up_to(against)), "statement")
         share = not_excluded([one.found for one in against if one.delay_ms <= at])
         text = f"Up to {ms(at)} mean answers to {statements} stay {within}; {share}."
         return self.answered("shown", text)
+
+
+NO_DELAY: Final = "We could not show for any delay that the mean answers to all statements stay {}."
+
+
+def _beyond_words(against: Sequence[ContrastWithControl]) -> str:
+    """Return how many comparisons are not equivalent, as a sentence; without any, that nothing follows."""
+    beyond = sum(one.verdict == "not equivalent" for one in against)
+    if not beyond:
+        return "That is not evidence that they change."
+    return (
+        f"In {beyond} of {number_text.counted(len(against), 'comparison')} the whole interval lies beyond the bound "
+        "(not equivalent; not corrected for the number of comparisons)."
+    )
 
 
 def not_excluded(tested: Sequence[Equivalence]) -> str:
@@ -480,9 +507,12 @@ def not_excluded(tested: Sequence[Equivalence]) -> str:
     return f"the data do not exclude that up to {100 * most:.0f} % of people differ by more"
 
 
+def _points(bound: float) -> str:
+    return f"±{bound:g} {'point' if bound == 1 else 'points'}"
+
+
 def _within(against: ContrastWithControl) -> str:
-    bound = against.found.bound
-    return f"within ±{bound:g} {'point' if bound == 1 else 'points'} of those at {ms(against.control_ms)}"
+    return f"within {_points(against.found.bound)} of those at {ms(against.control_ms)}"
 
 
 MEASURES: Final = ("Movement time, s", "Path, mm", "Overshoot, mm", "Submovements")
@@ -494,8 +524,8 @@ def _kept(block: Block, results: Results) -> str:
     here = [one for one in results.delivered if one.block == block.id]
     judged, valid = sum(one.judged for one in here), sum(one.valid for one in here)
     if not judged:
-        return "Whether trials kept to the protocol's limits of timing was not measured."
-    return f"Trials that kept to the protocol's limits of timing: {valid} of {judged}; all are included."
+        return "Whether trials met the protocol's timing limits was not measured."
+    return f"{valid} of {judged} trials met the protocol's timing limits; all are included."
 
 
 class Movement(Finding[None]):
@@ -522,7 +552,7 @@ class Movement(Finding[None]):
         n = counted(people, "participant")
         foot = "Added delay, ms. A participant's point: the median of a trial's reaches, the first left out."
         caption = (
-            f"How participants reached, over the delay that was asked for ({drawing.simulated}n = {n} "
+            f"How participants reached, against the requested delay ({drawing.simulated}n = {people} "
             f"with recordings). Thin lines: {answer_figures.line_words(people)}; thick line: median; band: the middle "
             "half. Movement time: from the lighting of a target to the entry that was held. Scales do not begin at "
             f"zero. {_kept(block, drawing.results)}"

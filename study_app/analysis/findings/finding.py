@@ -24,7 +24,6 @@ from study_app.store.csv_files import Column, optional
 T = TypeVar("T")
 U = TypeVar("U")
 
-SEALED: Final = "after unblinding: the key is sealed, and this needs to know which setting is which"
 MANY: Final = DRAWN_UP_TO
 """Above so many participants p of single statements is approximated."""
 
@@ -149,6 +148,11 @@ def summarize_block(study: Study | None, answers: BlockAnswers) -> BlockResult:
         presentations=presented(answers.single.values()),
         replicated_ms=tuple(delay for place, delay in delays if columns.count(place) > 1),
         sessions=tuple(sorted({int(number) for number in sessions})),
+        incomplete={
+            item: people
+            for item, values in answers.values.items()
+            if (people := tuple(np.array(answers.people)[np.isnan(values).any(axis=1)].tolist()))
+        },
     )
 
 
@@ -327,7 +331,7 @@ def rows_alone(found: BlockResult, what: str) -> dict[str, Any]:
     return {"family": f"{found.id}: {what}", "members": 1, "correction": ALONE}
 
 
-NO_EVIDENCE: Final = "That is not evidence that there is nothing."
+NO_EVIDENCE: Final = "That is not evidence that there is no difference."
 FOUND: Final = ("shown", "suggested")
 
 

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from study_app import number_text
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.findings.finding import (
     FOUND,
@@ -22,21 +23,10 @@ from study_app.analysis.findings.finding import (
 from study_app.analysis.findings.statement_tests import Pairs, SettingsDiffer
 from study_app.analysis.html_page import heading, paragraph, table_of
 from study_app.analysis.page_layout import Drawing, Picture
-from study_app.analysis.results import (
-    BlockResult,
-    NotTested,
-    Verdict,
-    counted,
-    interval,
-    listed,
-    name,
-    number,
-    p_equals,
-    p_value,
-    short,
-)
+from study_app.analysis.results import BlockResult, NotTested, Verdict, name, short
 from study_app.analysis.statistics.recognition import MOST as MOST_NAMED
 from study_app.analysis.statistics.recognition import Recognition, named, recognition
+from study_app.analysis.wording import counted, interval, listed, number, p_equals, p_value
 
 NONE_RECOGNISED: Final = "No liquid was shown to be recognised above chance."
 
@@ -94,30 +84,30 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         yield table_of(
             sorted(named.found.rates, key=lambda rate: rate.setting),
             ("Liquid", lambda rate: self.found.names[rate.setting]),
-            ("right", lambda rate: str(rate.hits)),
+            ("correct", lambda rate: str(rate.hits)),
             ("of", lambda rate: str(rate.n)),
+            ("undecided", lambda rate: str(named.found.table[rate.setting][UNDECIDED_COLUMN])),
             ("share", lambda rate: number(rate.rate)),
             ("95 % interval", lambda rate: interval(rate.interval)),
-            ("name most used for", lambda rate: "–" if rate.rival is None else self.found.names[rate.rival]),
+            ("closest other liquid", lambda rate: "–" if rate.rival is None else self.found.names[rate.rival]),
             ("p", lambda rate: p_value(rate.p)),
             ("adjusted p", lambda rate: p_value(rate.p_adjusted)),
         )
         outcome = named.found
-        why = "" if outcome.interval else f" ({outcome.no_interval})"
-        note = f" {outcome.note[:1].upper()}{outcome.note[1:]}." if outcome.note else ""
         if outcome.p is None:
             yield paragraph(f"Not tested: {outcome.note}.")
             return
         yield paragraph(
-            f"Hits {number(outcome.statistic, 0)}, {number(outcome.expected, 1)} expected by chance, "
-            f"{p_equals(outcome.p)} (smallest attainable {p_value(outcome.smallest_p)}), {named.verdict}. Kappa of "
-            f"decided answers {number(outcome.effect)}, 95 % interval {interval(outcome.interval)}{why}. Chance: "
-            f"{outcome.method}.{note} One test, corrected for no other."
+            f"Correct names: {number(outcome.statistic, 0)}; {number(outcome.expected, 1)} expected by chance; "
+            f"{p_equals(outcome.p)} ({outcome.method}; smallest attainable {p_equals(outcome.smallest_p or 0.0)}): "
+            f"{named.verdict}. {_kappa_words(outcome)} {_undecided_words(outcome)}This is one test; p is not "
+            "corrected for other tests."
         )
+        how = "" if outcome.interval is None else f" Interval of kappa: {outcome.interval.method}."
         yield paragraph(
-            "Intervals of the shares: Clopper-Pearson, which takes participants one by one. p tests whether the name "
-            "is used for the liquid more often than for each other liquid, within participants (McNemar's exact test, "
-            "one-sided; the largest p over the others). Adjusted p is corrected by Holm over the liquids.",
+            f"Intervals of the shares: Clopper–Pearson.{how} p tests whether the name is used for the liquid more "
+            "often than for each other liquid, within participants (McNemar's exact test, one-sided); the liquid with "
+            "the largest p is the closest other liquid. Adjusted p is corrected by Holm over the liquids.",
             "soft",
         )
 
@@ -131,13 +121,13 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         chance = ""
         if hits is not None and expected is not None and named.found.p is not None:
             chance = (
-                f" Right: {hits:g}; {number(expected, 1)} would be by chance, that is after exchanging the liquids "
-                f"within each participant (exact, one-sided, {p_equals(named.found.p)})."
+                f" Correct: {hits:g}; {number(expected, 1)} expected by chance (liquids permuted within each "
+                f"participant; exact, one-sided, {p_equals(named.found.p)})."
             )
         caption = (
             "The name that was rated highest for each liquid "
             f"({drawing.simulated}{answer_figures.counts(study, block)[0]}). Cells: counts and share of the row; "
-            f"framed: right. Undecided: {counted(2, 'name')} or more were rated equally high.{chance}"
+            f"framed: correct. Undecided: {counted(2, 'name')} or more were rated equally high.{chance}"
         )
         return drawing.picture(
             self.figure_title,
@@ -155,12 +145,38 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
     def methods(self) -> Iterator[str]:
         if self.value is not None:
             yield (
-                "A participant was taken to have named the liquid whose statement he or she rated highest; equal "
-                "highest ratings are undecided and count as no hit. Hits were tested against exchanging the liquids "
-                "within participants (exact, one-sided). A liquid was called recognised if, in addition, its name was "
-                "used for it more often than for each other liquid (McNemar's exact test within participants, "
-                "one-sided, Holm-adjusted over the liquids)."
+                "Participants were taken to have named the liquid whose statement they rated highest; answers with "
+                "equal highest ratings are undecided and count as incorrect. The number of correct names was tested "
+                "by permuting the liquids within participants (exact, one-sided). In addition, a liquid was called "
+                "recognised only if its name was used for it more often than for each other liquid (McNemar's exact "
+                "test within participants, one-sided, with p adjusted by Holm over the liquids)."
             )
+
+
+UNDECIDED_COLUMN: Final = -2
+"""Of the table of names, see `Recognition`."""
+
+
+def _kappa_words(outcome: Recognition) -> str:
+    """Return kappa with its interval and of how many answers it is, in a sentence."""
+    if outcome.effect is None:
+        return f"Cohen's kappa does not exist ({outcome.no_interval.removeprefix('no interval: ')})."
+    ends = outcome.no_interval if outcome.interval is None else f"95 % interval {interval(outcome.interval)}"
+    return (
+        f"Cohen's kappa of the {number_text.counted(outcome.decided, 'decided answer')} is {number(outcome.effect)} "
+        f"({ends})."
+    )
+
+
+def _undecided_words(outcome: Recognition) -> str:
+    """Return what becomes of undecided answers, as a sentence with a space; nothing without any."""
+    if not outcome.undecided:
+        return ""
+    one = outcome.undecided == 1
+    return (
+        f"{number_text.counted(outcome.undecided, 'undecided answer')} {'counts' if one else 'count'} as incorrect, "
+        f"and {'is' if one else 'are'} not in kappa. "
+    )
 
 
 def recognised(named: RecognitionResult, alpha: float) -> tuple[int, ...]:
@@ -205,9 +221,9 @@ class Distinguished(Finding[None]):
         if apart:
             text = f"Rated differently: {listed(list(dict.fromkeys(apart)))}."
         elif items:
-            text = f"The {found.kind} were rated differently in {listed(items)}; which ones is not shown."
+            text = f"The {found.kind} were rated differently in {listed(items)}; the tests do not show which ones."
         else:
-            text = "In no statement were two of them shown to be rated differently."
+            text = f"No statement showed a difference between any two {found.kind}."
         if named is not None and named.found.p is not None:
             names = listed([found.names[place].lower() for place in known])
             text = f"Recognised above chance: {names}. {text}" if names else f"{NONE_RECOGNISED} {text}"

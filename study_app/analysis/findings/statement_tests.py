@@ -33,25 +33,19 @@ from study_app.analysis.results import (
     Failure,
     NotTested,
     Tested,
-    all_of,
-    counted,
-    interval,
-    listed,
     name,
-    number,
-    p_equals,
-    p_value,
     settings_noun,
     short,
     statistic,
     test_name,
 )
-from study_app.analysis.statistics.mixed_model import Mixed, mixed
 from study_app.analysis.statistics.outcome import Outcome, false_discovery, holm, student_interval
 from study_app.analysis.statistics.rank_tests import Paired, friedman, global_permutation, paired
+from study_app.analysis.statistics.slope_tests import HOTELLING, T_TEST, SlopeTest, slope_test
 from study_app.analysis.statistics.trend import trend
+from study_app.analysis.wording import all_of, counted, interval, listed, number, p_equals, p_value, significant
 
-ONE_DELAY: Final = "the block has one delay: there is nothing to compare it with"
+ONE_DELAY: Final = "the block has only one delay, so there is nothing to compare it with"
 
 
 def table_of_tests(
@@ -65,10 +59,12 @@ def table_of_tests(
     reasons = dict.fromkeys(one.no_interval for one in outcomes if one.no_interval)
     methods = dict.fromkeys(one.method for one in outcomes if one.p is not None)
     family = dict.fromkeys(
-        f"{one.members} in the family “{one.family}”, p adjusted by {one.correction}" for one in tests
+        f"p adjusted by {one.correction} over {number_text.counted(one.members, 'test')} (“{one.family}”)"
+        for one in tests
     )
     two = isinstance(first.outcome, Paired) and len(compared) == 2
-    above = f", above 0 where {compared[0]} was rated higher than {compared[1]}" if two else ""
+    above = f", above 0 if {compared[0]} was rated higher than {compared[1]}" if two else ""
+    exact = f" ({'; '.join(methods)})" if methods else ""
     yield heading(3, title)
     yield table_of(
         tests,
@@ -84,13 +80,12 @@ def table_of_tests(
         last=1,
     )
     yield paragraph(
-        f"{test_name(first.outcome)}; effect: {first.outcome.effect_name}{above}. "
-        f"Found by: {'; '.join(methods) or 'none'}. {'; '.join(family)}. "
-        + (f"Intervals: 95 %, {'; '.join(intervals)}." if intervals else ""),
+        f"Test: {test_name(first.outcome)}{exact}; {'; '.join(family)}. Effect: "
+        f"{first.outcome.effect_name}{above}." + (f" Intervals: 95 %, {'; '.join(intervals)}." if intervals else ""),
         "soft",
     )
     if reasons and not intervals:
-        yield paragraph(f"Intervals: {'; '.join(reasons)}.", "soft")
+        yield paragraph(f"{'; '.join(map(number_text.capitalised, reasons))}.", "soft")
 
 
 def _verdict(one: Tested) -> str:
@@ -101,19 +96,19 @@ def families(tests: Sequence[Tested]) -> str:
     """Return what is corrected together: primary statements, and apart from them the exploratory ones."""
     each = sorted({(not one.primary, one.members, one.correction) for one in tests})
     several = len(each) > 1
-    return "p adjusted " + listed(
+    return "with p adjusted " + listed(
         [
-            f"over {counted(members, 'statement')} by {correction}"
-            + (f" ({'exploratory' if exploratory else 'primary'})" if several else "")
+            f"by {correction} over {counted(members, f'{kind} statement')}"
             for exploratory, members, correction in each
+            for kind in [("exploratory" if exploratory else "primary") if several else ""]
         ]
-    )
+    ).replace("  ", " ")
 
 
 def compared(answers: BlockAnswers) -> tuple[tuple[Tested, ...], Absent]:
     """Test in every statement whether the settings are answered alike."""
     if answers.k < 2:
-        return (), (NotTested("test of settings", "the block has one setting: there is nothing to compare it with"),)
+        return (), (NotTested("test of settings", "the block has only one setting, so there is nothing to compare"),)
     outcomes = {item: _alike(answers, values) for item, values in answers.values.items()}
     return judged(outcomes, answers, f"{answers.block.id}: settings differ"), ()
 
@@ -124,12 +119,12 @@ def _alike(answers: BlockAnswers, values: Any) -> Outcome:
     return friedman(values, draws=answers.draws, seed=answers.seed)
 
 
-def mixed_models(answers: BlockAnswers) -> dict[str, Mixed]:
-    """Return the model of every statement: slopes over the delay, or effects of the settings against the first."""
+def slope_tests(answers: BlockAnswers) -> dict[str, SlopeTest]:
+    """Return the test of means of every statement: slopes over the delay, or differences from the first setting."""
     over_delay = answers.block.kind == "delays"
     columns = np.array(answers.block.delays_ms)[:, None] / 100 if over_delay else None
     return {
-        item: mixed(values, columns, answers.decided.direction(item) if over_delay else None)
+        item: slope_test(values, columns, answers.decided.direction(item) if over_delay else None)
         for item, values in answers.values.items()
     }
 
@@ -179,8 +174,8 @@ class SettingsDiffer(StatementTests):
         if tests := self.value:
             one = _first_tested(tests)
             yield (
-                f"Each statement was tested by {test_name(one.outcome)} ({one.outcome.method}), with "
-                f"{one.outcome.effect_name} as the effect, {families(tests)}."
+                f"Each statement was tested by {test_name(one.outcome)} ({one.outcome.method}), {families(tests)}; the "
+                f"effect size is {one.outcome.effect_name}."
             )
 
 
@@ -199,7 +194,7 @@ class DelayTrend(StatementTests):
     waits = ("delays",)
     statements = True
     asks = "answers follow the delay"
-    title = "Do answers follow the delay?"
+    title = "Do answers show a trend over the delay?"
 
     @classmethod
     def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
@@ -207,7 +202,7 @@ class DelayTrend(StatementTests):
             return (), (NotTested(cls.what, ONE_DELAY),)
         outcomes: Mapping[str, Outcome]
         if answers.decided.trends == "slopes":
-            outcomes = mixed_models(answers)
+            outcomes = slope_tests(answers)
         else:
             outcomes = {
                 item: trend(values, answers.decided.direction(item), seed=answers.intervals)
@@ -217,16 +212,19 @@ class DelayTrend(StatementTests):
 
     def methods(self) -> Iterator[str]:
         if trends := self.value:
-            stated = "beforehand" if self.results.decided.binding else "by the protocol"
-            by = TRENDS[self.results.decided.trends]
-            if self.results.decided.trends == "ranks":
+            decided = self.results.decided
+            by, sides = TRENDS[decided.trends], [decided.direction(one.item) is not None for one in trends]
+            if decided.trends == "ranks":
                 by += f" ({_first_tested(trends).outcome.method.split(',')[0]})"
+            stated = "before the first session" if decided.binding else "by the protocol"
+            one_sided = f"one-sided in the direction stated {stated}" if all(sides) else "two-sided"
+            if any(sides) and not all(sides):
+                one_sided = f"one-sided if a direction was stated {stated}, otherwise two-sided"
+            yield f"Trends over the delay were tested by {by}, {one_sided}, {families(trends)}."
             yield (
-                f"Trends over the delay were tested by {by}, which is about the population, one-sided where a "
-                f"direction was stated {stated}, {families(trends)}; where a trend showed, the rank correlations were "
-                "tested again without the longest delay until none showed, which gives an upper bound of the lowest "
-                "delay that is noticed (every step at alpha over the number of statements, so that the error rate "
-                "holds over all of them)."
+                "If a statement showed a trend, the longest delay was dropped and its rank correlations were tested "
+                "again until no trend remained. The shortest delay with a trend requires p ≤ alpha divided by the "
+                "number of statements at every step, and is an upper bound of the delay that participants notice."
             )
 
 
@@ -259,7 +257,7 @@ class SessionsDiffer(StatementTests):
         ungated = replace(answers, gate=0.0)  # sessions may differ where settings do not
         tested = in_family(outcomes, ungated, f"{answers.block.id}: sessions", false_discovery, FDR, primary=False)
         if all(one.outcome.n == 0 for one in tested):
-            return (), (NotTested(cls.what, f"no one answered the same setting in all of sessions {numbers}"),)
+            return (), (NotTested(cls.what, "no participant answered the same setting in all sessions"),)
         return tested, ()
 
 
@@ -307,20 +305,20 @@ class OverAll(Finding[Outcome | None]):
         if (overall := self.value) is None:
             return
         if overall.p is None:
-            yield paragraph(f"One test over all statements: none ({overall.note}).")
+            yield paragraph(f"Test over all statements: not possible ({overall.note}).")
             return
         yield paragraph(
-            f"One test over all statements: {statistic(overall)}, {p_equals(overall.p)} (smallest attainable "
-            f"{p_value(overall.smallest_p)}; {overall.method}), {overall.effect_name} {number(overall.effect)}, "
+            f"Test over all statements: {statistic(overall)}, {p_equals(overall.p)} ({overall.method}; smallest "
+            f"attainable {p_equals(overall.smallest_p or 0.0)}), {overall.effect_name} {number(overall.effect)}, "
             f"n = {overall.n}."
         )
 
     def methods(self) -> Iterator[str]:
-        if self.value is not None and not self.found.delays_ms:
+        if self.value is not None:
             yield (
-                f"The {settings_noun(self.found)}s were compared over {all_of(len(self.found.items), 'statement')} at "
-                "once by permuting them within participants, the statistic being the sum of the statements' Friedman "
-                "statistics."
+                f"First, the {settings_noun(self.found)}s were compared over "
+                f"{all_of(len(self.found.items), 'statement')} together by permutation within participants; the "
+                "statistic was the sum of the statements' Friedman statistics."
             )
 
 
@@ -385,10 +383,10 @@ class Effects(Finding[tuple[Effect, ...]]):
         if not any(settings for _, settings in rows):
             return None
         caption = (
-            f"Mean difference of answers from those to {first} ({drawing.simulated}n = "
-            f"{counted(found.n, 'participant')}). Lines: Student's 95 % interval, not corrected for their number; no "
-            "line where all differences are equal. What is shown is decided by the tests below."
-            + (f" Grey: the bound of equivalence, ±{bound:g}." if bound else "")
+            f"Mean difference between the answers to each setting and those to {first} ({drawing.simulated}"
+            f"n = {found.n}). Lines: Student's 95 % interval, not corrected for the number of intervals; no line if "
+            "all differences are equal. The tests below decide what is shown."
+            + (f" Grey: the equivalence bound, ±{bound:g}." if bound else "")
         )
         draw = partial(answer_figures.draw_effects, rows, bound, f"Difference from {first}, points of the scale")
         return drawing.picture(self.figure_title, caption, draw, (counted(found.n, "participant"),))
@@ -418,9 +416,9 @@ def pairs_of(answers: BlockAnswers, omnibus: tuple[Tested, ...]) -> tuple[tuple[
         return (), ()
     if (corrected := smallest_of_pairs(k, n)) > alpha:
         why = (
-            f"{number_text.counted(n, 'participant')} cannot show it: the smallest p that "
-            f"{number_text.counted(n, 'pair')} can give is {smallest_of_pairs(2, n):.4g}, after Holm's correction over "
-            f"{math.comb(k, 2)} pairs {corrected:.4g}, which is above {alpha:g}"
+            f"{number_text.counted(n, 'participant')} cannot show a difference between two settings: the smallest "
+            f"attainable p is {p_value(smallest_of_pairs(2, n))}, and {p_value(corrected)} after Holm's correction "
+            f"over {math.comb(k, 2)} pairs, which is above {significant(alpha)}"
         )
         return (), (NotTested(Pairs.what, why),)
     opened = [one.item for one in omnibus if one.verdict in ("shown", "suggested")]
@@ -463,7 +461,7 @@ class Pairs(Finding[tuple[Pair, ...]]):
     def section(self) -> Iterator[str]:
         if not (pairs := self.value):
             return
-        yield heading(3, "Which of them differ?")
+        yield heading(3, f"Which {settings_noun(self.found)}s differ?")
         yield table_of(
             pairs,
             ("Statement", lambda one: short(self.found, one.tested.item)),
@@ -480,20 +478,21 @@ class Pairs(Finding[tuple[Pair, ...]]):
             last=1,
         )
         yield paragraph(
-            "Wilcoxon's signed ranks, exact, only in statements that differ as a whole; above 0 the first of a pair "
-            f"was rated higher. p adjusted by Holm over all {pairs[0].tested.members} pairs of this table. "
-            f"{pairs[0].tested.outcome.method}. Intervals: 95 %, Fisher z, which cover about 90 % up to two dozen "
-            "pairs; none where all pairs that differ went one way, since −1 and 1 are the ends of the scale, nor below "
-            "six pairs that differ.",
+            "Test: Wilcoxon's signed-rank test, only in statements that show a difference between the "
+            f"{settings_noun(self.found)}s; {pairs[0].tested.outcome.method}; p adjusted by Holm over the "
+            f"{pairs[0].tested.members} pairs of this table. A rank-biserial correlation above 0 means that the first "
+            "of a pair was rated higher. Intervals: 95 %, by Fisher's z; with up to two dozen pairs they cover about "
+            "90 %. There is no interval if all pairs that differ went one way, because −1 and 1 are the ends of the "
+            "scale, or if fewer than six pairs differ.",
             "soft",
         )
 
     def methods(self) -> Iterator[str]:
         if self.value:
             yield (
-                "Where these showed a difference, pairs were compared by Wilcoxon's signed ranks (exact; equal pairs "
-                "left out) with the matched rank-biserial correlation, Holm-adjusted over all pairs of all these "
-                "statements."
+                "If a statement showed a difference, pairs were compared by Wilcoxon's signed-rank test (exact; equal "
+                "pairs left out), with p adjusted by Holm over all pairs of all such statements; the effect size is "
+                "the matched rank-biserial correlation."
             )
 
 
@@ -510,15 +509,15 @@ def _pair_interval(pair: Pair) -> str:
     return f"– (all {_differing(pair)} one way)" if one_way else interval(outcome.interval)
 
 
-class MixedModel(StatementTests):
-    """The linear mixed model of every statement: exploratory, unless it is the planned test of trends."""
+class MeanTests(StatementTests):
+    """The test of means of every statement: exploratory, unless it is the planned test of trends."""
 
     key = "mixed"
     place = 13
     row_place = 5
-    what = "mixed model"
-    asks = "settings differ, mixed model"
-    title = "Mixed model"
+    what = "test of means"
+    asks = "means differ"
+    title = "Do mean answers differ? (exploratory)"
 
     @classmethod
     def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
@@ -526,26 +525,36 @@ class MixedModel(StatementTests):
             return (), (NotTested(cls.what, ONE_DELAY if answers.block.kind == "delays" else "there is one setting"),)
         if answers.block.kind == "delays" and answers.decided.trends == "slopes":
             return (), ()  # it is the test of trends
-        family = f"{answers.block.id}: mixed model"
-        return in_family(mixed_models(answers), answers, family, false_discovery, FDR, primary=False), ()
+        family = f"{answers.block.id}: means"
+        return in_family(slope_tests(answers), answers, family, false_discovery, FDR, primary=False), ()
 
     def section(self) -> Iterator[str]:
         yield from super().section()
-        per = "per 100 ms of delay" if self.found.delays_ms else "against the first"
         effects = [
             f"{short(self.found, one.item)}: "
             + listed([f"{number(slope)} {interval(ends)}" for slope, ends in zip(it.slopes, it.intervals, strict=True)])
             for one in self.value
-            if isinstance(it := one.outcome, Mixed) and it.slopes
+            if isinstance(it := one.outcome, SlopeTest) and it.slopes
         ]
         if effects:
-            yield paragraph(f"Slopes in points {per}, with 95 % intervals: {'; '.join(effects)}.", "soft")
+            what = "Slopes per 100 ms of delay" if self.found.delays_ms else "Differences from the first setting"
+            yield paragraph(f"{what}, in points, with 95 % intervals: {'; '.join(effects)}.", "soft")
+
+    @classmethod
+    def tested(cls, found: BlockResult) -> bool:
+        """Return whether any statement of a block was tested."""
+        return any(one.outcome.p is not None for one in cls.of(found))
 
     @classmethod
     def common_methods(cls, blocks: Sequence[BlockResult]) -> Iterator[str]:
-        if any(one.outcome.p is not None for found in blocks for one in cls.of(found)):
+        tests = {one.outcome.test for found in blocks for one in cls.of(found) if one.outcome.p is not None}
+        if tests:
+            how = {
+                HOTELLING: "differences between the settings were tested by Hotelling's T²",
+                T_TEST: "the participants' own slopes were tested by Student's t",
+            }
+            words = listed([how[test] for test in how if test in tests])
             yield (
-                "Besides, answers as numbers were fitted by linear mixed models with a random intercept and random "
-                "slopes of each participant (t of the mean slope, Hotelling's T²), corrected by their false discovery "
-                "rate and exploratory."
+                f"In an exploratory analysis, the answers were treated as numbers: {words}, in the participants who "
+                "answered under all settings; the false discovery rate was controlled (Benjamini–Hochberg)."
             )

@@ -9,17 +9,18 @@ from typing import Final
 
 from pydantic import TypeAdapter
 
-from study_app import __version__
+from study_app import __version__, number_text
 from study_app.analysis.contrasts import LEFT_OUT, RATIOS, equality_limits
 from study_app.analysis.data.blocks import SPENDINGS, TRENDS, Decided, decisions, spoken
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.html_page import bullets, heading, paragraph
 from study_app.analysis.levels.thresholds import FAMILIES, REMOVED
 from study_app.analysis.planning.simulated_studies import compares_statements
-from study_app.analysis.results import counted, least, listed
+from study_app.analysis.results import least
 from study_app.analysis.statistics.equivalence import fewest
 from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.statistics.thresholds import FEWEST
+from study_app.analysis.wording import counted, listed, percent, significant
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block
 from study_app.protocol.describe import describe, limit_rows
@@ -98,13 +99,16 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
         stimuli = {block.id: stimulus_of(protocol, block) for block in protocol.main_blocks if block.stimulus}
         words = contrast.words({block: condition_of(protocol, stimulus) for block, stimulus in stimuli.items()})
         ratio = contrast.measure in RATIOS and all(stimuli[block].spacing == "log" for block in contrast.blocks)
+        test = _test_of(contrast, " of logarithms" if ratio else "")
         yield (
-            f"Hypothesis: {contrast.described(words)}. Test: {_test_of(contrast)} of "
-            f"{'the logarithm of ' if ratio else ''}one number of each participant, "
-            f"{'weighted as in the group mean, ' if contrast.measure == 'threshold' else ''}"
-            f"{'two-sided' if contrast.expected is None else 'one-sided'}, with which the bootstrap must agree, "
-            f"corrected by Holm over all contrasts. {LEFT_OUT}{_equality_of(protocol, contrast)}"
+            f"Hypothesis: {contrast.described(words)}. We test it by a {test} "
+            f"({'two-sided' if contrast.expected is None else 'one-sided'}"
+            f"{', weighted as in the group mean' if contrast.measure == 'threshold' else ''}), with one number of each "
+            "participant. A bootstrap that adds a participant like the most extreme one must agree. p is adjusted by "
+            f"Holm over all hypotheses of this kind.{_equality_of(protocol, contrast)}"
         )
+    if protocol.analysis is not None and protocol.analysis.contrasts:
+        yield LEFT_OUT
     for block in protocol.main_blocks:
         if block.design is not None:
             yield from _of_intervals(protocol, block)
@@ -114,11 +118,11 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
         yield f"Published value to compare with: {one.described()}."
 
 
-def _test_of(contrast: Contrast) -> str:
+def _test_of(contrast: Contrast, of: str) -> str:
     """Return the t test of a contrast."""
     if contrast.groups is None:
-        return "paired t test"
-    return "t test of two groups with unequal variances and the degrees of freedom of the smaller one"
+        return f"paired t test{of}"
+    return f"t test{of} of two groups with unequal variances and the degrees of freedom of the smaller group"
 
 
 def _equality_of(protocol: Protocol, contrast: Contrast) -> str:
@@ -129,8 +133,9 @@ def _equality_of(protocol: Protocol, contrast: Contrast) -> str:
     reach, largest = equality_limits(contrast, contrast.bound, ratio=contrast.measure in RATIOS)
     alpha = decisions(protocol).alphas[-1] / bounds
     return (
-        f" Equality: two one-sided t tests and the bootstrap, corrected by Holm over {counted(bounds, 'bound')}, with "
-        f"at least {fewest(alpha, reach, largest)} participants{' in each group' if contrast.groups else ''}."
+        " We test equivalence by two one-sided t tests and the bootstrap, adjusted by Holm over "
+        f"{number_text.counted(bounds, 'bound')}; it requires at least {fewest(alpha, reach, largest)} "
+        f"participants{' in each group' if contrast.groups else ''}."
     )
 
 
@@ -148,7 +153,7 @@ def _of_intervals(protocol: Protocol, block: Block) -> Iterator[str]:
         return
     at = f" at {listed([f'{one:g}' for one in standards])} {unit}".rstrip() if standards else ""
     kind = "Weber fraction" if stimulus.level_kind == "weber" else "threshold"
-    yield f"Block {block.id}: what is the {kind} of {what}{at}? An estimate with its interval; no test."
+    yield f"Block {block.id}: what is the {kind} of {what}{at}? We estimate it with its interval and do not test it."
     if len(standards) > 1:
         yield (
             f"Block {block.id}: is the just-noticeable difference proportional to the standard (exponent 1, Weber's "
@@ -167,10 +172,14 @@ def _of_statements(protocol: Protocol, block: Block, language: str) -> Iterator[
                 moves = "rises" if name in decided.rising else "falls"
                 yield f"Hypothesis, block {block.id}: agreement with “{words}” ({name}) {moves} with the delay."
         if decided.noticed in texts:
-            yield f"Block {block.id}: from which delay on is it noticed (agreement, 5 to 7, with {decided.noticed})?"
+            yield (
+                f"Block {block.id}: at which delay do participants notice a difference (agreement, 5 to 7, with "
+                f"{decided.noticed})?"
+            )
         if decided.equivalence_bound is not None:
             yield (
-                f"Block {block.id}: which delays are equivalent to none, within ±{decided.equivalence_bound:g} points?"
+                f"Block {block.id}: which delays are equivalent to the shortest one, within "
+                f"±{decided.equivalence_bound:g} {'point' if decided.equivalence_bound == 1 else 'points'}?"
             )
         return
     primary = [name for name in texts if not decided.primary or name in decided.primary]
@@ -180,7 +189,7 @@ def _of_statements(protocol: Protocol, block: Block, language: str) -> Iterator[
     )
     labels = [f"{name} by {one.label}" for name, one in protocol.conditions.items() if one.label in texts]
     if labels and protocol.analysis is not None:
-        yield f"Block {block.id}: are the liquids recognised ({listed(labels)}) more often than by chance?"
+        yield f"Block {block.id}: are the liquids recognised above chance ({listed(labels)})?"
 
 
 def analyses(protocol: Protocol) -> Iterator[str]:
@@ -191,23 +200,27 @@ def analyses(protocol: Protocol) -> Iterator[str]:
             stimulus, design = stimulus_of(protocol, block), design_of(protocol, block)
             method, family = method_of(protocol, block), FAMILIES[assumed_for(stimulus, design).family]
             yield (
-                f"Block {block.id} ({design.paper_name}, {method.paper_name}): for each participant and standard the "
-                f"posterior median of the threshold ({family} function) with its "
-                "equal-tailed 95 % interval, at the delivered levels; the median under a flat prior of the width is "
-                "reported, too; goodness of fit by 999 simulated sets of answers, drift over trials."
+                f"Block {block.id} ({design.paper_name}, {method.paper_name}): for each participant and standard we "
+                f"estimate the threshold by the posterior median ({family} function) with its equal-tailed 95 % "
+                "interval, at the delivered levels, and also report the median under a flat prior on the width. "
+                "Goodness of fit is tested with 999 simulated sets of answers; drift over trials is reported."
                 + (f" {REMOVED.format('is', 'is')}" if design.kind == "2ifc" else "")
             )
             yield (
-                f"Block {block.id}, group: random-effects mean of logarithmic thresholds (Paule–Mandel) with the "
-                f"Hartung–Knapp 95 % interval from {FEWEST} participants on, each variance as its geometric mean with "
-                "the median."
+                f"Block {block.id}, group: the random-effects mean of logarithmic thresholds (Paule–Mandel) with the "
+                f"Hartung–Knapp 95 % interval, if there are at least {FEWEST} participants. Each variance is replaced "
+                "by its geometric mean with the median of all variances."
             )
             if plan.standards > 1:
-                yield f"Block {block.id}, exponent: slope of ln JND over ln standard of each participant, t interval."
+                yield (
+                    f"Block {block.id}, exponent: the slope of ln JND over ln standard of each participant, with "
+                    "Student's interval."
+                )
         elif block.design is not None and block.stimulus is not None:
             yield (
-                f"Block {block.id}: answers at each level, as means of participants' (of logarithms, where numbers are "
-                "estimated; the exponent is the slope over the logarithm of the level) with Student's 95 % interval."
+                f"Block {block.id}: we report the mean over participants of their mean answers at each level, with "
+                "Student's 95 % interval (of logarithms if numbers are estimated; the exponent is the slope over the "
+                "logarithm of the level)."
             )
             if design_of(protocol, block).reply == "rating":
                 yield f"Block {block.id}: d_a of each level against the lowest, from the area under the ROC curve."
@@ -220,26 +233,26 @@ def analyses(protocol: Protocol) -> Iterator[str]:
     kinds = {protocol.compared_in(block.id) for block in asked}
     if "delays" in kinds:
         yield (
-            f"Delays: a trend in the population, by {TRENDS[decided.trends]}, one-sided in the stated direction, "
-            "otherwise two-sided; where a trend shows, rank correlations are tested again without the longest delay "
-            f"until none shows; {_equivalence_words(decided)}the detection threshold from agreement, where it shows a "
-            "trend."
+            f"Delays: we test trends by {TRENDS[decided.trends]}, one-sided if a direction is stated, otherwise "
+            "two-sided. If a statement shows a trend, we drop the longest delay and test the rank correlations again "
+            f"until no trend remains. {_equivalence_words(decided)}We estimate the detection threshold from agreement "
+            "if agreement shows a trend."
         )
     if others := kinds - {None, "delays"}:
         yield (
-            f"{' and '.join(sorted(map(str, others))).capitalize()}: Friedman's permutation test of each statement, "
-            "signed ranks where two conditions are compared."
+            f"{' and '.join(sorted(map(str, others))).capitalize()}: we test each statement by Friedman's permutation "
+            "test, and two conditions by Wilcoxon's signed-rank test."
         )
     yield (
-        "A statement counts only where the permutation test over all statements of its block shows a difference, "
-        "corrected by Holm over the blocks; the report's first page states only what counts. Contrasts are corrected "
-        f"by Holm among themselves. Bootstrap intervals and mixed models take at least {FEW} participants."
+        "A difference in a statement is claimed only if the permutation test over all statements of its block is "
+        "significant, adjusted by Holm over the blocks. Intervals of mean rank correlations and exploratory tests of "
+        f"means require at least {FEW} participants."
     )
     yield (
-        f"α = {decided.alpha:g}; primary statements ({', '.join(decided.primary) or 'all'}) are corrected by Holm, the "
-        "others, exploratory, by Benjamini and Hochberg."
+        f"α = {decided.alpha:g}. p values of primary statements ({', '.join(decided.primary) or 'all'}) are adjusted "
+        "by Holm, those of other statements, which are exploratory, by Benjamini and Hochberg."
         if protocol.analysis is not None
-        else "Nothing is decided (there is no table [analysis]): all results are exploratory."
+        else "There is no table [analysis], so all results are exploratory."
     )
 
 
@@ -248,8 +261,8 @@ def _equivalence_words(decided: Decided) -> str:
     if (bound := decided.equivalence_bound) is None:
         return ""
     return (
-        "equivalence to no delay by two one-sided tests, with which the bootstrap must agree, with "
-        f"{least(decided.alphas[-1], bound)}; "
+        "We test equivalence to the shortest delay by two one-sided tests with which the bootstrap must agree; it "
+        f"requires {least(decided.alphas[-1], bound)}. "
     )
 
 
@@ -303,47 +316,55 @@ def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = 
 def _design(protocol: Protocol) -> Iterator[str]:
     study = protocol.study
     yield (
-        "Conditions are known by codes until the key is opened; double-blind: the operator sees no force."
-        if study.blinding == "double"
-        else "Conditions are known by codes until the key is opened; the operator sees force and wake (single-blind)."
+        "Conditions are known only by codes until the key is opened. The study is "
+        + (
+            "double-blind: the operator sees no force."
+            if study.blinding == "double"
+            else "single-blind: the operator sees force and wake."
+        )
     )
-    shares = ", ".join(f"{name} (share {share})" for name, share in protocol.shares.items())
+    names, ratio = listed(list(protocol.shares)), ":".join(map(str, protocol.shares.values()))
     if protocol.randomises:
-        yield f"Participants are assigned at random, in permuted blocks, to the groups {shares}."
+        yield (
+            f"Participants are randomised in permuted blocks to the groups {names}, with an allocation ratio of "
+            f"{ratio}."
+        )
     elif protocol.asks_group:
         yield (
-            f"Participants belong to a group by an existing attribute ({shares}), which is recorded at the start of "
-            "their first session. Groups are not randomised, so a difference between them may have other causes."
+            f"Participants belong to the groups {names} by an existing attribute, which is recorded at the start of "
+            f"their first session; the planned ratio is {ratio}. Groups are not randomised, so a difference between "
+            "them may have other causes."
         )
     for group, words in block_orders_by_group(protocol).items():
-        yield f"Order of blocks{f' in group {group}' if group else ''} {words}."
-    yield "Orders are drawn for each participant from the session's seed, as described for each block below."
+        yield f"The order of blocks{f' in group {group}' if group else ''} is {words}."
+    yield "Orders of trials are drawn for each participant from the session's seed, as described for each block below."
     for block in protocol.main_blocks:
         rows = dict(precision_rows(protocol, block))
         kind = "levels" if block.stimulus is not None else "conditions"
-        of_block = f"Block {block.id}: {kind}, see below"
-        yield f"{of_block}; expected: {rows['Expected precision']}." if rows else f"{of_block}."
+        yield f"Block {block.id} compares {kind}, which are described below." + (
+            f" Expected precision: {rows['Expected precision']}." if rows else ""
+        )
 
 
 def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Iterator[str]:
     """Yield how many participants there are and why."""
-    planned = "Their number is not decided: there is no stopping rule."
+    planned = "The number of participants is not decided, and there is no stopping rule."
     if one.participants is not None:
         decided = decisions(protocol)
         planned = (
-            f"{one.participants} are planned. The study ends when so many sessions that count are complete; the key is "
-            "opened, and anything tested, only then."
+            f"We plan {number_text.counted(one.participants, 'participant')}. The study ends when as many valid "
+            "sessions are complete; only then is the key opened and anything tested."
             if not decided.looks
-            else f"{one.participants} are planned. The key is opened, and everything tested, when "
-            f"{listed([str(look) for look in decided.looks])} sessions that count are complete; an adjusted p of at "
-            f"most {listed([f'{level:.2g}' for level in decided.alphas])} is significant there "
-            f"({SPENDINGS[decided.spending]} spending of alpha, Lan and DeMets 1983). The study ends at the first look "
-            "at which all primary statements and contrasts are shown, otherwise at the last one."
+            else f"We plan {one.participants} participants. The key is opened and everything is tested when "
+            f"{listed([str(look) for look in decided.looks])} valid sessions are complete; adjusted p values up to "
+            f"{listed([significant(level) for level in decided.alphas])} are significant at these looks "
+            f"({SPENDINGS[decided.spending]} spending of alpha, Lan & DeMets 1983). The study ends at the first look "
+            "at which all primary statements and hypotheses are shown, and otherwise at the last look."
         )
     wanted = (
         ""
         if one.precision is None
-        else f" The aim is a 95 % interval of the group's mean within ±{100 * one.precision:g} %."
+        else f" The aim is a 95 % interval of the group mean within ±{percent(one.precision)}."
     )
     yield planned + wanted
     reasons = []
@@ -354,12 +375,13 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
         reached = ""
         if one.participants is not None:
             half = 100 * found.of_group(one.participants)
-            reached = f" {one.participants} participants give ±{half:.0f} %."
+            people = number_text.counted(one.participants, "participant")
+            reached = f" With {people} the expected precision is ±{half:.0f} %."
         needed = None if one.precision is None else found.participants_for(one.precision)
-        enough = "" if needed is None else f" The aim takes {counted(needed, 'participant')}."
+        enough = "" if needed is None else f" The aim needs at least {number_text.counted(needed, 'participant')}."
         reasons.append(
-            f"- Block {block.id}: from simulated answers, {found.trials} trials{plan.per}, people who differ by a "
-            f"factor of {BETWEEN_PEOPLE:g}.{reached}{enough}"
+            f"- Block {block.id}: we simulated {found.trials} trials{plan.per}, with thresholds that differ between "
+            f"people by a factor of {BETWEEN_PEOPLE:g}.{reached}{enough}"
         )
     if reasons:
         yield from ("", *reasons)
@@ -368,13 +390,13 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
     elif compares_statements(protocol):
         yield ""
         yield (
-            f"No power was computed for this text: `liquid-study power {protocol.study.name} --to DIR` computes it, "
+            f"Power was not computed for this text: `liquid-study power {protocol.study.name} --to DIR` computes it, "
             "and `--power DIR` includes it here."
         )
 
 
 def _exclusions(protocol: Protocol) -> Iterator[str]:
-    yield "Sessions that are not completed are left out of every number."
+    yield "Sessions that are not completed are not analysed."
     for block in protocol.main_blocks:
         if block.catch is not None:
             yield (
@@ -386,16 +408,17 @@ def _exclusions(protocol: Protocol) -> Iterator[str]:
     if has_intervals:
         attempts = protocol.limits.attempts
         times = "" if attempts is None else f", up to {attempts} times"
-        yield f"A trial of intervals beyond a limit is not asked about and is presented again{times}."
+        yield f"If a trial of intervals exceeds a limit, no question is asked and the trial is presented again{times}."
         if (permitted := protocol.limits.missing_percent) is not None:
             yield (
-                f'Rule "missing": at most {permitted:g} % of a session\'s main trials of intervals may stay unanswered '
-                "because no presentation was within the limits. A session with more is incomplete and is excluded."
+                f'Rule "missing": a session is excluded as incomplete if more than {permitted:g} % of its main trials '
+                "of intervals stay unanswered because no presentation was within the limits."
             )
     if any(block.design is None for block in protocol.main_blocks):
-        yield f"{'Other trials' if has_intervals else 'Trials'} beyond a limit are counted and reported."
+        trials = "Other trials" if has_intervals else "Trials"
+        yield f"{trials} beyond a limit are analysed, and their number is reported."
     yield f"Limits: {limits}."
-    yield "Any other exclusion is a deviation: the report lists it with its reason and date."
+    yield "Any other exclusion is a deviation from this preregistration; the report lists it with its reason and date."
 
 
 SHOWN = 20

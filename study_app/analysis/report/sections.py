@@ -6,9 +6,8 @@ from typing import Any, Final, NamedTuple
 
 from markupsafe import Markup
 
-from study_app import __version__
 from study_app.analysis.contrasts import answer, question
-from study_app.analysis.data.measures import QUARTILES, number_or_none
+from study_app.analysis.data.measures import number_or_none
 from study_app.analysis.data.motion import (
     OF_REACHES,
     OF_TRIALS,
@@ -18,14 +17,14 @@ from study_app.analysis.data.motion import (
     Performance,
 )
 from study_app.analysis.data.study_tables import By, Study, group_assignment, group_counts, group_means
-from study_app.analysis.figures.answer_figures import people_a_setting
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.finding import Answer, Finding
 from study_app.analysis.html_page import attempted, bullets, drawn, heading, paragraph, render, table, table_of
-from study_app.analysis.levels.evaluate import level_findings, level_limits, level_methods, level_section
+from study_app.analysis.levels.evaluate import level_findings, level_limits, level_section
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.planning.power_curves import interval as share_interval
 from study_app.analysis.questions import MEASURES
+from study_app.analysis.report.methods import late_exclusions
 from study_app.analysis.results import (
     VERDICTS_MEAN,
     BlockResult,
@@ -34,27 +33,21 @@ from study_app.analysis.results import (
     QuestionResult,
     Results,
     ScoreResult,
-    counted,
+    incomplete_words,
     lead,
-    listed,
     missing,
-    ms,
     name,
-    number,
     said_of_presentations,
     settings_noun,
     short,
 )
 from study_app.analysis.statistics.outcome import FEW
+from study_app.analysis.wording import counted, listed, ms, number, significant
 from study_app.discovery import by_name
 from study_app.protocol.orders.balance import Evenness
 from study_app.store.delivered import broken_limits
 from study_app.store.exclusions import named
 from study_app.store.missing_trials import MISSING_PERCENT, MissingTrials, limit_words
-from study_app.store.unblinding import RULES
-
-WITHOUT_FORCE: Final = {"mouse", "spacemouse"}
-"""The devices without force: reading results must not load their descriptors."""
 
 
 def of_levels(results: Results) -> tuple[str, ...]:
@@ -65,8 +58,8 @@ def of_levels(results: Results) -> tuple[str, ...]:
 def none_found(results: Results) -> str:
     """Return why there are no findings."""
     if results.blocks:
-        return "No answers count yet: there are no findings."
-    return "No statements were asked after trials, so nothing was tested; the answers are in the sections below."
+        return "No answers are included yet."
+    return "The study asks no statements after trials, so there are no tests; the sections below show the answers."
 
 
 def limits(study: Study, results: Results) -> tuple[str, ...]:
@@ -74,21 +67,21 @@ def limits(study: Study, results: Results) -> tuple[str, ...]:
     lines = list(_in_general(study, results))
     for found in results.blocks:
         if not found.n:
-            lines.append(f"{lead(found)}: no answers count yet, so that nothing can be said.")
+            lines.append(f"{lead(found)}: no answers are included yet.")
             continue
         lines += [f"{lead(found)}: {sentence}" for sentence in missing(found)]
         decisive = [one for finding in all_findings() if finding.statements for one in finding.of(found)]
         out = [f"“{short(found, one.item)}”" for one in decisive if one.verdict == "out of reach"]
         if out:
             lines.append(
-                f"{lead(found)}: so few participants, with the ties in their answers and the other p of the family as "
-                f"they came out, could not have shown anything in {listed(out)}, even had they all agreed."
+                f"{lead(found)}: the tests of {listed(out)} could not have been significant with so few participants: "
+                "no rearrangement of the answers within participants gives an adjusted p that is small enough."
             )
         untested: dict[str, list[str]] = {}
         for one in decisive:
             if one.verdict == "not tested":
                 untested.setdefault(one.outcome.note, []).append(f"“{short(found, one.item)}”")
-        lines += [f"{lead(found)}: {listed(items)} could not be tested: {why}." for why, items in untested.items()]
+        lines += [f"{lead(found)}: {listed(items)} could not be tested ({why})." for why, items in untested.items()]
         lines += _mixed_up(found, results)
         lines += [sentence for finding in all_findings() for sentence in finding(found, results).limits()]
     lines += [sentence for found in results.levels for sentence in level_limits(found)]
@@ -99,30 +92,31 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
     decided = results.decided
     if not study.revealed:
         yield (
-            "The key is sealed: settings are codes, and only counts and comparisons without an order are shown. Who "
-            "decides by them to go on or to stop makes chance findings likelier. Unblind in Results, or the command "
-            "liquid-study unblind RESULTS --by NAME --reason TEXT, opens it."
+            "The key is sealed: conditions appear as codes, and the report shows only counts and comparisons that do "
+            "not depend on their order. Using these numbers to decide whether to continue makes chance findings more "
+            "likely. To open the key, use Unblind in Results or the command liquid-study unblind RESULTS --by NAME "
+            "--reason TEXT."
         )
         if study.own_codes:
-            yield "A code means another setting for each participant until the key is open: no settings are compared."
+            yield "Until the key is open, each participant has other codes, so settings cannot be compared."
         if study.sites:
             yield (
-                "Each site has a key of its own: until the keys of all sites are open, the code of a setting begins "
-                "with its site, and settings of different sites cannot be compared."
+                "Each site has its own key: until the keys of all sites are open, the code of a setting begins with "
+                "its site, and settings of different sites cannot be compared."
             )
     if study.simulated:
-        yield "These participants were SIMULATED: nothing here is evidence about people."
+        yield "The participants were SIMULATED: this report is not evidence about people."
     if study.pilot:
-        yield "These are pilot sessions: nothing here belongs in the results of the study."
+        yield "These are pilot sessions: do not report them as results of the study."
     if not decided.made:
         yield (
-            "The protocol decided nothing about the analysis beforehand (it has no table [analysis]): everything "
-            "found is exploratory, and a reason to look again."
+            "The protocol states no decisions about the analysis (it has no table [analysis]), so all results are "
+            "exploratory."
         )
     elif decided.changed:
         yield (
-            "Not all sessions were run under the same decisions about the analysis: everything found is exploratory; "
-            "the first session's decisions are used."
+            "The decisions about the analysis changed between sessions, so all results are exploratory; those of the "
+            "first session are used."
         )
     if study.contents > len(study.versions):
         yield (
@@ -131,21 +125,21 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
         )
     if study.late:
         yield (
-            f"Decided after the key was opened, when the effect on the results could be seen: {_late(study)}. Compare "
-            "with the report of a copy in which `include` or `exclude` takes these decisions back."
+            f"Decided after the key was opened, when the effect on the results was visible: {late_exclusions(study)}. "
+            "Compare this report with that of a copy in which `include` or `exclude` reverses these decisions."
         )
     if study.n == 1:
-        yield "One participant: all results concern this person alone, and do not generalise to others."
+        yield "There is only one participant: the results do not generalise to other people."
     if study.n < FEW and results.blocks:
         people = counted(study.n, "participant")
         yield (
-            f"{people[:1].upper()}{people[1:]}: below {FEW} no bootstrap interval and no mixed model is given, since "
-            "they need more. An effect that is not shown here may well exist."
+            f"{people[:1].upper()}{people[1:]}: intervals of mean rank correlations and exploratory tests of means "
+            f"need at least {FEW}. An effect that is not shown here may well exist."
         )
 
 
 def _mixed_up(found: BlockResult, results: Results) -> Iterator[str]:
-    """Name the settings that everybody met at the same place, where more than one order was to be expected."""
+    """Name the settings that were in the same position for all participants, if several orders were expected."""
     counts = results.orders.get(found.id)
     if counts is None or counts.orders < 2 or len(counts.codes) < 2:
         return
@@ -153,176 +147,9 @@ def _mixed_up(found: BlockResult, results: Results) -> Iterator[str]:
         for code, count in zip(counts.codes, line, strict=True):
             if count == counts.orders:
                 yield (
-                    f"{lead(found)}: {name(found, code)} came at place {place} for everybody, so that what it did "
-                    "cannot be distinguished from the effect of that place."
+                    f"{lead(found)}: {name(found, code)} was in position {place} for all participants, so its effect "
+                    "cannot be distinguished from the effect of that position."
                 )
-
-
-def methods(study: Study, results: Results) -> str:
-    """Return the methods paragraph."""
-    return " ".join(sentence for sentence in _sentences(study, results) if sentence)
-
-
-def _sentences(study: Study, results: Results) -> Iterator[str]:
-    blocks = [found for found in results.blocks if found.n]
-    yield _sample(study)
-    yield _assignment(study)
-    yield _apparatus(study)
-    yield from level_methods(study.levels, results.levels)
-    yield _missing_sentence(study)
-    if blocks:
-        yield from _of_statements(study, results, blocks)
-    if blocks or results.levels:
-        ran, analysed = (f"liquid-study {listed(them)}" for them in (study.programs or [__version__], [__version__]))
-        yield f"Sessions and analysis: {ran}." if ran == analysed else f"Sessions: {ran}; analysis: {analysed}."
-
-
-def _of_statements(study: Study, results: Results, blocks: list[BlockResult]) -> Iterator[str]:
-    yield _presented(study, results)
-    quartiles = QUARTILES.replace(" (", ", ").rstrip(")")
-    yield (
-        f"Answers were given on scales of seven points and are taken as ordinal: medians, quartiles ({quartiles}), "
-        "never means, except in the test of equivalence, which concerns the mean difference, and in mixed models."
-    )
-    for found in blocks:
-        of_findings = (sentence for finding in all_findings() for sentence in finding(found, results).methods())
-        said = [sentence for sentence in (*said_of_presentations(found), *of_findings) if sentence]
-        if said and len(blocks) > 1:
-            yield f"{lead(found)}:"
-        yield from said
-    yield from _common(results, blocks)
-
-
-def _sample(study: Study) -> str:
-    people = counted(study.n, "participant")
-    kind = " (SIMULATED, no people)" if study.simulated else ""
-    out = study.left_out + len(study.excluded_sessions)
-    gone = f"; {counted(out, 'further session')} {'was' if out == 1 else 'were'} left out" if out else ""
-    under = ""
-    if study.blocks and study.n:
-        whole = all(set(people_a_setting(study, block).values()) == {study.n} for block in study.blocks)
-        under = ", each under all settings" if whole else _fewer_settings(study)
-    late = ""
-    if study.revealed and any(one.rule_or_person not in RULES for one in (*study.exclusions, *study.late)):
-        late = " Exclusions were decided while the key was sealed."
-        if study.late:
-            late = f" Decided after the key was opened: {_late(study)}."
-    return (
-        f"{people[:1].upper()}{people[1:]}{kind} took part in “{study.title}” (protocol {study.name}, "
-        f"{version_words(study)}){under}{gone}.{late}"
-    )
-
-
-def _assignment(study: Study) -> str:
-    """Return how participants came into groups; "" without groups."""
-    groups = listed([*study.protocol.get("groups", {})])
-    match group_assignment(study):
-        case "pre-existing":
-            return (
-                f"Participants were assigned to a group by an existing attribute ({groups}), recorded at the start of "
-                "the session; groups were not randomised."
-            )
-        case "randomised":
-            return f"Participants were randomised in permuted blocks to the groups {groups}."
-    return ""
-
-
-def _apparatus(study: Study) -> str:
-    """Return the devices, their force if any gives one, and how large ball and motion were, as receipts have it."""
-    used = study.participants.loc[study.participants["counted"], "device"].dropna()
-    names = sorted({str(name).partition(":")[0] for name in used} - {"answers-only"})
-    device, scene = study.protocol.get("device"), study.protocol.get("scene")
-    if not (device and scene and names):
-        return ""
-    force = f"forces computed at {device['rate_hz']:g} Hz and limited to {device['force_limit_n']:g} N, "
-    velocity = {None: "", "device": ", its velocity measured by the device"}.get(
-        study.estimator, f", its velocity estimated by {study.estimator}"
-    )
-    return (
-        f"Apparatus: {listed(names)}, {'without force, ' if WITHOUT_FORCE.issuperset(names) else force}a ball of "
-        f"{1000 * scene['body']['diameter_m']:g} mm that moves {scene['scale']:g} times as far as the hand{velocity}."
-    )
-
-
-def _fewer_settings(study: Study) -> str:
-    """Return that participants were not under all settings: how many, if exclusions of single trials are the cause."""
-    fewer: set[str] = set()
-    for block in study.blocks:
-        trials = study.trials[study.trials["counted"] & (study.trials["block"] == block.id)]
-        left = set(zip(trials["participant"], trials["code"], strict=True))
-        gone = study.excluded_trials(block)
-        fewer |= {who for who, code in zip(gone["participant"], gone["code"], strict=True) if (who, code) not in left}
-    if not fewer:
-        return ", not all of them under all settings"
-    people = counted(len(fewer), "participant")
-    return f"; {people} {'lacks' if len(fewer) == 1 else 'lack'} a setting, because single trials were excluded"
-
-
-def _late(study: Study) -> str:
-    """Return how many exclusions were decided, and how many reversed, after the key was opened."""
-    decided = sum(one in study.exclusions for one in study.late)
-    back = len(study.late) - decided
-    told = [f"{counted(decided, 'exclusion')} of {len(study.exclusions)}"] if decided else []
-    return listed([*told, *([f"the reversal of {counted(back, 'exclusion')}"] if back else [])])
-
-
-def version_words(study: Study) -> str:
-    """Return the versions of the protocol whose sessions are pooled."""
-    versions = study.versions
-    pooled = f"version {versions[0]}" if len(versions) == 1 else f"versions {listed(versions)}, pooled"
-    return f"{pooled}, in {study.contents} different files" if study.contents > len(versions) else pooled
-
-
-def _presented(study: Study, results: Results) -> str:
-    parts = []
-    for found in results.blocks:
-        noun = settings_noun(found)
-        order = study.protocol.get("blocks", {}).get(found.id, {}).get("order", "")
-        words = {
-            "fixed": "in one order for all",
-            "shuffled": "in an order drawn for each participant",
-            "constrained": "in a constrained order drawn for each participant",
-            "williams": "in the orders of a Williams design",
-            "latin": "in the orders of a Latin square",
-        }.get(order, "")
-        delays = f" ({listed([f'{delay:g}' for delay in found.delays_ms])} ms)" if found.delays_ms else ""
-        asked = f", each followed by {counted(len(found.items), 'statement')}"
-        parts.append(f"{counted(len(found.settings), noun)}{delays} {words}".strip() + asked)
-    blind = (
-        "they were known only by codes until the key was opened" if study.revealed else "they are known only by codes"
-    )
-    return f"The study presented {'; '.join(parts)}; {blind}."
-
-
-def _common(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
-    decided = results.decided
-    if decided.binding:
-        which = "all statements were primary" if not decided.primary else f"primary: {', '.join(decided.primary)}"
-        yield (
-            f"These decisions were made before the first session: alpha = {decided.alpha_words()}, {which}. "
-            "Different questions are not corrected for each other."
-        )
-    elif decided.changed:
-        yield (
-            "The decisions about the analysis changed between sessions, so all results are exploratory; the "
-            f"decisions of the first session were used (alpha = {decided.alpha_words()})."
-        )
-    elif decided.made:
-        yield decided.look_words(len(results.people))
-    else:
-        yield f"No decisions were made beforehand: all results are exploratory, with alpha = {decided.alpha:g}."
-    for finding in all_findings():
-        yield from finding.common_methods(blocks)
-    yield (
-        "Missing answers were never replaced; tests over several settings use participants who answered under all of "
-        "them, comparisons of two those who answered under both."
-    )
-    measured = results.performance
-    if measured is not None and measured.recorded:
-        yield (
-            "Movement times run from the lighting of a target to the entry that was held, from recordings at the rate "
-            "of the servo, the first reach of each trial left out."
-        )
 
 
 CLAIMS: Final[dict[int, tuple[int, int]]] = {5: (4, 2000), 12: (47, 3000), 24: (42, 3000)}
@@ -371,7 +198,7 @@ def answers(results: Results) -> tuple[Answer, ...]:
 def _answer(finding: Finding[Any]) -> Answer:
     """Return the answer of a finding."""
     if not finding.found.revealed:
-        return finding.answered("sealed", "This waits for the key to be opened: until then settings are codes.")
+        return finding.answered("sealed", "This question is answered after unblinding.")
     return finding.answer()
 
 
@@ -379,11 +206,11 @@ def empty_studies(participants: int) -> str:
     """Return in how many of a hundred empty studies the report claims something; ``participants`` take part."""
     n = min(CLAIMS, key=lambda size: abs(size - participants))
     claims, studies = CLAIMS[n]
-    share, low, high = (100 * one for one in (claims / studies, *share_interval(claims / studies, studies)))
+    share, low, high = (number(100 * one, 1) for one in (claims / studies, *share_interval(claims / studies, studies)))
     return (
-        f"Of simulated studies of three liquids and seven delays in which nothing differs, with {n} participants, "
-        f"a report claims a difference or a noticed delay in {share:.1f} of a hundred ({claims} of {studies} studies, "
-        f"95 % interval {low:.1f} to {high:.1f}; liquid-study validate-report)."
+        f"In {studies} simulated studies with {n} participants, three liquids, seven delays and no true effect, "
+        f"{share} % of the reports claimed a difference or a noticed delay ({claims} reports, 95 % interval {low} to "
+        f"{high} %; liquid-study validate-report)."
     )
 
 
@@ -394,7 +221,7 @@ def block(
     yield heading(2, lead(found))
     if not found.n:
         untested = any(one.block == found.id for one in results.failures)
-        none = paragraph("No answers count yet: there is nothing to test or to plot.")
+        none = paragraph("No answers are included yet.")
         yield bullets(missing(found)) if untested else none
         return
     held = Failures() if failures is None else failures
@@ -409,6 +236,8 @@ def _parts(
     """Yield what the parts of a block's section are, and how each is made."""
     if said := said_of_presentations(found):
         yield "presentations", lambda: [paragraph(" ".join(said))]
+    if found.incomplete:
+        yield "missing answers", lambda: [paragraph(incomplete_words(found), "soft")]
     effects, *others = all_findings()
     yield effects.what, effects(found, results, pictures).section
     yield "figure of answers", lambda: drawn(pictures, found.kind)
@@ -416,15 +245,15 @@ def _parts(
         yield finding.what or finding.figure_title, finding(found, results, pictures).section
     if found.absent:
         lines = [f"{line[:1].upper()}{line[1:]}" for line in missing(found)]
-        yield "what is not here", lambda: (heading(3, "What is not here, and why"), bullets(lines))
+        yield "what is not here", lambda: (heading(3, "What could not be computed, and why"), bullets(lines))
 
 
 def verdicts_mean(results: Results) -> Iterator[str]:
     """Yield what the words of verdicts mean, once for all tables; nothing where nothing was tested."""
     if not results.blocks:
         return
-    yield heading(2, "What the words of verdicts mean")
-    yield paragraph(VERDICTS_MEAN.format(alpha=f"{results.decided.alpha:.4g}"))
+    yield heading(2, "What the verdicts mean")
+    yield paragraph(VERDICTS_MEAN.format(alpha=significant(results.decided.alpha)))
 
 
 def counts_of_answers(results: Results) -> Iterator[str]:
@@ -527,13 +356,13 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
     states = Counter(map(str, study.participants["status"]))
     yield paragraph(
         f"{counted(len(study.participants), 'session').capitalize()}: "
-        f"{listed([f'{count} {status}' for status, count in states.most_common()])}. Counted: "
+        f"{listed([f'{count} {status}' for status, count in states.most_common()])}. The analysis includes "
         f"{counted(study.n, 'participant')}."
     )
     if study.sites:
         here = Counter(map(study.site_of, study.people))
-        people = listed([f"{site} with {counted(here[site], 'participant')}" for site in study.sites])
-        yield paragraph(f"Merged sites: {people}, counted.")
+        people = listed([f"{site} ({counted(here[site], 'participant')})" for site in study.sites])
+        yield paragraph(f"The results of these sites are merged: {people}.")
     if study.withdrawn:
         yield paragraph(f"{counted(study.withdrawn, 'participant').capitalize()} withdrew; their data were erased.")
     masked = Counter(map(str, study.participants["motors_masked"].dropna()))
@@ -547,8 +376,8 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         for one in study.exclusions
     ]
     if study.left_out:
-        gone.append(f"{counted(study.left_out, 'session')} not completed: left out of every number")
-    yield bullets(_first(gone)) if gone else paragraph("Nothing is excluded: every completed session counts whole.")
+        gone.append(f"{counted(study.left_out, 'session')} not completed: not in the analysis")
+    yield bullets(_first(gone)) if gone else paragraph("Nothing is excluded.")
     yield from _missing(study)
     if study.doubts:
         yield heading(3, "Files that are not as they were recorded")
@@ -573,10 +402,15 @@ def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
             yield _means(found, rows, by)
     if not results.blocks:
         return
+    compared = by == "group" and any(one.contrast.groups for one in results.contrasts)
+    tested = (
+        f"Differences between {by}s are tested only in the hypotheses."
+        if compared
+        else (f"Differences between {by}s are not tested.")
+    )
     preexisting = by == "group" and group_assignment(study) == "pre-existing"
     yield paragraph(
-        "Mean and standard deviation over participants, each with the mean of their answers. Differences between "
-        f"{by}s are described, not tested."
+        f"Mean and standard deviation over participants of each participant's mean answer. {tested}"
         f"{' Groups were not randomised, so a difference may have other causes.' * preexisting}",
         "soft",
     )
@@ -644,18 +478,6 @@ def _track(study: Study, block: str, code: str) -> str:
     return f"{titles.get(block, block)}, {code if setting is None or setting.condition is None else setting.condition}"
 
 
-def _missing_sentence(study: Study) -> str:
-    """Return how many trials of intervals were not delivered in the sessions that count, as a sentence."""
-    known = [one for one in study.participants.loc[study.participants["counted"], "missing"] if one is not None]
-    asked, count = sum(one.asked for one in known), sum(one.count for one in known)
-    if not study.levels or not asked:
-        return ""
-    if not count:
-        return "All main trials of intervals were delivered within the limits."
-    lost = f"{count} of {counted(asked, 'main trial')} {'was' if count == 1 else 'were'} lost"
-    return f"{lost} because no presentation was within the limits."
-
-
 def _first(lines: list[str]) -> list[str]:
     more = len(lines) - SHOWN
     return [*lines[:SHOWN], *([f"and {more} more, in report.json"] if more > 0 else [])]
@@ -678,7 +500,7 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
         results.delivered,
         ("Block", lambda one: blocks[one.block].title),
         ("Setting", lambda one: "all" if one.code is None else name(blocks[one.block], one.code)),
-        ("asked", shown(lambda one: "–" if one.delay_ms is None else ms(one.delay_ms))),
+        ("requested", shown(lambda one: "–" if one.delay_ms is None else ms(one.delay_ms))),
         ("achieved", shown(lambda one: "–" if one.achieved_ms is None else f"{number(one.achieved_ms, 1)} ms")),
         ("mean error", shown(lambda one: _signed_ms(one.error_mean_ms))),
         ("worst trial", shown(lambda one: _signed_ms(one.error_worst_ms))),
@@ -688,11 +510,12 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
     )
     limits = study.protocol.get("limits", {})
     yield paragraph(
-        "Age of what was drawn, less the delay asked for: mean over trials of each trial's mean, and the trial whose "
-        "mean was farthest off; on the program's clock, without the display's own latency. Within limits: "
-        + "; ".join(_limit(what, limit) for what, limit in limits.items())
-        + f". {_beyond(study, limits)}Trials beyond them are counted all the same, unless they are excluded above."
-        + ("" if study.revealed else " Until unblinding delay error and force withheld are sealed, and not judged."),
+        "Delay error is the age of the drawn position minus the requested delay. The table shows the mean over trials "
+        "and the trial with the largest mean error. Times are from the program's clock and do not include display "
+        "latency. "
+        + (f"Timing limits: {'; '.join(_limit(what, limit) for what, limit in limits.items())}. " if limits else "")
+        + f"{_beyond(study, limits)}Trials beyond a limit are included, unless they are excluded above."
+        + ("" if study.revealed else " Delay error and withheld force are sealed, and not judged, until unblinding."),
         "soft",
     )
 
@@ -706,7 +529,7 @@ def _beyond(study: Study, limits: Mapping[str, float]) -> str:
         return ""
     counts = Counter(limit for one in broken for limit in one)
     listed = ", ".join(f"{_limit(what, limits[what])} in {count}" for what, count in counts.items())
-    return f"{sum(map(bool, broken))} of {len(rows)} trials broke one: {listed}. "
+    return f"{sum(map(bool, broken))} of {len(rows)} trials exceeded a limit: {listed}. "
 
 
 def _limit(what: str, limit: float) -> str:
@@ -729,22 +552,22 @@ def _orders(results: Results) -> Iterator[str]:
     several = [(found, counts) for found, counts in several if counts.orders and len(counts.codes) >= 2]
     if not several:
         return
-    yield heading(3, "Orders as run")
+    yield heading(3, "Orders that were run")
     for found, counts in several:
         names = [name(found, code) if found.revealed else code for code in counts.codes]
         yield paragraph(f"{found.title}, {counted(counts.orders, 'order')}: {_evenness(counts)}")
         lines = enumerate(counts.positions, start=1)
-        yield table(("Place", *names), [[str(place), *map(str, line)] for place, line in lines])
-    yield paragraph("How often each setting came at each place of its block.", "soft")
+        yield table(("Position", *names), [[str(place), *map(str, line)] for place, line in lines])
+    yield paragraph("How often each setting was in each position of its block.", "soft")
 
 
 def _evenness(counts: Evenness) -> str:
     cells, after = [count for line in counts.positions for count in line], counts.after_another
-    places = f"a setting came at a place {min(cells)} to {max(cells)} times, so that settings and places mix unevenly"
+    places = f"positions were not balanced: each setting was {min(cells)} to {max(cells)} times in each position"
     if counts.positions_even:
-        places = f"each came at each place {counted(cells[0], 'time')}"
-    follows = f"one followed another {min(after)} to {max(after)} times" if not counts.follows_even else ""
-    return f"{places}; {follows or 'each followed each other one equally often'}."
+        places = f"each setting was in each position {counted(cells[0], 'time')}"
+    times = "equally often" if counts.follows_even else f"{min(after)} to {max(after)} times"
+    return f"{places}, and followed each other setting {times}."
 
 
 def motion(results: Results) -> Iterator[str]:
@@ -754,7 +577,7 @@ def motion(results: Results) -> Iterator[str]:
     yield heading(2, "Motion and force")
     measured = results.performance
     if measured is None:
-        yield paragraph("After unblinding: a thick liquid is known by its force, and a delay by the motion.")
+        yield paragraph("Shown after unblinding, because force and motion reveal liquids and delays.")
         return
     for found in results.blocks:
         measures = [one for one in (*OF_TRIALS, *OF_REACHES) if any(_of(measured, found, measure=one))]
@@ -765,19 +588,18 @@ def motion(results: Results) -> Iterator[str]:
             yield table(head, rows)
             if found.id not in measured.reaching:
                 yield paragraph(
-                    "No reaching task in this block: movement time, overshoot and submovements do not exist here.",
-                    "soft",
+                    "This block has no reaching task, and so no movement times, overshoots and submovements.", "soft"
                 )
             elif not measured.recorded_in(found.id):
-                yield paragraph("No measures of reaches in this block: none of its recordings could be read.", "soft")
+                yield paragraph("No recording of this block could be read, so it has no measures of reaches.", "soft")
     yield paragraph(_recordings(measured))
     yield bullets(
         f"{_label(measure)}: {words}." for measure, words in {**TRIAL_DEFINITIONS, **REACH_DEFINITIONS}.items()
     )
     yield paragraph(
-        "Median over participants (quartiles); each participant counts by his or her own median. Within limits: trials "
-        "that kept to the protocol's limits of timing, of those of which it is known; the others are in these numbers "
-        "too. These measures are described and not tested.",
+        "Median over participants (quartiles) of each participant's own median. Within limits: how many of the "
+        "measured trials met the protocol's timing limits. All trials are included in the other columns. These "
+        "measures are not tested.",
         "soft",
     )
 
@@ -817,14 +639,14 @@ def _label(measure: str) -> str:
 
 def _recordings(measured: Performance) -> str:
     if not measured.trials:
-        return "No trial that counts was one of reaching, so that there are no measures of reaches."
-    text = f"Reaches: from the recordings of {measured.recorded} of {measured.trials} trials of reaching"
+        return "The study has no reaching trials, and so no measures of reaches."
+    text = f"Measures of reaches are from the recordings of {measured.recorded} of {measured.trials} reaching trials"
     if measured.unread:
-        text += f"; of the others: {'; '.join(measured.unread)}"
+        text += f" (others: {'; '.join(measured.unread)})"
     if not measured.judged:
-        return f"{text}. Whether trials kept to the protocol's limits of timing was not measured."
+        return f"{text}. Whether trials met the protocol's timing limits was not measured."
     if not measured.invalid:
-        return f"{text}. No trial that counts exceeded the protocol's limits of timing."
+        return f"{text}. All measured trials met the protocol's timing limits."
     verb = "is" if measured.invalid == 1 else "are"
-    invalid = f"{counted(measured.invalid, 'trial').capitalize()} exceeded the protocol's limits of timing and {verb}"
-    return f"{text}. {invalid} in these numbers."
+    invalid = f"{counted(measured.invalid, 'trial').capitalize()} exceeded the protocol's timing limits and {verb}"
+    return f"{text}. {invalid} included."

@@ -32,19 +32,10 @@ from study_app.analysis.planning.preregistration import FILE as PREREGISTRATION
 from study_app.analysis.planning.preregistration import deviations
 from study_app.analysis.planning.preregistration import deviations_section as preregistration_section
 from study_app.analysis.report import sections
-from study_app.analysis.report.sections import methods, version_words
+from study_app.analysis.report.methods import methods, version_words
 from study_app.analysis.report.study_figures import pictures
-from study_app.analysis.results import (
-    BlockResult,
-    Failure,
-    Failures,
-    LevelsResult,
-    Progress,
-    Results,
-    counted,
-    name,
-    silent,
-)
+from study_app.analysis.results import BlockResult, Failure, Failures, LevelsResult, Progress, Results, name, silent
+from study_app.analysis.wording import counted
 from study_app.errors import AnalysisError
 from study_app.protocol.model import Contrast, Published
 from study_app.store.checksums import sha256
@@ -93,7 +84,8 @@ def _entries(found: BlockResult) -> Iterator[tuple[str, Any]]:
     """Yield a block's fields, with its findings in their midst."""
     for field in fields(found):
         if field.name != "findings":
-            yield field.name, getattr(found, field.name)
+            if field.name != "incomplete" or found.incomplete:
+                yield field.name, getattr(found, field.name)
             continue
         for finding in all_findings():
             if finding.what:
@@ -334,7 +326,7 @@ def _page(
             (title, partial(sections.question_section, where, study, results, drawn))
             for where, title in sections.places(results).items()
         ),
-        ("What the words mean", lambda: sections.verdicts_mean(results)),
+        ("What the verdicts mean", lambda: sections.verdicts_mean(results)),
         ("Groups", lambda: sections.groups(study, results)),
         ("Sites", lambda: sections.groups(study, results, "site")),
         ("Motion and force", lambda: sections.motion(results)),
@@ -372,7 +364,7 @@ def _facts(study: Study) -> str:
 
 def _marks(study: Study) -> list[tuple[str, str]]:
     """Return what must be seen at the head of the page: a class of the style, and words."""
-    marks = [("mark", "SIMULATED participants, no people")] if study.simulated else []
+    marks = [("mark", "SIMULATED participants, not people")] if study.simulated else []
     marks += [("mark", "PILOT")] if study.pilot else []
     return marks if study.revealed else [*marks, ("sealed", "Blinded: by code")]
 
@@ -385,7 +377,7 @@ def _again(study: Study, results: Results) -> Iterator[str]:
     rows = [
         ("Decided before the first session", "yes" if decided.binding else "no: everything is exploratory"),
         ("Alpha", decided.alpha_words()),
-        ("Bound of equivalence", "none" if bound is None else f"±{bound:g}"),
+        ("Equivalence bound", "none" if bound is None else f"±{bound:g}"),
         ("Primary statements", (", ".join(decided.primary) or "all") if decided.binding else "none"),
         ("Seed of the analysis", str(results.seed)),
         *((f"Version of {library}", version) for library, version in versions().items()),

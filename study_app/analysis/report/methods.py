@@ -1,0 +1,340 @@
+"""The methods paragraph: participants, apparatus, design, hypotheses, tests and exclusions, as the study has them."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from study_app import __version__, number_text
+from study_app.analysis.contrasts import contrast_methods
+from study_app.analysis.data.blocks import SPENDINGS, Block
+from study_app.analysis.data.measures import QUARTILES
+from study_app.analysis.data.study_tables import Study, group_assignment, group_counts
+from study_app.analysis.figures.answer_figures import people_a_setting
+from study_app.analysis.findings import all_findings
+from study_app.analysis.findings.delays import ContrastsWithControl
+from study_app.analysis.findings.statement_tests import DelayTrend, Effects, MeanTests, OverAll
+from study_app.analysis.levels.evaluate import level_methods
+from study_app.analysis.results import BlockResult, Results, lead, said_of_presentations
+from study_app.analysis.wording import counted, listed, ms, number, significant
+from study_app.store.unblinding import RULES
+
+WITHOUT_FORCE: Final = {"mouse", "spacemouse"}
+"""The devices without force: reading results must not load their descriptors."""
+
+ORDERS: Final = {
+    "fixed": "in one order for all participants",
+    "shuffled": "in an order drawn for each participant",
+    "constrained": "in a constrained order drawn for each participant",
+    "williams": "in the orders of a Williams design",
+    "latin": "in the orders of a Latin square",
+}
+BLOCK_ORDERS: Final = {
+    "fixed": "in the same order for all participants",
+    "balanced": "in orders balanced over participants (Williams design)",
+    "random": "in an order drawn for each participant",
+}
+
+
+def methods(study: Study, results: Results) -> str:
+    """Return the methods paragraph. A sentence is in it only if it applies to the study."""
+    return " ".join(sentence for sentence in _sentences(study, results) if sentence)
+
+
+def _sentences(study: Study, results: Results) -> Iterator[str]:
+    blocks = [found for found in results.blocks if found.n]
+    yield _sample(study)
+    yield _groups(study)
+    yield _planned(study, results)
+    yield _exclusions(study)
+    yield _apparatus(study)
+    yield _liquids(study)
+    yield from _design(study, results)
+    yield from _delays(study, results)
+    yield from level_methods(study.levels, results.levels)
+    yield _missing_trials(study)
+    yield from contrast_methods(results)
+    if blocks:
+        yield from _of_statements(study, results, blocks)
+    if blocks or results.levels:
+        ran, analysed = (f"liquid-study {listed(them)}" for them in (study.programs or [__version__], [__version__]))
+        same = f"The sessions were run and analysed with {ran}."
+        yield same if ran == analysed else f"The sessions were run with {ran} and analysed with {analysed}."
+
+
+def _sample(study: Study) -> str:
+    people = number_text.capitalised(counted(study.n, "participant"))
+    kind = " (SIMULATED, not people)" if study.simulated else ""
+    under = ""
+    if study.blocks and study.n:
+        whole = all(set(people_a_setting(study, block).values()) == {study.n} for block in study.blocks)
+        under = ", each in all conditions" if whole else _fewer_settings(study)
+    sites = f" at the sites {listed(study.sites)}" if study.sites else ""
+    return f"{people}{kind} took part in “{study.title}” (protocol {study.name}, {version_words(study)}){sites}{under}."
+
+
+def _fewer_settings(study: Study) -> str:
+    """Return that participants were not in all conditions: how many, if exclusions of single trials are the cause."""
+    fewer: set[str] = set()
+    for block in study.blocks:
+        trials = study.trials[study.trials["counted"] & (study.trials["block"] == block.id)]
+        left = set(zip(trials["participant"], trials["code"], strict=True))
+        gone = study.excluded_trials(block)
+        fewer |= {who for who, code in zip(gone["participant"], gone["code"], strict=True) if (who, code) not in left}
+    if not fewer:
+        return ", not all of them in all conditions"
+    people = counted(len(fewer), "participant")
+    return f"; {people} {'lacks' if len(fewer) == 1 else 'lack'} a condition, because single trials were excluded"
+
+
+def _groups(study: Study) -> str:
+    """Return how participants came into groups, and how many there are; "" without groups."""
+    counts, shares = group_counts(study), {name: one["share"] for name, one in study.protocol.get("groups", {}).items()}
+    named = listed([f"{name} (n = {counts.get(name, 0)})" if counts else name for name in shares])
+    match group_assignment(study):
+        case "pre-existing":
+            return (
+                f"Participants belonged to the groups {named} by an existing attribute, recorded at the start of the "
+                "session; groups were not randomised."
+            )
+        case "randomised":
+            ratio = ":".join(f"{share}" for share in shares.values())
+            return (
+                f"Participants were randomised in permuted blocks to the groups {named}, with an allocation ratio of "
+                f"{ratio}."
+            )
+    return ""
+
+
+def _planned(study: Study, results: Results) -> str:
+    """Return how many participants were planned, at which numbers looks were, and which look this is."""
+    decided = results.decided
+    if decided.looks:
+        levels = listed([significant(level) for level in decided.alphas])
+        alpha = significant(decided.planned_alpha or decided.alpha)
+        return (
+            f"{decided.look_words(len(results.people))} At the planned looks, adjusted p values up to {levels} are "
+            f"significant ({SPENDINGS[decided.spending]} spending of alpha = {alpha}, Lan & DeMets 1983)."
+        )
+    planned = (study.protocol.get("analysis") or {}).get("participants")
+    return "" if planned is None else f"{number_text.capitalised(counted(planned, 'participant'))} had been planned."
+
+
+def _exclusions(study: Study) -> str:
+    """Return what was left out, and whether the key was sealed when it was decided."""
+    trials, sessions = sum(one.trial is not None for one in study.exclusions), len(study.excluded_sessions)
+    out = [(study.left_out, "unfinished session"), (sessions, "excluded session"), (trials, "excluded trial")]
+    parts = [counted(count, noun) for count, noun in out if count]
+    many = len(parts) > 1 or any(count > 1 for count, _ in out)
+    sentences = []
+    if parts:
+        sentences.append(
+            f"{number_text.capitalised(listed(parts))} {'were' if many else 'was'} left out of the analysis."
+        )
+    if study.late:
+        sentences.append(f"Decided after the key was opened: {late_exclusions(study)}.")
+    elif study.revealed and any(one.rule_or_person not in RULES for one in study.exclusions):
+        sentences.append("Exclusions were decided while the key was sealed.")
+    return " ".join(sentences)
+
+
+def late_exclusions(study: Study) -> str:
+    """Return how many exclusions were decided, and how many reversed, after the key was opened."""
+    decided = sum(one in study.exclusions for one in study.late)
+    back = len(study.late) - decided
+    parts = [f"{counted(decided, 'exclusion')} of {len(study.exclusions)}"] if decided else []
+    return listed([*parts, *([f"the reversal of {counted(back, 'exclusion')}"] if back else [])])
+
+
+def version_words(study: Study) -> str:
+    """Return the versions of the protocol whose sessions are pooled."""
+    versions = study.versions
+    pooled = f"version {versions[0]}" if len(versions) == 1 else f"versions {listed(versions)}, pooled"
+    return f"{pooled}, in {study.contents} different files" if study.contents > len(versions) else pooled
+
+
+def _apparatus(study: Study) -> str:
+    """Return the devices, their force if any gives one, and how large ball and motion were, as receipts have it."""
+    used = study.participants.loc[study.participants["counted"], "device"].dropna()
+    names = sorted({str(name).partition(":")[0] for name in used} - {"answers-only"})
+    device, scene = study.protocol.get("device"), study.protocol.get("scene")
+    if not (device and scene and names):
+        return ""
+    device_words = (
+        f"a haptic device ({listed(names)}); forces were computed at {device['rate_hz']:g} Hz and limited to "
+    )
+    device_words += f"{device['force_limit_n']:g} N"
+    if WITHOUT_FORCE.issuperset(names):
+        device_words = f"a device without force ({listed(names)})"
+    velocity = {None: "", "device": "; its velocity was measured by the device"}.get(
+        study.estimator, f"; its velocity was estimated by {study.estimator}"
+    )
+    return (
+        f"Participants used {device_words}. "
+        f"A ball of {1000 * scene['body']['diameter_m']:g} mm diameter moved {scene['scale']:g} times as far as the "
+        f"hand{velocity}."
+    )
+
+
+def _liquids(study: Study) -> str:
+    """Return the liquids of the main blocks with their parameters; nothing while the key is sealed."""
+    settings = [one for block in study.blocks for one in block.settings]
+    settings += [one for block in study.levels for one in block.settings]
+    held = [one.liquid for each in settings for one in (each, each.of) if one is not None and one.liquid is not None]
+    names = [name for liquids in dict.fromkeys(held) for name in liquids.split(" + ")]
+    words = [f"{name.replace('_', ' ')} ({_parameters(study.liquids[name])})" for name in dict.fromkeys(names)
+             if name in study.liquids]  # fmt: skip
+    if not words:
+        return ""
+    return f"The simulated liquid{'s were' if len(words) > 1 else ' was'} {listed(words)}."
+
+
+def _parameters(liquid: Mapping[str, Any]) -> str:
+    """Return a liquid's numbers and effects in words."""
+    damping, viscosity = liquid["drag"].get("damping_nspm"), liquid.get("viscosity_pa_s")
+    numbers = [f"{liquid['density_kg_m3']:g} kg/m³"] if damping is None else [f"damping {damping:g} N·s/m at the hand"]
+    numbers += [] if viscosity is None else [f"{viscosity:g} Pa·s"]
+    if liquid["effects"] == "auto":
+        return ", ".join([*numbers, "effects chosen by their size"])
+    wake = liquid.get("wake") or {}
+    of_wake = ", ".join(f"{key} {wake[key]:g}" for key in ("length", "scaling", "exponent") if key in wake)
+    of = {"drag": f"drag (law: {liquid['drag']['law']})", "wake": f"wake ({of_wake})"}
+    return ", ".join([*numbers, *(of.get(effect, effect.replace("_", " ")) for effect in liquid["effects"])])
+
+
+def _design(study: Study, results: Results) -> Iterator[str]:
+    """Yield what each block of statements presented, in which order, and how blocks followed each other."""
+    blocks = {block.id: block for block in study.blocks}
+    for found in results.blocks:
+        yield _presented(study, blocks[found.id], found)
+        yield from said_of_presentations(found)
+    if results.blocks:
+        opened = "Conditions were known only by codes until the key was opened."
+        yield opened if study.revealed else "Conditions are known only by codes."
+    yield _block_order(study)
+
+
+def _presented(study: Study, block: Block, found: BlockResult) -> str:
+    order = ORDERS.get(study.protocol.get("blocks", {}).get(found.id, {}).get("order", ""), "")
+    noun = {"delays": "visual delay"}.get(found.kind, found.kind.removesuffix("s")) if found.revealed else "setting"
+    names = [f"{delay:g}" for delay in found.delays_ms] or [name.lower() for name in found.names]
+    unit = " ms" if found.delays_ms else ""
+    which = counted(len(names), noun) + (f" ({listed(names)}{unit})" if found.revealed else "")
+    of = sorted({one.liquid for one in block.settings if one.liquid is not None}) if found.delays_ms else []
+    liquid = f" in {listed(of)}".replace("_", " ") if of else ""
+    asked = counted(len(found.items), "statement")
+    return (
+        f"In “{found.title}”, {which}{liquid} {'was' if len(names) == 1 else 'were'} presented"
+        f"{f' {order}' if order and len(names) > 1 else ''}; participants rated {asked} after each."
+    )
+
+
+def _block_order(study: Study) -> str:
+    """Return the order of the main blocks, of each group if these differ; nothing with one block."""
+    titles = {one.id: one.title for one in study.blocks}
+    titles |= {one.id: one.title for one in study.levels if one.phase == "main"}
+    if len(titles) < 2:
+        return ""
+    order = study.protocol.get("study", {}).get("block_order", "fixed")
+    groups = study.protocol.get("groups", {})
+    orders = {
+        group: [titles[step] for step in table.get("sequence", ()) if step in titles] for group, table in groups.items()
+    }
+    if order == "fixed" and len({tuple(one) for one in orders.values()}) > 1:
+        by_group = [f"{listed([f'“{title}”' for title in one])} in the group {group}" for group, one in orders.items()]
+        return f"The order of the blocks was {'; '.join(by_group)}."
+    return f"The blocks were presented {BLOCK_ORDERS[order]}."
+
+
+def _delays(study: Study, results: Results) -> Iterator[str]:
+    """Yield requested and achieved delays of each block of delays whose key is open."""
+    for found in results.blocks:
+        rows = [one for one in results.delivered if one.block == found.id and one.delay_ms is not None]
+        if not found.n or not found.delays_ms or not rows:
+            continue
+        known = [one for one in rows if one.achieved_ms is not None]
+        if not known:
+            yield f"The delays achieved in “{found.title}” were not measured."
+            continue
+        pairs = [f"{number(one.achieved_ms, 1)} ms ({ms(one.delay_ms or 0.0)})" for one in known]
+        yield (
+            f"The mean delays achieved in “{found.title}” (and requested) were {listed(pairs)}, by the program's clock "
+            "and without the latency of the display."
+        )
+
+
+def _missing_trials(study: Study) -> str:
+    """Return how many trials of intervals were not delivered in the sessions that count, as a sentence."""
+    known = [one for one in study.participants.loc[study.participants["counted"], "missing"] if one is not None]
+    asked, count = sum(one.asked for one in known), sum(one.count for one in known)
+    if not study.levels or not asked:
+        return ""
+    if not count:
+        return "All main trials of intervals were delivered within the limits."
+    lost = f"{count} of {number_text.counted(asked, 'main trial')} {'was' if count == 1 else 'were'} lost"
+    return f"{lost} because no presentation was within the limits."
+
+
+def _of_statements(study: Study, results: Results, blocks: list[BlockResult]) -> Iterator[str]:
+    quartiles = QUARTILES.replace(" (", ", ").rstrip(")")
+    yield (
+        "Statements were rated on seven-point scales and treated as ordinal: answers are summarised by medians and "
+        f"quartiles ({quartiles})."
+    )
+    yield from _means(results, blocks)
+    for found in blocks:
+        of_findings = [sentence for finding in all_findings() for sentence in finding(found, results).methods()]
+        if of_findings and len(blocks) > 1:
+            yield f"{lead(found)}:"
+        yield from of_findings
+    yield from _common(results, blocks)
+
+
+def _means(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
+    """Yield which means are shown, and in which tests they are."""
+    if any(Effects.of(found) for found in blocks):
+        yield "Mean differences from the first setting are shown with Student's 95 % intervals."
+    tested = [
+        ("the hypotheses", any(one.contrast.blocks[0] in {found.id for found in blocks} for one in results.contrasts)),
+        ("the equivalence tests", any(ContrastsWithControl.of(found) for found in blocks)),
+        ("the trend tests", results.decided.trends == "slopes" and any(DelayTrend.of(found) for found in blocks)),
+        ("the exploratory tests of means", any(MeanTests.tested(found) for found in blocks)),
+    ]
+    where = [what for what, applies in tested if applies]
+    yield f"Means were tested in {listed(where)}." if where else "Means were not tested."
+
+
+def _common(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
+    decided = results.decided
+    gated = [found for found in blocks if (overall := OverAll.of(found)) is not None and overall.p is not None]
+    if gated:
+        holm = f", adjusted by Holm over {counted(len(gated), 'block')}" if len(gated) > 1 else ""
+        yield (
+            "An adjusted p value of a statement is at least the p value of the test over all statements of its "
+            f"block{holm}."
+        )
+    if decided.binding:
+        which = listed([f"“{item}”" for item in decided.primary]) if decided.primary else "all statements"
+        yield (
+            f"Alpha ({decided.alpha_words()}) and the primary statements ({which}) were stated before the first "
+            "session."
+        )
+    elif decided.changed:
+        yield (
+            "The decisions about the analysis changed between sessions, so all results are exploratory; those of the "
+            f"first session were used (alpha = {decided.alpha_words()})."
+        )
+    elif not decided.made:
+        yield f"No decisions were made beforehand: all results are exploratory, with alpha = {decided.alpha:g}."
+    for finding in all_findings():
+        yield from finding.common_methods(blocks)
+    if gone := sorted({person for found in blocks for people in found.incomplete.values() for person in people}):
+        yield (
+            f"Missing answers were not replaced: {number_text.counted(len(gone), 'participant')} with a missing answer "
+            "to a statement were left out of its tests over all conditions, and of those comparisons of two conditions "
+            "that the missing answer concerns."
+        )
+    measured = results.performance
+    if measured is not None and measured.recorded:
+        yield (
+            "Movement times were measured from recordings at the servo's rate, from the moment a target lit up until "
+            "the entry that was held; the first reach of each trial was left out."
+        )
