@@ -20,6 +20,7 @@ from study_app.analysis.planning.preregistration import preregistration
 from study_app.analysis.planning.simulated_studies import count, people, plan, together
 from study_app.analysis.planning.threshold_studies import PrecisionResult, Precisions, threshold_markdown
 from study_app.analysis.report import write_report
+from study_app.analysis.report.methods import methods
 from study_app.analysis.report.sections import first_page
 from study_app.analysis.report.write_report import report
 from study_app.analysis.statistics.equivalence import tost
@@ -93,7 +94,7 @@ def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_pat
     first = page[page.index('class="first"') :]
     asked = "Threshold is higher in late (late_one) than in prompt (prompt_one); equivalent within 1.25"
     assert first.index(asked) < first.index("Prompt: ")
-    assert f"Threshold in late (late_one) is on average {found.effect:.2f} times that in prompt (prompt_one)" in first
+    assert f"Threshold, late (late_one) ÷ prompt (prompt_one): ratio {found.effect:.2f}, 95 % interval" in first
 
 
 def test_thresholds_of_a_staircase_leave_nobody_out_and_name_who_did_not_do_a_block(tmp_path: Path) -> None:
@@ -154,6 +155,33 @@ def test_two_conditions_of_a_statement_are_compared_and_can_be_equivalent() -> N
     assert (same.verdict, same.equivalent) == ("equivalent", True)
     (narrow,) = evaluate(statements(contrast.model_copy(update={"bound": 0.01}))).contrasts
     assert (narrow.verdict, narrow.equivalent) == ("not shown", False)
+    assert "The mean is not shown to lie within the bound." in answer(narrow)
+    (beyond,) = evaluate(statements(contrast, 2.0)).contrasts
+    assert beyond.interval is not None
+    assert beyond.interval.low > 1.0
+    assert "The whole interval lies beyond the bound (not equivalent)." in answer(beyond)
+    assert "not shown to lie" not in answer(beyond)
+
+
+def test_a_difference_that_is_the_same_for_all_is_not_called_equivalent() -> None:
+    contrast = Contrast(measure=ITEMS[0], blocks=("b",), conditions=("c2", "c1"), bound=1.0)
+    made = study(liquids(3), list(everybody(liquids(3), 12, lambda _p, _s, code, _i: 2 + 2 * (code == "L2"))))
+    (found,) = evaluate(replace(made, contrasts=(contrast,))).contrasts
+    assert (found.effect, found.equivalent) == (2.0, False)
+    assert "All differences lie beyond the bound (not equivalent)." in answer(found)
+
+
+def test_the_methods_state_every_hypothesis_and_its_correction() -> None:
+    contrast = Contrast(measure=ITEMS[0], blocks=("b",), conditions=("c2", "c1"), bound=1.0)
+    other = Contrast(measure=ITEMS[1], blocks=("b",), conditions=("c3", "c1"), expected="higher")
+    made = replace(statements(contrast), contrasts=(contrast, other))
+    told = methods(made, evaluate(made))
+    assert f"Hypothesis 1 ({contrast.described()}) was tested by a paired t test, two-sided." in told
+    assert f"Hypothesis 2 ({other.described()}) was tested by a paired t test, one-sided." in told
+    assert "p is the larger of both, adjusted by Holm over 2 hypotheses." in told
+    assert "Equivalence was tested by two one-sided t tests" in told
+    assert "Means were tested in the hypotheses" in told
+    assert "never means" not in told
     rows = write_report.tests_csv(evaluate(statements(contrast))).decode().splitlines()
     assert "hypotheses" in rows[1]
 
@@ -180,7 +208,7 @@ def test_hypotheses_are_corrected_together_and_say_why_they_are_not_tested() -> 
     assert first.p is not None
     assert first.p_adjusted == pytest.approx(2 * max(first.p, first.p_bootstrap))
     assert (second.verdict, second.p) == ("not tested", None)
-    assert second.note.startswith("fewer than two participants have both numbers")
+    assert second.note.startswith("fewer than two participants have the numbers")
     assert pd.isna(second.statistic) or second.statistic is None
 
 

@@ -109,7 +109,7 @@ def test_of_five_no_pair_is_there_and_it_says_why(rek: Folder) -> None:
     assert [one.what for one in liquids.absent] == ["comparison of two settings"]
     assert "5 participants cannot show it: the smallest p that 5 pairs can give is 0.0625" in liquids.absent[0].why
     assert "0.1875, which is above 0.05" in liquids.absent[0].why
-    assert [one.what for one in delays.absent] == ["lowest delay that shows", "detection threshold"]
+    assert [one.what for one in delays.absent] == ["lowest delay with a trend", "detection threshold"]
 
 
 def test_nothing_decided_makes_everything_exploratory(tmp_path: Path) -> None:
@@ -120,10 +120,10 @@ def test_nothing_decided_makes_everything_exploratory(tmp_path: Path) -> None:
     assert {one.correction for one in SettingsDiffer.of(liquids)} == {"Benjamini-Hochberg"}
     assert "shown" not in {one.verdict for one in SettingsDiffer.of(liquids)}
     why = {one.what: one.why for one in (*liquids.absent, *delays.absent)}
-    assert "chosen by the answers" in why["test of equivalence"]
+    assert "depend on the answers" in why["equivalence test"]
     assert "does not say which statements name" in why["test of recognition"]
     assert {one.outcome.method.split(", ")[1] for one in DelayTrend.of(delays)} == {"two-sided"}
-    assert "no statement that asks" in why["detection threshold"]
+    assert "states no statement about it" in why["detection threshold"]
 
 
 def test_a_bound_that_was_not_decided_is_not_made_up(tmp_path: Path) -> None:

@@ -11,13 +11,14 @@ from scipy.stats import norm, ttest_rel
 from study_app.analysis.data.blocks import Decided, Spending
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.findings.statement_tests import DelayTrend, MixedModel
+from study_app.analysis.findings.statement_tests import DelayTrend, MeanTests
 from study_app.analysis.planning.power_curves import power_markdown, powers
 from study_app.analysis.planning.preregistration import preregistration
 from study_app.analysis.planning.simulated_studies import FULL, count, people, plan
-from study_app.analysis.report.sections import first_page, methods
-from study_app.analysis.statistics.mixed_model import mixed
+from study_app.analysis.report.methods import methods
+from study_app.analysis.report.sections import first_page
 from study_app.analysis.statistics.outcome import alpha_of_looks, error_of_every_report, holm
+from study_app.analysis.statistics.slope_tests import slope_test
 from study_app.cli import commands
 from study_app.errors import ProtocolError
 from study_app.protocol.load import parse
@@ -74,9 +75,8 @@ def test_the_cost_of_a_test_at_every_participant_is_that_of_simulated_studies(sp
         looks=looks,
         spending=spending,
     )
-    assert f"claims something falsely in {100 * error_of_every_report(looks, 0.05, spending):.1f} % instead of 5 %" in (
-        made.at(13).look_words(13)
-    )
+    rate = f"{100 * error_of_every_report(looks, 0.05, spending):.1f} %"
+    assert f"makes a false claim in {rate} of cases instead of 5 %" in made.at(13).look_words(13)
 
 
 @pytest.mark.parametrize(
@@ -112,8 +112,8 @@ def test_a_look_is_planned_and_its_alpha_is_less_than_that_of_all() -> None:
     ps = [ttest_rel(one[:, late, item], one[:, prompt, item], alternative="greater").pvalue for one in here]
     assert counts[contrast.described(), "contrast"][0, FULL] == sum(p <= first for p in ps) > 0
     text = preregistration(protocol, "0" * 64)
-    assert "everything tested, when 6 and 12 sessions that count are complete" in text
-    assert f"at most {first:.2g} and {last:.2g} is significant there (O'Brien–Fleming spending" in text
+    assert "everything is tested when 6 and 12 valid sessions are complete" in text
+    assert f"up to {first:.3g} and {last:.3g} are significant at these looks (O'Brien–Fleming spending" in text
 
 
 @pytest.mark.slow
@@ -125,25 +125,27 @@ def test_slopes_are_tested_and_planned_where_the_study_says_so() -> None:
     shown = 0
     for number in range(10):
         given = people(planned, 10, 1, number)[1].answers(1.0, PUBLISHED[TYPICAL])
-        ps = [mixed(given[:, :, at], x, planned.decided.direction(one.id)).p or 1.0 for at, one in enumerate(items)]
+        ps = [
+            slope_test(given[:, :, at], x, planned.decided.direction(one.id)).p or 1.0 for at, one in enumerate(items)
+        ]
         shown += (holm(ps)[0] or 1.0) <= 0.05
     assert counts[0, FULL, 0] == shown > 0
-    told = "linear mixed models with random intercepts and slopes of each participant (t of the mean slope)"
+    told = "Student's t test on the slopes of each participant's own regression of answers on delays"
     assert told in preregistration(protocol, "0" * 64)
     assert told in power_markdown(powers(planned, (10,), 10, 10, 1, count(planned, (10,), 1, 0, 10)))
     settings = delays((0, 50, 100))
     made = study(settings, list(everybody(settings, 12, lambda person, _s, code, _i: int(code[1]) + person % 3)))
     made = replace(made, decided=replace(made.decided, trends="slopes"))
     (found,) = (results := evaluate(made)).blocks
-    assert {one.outcome.test for one in DelayTrend.of(found)} == {"linear mixed model"}
-    assert not MixedModel.of(found), "each statement is tested once"
-    assert f"Trends over the delay were tested by {told}, which" in methods(made, results)
+    assert {one.outcome.test for one in DelayTrend.of(found)} == {"t test of slopes"}
+    assert not MeanTests.of(found), "each statement is tested once"
+    assert f"Trends over the delay were tested by {told}, one-sided" in methods(made, results)
 
 
 @pytest.mark.parametrize(
     ("n", "said"),
     [
-        (5, "none of which is reached"),
+        (5, "none has been reached"),
         (6, "look 1 of 2"),
         (12, "look 2 of 2"),
         (9, "This look at 9 participants is unplanned: looks are planned at 6 and 12 participants."),

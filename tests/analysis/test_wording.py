@@ -11,7 +11,8 @@ import pytest
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.table_files import codebook_bytes
-from study_app.analysis.report.sections import block, conduct, limits, methods
+from study_app.analysis.report.methods import methods
+from study_app.analysis.report.sections import block, conduct, limits
 from tests.analysis.made_up import DECIDED, delays, everybody, study
 from tests.analysis.outputs import GOLDEN
 from tests.golden import CHANGING, compare

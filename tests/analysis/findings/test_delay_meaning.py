@@ -52,12 +52,13 @@ def found(block: BlockResult) -> Found:
 
 
 UNCLEAR = "neither support nor refute “delays up to 50 ms do not matter”"
+BEYOND = "speak against “delays up to 50 ms do not matter”: at 50 ms “Different” differs by more than the bound."
 WITHIN = "Mean answers to these statements stay within the bound"
 
 
 @pytest.mark.parametrize(
     ("differences", "said"),
-    [(CALM, WITHIN), (SCATTERED, UNCLEAR), (AWAY, UNCLEAR), ([0] * 5, UNCLEAR), ([2] * 5, UNCLEAR)],
+    [(CALM, WITHIN), (SCATTERED, UNCLEAR), (AWAY, BEYOND), ([0] * 5, UNCLEAR), ([2] * 5, BEYOND), ([2] * 12, BEYOND)],
 )
 def test_the_sentence_about_one_delay_follows_the_verdict(differences: list[int], said: str) -> None:
     assert said in by_delay(delays({50: differences}))[0][-1]
@@ -78,17 +79,24 @@ def test_what_only_t_calls_equivalent_is_told_as_inconclusive(rek: Results) -> N
     assert ContrastsWithControl.of(block)[0].found.p < 0.05
     assert ContrastsWithControl.of(block)[0].found.checks_agree is False
     ((*told, said),) = by_delay(block)
-    assert told == ["50 ms", "–", "Different", "–"]
+    assert told == ["50 ms", "–", "–", "Different", "–"]
     assert UNCLEAR in said
     rek.add("P001", lambda *_: 4)
-    assert any(
-        "inconclusive or out of reach: 1 of 1 comparisons" in line
-        for line in limits(load_study(rek.folder), found(block))
-    )
+    undecided = "1 of 1 comparison with 0 ms is undecided"
+    assert any(undecided in line for line in limits(load_study(rek.folder), found(block)))
+
+
+def test_limits_do_not_call_an_interval_beyond_the_bound_undecided(rek: Results) -> None:
+    rek.add("P001", lambda *_: 4)
+    lines = limits(load_study(rek.folder), found(delays({50: DOUBTED, 150: [2] * 17})))
+    assert any("1 of 2 comparisons with 0 ms is undecided" in line for line in lines)
+    assert not any("undecided" in line for line in limits(load_study(rek.folder), found(delays({150: AWAY}))))
+    (row,) = by_delay(delays({150: AWAY}))
+    assert row[:-1] == ["150 ms", "–", "Different", "–", "–"]
 
 
 def test_every_delay_has_its_own_sentence() -> None:
     steps = step_down(np.tile([1, 2, 2, 5], (12, 1)), [0, 50, 125, 300])
     rows = by_delay(delays({50: CALM, 125: SCATTERED, 300: AWAY}, (Lowest("different", steps),)))
     assert rows[0][-1].startswith(WITHIN)
-    assert "speak against “delays up to 300 ms do not matter”: “Different” follows the delay" in rows[2][-1]
+    assert "“delays up to 300 ms do not matter”: agreement with “Different” shows a trend over delays up" in rows[2][-1]

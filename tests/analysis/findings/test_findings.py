@@ -77,7 +77,7 @@ def test_while_sealed_findings_speak_of_codes_and_say_what_waits(rek: Results, s
             assert found.delays_ms == ()
             waiting = {one.what for one in all_findings() if found.kind in one.waits}
             assert {one.what for one in found.absent if "after unblinding" in one.why} == waiting
-        assert all("waits for the key" in one.text for one in answers(results))
+        assert all("answered after unblinding" in one.text for one in answers(results))
         assert {(one.code, one.delay_ms, one.achieved_ms) for one in results.delivered} == {(None, None, None)}
         assert results.performance is None
         assert not [word for word in HIDDEN if word in repr(results).lower()]

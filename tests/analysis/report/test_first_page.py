@@ -125,7 +125,9 @@ def test_what_is_answered(pytestconfig: pytest.Config) -> None:
 def test_the_measured_rate_is_that_of_the_nearest_size(participants: int, n: int) -> None:
     told = empty_studies(participants)
     assert f"with {n} participants" in told
-    assert "({} of {} studies, 95 % interval".format(*CLAIMS[n]) in told
+    claims, studies = CLAIMS[n]
+    assert f"In {studies} simulated studies" in told
+    assert f"({claims} reports, 95 % interval" in told
 
 
 def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from study_app.analysis.data.study_tables import group_counts, group_means, load_study
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.report.sections import methods
+from study_app.analysis.report.methods import methods
 from study_app.analysis.report.write_report import report
 from study_app.errors import AnalysisError
 from study_app.protocol.load import parse
@@ -36,7 +36,7 @@ def test_methods_distinguish_primary_and_exploratory_statements(tmp_path: Path) 
     results.open()
     study = load_study(results.folder)
     told = methods(study, evaluate(study))
-    both = "p adjusted over 1 statement by Holm (primary) and over {} statements by Benjamini-Hochberg (exploratory)"
+    both = "p adjusted by Holm over 1 primary statement and by Benjamini-Hochberg over {} exploratory statements"
     assert both.format("eight") in told
     assert both.format("four") in told
 
@@ -47,10 +47,12 @@ def test_methods_state_the_devices_and_their_force_if_they_give_one() -> None:
     said = {}
     for device in ("mouse", "falcon:12", "answers-only"):
         told = methods(replace(study, participants=study.participants.assign(device=device)), results)
-        said[device] = told.partition("Apparatus: ")[2].partition(" a ball of 68 mm that moves 10 times")[0]
+        said[device] = told.partition("Participants used a ")[2].partition(" A ball of 68 mm diameter moved 10 times")[
+            0
+        ]
     assert said == {
-        "mouse": "mouse, without force,",
-        "falcon:12": "falcon, forces computed at 1000 Hz and limited to 8 N,",
+        "mouse": "device without force (mouse).",
+        "falcon:12": "haptic device (falcon); forces were computed at 1000 Hz and limited to 8 N.",
         "answers-only": "",
     }
 
@@ -72,7 +74,8 @@ def test_a_changed_file_of_one_version_and_an_exclusion_after_unblinding_are_sta
     report(small.folder, tmp_path / "report")
     told = " ".join((tmp_path / "report" / "methods.txt").read_text("utf-8").split())
     assert (
-        "in 2 different files); 1 participant lacks a setting, because single trials were excluded; 1 further" in told
+        "in 2 different files); 1 participant lacks a condition, because single trials were excluded. 1 excluded "
+        "session and two excluded trials were left out of the analysis." in told
     )
     assert f"Decided after the key was opened: 1 exclusion of {len(gone) + 1} and the reversal of 1 exclusion." in told
     rows = json.loads((tmp_path / "report" / "report.json").read_text("utf-8"))["exclusions"]
@@ -112,7 +115,8 @@ def test_groups_are_reported_after_unblinding_alone(folder: Path, tmp_path: Path
     assert list(group_means(sealed)) == []
     report(folder, tmp_path / "sealed")
     assert "<td>first_thin" not in (tmp_path / "sealed" / "report.html").read_text()
-    assert "randomised in permuted blocks to the groups" in (tmp_path / "sealed" / "methods.txt").read_text()
+    words = "randomised in permuted blocks to the groups first_thin and first_thick, with an allocation ratio of 1:1."
+    assert words in (tmp_path / "sealed" / "methods.txt").read_text()
     unblind(folder, "AB", "a test")
     study = load_study(folder)
     assert group_counts(study) == {"first_thick": 3, "first_thin": 3}
@@ -137,7 +141,7 @@ def test_preexisting_groups_are_reported_before_unblinding_as_not_randomised(tmp
     assert group_counts(load_study(study)) == {"first_thick": 2, "first_thin": 3}, "dealt in turn"
     report(study, tmp_path / "sealed")
     methods = (tmp_path / "sealed" / "methods.txt").read_text()
-    assert "assigned to a group by an existing attribute (first_thin and first_thick), recorded at the start" in methods
+    assert "belonged to the groups first_thin (n = 3) and first_thick (n = 2) by an existing attribute" in methods
     assert "groups were not randomised" in methods
     assert (
         "Groups were not randomised, so a difference may have other causes"

@@ -20,10 +20,10 @@ TESTS = {
     "findings.statement_tests.friedman": ("liquids", "test of settings"),
     "findings.statement_tests.global_permutation": ("liquids", "test over all statements"),
     "findings.recognition.recognition": ("liquids", "test of recognition"),
-    "findings.statement_tests.mixed_models": ("liquids", "mixed model"),
+    "findings.statement_tests.slope_tests": ("liquids", "test of means"),
     "findings.statement_tests.trend": ("delays", "test of a trend"),
-    "findings.delays.step_down": ("delays", "lowest delay that shows"),
-    "findings.delays.tost": ("delays", "test of equivalence"),
+    "findings.delays.step_down": ("delays", "lowest delay with a trend"),
+    "findings.delays.tost": ("delays", "equivalence test"),
     "findings.delays.noticed": ("delays", "detection threshold"),
 }
 WRITING = {
@@ -32,7 +32,7 @@ WRITING = {
     "report.write_report.sections.of_levels": "texts: findings",
     "report.write_report.r_script": "report.R",
     "report.write_report.motion_csv": "motion.csv",
-    "findings.delays.LowestDelay.section": "lowest delay that shows",
+    "findings.delays.LowestDelay.section": "lowest delay with a trend",
     "report.write_report.sections.conduct": "section “How it was run”",
 }
 

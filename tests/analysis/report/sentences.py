@@ -1,0 +1,759 @@
+"""Every sentence of the first page, the limits and the methods as a template, with a check of what it claims.
+
+A template is a regular expression and a function that recomputes the claim from report.json, tests.csv and the
+answers. `check` refuses a sentence that has no template.
+"""
+
+import csv
+import io
+import json
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+from scipy.stats import binom
+
+from study_app import __version__
+from study_app.analysis.data.study_tables import Study
+from study_app.analysis.report.sections import CLAIMS
+from study_app.analysis.report.write_report import plain, tests_csv
+from study_app.analysis.results import Results
+
+WORDS: Final = ["no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"]
+N: Final = r"(\d+|[A-Za-z]+)"
+"""A count, in digits or as a word."""
+R: Final = r"(−?\d+(?:\.\d+)?)"
+"""A number with a real minus sign."""
+P: Final = r"p ([<>=] \.\d{3})"
+ENDS: Final = rf"\[{R}, {R}\]"
+ITEM: Final = r"“\w+”"
+LEAD: Final = r"Block(?: \(\w+\))?: "
+DECIDED: Final = ("shown", "suggested")
+
+
+@dataclass(frozen=True)
+class Told:
+    """A study and what its report holds in numbers."""
+
+    study: Study
+    found: Results
+    only: int | None = None
+    """The hypothesis that the sentences are about; None: all of them."""
+
+    @cached_property
+    def results(self) -> dict[str, Any]:
+        """The results in report.json."""
+        return json.loads(json.dumps(plain(self.found)))  # type: ignore[no-any-return]
+
+    @cached_property
+    def rows(self) -> list[dict[str, str]]:
+        """The rows of tests.csv."""
+        rows = csv.DictReader(io.StringIO(tests_csv(self.found).decode()))
+        return [{name: "" if cell == "n/a" else cell for name, cell in row.items()} for row in rows]
+
+    @property
+    def block(self) -> dict[str, Any]:
+        """The one block."""
+        return self.results["blocks"][0]  # type: ignore[no-any-return]
+
+    @property
+    def alpha(self) -> float:
+        """The alpha that decides."""
+        return float(self.results["decided"]["alpha"])
+
+    @property
+    def against(self) -> list[dict[str, Any]]:
+        """The comparisons with the shortest delay."""
+        return self.block["against"]  # type: ignore[no-any-return]
+
+    @property
+    def contrasts(self) -> list[dict[str, Any]]:
+        """The hypotheses."""
+        contrasts: list[dict[str, Any]] = self.results.get("contrasts", [])
+        return contrasts if self.only is None else [contrasts[self.only]]
+
+    @property
+    def of_statements(self) -> list[dict[str, str]]:
+        """The tests of single statements that the test over all statements gates."""
+        return [*self.asked("settings differ"), *self.asked("answers follow the delay")]
+
+    @property
+    def p_over_all(self) -> float:
+        """The p of the test over all statements."""
+        return float(self.asked("settings differ, all statements")[0]["p"])
+
+    def asked(self, question: str) -> list[dict[str, str]]:
+        """Return the rows of tests.csv that answer a question."""
+        return [row for row in self.rows if row["question"] == question]
+
+    def lowest(self) -> dict[str, float]:
+        """Return of each statement with a trend the shortest delay whose steps are all significant, by item."""
+        trends = {row["item"]: row for row in self.asked("answers follow the delay")}
+        found = {}
+        for row in self.asked("answers follow the delay, stepping down"):
+            step = float(row["comparison"].removeprefix("up to ").removesuffix(" ms"))
+            if float(row["p"] or 1) > self.alpha / int(trends[row["item"]]["members"]):
+                found.setdefault(row["item"], math.nan)  # the first that fails ends them
+            elif not math.isnan(found.get(row["item"], 0.0)) or row["item"] not in found:
+                found[row["item"]] = step if not math.isnan(found.get(row["item"], step)) else math.nan
+        return found
+
+
+def count(text: str) -> int:
+    """Return a count that is written in digits or as a word."""
+    return int(text) if text.isdigit() else WORDS.index(text.lower())
+
+
+def is_number(text: str, value: float) -> bool:
+    """Return whether a number is a value as rounded to the digits that are shown, three significant ones at most."""
+    decimals = len(text.partition(".")[2])
+    digits = text.strip("−").replace(".", "").lstrip("0")
+    rounded = abs(float(text.replace("−", "-")) - value) <= 0.5 * 10**-decimals * (1 + 1e-9)
+    return rounded and (len(digits) <= 3 or not decimals)
+
+
+def is_p(text: str, p: float) -> bool:
+    """Return whether "= .023", "< .001" or "> .999" is p."""
+    sign, _, number = text.partition(" ")
+    return {"<": p < 0.001, ">": p > 0.999, "=": abs(p - float(number)) <= 0.0005 + 1e-9}[sign]
+
+
+def position(one: Mapping[str, Any]) -> str:
+    """Return where the interval of a comparison lies: "within" the bound, "beyond" it, or "across"."""
+    ends, bound = one["found"]["interval"], one["found"]["bound"]
+    effect = one["found"]["effect"]
+    if ends is None and (effect is None or 0.5 ** one["found"]["n"] > one["found"]["alpha"]):
+        return "across"
+    low, high = (effect, effect) if ends is None else (ends["low"], ends["high"])
+    if low > bound + 1e-9 or high < -bound - 1e-9:
+        return "beyond"
+    return "within" if -bound < low and high < bound else "across"
+
+
+def beyond(told: Told) -> int:
+    """Return how many comparisons lie beyond the bound."""
+    return sum(position(one) == "beyond" for one in told.against)
+
+
+def undecided(told: Told) -> int:
+    """Return how many comparisons are neither equivalent nor beyond the bound."""
+    return sum(one["found"]["verdict"] != "equivalent" and position(one) != "beyond" for one in told.against)
+
+
+def fewest(alpha: float, share: float) -> int:
+    """Return of how many people at least one is of a minority, with a probability of 1 − alpha."""
+    return next(n for n in range(1, 10_000) if binom.pmf(0, n, share) <= alpha * (1 + 1e-9))
+
+
+def names_in(text: str) -> set[str]:
+    """Return the statements that a text names."""
+    return {name.lower() for name in re.findall(r"“(\w+)”", text)}
+
+
+def short_delay(told: Told) -> float:
+    """Return the shortest delay."""
+    return min(one["delay_ms"] or 0.0 for one in told.block["settings"])
+
+
+# ----------------------------------------------------------------------------------------------- first page: delays
+
+
+def trend_is_shown(match: re.Match[str], told: Told) -> bool:
+    """Check the shortest delay with a trend, and the correlations."""
+    shortest, at, rated = match.groups()
+    lowest = {item: delay for item, delay in told.lowest().items() if not math.isnan(delay)}
+    primary = {row["item"]: row["primary"] == "true" for row in told.asked("answers follow the delay")}
+    of = [item for item in lowest if primary[item]] or list(lowest)
+    if float(at) != min(lowest[item] for item in of) or float(shortest) != short_delay(told):
+        return False
+    falling = told.results["decided"]["falling"]
+    for side, item, number in re.findall(rf"(higher|lower) in “(\w+)” \(mean rank correlation {R}\)", rated):
+        (row,) = (
+            row
+            for row in told.asked("answers follow the delay, stepping down")
+            if row["item"] == item.lower() and row["comparison"] == f"up to {at} ms"
+        )
+        effect = float(row["effect"]) * (-1 if item.lower() in falling else 1)
+        if not is_number(number, effect) or (side == "higher") != (effect > 0):
+            return False
+    return True
+
+
+def nothing_noticed(_match: re.Match[str], told: Told) -> bool:
+    """Check that no delay has a trend."""
+    return all(math.isnan(delay) for delay in told.lowest().values())
+
+
+def nothing_equivalent(match: re.Match[str], told: Told) -> bool:
+    """Check that not all statements are equivalent at the shortest of the delays that are compared."""
+    first = min(one["delay_ms"] for one in told.against)
+    at_first = [one for one in told.against if one["delay_ms"] == first]
+    bound = told.against[0]["found"]["bound"]
+    return (
+        float(match[1]) == bound
+        and float(match[2]) == short_delay(told)
+        and not all(one["found"]["verdict"] == "equivalent" for one in at_first)
+    )
+
+
+def all_equivalent(match: re.Match[str], told: Told) -> bool:
+    """Check that all statements are equivalent up to a delay, and not up to the next."""
+    up_to, _, bound, control, percent = match.groups()
+    within = [one for one in told.against if one["delay_ms"] <= float(up_to)]
+    after = [one for one in told.against if one["delay_ms"] > float(up_to)]
+    following = [one for one in after if one["delay_ms"] == min((it["delay_ms"] for it in after), default=0)]
+    most = max(one["found"]["beyond"]["interval"]["high"] for one in within)
+    return (
+        all(one["found"]["verdict"] == "equivalent" and position(one) != "beyond" for one in within)
+        and (not following or not all(one["found"]["verdict"] == "equivalent" for one in following))
+        and float(bound) == within[0]["found"]["bound"]
+        and float(control) == short_delay(told)
+        and abs(float(percent) - 100 * most) <= 0.5
+    )
+
+
+# ---------------------------------------------------------------------------------------------- first page: liquids
+
+
+def recognised(told: Told) -> set[str]:
+    """Return the names of the liquids that are recognised."""
+    named = told.block["named"]
+    if named is None or named["verdict"] not in DECIDED:
+        return set()
+    rates = [rate for rate in named["found"]["rates"] if rate["p_adjusted"] is not None]
+    return {told.block["names"][rate["setting"]].lower() for rate in rates if rate["p_adjusted"] <= told.alpha}
+
+
+def listed_in(text: str) -> set[str]:
+    """Return the parts of "a, b and c"."""
+    return set(re.split(r", | and ", text))
+
+
+def pairs_differ(match: re.Match[str], told: Told) -> bool:
+    """Check that each named pair is significant in a statement, in the verdict of the first page."""
+    names = {setting["code"]: name.lower() for setting, name in
+             zip(told.block["settings"], told.block["names"], strict=True)}  # fmt: skip
+    question = "settings differ" if len(names) == 2 else "two settings differ"
+    found: dict[str, set[str]] = {"shown": set(), "suggested": set()}
+    verdicts = {row["verdict"] for row in (*told.asked("settings differ"), *told.asked(question))}
+    for row in told.asked(question):
+        if row["verdict"] in found and float(row["p_adjusted"]) <= told.alpha:
+            found[row["verdict"]].add(" – ".join(names[code] for code in row["codes"].split()))
+    stated = "shown" if "shown" in verdicts or _recognition_shown(told) else "suggested"
+    return listed_in(match[1]) == found[stated]
+
+
+def _recognition_shown(told: Told) -> bool:
+    return bool(recognised(told)) and told.block["named"]["verdict"] == "shown"
+
+
+def statements_differ(match: re.Match[str], told: Told) -> bool:
+    """Check that the named statements show a difference."""
+    rows = {row["item"]: row for row in told.asked("settings differ")}
+    return all(float(rows[item]["p_adjusted"]) <= told.alpha for item in names_in(match[1]))
+
+
+def no_statement_differs(_match: re.Match[str], told: Told) -> bool:
+    """Check that nothing is significant in the verdict of the first page."""
+    rows = [*told.asked("settings differ"), *told.asked("two settings differ")]
+    shown = [row for row in rows if row["verdict"] in DECIDED]
+    return not shown or (_recognition_shown(told) and all(row["verdict"] == "suggested" for row in shown))
+
+
+# ------------------------------------------------------------------------------------------------------- hypotheses
+
+
+def a_contrast(told: Told, text: str) -> dict[str, Any]:
+    """Return the hypothesis that a sentence is about, by its beginning."""
+    for one in told.contrasts:
+        first, second = one["compared"]
+        if text.startswith(f"Agreement with “{one['contrast']['measure']}”, {first} − {second}"):
+            return one  # type: ignore[no-any-return]
+    raise AssertionError(text)
+
+
+def contrast_is_tested(match: re.Match[str], told: Told) -> bool:
+    """Check every number of a hypothesis, and its verdict."""
+    one = a_contrast(told, match[0])
+    mean, low, high, p, n, _, higher, of = match.groups()
+    differences = contrast_values(told, one)
+    return (
+        is_number(mean, one["effect"])
+        and is_number(low, one["interval"]["low"])
+        and is_number(high, one["interval"]["high"])
+        and is_p(p, one["p_adjusted"])
+        and (one["verdict"] in DECIDED) == (one["p_adjusted"] <= told.alpha)
+        and int(n) == one["n"]
+        and (
+            higher is None
+            or (int(higher), int(of)) == (int((differences > 0).sum()), len(differences))
+        )
+        and (one["contrast"]["groups"] is not None or is_number(mean, float(differences.mean())))
+    )  # fmt: skip
+
+
+def contrast_values(told: Told, one: Mapping[str, Any]) -> np.ndarray:
+    """Return the differences of each participant's median answers under two conditions; of all, between groups."""
+    rows = told.study.responses[told.study.responses["item"] == one["contrast"]["measure"]].dropna(subset=["response"])
+    delays = {it["code"]: it["delay_ms"] for it in told.block["settings"]}
+    if told.block["kind"] == "delays":
+        rows = rows.assign(code=[f"{delays[code]:g}" for code in rows["code"]])
+    medians = rows.astype({"response": float}).groupby(["participant", "code"])["response"].median().unstack()
+    if one["contrast"]["conditions"] is None:
+        return medians.mean(axis=1).dropna().to_numpy()  # type: ignore[no-any-return]
+    codes = {it["condition"]: it["code"] for it in told.block["settings"]}
+    first, second = (codes[condition] for condition in one["contrast"]["conditions"])
+    if told.block["kind"] == "delays":
+        first, second = f"{delays[first]:g}", f"{delays[second]:g}"
+    return (medians[first] - medians[second]).dropna().to_numpy()  # type: ignore[no-any-return]
+
+
+def bound_of_a_contrast(where: str) -> Callable[[re.Match[str], Told], bool]:
+    """Return the check that a hypothesis with a bound lies there: its interval, or the difference of all."""
+
+    def check_bound(_match: re.Match[str], told: Told) -> bool:
+        found = set()
+        for one in told.contrasts:
+            if (bound := one["contrast"]["bound"]) is not None and one["effect"] is not None:
+                ends = one["interval"] or {"low": one["effect"], "high": one["effect"]}
+                few = one["interval"] is None and 0.5 ** one["n"] > 0.05
+                outside = not few and (ends["low"] > bound or ends["high"] < -bound)
+                found.add("beyond" if outside else "within" if one["equivalent"] else "neither")
+                assert not (outside and one["equivalent"])
+                assert not one["equivalent"] or one["p_equivalent"] <= told.alpha
+            elif bound is not None:
+                found.add("neither")
+        return where in found
+
+    return check_bound
+
+
+def contrast_is_untested(_match: re.Match[str], told: Told) -> bool:
+    """Check that a hypothesis has no p."""
+    return any(one["p"] is None and one["verdict"] in ("not tested", "equivalent") for one in told.contrasts)
+
+
+# ------------------------------------------------------------------------------------------------------------ looks
+
+
+def look(number: Callable[[Told], bool]) -> Callable[[re.Match[str], Told], bool]:
+    """Return the check that the planned looks are named and the study is at one of this kind."""
+
+    def check_look(match: re.Match[str], told: Told) -> bool:
+        looks = told.results["decided"]["looks"]
+        return [int(one) for one in re.findall(r"\d+", match["looks"])] == looks and number(told)
+
+    return check_look
+
+
+def people(told: Told) -> int:
+    """Return how many participants have answers that count."""
+    return len(told.study.people)
+
+
+def alpha_here(match: re.Match[str], told: Told) -> bool:
+    """Check the alpha of this look."""
+    return math.isclose(float(match[1]), told.alpha, rel_tol=6e-3)
+
+
+def alphas_of_looks(match: re.Match[str], told: Told) -> bool:
+    """Check the alphas of all looks, of which the last is the largest below the alpha of all."""
+    alphas = [float(one) for one in re.findall(r"0\.\d+", match[1])]
+    total = told.results["decided"]["planned_alpha"] or told.alpha
+    return len(alphas) == len(told.results["decided"]["looks"]) and alphas == sorted(alphas) and alphas[-1] <= total
+
+
+# ----------------------------------------------------------------------------------------------------------- limits
+
+
+def claims(match: re.Match[str], told: Told) -> bool:
+    """Check the rate of empty studies that claim something."""
+    studies, n, percent, reports = (match[place] for place in (1, 2, 3, 4))
+    return CLAIMS[int(n)] == (int(reports), int(studies)) and is_number(percent, 100 * int(reports) / int(studies))
+
+
+def too_few_for_equivalence(match: re.Match[str], told: Told) -> bool:
+    """Check the least number, the chance of missing a minority, and its size."""
+    n, chance, share, points = match.groups()
+    first = told.against[0]["found"]
+    minority = min(1 / 5, first["bound"] / 6)
+    return (
+        int(n) == fewest(first["alpha"], minority)
+        and (is_number(chance, 100 * first["alpha"]) or (chance == "0.1" and first["alpha"] < 0.001))
+        and is_number(share, 100 * minority)
+        and is_number(points, first["bound"] / minority)
+    )
+
+
+def nobody_is_left(match: re.Match[str], told: Told) -> bool:
+    """Check that so many comparisons are undecided."""
+    return (int(match[1]), int(match[2])) == (undecided(told), len(told.against))
+
+
+def out_of_reach(match: re.Match[str], told: Told) -> bool:
+    """Check that the named statements are those that no answers could have shown."""
+    rows = [row for row in told.of_statements if row["verdict"] == "out of reach"]
+    return names_in(match[1]) == {row["item"] for row in rows} and all(
+        float(row["p_adjusted"]) > told.alpha for row in rows
+    )
+
+
+def not_testable(match: re.Match[str], told: Told) -> bool:
+    """Check that the named statements have no p."""
+    return names_in(match[1]) <= {row["item"] for row in told.of_statements if not row["p"]}
+
+
+def same_position(match: re.Match[str], told: Told) -> bool:
+    """Check that a setting has been in this position in all orders."""
+    orders = told.results["orders"]["b"]
+    names = [f"{one['delay_ms']:g} ms" for one in told.block["settings"]]
+    names = names if told.block["kind"] == "delays" else told.block["names"]
+    codes = {one["code"] for name, one in zip(names, told.block["settings"], strict=True) if name == match[1]}
+    counts = dict(zip(orders["codes"], orders["positions"][int(match[2]) - 1], strict=True))
+    return any(counts[code] == orders["orders"] for code in codes)
+
+
+def not_computed(match: re.Match[str], told: Told) -> bool:
+    """Check that the reason is one of those that the block gives."""
+    return match[2] in {one["why"] for one in told.block["absent"]}
+
+
+# ---------------------------------------------------------------------------------------------------------- methods
+
+
+def settings_presented(match: re.Match[str], told: Told) -> bool:
+    """Check how many settings there are, which, and how many statements."""
+    number, noun, names, statements = match["n"], match["noun"], match["names"], match["statements"]
+    settings = told.block["settings"]
+    if noun == "visual delay":
+        delays = sorted({one["delay_ms"] for one in settings})
+        return count(number) == len(delays) and [float(one) for one in re.findall(r"[\d.]+", names)] == delays
+    return (
+        count(number) == len(settings)
+        and listed_in(names) == {name.lower() for name in told.block["names"]}
+        and count(statements) == len(told.block["items"])
+    )
+
+
+def presentations(match: re.Match[str], told: Told) -> bool:
+    """Check how often a participant rated a setting."""
+    fewest_, most = told.block["presentations"]
+    return match[1] == (f"{most}" if fewest_ == most else f"{fewest_} to {most}")
+
+
+def groups(match: re.Match[str], told: Told) -> bool:
+    """Check the sizes of the groups and their ratio."""
+    members = told.study.trials.drop_duplicates("participant")["group"].value_counts()
+    named = {name: int(n) for name, n in re.findall(r"(\w+) \(n = (\d+)\)", match[0])}
+    shares = ":".join(str(one["share"]) for one in told.study.protocol["groups"].values())
+    return all(members.get(name, 0) == n for name, n in named.items()) and match["ratio"] == shares
+
+
+def hypothesis(match: re.Match[str], told: Told) -> bool:
+    """Check that a hypothesis is stated with its test and sides."""
+    place = int(match[1] or 1) - 1
+    contrast = told.contrasts[place]["contrast"]
+    return (
+        ("groups" in match[3]) == (contrast["groups"] is not None)
+        and (match[4] == "two-sided") == (contrast["expected"] is None)
+        and contrast["measure"] in match[2]
+    )
+
+
+def tested_means(match: re.Match[str], told: Told) -> bool:
+    """Check in which tests means are."""
+    expected = {
+        "the hypotheses": bool(told.contrasts),
+        "the equivalence tests": bool(told.against),
+        "the exploratory tests of means": any(one["outcome"]["p"] is not None for one in told.block["mixed"]),
+    }
+    return listed_in(match[1]) == {what for what, applies in expected.items() if applies}
+
+
+def no_tested_means(_match: re.Match[str], told: Told) -> bool:
+    """Check that no test is of means."""
+    tested = any(one["outcome"]["p"] is not None for one in told.block["mixed"])
+    return not (told.contrasts or told.against or tested)
+
+
+def family(match: re.Match[str], told: Told) -> bool:
+    """Check how many statements are corrected together."""
+    return corrected(match[1], told)
+
+
+def corrected(text: str, told: Told) -> bool:
+    """Return whether a text names each correction and its number of statements."""
+    question = "answers follow the delay" if told.block["kind"] == "delays" else "settings differ"
+    rows = told.asked(question)
+    found = {(row["correction"], int(row["members"])) for row in rows}
+    return {(how, count(n)) for how, n in re.findall(rf"by (Holm|Benjamini-Hochberg) over {N}", text)} == found
+
+
+def trends_tested(match: re.Match[str], told: Told) -> bool:
+    """Check sides and correction of the tests of trends."""
+    decided = told.results["decided"]
+    stated = {row["item"] in (*decided["rising"], *decided["falling"]) for row in told.of_statements}
+    sides = {
+        frozenset({True}): "one-sided in",
+        frozenset({False}): "two-sided",
+        frozenset({True, False}): "one-sided if",
+    }
+    return match[1].startswith(sides[frozenset(stated)]) and corrected(match[2], told)
+
+
+def equivalence_tests(match: re.Match[str], told: Told) -> bool:
+    """Check the control, the bound and the level of the intervals."""
+    control, bound, above, percent = match.groups()
+    first = told.against[0]["found"]
+    level = 100 * (1 - 2 * first["alpha"])
+    return (
+        float(control) == short_delay(told)
+        and float(bound) == first["bound"]
+        and (level > float(percent) if above else is_number(percent, level))
+    )
+
+
+def left_out(match: re.Match[str], told: Told) -> bool:
+    """Check how many participants miss an answer."""
+    gone = {person for members in told.block["incomplete"].values() for person in members}
+    return int(match[1]) == len(gone)
+
+
+def decided_beforehand(match: re.Match[str], told: Told) -> bool:
+    """Check alpha and the primary statements."""
+    decided = told.results["decided"]
+    primary = decided["primary"]
+    return (
+        decided["made"]
+        and not decided["changed"]
+        and float(match[1]) == (decided["planned_alpha"] or decided["alpha"])
+        and (match[2] == "all statements" if not primary else names_in(match[2]) == set(primary))
+    )
+
+
+Check = Callable[[re.Match[str], Told], bool]
+
+
+def always(_match: re.Match[str], _told: Told) -> bool:
+    """A sentence that states no number of the study."""
+    return True
+
+
+def when(holds: Callable[[Told], bool]) -> Check:
+    """Return the check that something holds of the study."""
+    return lambda _match, told: holds(told)
+
+
+LOOKS: Final = r"(?P<looks>\d+(?:, \d+)* and \d+) participants"
+TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
+    # First page: delays
+    (rf"Over delays of {R} to {R} ms participants already tend to rate longer delays (.*)\.", trend_is_shown),
+    (r"Participants may also notice shorter delays\.", always),
+    (r"Mean ratings need not change\.", always),
+    (r"Agreement rises with the delay, but no single delay is shown to be noticed\.",
+     when(lambda told: told.block["threshold"]["effect"] is not None)),
+    (r"No delay was shown to be noticed\.", nothing_noticed),
+    (r"That is not evidence that there is no difference\.", always),
+    (r"No answer: [a-z].*\.", when(lambda told: not told.against)),
+    (rf"We could not show for any delay that the mean answers to all statements stay within ±{R} points? of those at "
+     rf"{R} ms\.", nothing_equivalent),
+    (r"That is not evidence that they change\.", when(lambda told: beyond(told) == 0)),
+    (r"In (\d+) of (\d+) comparisons? the whole interval lies beyond the bound \(not equivalent; not corrected for the "
+     r"number of comparisons\)\.",
+     lambda match, told: (int(match[1]), int(match[2])) == (beyond(told), len(told.against))),
+    (rf"Up to {R} ms mean answers to (all \w+ statements|both statements|the one statement) stay within ±{R} points? "
+     rf"of those at {R} ms; the data do not exclude that up to {R} % of people differ by more\.", all_equivalent),
+    # First page: liquids
+    (r"Recognised above chance: (.*)\.", lambda match, told: listed_in(match[1]) == recognised(told)),
+    (r"No liquid was shown to be recognised above chance\.", when(lambda told: not recognised(told))),
+    (r"Rated differently: (.*)\.", pairs_differ),
+    (r"The liquids were rated differently in (.*); the tests do not show which ones\.", statements_differ),
+    (r"No statement showed a difference between any two liquids\.", no_statement_differs),
+    # Hypotheses
+    (rf"Agreement with {ITEM}, .* − .*: mean difference {R}, 95 % interval {ENDS}, {P}, n = (\d+)"
+     r"(; higher in \S+ in (\d+) of (\d+) participants)?\.", contrast_is_tested),
+    (r"The mean lies within the bound \(equivalent\); the data do not exclude that up to (\d+) % of (people differ by "
+     r"more|a group are not in the sample)\.", bound_of_a_contrast("within")),
+    (r"(The whole interval lies|All differences lie) beyond the bound \(not equivalent\)\.",
+     bound_of_a_contrast("beyond")),
+    (r"The mean is not shown to lie within the bound\.", bound_of_a_contrast("neither")),
+    (r"Not tested: (fewer than two participants have the numbers that are compared|the numbers do not vary between "
+     r"participants, so that no t test exists)\.", contrast_is_untested),
+    (r"Left out: .*\.", when(lambda told: any(one["left_out"] for one in told.contrasts))),
+    # Looks
+    (rf"Looks are planned at {LOOKS}; none has been reached, so all results are exploratory\.",
+     look(lambda told: people(told) < told.results["decided"]["looks"][0])),
+    (rf"This is look (?P<look>\d+) of \d+, planned at {LOOKS}\.",
+     look(lambda told: people(told) in told.results["decided"]["looks"])),
+    (rf"This look at \d+ participants is unplanned: looks are planned at {LOOKS}\.",
+     look(lambda told: people(told) not in told.results["decided"]["looks"])),
+    (rf"An adjusted p ≤ {R} is significant( \(alpha is shared by .* spending\)|, as at the last planned look)\.",
+     alpha_here),
+    (rf"A study without an effect that is tested at every number of participants in this way makes a false claim in "
+     rf"{R} "
+     rf"% of cases instead of {R} %\.", lambda match, told: float(match[1]) >= float(match[2])),
+    (r"At the planned looks, adjusted p values up to (.*) are significant \((O'Brien–Fleming|Pocock) spending of alpha "
+     r"= [\d.]+, Lan & DeMets 1983\)\.", alphas_of_looks),
+    # Limits
+    (rf"In (\d+) simulated studies with (\d+) participants, three liquids, seven delays and no true effect, {R} % of "
+     rf"the reports claimed a difference or a noticed delay \((\d+) reports, 95 % interval {R} to {R} %; liquid-study "
+     r"validate-report\)\.", claims),
+    (r"No answers are included yet\.", when(lambda told: told.block["n"] == 0)),
+    (rf"{LEAD}no answers are included yet\.", when(lambda told: told.block["n"] == 0)),
+    (r"The participants were SIMULATED: this report is not evidence about people\.",
+     when(lambda told: told.study.simulated)),
+    (r"The protocol states no decisions about the analysis \(it has no table \[analysis\]\), so all results are "
+     r"exploratory\.", when(lambda told: not told.results["decided"]["made"])),
+    (r"The decisions about the analysis changed between sessions, so all results are exploratory; those of the first "
+     r"session (are used|were used \(alpha = .*\))\.", when(lambda told: told.results["decided"]["changed"])),
+    (r"There is only one participant: the results do not generalise to other people\.",
+     when(lambda told: people(told) == 1)),
+    (rf"{N} participants?: intervals of mean rank correlations and exploratory tests of means need at least 10\.",
+     lambda match, told: count(match[1]) == people(told) < 10),
+    (r"An effect that is not shown here may well exist\.", always),
+    (rf"{LEAD}(the .*) (?:was|were) not computed: (.*)\.", not_computed),
+    (rf"{LEAD}the tests of (.*) could not have been significant with so few participants: no rearrangement of the "
+     r"answers within participants gives an adjusted p that is small enough\.", out_of_reach),
+    (rf"{LEAD}(.*) could not be tested \((.*)\)\.", not_testable),
+    (rf"{LEAD}(.*) was in position (\d+) for all participants, so its effect cannot be distinguished from the effect "
+     rf"of "
+     r"that position\.", same_position),
+    (rf"{LEAD}a comparison can count as equivalent only with at least (\d+) participants, because a smaller sample has "
+     rf"more than a (?:< )?{R} % chance of including nobody from a minority of {R} % of all people whose answers "
+     rf"differ "
+     rf"by {R} points, which shifts the mean by the bound\.", too_few_for_equivalence),
+    (r"This study has (\d+)\.", lambda match, told: int(match[1]) == told.block["n"]),
+    (rf"{LEAD}(\d+) of (\d+) comparisons? with .* ms (?:is|are) undecided: the mean difference is not shown to lie "
+     r"within the equivalence bound, nor beyond it\.", nobody_is_left),
+    # Methods
+    (rf"{N} participants?(?: \(SIMULATED, not people\))? took part in “Made up” \(protocol made_up, version 1\)(, "
+     rf"each in "
+     r"all conditions|, not all of them in all conditions)?\.", lambda match, told: count(match[1]) == people(told)),
+    (r"Participants were randomised in permuted blocks to the groups .*, with an allocation ratio of (?P<ratio>\S+)\.",
+     groups),
+    (rf"In “Block”, (?P<n>\w+) (?P<noun>visual delay|liquid|view)s? \((?P<names>.*?)(?: ms)?\)(?: in \w+)? "
+     rf"(?:was|were) "
+     rf"presented(?: in an order drawn for each participant)?; participants rated (?P<statements>{N}) statements? "
+     rf"after "
+     r"each\.", settings_presented),
+    (r"Several conditions have a delay of .*; they are treated as repeated presentations of one delay\.",
+     when(lambda told: bool(told.block["replicated_ms"]))),
+    (r"Each participant rated each \w+ (\d+(?: to \d+)?) times; the tests use the median of these answers(; the "
+     r"detection threshold uses each single answer)?\.", presentations),
+    (r"The answers of sessions (.*) are compared with each other, and pooled in all other tests\.",
+     lambda match, told: listed_in(match[1]) == {str(one) for one in told.block["sessions"]}),
+    (r"Conditions were known only by codes until the key was opened\.", when(lambda told: told.study.revealed)),
+    (r"The delays achieved in “Block” were not measured\.",
+     when(lambda told: all(one["measured"] == 0 for one in told.results["delivered"]))),
+    (r"(?:Hypothesis (\d+)|The hypothesis) \((.*)\) was tested by a (.*), (one-sided|two-sided)\.", hypothesis),
+    (r"Between groups, t has the degrees of freedom of the smaller group \(Hsu 1938\)\.",
+     when(lambda told: any(one["contrast"]["groups"] for one in told.contrasts))),
+    (r"Each participant had one number in each comparison\.", when(lambda told: bool(told.contrasts))),
+    (r"A bootstrap that adds a participant like the most extreme one \(Gaffke 2005\) had to agree: p is the larger of "
+     r"both(?:, adjusted by Holm over (\d+) hypotheses)?\.",
+     lambda match, told: int(match[1] or 1) == len(told.contrasts)),
+    (r"Equivalence was tested by two one-sided t tests with which the same bootstrap had to agree(?:, adjusted by Holm "
+     r"over (\d+) bounds)?, and requires that the sample is large enough to contain a member of a minority that shifts "
+     r"the mean by the bound\.",
+     lambda match, told: int(match[1] or 1)
+     == sum(one["contrast"]["bound"] is not None for one in told.contrasts)),
+    (r"Participants were left out of a hypothesis because a number is missing \(.*\)\.",
+     when(lambda told: any(one["left_out"] for one in told.contrasts))),
+    (r"Statements were rated on seven-point scales and treated as ordinal: answers are summarised by medians and "
+     r"quartiles \(linear, Hyndman & Fan type 7\)\.", always),
+    (r"Mean differences from the first setting are shown with Student's 95 % intervals\.",
+     when(lambda told: bool(told.block["effects"]))),
+    (r"Means were tested in (.*)\.", tested_means),
+    (r"Means were not tested\.", no_tested_means),
+    (r"First, the (?:liquids|delays) were compared over both statements together by permutation within participants; "
+     r"the "
+     r"statistic was the sum of the statements' Friedman statistics\.",
+     when(lambda told: told.block["overall"] is not None)),
+    (r"Each statement was tested by (?:Friedman's test|Wilcoxon's signed ranks) \(.*\), with p adjusted (by .*); the "
+     r"effect size is .*\.", family),
+    (r"If a statement showed a difference, pairs were compared by Wilcoxon's signed-rank test \(exact; equal pairs "
+     r"left "
+     r"out\), with p adjusted by Holm over all pairs of all such statements; the effect size is the matched "
+     r"rank-biserial correlation\.", when(lambda told: bool(told.block["pairs"]))),
+    (r"Participants were taken to have named the liquid whose statement they rated highest; answers with equal highest "
+     r"ratings are undecided and count as incorrect\.", when(lambda told: told.block["named"] is not None)),
+    (r"The number of correct names was tested by permuting the liquids within participants \(exact, one-sided\)\.",
+     when(lambda told: told.block["named"] is not None)),
+    (r"In addition, a liquid was called recognised only if its name was used for it more often than for each other "
+     r"liquid "
+     r"\(McNemar's exact test within participants, one-sided, with p adjusted by Holm over the liquids\)\.",
+     when(lambda told: told.block["named"] is not None)),
+    (r"Trends over the delay were tested by a sign-flip permutation test on the participants' rank correlations of "
+     r"answers and delays \(.*\), (one-sided in the direction stated (?:before the first session|by the protocol)|"
+     r"two-sided|one-sided if a direction was stated (?:before the first session|by the protocol), otherwise "
+     r"two-sided), "
+     r"with p adjusted (by .*)\.", trends_tested),
+    (r"If a statement showed a trend, the longest delay was dropped and its rank correlations were tested again "
+     r"until no "
+     r"trend remained\.", when(lambda told: bool(told.block["trends"]))),
+    (r"The shortest delay with a trend requires p ≤ alpha divided by the number of statements at every step, and is an "
+     r"upper bound of the delay that participants notice\.", when(lambda told: bool(told.block["trends"]))),
+    (rf"Each delay was compared with {R} ms by two one-sided t tests on paired differences, with an equivalence "
+     rf"bound of "
+     rf"±{R} points?(?:, stated before the first session)?, and (> )?{R} % intervals\.",
+     equivalence_tests),
+    (r"A delay was called equivalent only if a bootstrap that adds a participant like the most extreme one \(Gaffke "
+     r"2005\) agreed, and only with at least (\d+) participants; not equivalent if its whole interval was beyond the "
+     r"bound\.",
+     lambda match, told: int(match[1])
+     == fewest(told.against[0]["found"]["alpha"], min(1 / 5, told.against[0]["found"]["bound"] / 6))),
+    (r"The detection threshold is the delay at which a logistic function, fitted to agreement \(5 to 7\) in the single "
+     r"answers of all participants together, lies halfway between the guess rate and one minus the lapse rate "
+     r"\(posterior median\)\.", when(lambda told: told.block["threshold"] is not None)),
+    (r"Its 95 % interval is widened by how far participants differ\.", always),
+    (r"It is reported only if the statement shows a trend and if the threshold lies within the presented delays\.",
+     when(lambda told: told.block["threshold"] is not None)),
+    (r"An adjusted p value of a statement is at least the p value of the test over all statements of its block\.",
+     when(lambda told: all(float(row["p_adjusted"] or 1) >= told.p_over_all - 1e-9 for row in told.of_statements))),
+    (r"Alpha \(([\d.]+)(?: over all looks, [\d.]+ at this one)?\) and the primary statements \((.*)\) were stated "
+     r"before "
+     r"the first session\.", decided_beforehand),
+    (r"No decisions were made beforehand: all results are exploratory, with alpha = ([\d.]+)\.",
+     lambda match, told: not told.results["decided"]["made"] and float(match[1]) == told.alpha),
+    (r"In an exploratory analysis, the answers were treated as numbers: (?:differences between the settings were "
+     r"tested "
+     r"by Hotelling's T²|the participants' own slopes were tested by Student's t), in the participants who answered "
+     r"under all settings; the false discovery rate was controlled \(Benjamini–Hochberg\)\.",
+     when(lambda told: any(one["outcome"]["p"] is not None for one in told.block["mixed"]))),
+    (r"Missing answers were not replaced: (\d+) participants? with a missing answer to a statement were left out of "
+     r"its "
+     r"tests over all conditions, and of those comparisons of two conditions that the missing answer concerns\.",
+     left_out),
+    (rf"The sessions were run and analysed with liquid-study {re.escape(__version__)}\.", always),
+)  # fmt: skip
+
+
+def split(text: str) -> Iterator[str]:
+    """Yield the sentences of a text."""
+    yield from (part.strip() for part in re.split(r"(?<=[.!?])\s+(?=[A-Z“\d])", text) if part.strip())
+
+
+def check(text: str, told: Told) -> None:
+    """Check every sentence of a text; a sentence without a template, or that is not true of the study, is a failure."""
+    for sentence in split(text):
+        found = [(match, holds) for pattern, holds in TEMPLATES if (match := re.fullmatch(pattern, sentence))]
+        assert found, f"no template for: {sentence}"
+        match, holds = found[0]
+        assert holds(match, told), f"not true of the study: {sentence}"
+
+
+def check_verdicts(told: Told) -> None:
+    """Check that the verdict of each row agrees with its p, or its interval."""
+    for one in told.against:
+        verdict = one["found"]["verdict"]
+        assert (position(one) == "beyond") == (verdict == "not equivalent"), one
+        assert verdict != "equivalent" or one["found"]["p"] <= one["found"]["alpha"], one
+    for row in told.rows:
+        if row["p_adjusted"] and row["verdict"] in ("shown", "suggested", "not shown", "out of reach"):
+            significant = float(row["p_adjusted"]) <= told.alpha
+            assert significant == (row["verdict"] in DECIDED), row
+            assert row["verdict"] != "shown" or row["primary"] == "true", row
