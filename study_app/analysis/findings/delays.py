@@ -398,7 +398,7 @@ class DetectionThreshold(Finding[Threshold | None]):
         if self.value is not None:
             yield (
                 "The detection threshold is the delay at which a logistic function, fitted to agreement (5 to 7) in "
-                "the single answers of all participants together, lies halfway between the guess rate and one minus "
+                "single answers pooled over participants, lies halfway between the guess rate and one minus "
                 "the lapse rate (posterior median). Its 95 % interval is widened by how far participants differ. It is "
                 "reported only if the statement shows a trend and if the threshold lies within the presented delays."
             )

@@ -10,7 +10,6 @@ import pytest
 from scipy.stats import binomtest, norm
 
 from study_app.analysis.data.blocks import LevelBlock
-from study_app.analysis.levels.columns import RESULTS
 from study_app.analysis.levels.sensitivities import Sensitivities, SensitivityEstimate, preferences, sensitivities
 from study_app.protocol.presented.presentation import arrangement_text
 from study_app.protocol.trials.designs import Rated, default_design
@@ -119,11 +118,15 @@ def test_designs_without_a_criterion_have_d_prime_from_the_share_correct(design:
 
 def test_what_is_said_of_abx_names_its_assumption_and_where_the_other_model_is() -> None:
     one = SensitivityEstimate(participant="P1", n=40, shares={"first": 0.73}, d_prime=0.0, model="independent")
-    of_block = SimpleNamespace(design="abx", vary="damping", summary="share", statistics={Sensitivities.key: (one,)})
+    of_block = SimpleNamespace(
+        block="b", design="abx", vary="damping", summary="share", statistics={Sensitivities.key: (one,)}
+    )
     told = Sensitivities(cast("Any", of_block)).explained()
     assert "assumes that no answer is preferred" in told
     assert "exported table thresholds" in told
-    assert "d_prime_other" in {column.name for column in RESULTS["thresholds"].columns}
+    (row,) = Sensitivities(cast("Any", of_block)).exported()
+    assert "d_prime_other" in row
+    assert Sensitivities.table == "thresholds"
 
 
 def test_without_a_correct_answer_only_shares_are_known() -> None:

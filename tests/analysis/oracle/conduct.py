@@ -79,7 +79,7 @@ def compare_captions(compared: Compared, trials: pd.DataFrame) -> None:
             (r"(?:n = |people; |of )(\w+) participants", [people]),
             (r"Cannot judge: (\d+); not answered: (\d+)\.", [sums.get("cannot_judge"), sums.get("missing")]),
             (r"by (\S+) ms on average \(trials: (\S+) to (\S+) ms", [errors.mean(), errors.min(), errors.max()]),
-            (r"Right: (\d+); (\S+) would .* p = (\S+)\)", *hits),
+            (r"Correct: (\d+); (\S+) expected .* p = (\S+)\)", *hits),
         ):
             for reported in (found.groups() for found in re.finditer(pattern, path.read_text("utf-8"))):
                 if not any(all(map(_is_rounded, reported, one)) for one in own):

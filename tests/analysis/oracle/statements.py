@@ -150,7 +150,7 @@ def _settings_differ(block: Block) -> None:
     delays = block.found["kind"] == "delays"
     design = np.array(block.delays)[:, None] / 100 if delays else np.eye(k)[:, 1:]
     slopes = {item: _slopes(answers, design, block.sides.get(item)) for item, answers in block.wide.items()}
-    block.record_family("mixed", "settings differ, mixed model", slopes, explored=True)
+    block.record_family("mixed", "means differ", slopes, explored=True)
     if not delays:
         block.record_family("omnibus", "settings differ", {item: _alike(one) for item, one in block.wide.items()})
 

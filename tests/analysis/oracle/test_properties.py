@@ -90,10 +90,12 @@ def test_intervals_of_resampled_people_are_those_of_other_draws() -> None:
     names = np.where(draw.random((40, 3)) < 0.6, np.arange(3), draw.integers(0, 3, (40, 3)))
     of_names = recognition(names, [0, 1, 2], 3).interval
     tables = np.array([[(names[:, right] == given) for given in range(3)] for right in range(3)], float)
-    sums = np.einsum("rgp,dp->drg", tables, draw.multinomial(40, np.full(40, 1 / 40), 4000))
-    sums /= sums.sum(axis=(1, 2), keepdims=True)
-    agreed, chance = np.trace(sums, axis1=1, axis2=2), (sums.sum(axis=1) * sums.sum(axis=2)).sum(axis=1)
-    ends = np.quantile((agreed - chance) / (1 - chance), [0.025, 0.975])
+    shares = tables.sum(axis=2) / tables.sum()
+    chance = float((shares.sum(axis=0) * shares.sum(axis=1)).sum())
+    correct = np.array([*(names == np.arange(3)).mean(axis=1), 0.0])  # a further participant is never correct
+    weights = draw.dirichlet(np.ones(41), 40_000)
+    agreed = np.array([np.quantile(weights @ correct, 0.025), np.quantile(weights @ correct + weights[:, -1], 0.975)])
+    ends = (agreed - chance) / (1 - chance)
     assert of_names is not None
     assert (of_names.low, of_names.high) == pytest.approx(ends, abs=0.1 * np.ptp(ends))
 

@@ -706,9 +706,9 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"bound\.",
      lambda match, told: int(match[1])
      == fewest(told.against[0]["found"]["alpha"], min(1 / 5, told.against[0]["found"]["bound"] / 6))),
-    (r"The detection threshold is the delay at which a logistic function, fitted to agreement \(5 to 7\) in the single "
-     r"answers of all participants together, lies halfway between the guess rate and one minus the lapse rate "
-     r"\(posterior median\)\.", when(lambda told: told.block["threshold"] is not None)),
+    (r"The detection threshold is the delay at which a logistic function, fitted to agreement \(5 to 7\) in single "
+     r"answers pooled over participants, lies halfway between the guess rate and one minus the lapse rate \(posterior "
+     r"median\)\.", when(lambda told: told.block["threshold"] is not None)),
     (r"Its 95 % interval is widened by how far participants differ\.", always),
     (r"It is reported only if the statement shows a trend and if the threshold lies within the presented delays\.",
      when(lambda told: told.block["threshold"] is not None)),
