@@ -177,8 +177,8 @@ def temporary_path(path: Path) -> Path:
 
 def temporaries(folder: Path, of: str = "") -> tuple[Path, ...]:
     """Return the temporary files in ``folder`` itself, ``of`` a name, of a program that writes now or was killed."""
-    found = (path for path in folder.glob(".*.tmp") if _TEMPORARY.fullmatch(path.name))
-    return tuple(sorted(path for path in found if not of or path.name[1:-13] == of))  # without ".", and ".01234567.tmp"
+    paths = (path for path in folder.glob(".*.tmp") if _TEMPORARY.fullmatch(path.name))
+    return tuple(sorted(path for path in paths if not of or path.name[1:-13] == of))  # without ".", and ".01234567.tmp"
 
 
 def sweep_old(folder: Path, of: str = "") -> None:
@@ -203,8 +203,8 @@ def sweep(folder: Path) -> tuple[Path, ...]:
 
     Only for a folder that no other program writes into now.
     """
-    found = temporaries(folder)
-    for path in found:
+    leftovers = temporaries(folder)
+    for path in leftovers:
         try:
             if path.is_dir():
                 shutil.rmtree(path)
@@ -212,7 +212,7 @@ def sweep(folder: Path) -> tuple[Path, ...]:
                 path.unlink(missing_ok=True)
         except OSError as error:
             raise cannot_write(path, error) from error
-    return found
+    return leftovers
 
 
 def probe(folder: Path) -> int:
@@ -348,8 +348,12 @@ def parse_json(content: bytes | str) -> Any:
         raise ValueError("it is nested too deeply") from error
     level = [value]
     for _ in range(_MOST_LEVELS):
-        containers = (one for one in level if isinstance(one, dict | list))
-        level = [inner for one in containers for inner in (one.values() if isinstance(one, dict) else one)]
+        containers = (value for value in level if isinstance(value, dict | list))
+        level = [
+            inner
+            for container in containers
+            for inner in (container.values() if isinstance(container, dict) else container)
+        ]
         if not level:
             return value
     raise ValueError("it is nested too deeply")

@@ -106,15 +106,15 @@ def hashed(session: SessionFolder, name: str) -> str:
 def read_checksums(session: SessionFolder) -> dict[str, str]:
     """Return path in the folder → SHA-256."""
     text = read_own(session.checksums, study_root(session.checksums)).decode("utf-8", "surrogateescape")
-    found: dict[str, str] = {}
+    checksums: dict[str, str] = {}
     for line in text.splitlines():
         match = _LINE.fullmatch(line)
         if match is None:
             raise StoreError(f"{session.checksums} has a line that is not a checksum: restore it from a copy")
-        found[match[2]] = match[1]
-    if not found:
+        checksums[match[2]] = match[1]
+    if not checksums:
         raise StoreError(f"{session.checksums} is empty: restore it from a copy")
-    return found
+    return checksums
 
 
 def files(session: SessionFolder) -> tuple[str, ...]:
@@ -131,8 +131,8 @@ def system_files(session: SessionFolder) -> tuple[str, ...]:
 
 
 def _paths(session: SessionFolder) -> list[Path]:
-    found = (path.relative_to(session.path) for path in paths_in(session.path) if path.is_file())
-    return sorted(found, key=Path.as_posix)
+    relative_paths = (path.relative_to(session.path) for path in paths_in(session.path) if path.is_file())
+    return sorted(relative_paths, key=Path.as_posix)
 
 
 def _is_hidden(name: Path) -> bool:
@@ -193,9 +193,11 @@ def _letters(content: bytes) -> str:
     return base64.b32encode(hashlib.sha256(content).digest()).decode().lower()
 
 
-def note_fingerprint(study: StudyFolder, session: SessionFolder, found: str, *, waits: bool = True) -> None:
+def note_fingerprint(
+    study: StudyFolder, session: SessionFolder, session_fingerprint: str, *, waits: bool = True
+) -> None:
     """Add a session's fingerprint to the study's list; without ``waits`` nothing is flushed."""
-    append_line(study.fingerprints, f"{found}  {place_of(study, session)}\n".encode(), waits=waits)
+    append_line(study.fingerprints, f"{session_fingerprint}  {place_of(study, session)}\n".encode(), waits=waits)
 
 
 def place_of(study: StudyFolder, session: SessionFolder) -> str:
@@ -215,7 +217,7 @@ def unreadable(path: Path) -> tuple[int, ...]:
 
 def parsed(path: Path, text: str) -> Proofs:
     """Return fingerprint and place of every line of a copy with this text, which holds nothing else."""
-    found: list[tuple[str, str]] = []
+    proofs: list[tuple[str, str]] = []
     for number, match in _matches(text):
         if match is None:
             raise StoreError(
@@ -224,10 +226,10 @@ def parsed(path: Path, text: str) -> Proofs:
             )
         if match[2] not in (None, _check(match[1], match[3])):
             raise StoreError(f"{path}, line {number} was misread: its last two characters are of another line")
-        found.append((match[1], match[3]))
-    if not found:
+        proofs.append((match[1], match[3]))
+    if not proofs:
         raise StoreError(f"{path} has no fingerprint: name a copy of a study's fingerprints.txt")
-    return tuple(found)
+    return tuple(proofs)
 
 
 def _text(path: Path) -> str:

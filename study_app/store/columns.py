@@ -83,10 +83,10 @@ _INCOMPLETE = ("incomplete", "it reached its last page, but more trials were not
 GROUP = optional("group", "text", "The participant's group; n/a in a study without groups.", sealed=True, later=True)
 PARTICIPANTS_2: tuple[Column, ...] = (
     *(
-        replace(one, description="Answers given in main trials and forms, those off the scale included.")
-        if one.name == "responses"
-        else one
-        for one in PARTICIPANTS
+        replace(column, description="Answers given in main trials and forms, those off the scale included.")
+        if column.name == "responses"
+        else column
+        for column in PARTICIPANTS
     ),
     GROUP,
 )
@@ -95,7 +95,10 @@ PARTICIPANTS_2: tuple[Column, ...] = (
 
 def with_missing_trials(columns: tuple[Column, ...]) -> tuple[Column, ...]:
     """Return the columns of sessions in a study with trials of intervals, which may be missing."""
-    with_level = (replace(one, levels=(*one.levels, _INCOMPLETE)) if one.name == "status" else one for one in columns)
+    with_level = (
+        replace(column, levels=(*column.levels, _INCOMPLETE)) if column.name == "status" else column
+        for column in columns
+    )
     return (*with_level, TRIALS_MISSING)
 
 
@@ -397,8 +400,8 @@ def every_column(protocol_format: int = 1, *, intervals: bool = False) -> tuple[
     tables = tables_of(protocol_format)
     if intervals:
         tables = tables | {"participants": with_missing_trials(tables["participants"])}
-    found: dict[str, Column] = {}
+    by_name: dict[str, Column] = {}
     for name, columns in tables.items():
         for column in columns if name != "intervals" or intervals else ():
-            found.setdefault(column.name, column)
-    return tuple(found.values())
+            by_name.setdefault(column.name, column)
+    return tuple(by_name.values())

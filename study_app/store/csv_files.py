@@ -38,7 +38,7 @@ def unguarded(cell: str) -> str:
 
 
 class _Cells(NamedTuple):
-    words: str
+    description: str
     pattern: str
     read: Callable[[str], Any]
 
@@ -110,12 +110,12 @@ class Column:
     def permitted(self) -> str:
         """What a cell may be, in words."""
         levels = ", ".join(level for level, _ in self.levels)
-        words = f"one of {levels}" if levels else _KINDS[self.kind].words
+        text = f"one of {levels}" if levels else _KINDS[self.kind].description
         if self.maximum is not None:
-            words += f" from {self.minimum:g} to {self.maximum:g}"
+            text += f" from {self.minimum:g} to {self.maximum:g}"
         elif self.minimum is not None:
-            words += f" of at least {self.minimum:g}"
-        return f"{words} or {MISSING}" if self.may_miss else words
+            text += f" of at least {self.minimum:g}"
+        return f"{text} or {MISSING}" if self.may_miss else text
 
     @property
     def variable(self) -> dict[str, Any]:
@@ -179,20 +179,22 @@ def cells(table: bytes) -> list[list[str]]:
         It is not CSV in UTF-8, or its records differ in length.
     """
     try:
-        found = list(csv.reader(io.StringIO(table.decode("utf-8"), newline=""), strict=True)) or [[]]
+        rows = list(csv.reader(io.StringIO(table.decode("utf-8"), newline=""), strict=True)) or [[]]
     except (UnicodeDecodeError, csv.Error) as error:
         raise ValueError(f"is not CSV in UTF-8 ({error})") from error
-    for number, row in enumerate(found[1:], start=2):
-        if len(row) != len(found[0]):
-            raise ValueError(f"row {number} has {len(row)} cells, not {len(found[0])}")
-    return found
+    for number, row in enumerate(rows[1:], start=2):
+        if len(row) != len(rows[0]):
+            raise ValueError(f"row {number} has {len(row)} cells, not {len(rows[0])}")
+    return rows
 
 
 def read_table(table: bytes, columns: Sequence[Column]) -> list[Row]:
     """Return the rows of a table that `csv_bytes` wrote, in these of its columns; None is what is missing."""
     names, *rows = cells(table)
     places = [(column, names.index(column.name)) for column in columns]
-    return [{one.name: None if row[at] == MISSING else one.value(row[at]) for one, at in places} for row in rows]
+    return [
+        {column.name: None if row[at] == MISSING else column.value(row[at]) for column, at in places} for row in rows
+    ]
 
 
 def problems(table: bytes, columns: Sequence[Column]) -> Iterator[str]:
@@ -228,10 +230,10 @@ def in_columns_of(held: bytes, table: bytes, columns: Sequence[Column]) -> tuple
     ``held`` may lack later columns, which its version did not write, and ``table`` those that are sealed. Where
     ``held`` has the same texts without apostrophes, as earlier versions wrote them, it is returned itself.
     """
-    names, ours = (one.partition(b"\n")[0].decode("utf-8", "replace").split(",") for one in (held, table))
-    there = tuple(column for column in columns if column.name in ours)
-    kept = tuple(column for column in there if column.name in names or not column.later)
-    if kept != there:
+    names, ours = (content.partition(b"\n")[0].decode("utf-8", "replace").split(",") for content in (held, table))
+    present = tuple(column for column in columns if column.name in ours)
+    kept = tuple(column for column in present if column.name in names or not column.later)
+    if kept != present:
         places = [ours.index(column.name) for column in kept]
         table = _lines([row[place] for place in places] for row in cells(table))
     if b"'" in table and held == _lines(map(unguarded, row) for row in cells(table)):

@@ -50,10 +50,10 @@ _LEAST = "targets_reached"  # judged by "targets_percent": the only measure with
 
 def judged(samples: Any) -> Any:
     """Return the fields `JUDGED` of samples (n,): a third of the bytes."""
-    found = np.empty(len(samples), JUDGED)
+    rows = np.empty(len(samples), JUDGED)
     for name in JUDGED.fields or ():
-        found[name] = samples[name]
-    return found
+        rows[name] = samples[name]
+    return rows
 
 
 @dataclass(frozen=True, slots=True, repr=False, kw_only=True)
@@ -177,8 +177,8 @@ def _plausible(samples: Any) -> Any:
 def delay_error_ms(presented: Stimulated, summary: Mapping[str, Any]) -> float | None:
     """Return the error of an interval's varied delay [ms], from its measurements; None if unknown."""
     if presented.vary != FORCE_DELAY:
-        found: float | None = summary.get("delay_error_mean_ms")
-        return found
+        mean_ms: float | None = summary.get("delay_error_mean_ms")
+        return mean_ms
     value = summary.get("value_delivered")
     return None if value is None else value - presented.value
 
@@ -189,7 +189,7 @@ def varies_damping(presented: Stimulated) -> bool:
 
 
 def undelivered(
-    limits: Limits, presented: Stimulated, task: AnyTask, found: Delivered, *, adjusted: bool = False
+    limits: Limits, presented: Stimulated, task: AnyTask, delivery: Delivered, *, adjusted: bool = False
 ) -> Iterator[str]:
     """Yield the keys of the file's limits that an interval breaks: reasons without a number.
 
@@ -198,15 +198,15 @@ def undelivered(
     most = limits.level_error_percent
     if presented.vary is not None and presented.vary not in OF_CONDITION and most is not None:
         fitted = varies_damping(presented) and not adjusted
-        measured = found.value_delivered if fitted else found.force_share
+        measured = delivery.value_delivered if fitted else delivery.force_share
         requested = presented.value if fitted else 1.0
         if abs((measured or 0.0) - requested) > abs(requested) * most / 100:  # nothing was delivered to a hand at rest
             yield "level_error_percent"
-    if presented.vary not in {None, DELAY} and most is not None and found.clipped:
+    if presented.vary not in {None, DELAY} and most is not None and delivery.clipped:
         yield "force_limit_n"
     if isinstance(task, Follow) and limits.pace_error_percent is not None:
         pace = task.rms_speed_mps
-        if abs(found.pace_mps - pace) > pace * limits.pace_error_percent / 100:
+        if abs(delivery.pace_mps - pace) > pace * limits.pace_error_percent / 100:
             yield "pace_error_percent"
 
 
@@ -252,7 +252,11 @@ def beyond_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> t
     Value and limit are in the limit's unit, ms or percent.
     """
     judged = _judged(measured, limits)
-    return tuple(one for one in judged if (one[1] < one[2] if one[0] == _LEAST else not abs(one[1]) <= one[2]))
+    return tuple(
+        comparison
+        for comparison in judged
+        if (comparison[1] < comparison[2] if comparison[0] == _LEAST else not abs(comparison[1]) <= comparison[2])
+    )
 
 
 def broken_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> tuple[str, ...]:

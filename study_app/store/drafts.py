@@ -141,20 +141,20 @@ def draft_of(file: Path) -> Draft | None:
         draft = Draft(text=kept["text"], base=kept["base"], selected=selected, kept_at=kept["kept_at"])
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    return draft if all(isinstance(one, str) for one in (draft.text, draft.base, draft.kept_at)) else None
+    return draft if all(isinstance(value, str) for value in (draft.text, draft.base, draft.kept_at)) else None
 
 
 def drafted_files() -> tuple[Path, ...]:
     """Return the files that have a readable draft, sorted."""
-    found: list[Path] = []
+    files: list[Path] = []
     for kept in draft_files():
         try:
             file = Path(parse_json(kept.read_bytes())["file"])
         except (OSError, ValueError, KeyError, TypeError):
             continue
         if draft_of(file) is not None:
-            found.append(file)
-    return tuple(sorted(found))
+            files.append(file)
+    return tuple(sorted(files))
 
 
 def draft_files() -> tuple[Path, ...]:

@@ -223,7 +223,7 @@ def _exclusion(path: Path, line: int, row: list[str]) -> Exclusion:
 def _check_there(study: StudyFolder, participant: str, session: int, trial: int | None) -> None:
     place = study.session(participant, session)
     if place not in study.sessions():
-        known = [str(one.number) for one in study.sessions() if one.participant == participant]
+        known = [str(session.number) for session in study.sessions() if session.participant == participant]
         ids = study.ids()
         more = f" … {ids[-1]}" if len(ids) > NAMED_IDS else ""
         participants = f"participants: {', '.join(ids[:NAMED_IDS]) or 'none'}{more}"

@@ -123,12 +123,12 @@ class StudyFolder:
             paths = list(self.data.glob("sub-*/ses-*"))
         except FileNotFoundError:  # a participant was withdrawn meanwhile
             return self.sessions()
-        found = [
+        sessions = [
             SessionFolder(path, path.parent.name.removeprefix("sub-"), int(match[1]))
             for path in paths
             if (match := _SESSION_FOLDER.fullmatch(path.name))
         ]
-        return tuple(sorted(found, key=lambda session: (session.participant, session.number)))
+        return tuple(sorted(sessions, key=lambda session: (session.participant, session.number)))
 
     def ids(self) -> tuple[str, ...]:
         """Return the participant ids that were used, sorted."""

@@ -62,12 +62,12 @@ class MissingTrials:
     @property
     def reasons(self) -> dict[str, int]:
         """The number of missing trials that broke each limit, by its key, the most frequent first."""
-        return dict(Counter(limit for one in self.missing for limit in one.broken).most_common())
+        return dict(Counter(limit for trial in self.missing for limit in trial.broken).most_common())
 
     @property
     def tracks(self) -> dict[tuple[str, str], int]:
         """The number of missing trials of each block and code, in the order of the trials."""
-        return dict(Counter((one.block, one.code) for one in self.missing))
+        return dict(Counter((trial.block, trial.code) for trial in self.missing))
 
     @property
     def brief(self) -> str:
@@ -91,16 +91,16 @@ def missing_words(count: int, asked: int, reasons: Mapping[str, int], limits: Ma
     limits : mapping of str to float
         The limits of the study, by their keys.
     """
-    each = (
+    phrases = (
         f"{limit_words(limit, limits)}{f' in {of_limit}' if len(reasons) > 1 else ''}"
         for limit, of_limit in reasons.items()
     )
     was = "trial was" if asked == 1 else "trials was" if count == 1 else "trials were"
-    return f"{count} of {asked} {was} not delivered: {', '.join(each)}"
+    return f"{count} of {asked} {was} not delivered: {', '.join(phrases)}"
 
 
 def limit_words(limit: str, limits: Mapping[str, float]) -> str:
     """Return why a presentation that broke a limit was invalid, with the limit: "frames were late (limit 250 ms)"."""
-    words = REASONS.get(limit, limit)
+    reason = REASONS.get(limit, limit)
     unit = _UNITS.get(limit.rpartition("_")[2], "")
-    return f"{words} (limit {limits[limit]:g} {unit})" if limit in limits else words
+    return f"{reason} (limit {limits[limit]:g} {unit})" if limit in limits else reason

@@ -140,7 +140,7 @@ def write_output(study: Path, to: Path, files: Mapping[str, bytes | FileCopy]) -
 
 def outputs(study: Path) -> tuple[Output, ...]:
     """Return the noted outputs of a study's results, one for each folder and set of files, the newest last."""
-    found: dict[tuple[str, tuple[str, ...]], Output] = {}
+    latest: dict[tuple[str, tuple[str, ...]], Output] = {}
     try:
         lines = (data_folder() / NAME).read_bytes().splitlines()
     except OSError:
@@ -150,10 +150,10 @@ def outputs(study: Path) -> tuple[Output, ...]:
             held = parse_json(line)
             if held["study"] == str(study.resolve()):
                 names = tuple(map(str, held["files"]))
-                found[held["to"], names] = Output(Path(held["to"]), str(held["at"]), names)
+                latest[held["to"], names] = Output(Path(held["to"]), str(held["at"]), names)
         except (ValueError, KeyError, TypeError):  # a torn line
             continue
-    return tuple(found.values())
+    return tuple(latest.values())
 
 
 def erase_outputs(study: Path, within: Path) -> tuple[tuple[Path, ...], tuple[Output, ...]]:

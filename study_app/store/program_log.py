@@ -85,7 +85,7 @@ def kept_log() -> str:
 def last_error(log: str) -> str:
     """Return the last error in a log, a device's failure included, with the lines that belong to it; "" without one."""
     records = re.split(r"\n(?! )", log.strip("\n"))
-    return next((one for one in reversed(records) if _ERROR.match(one)), "")
+    return next((record for record in reversed(records) if _ERROR.match(record)), "")
 
 
 def source_place(path: str) -> str:

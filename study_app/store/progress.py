@@ -92,11 +92,11 @@ class Progress:
     @property
     def unconfirmed(self) -> dict[tuple[int, int], dict[str, events.Answer]]:
         """The choices without a confirmation, by trial and attempt."""
-        found = dict(self._left_open)
+        choices = dict(self._left_open)
         chosen = {item: answer for item, answer in self.answers.items() if answer.given}
         if self.trial is not None and chosen:
-            found[self.trial, self.attempt] = chosen
-        return found
+            choices[self.trial, self.attempt] = chosen
+        return choices
 
     @property
     def missing_trials(self) -> MissingTrials:
@@ -287,7 +287,7 @@ def trial_results(protocol: Protocol, lines: Iterable[events.Event]) -> tuple[Tr
     Lines that do not fit the study, or whose sealed fields are not opened, raise KeyError or ValueError.
     """
     started: dict[tuple[int, int], events.TrialStarted] = {}
-    found: dict[int, TrialResult] = {}
+    results: dict[int, TrialResult] = {}
     for line in lines:
         if isinstance(line, events.TrialStarted):
             started[line.trial, line.attempt] = line
@@ -301,8 +301,8 @@ def trial_results(protocol: Protocol, lines: Iterable[events.Event]) -> tuple[Tr
             arrangement = arrangement_of(design_of(protocol, block), start.arrangement)
             answer: Any = line.items[0].value
             of_trial = line.trial, start.code, start.level, arrangement
-            found[line.trial] = trial_result(protocol, block, *of_trial, answer, catch=bool(start.catch))
-    return tuple(found[number] for number in sorted(found))
+            results[line.trial] = trial_result(protocol, block, *of_trial, answer, catch=bool(start.catch))
+    return tuple(results[number] for number in sorted(results))
 
 
 def recordable(lines: Iterable[events.Event]) -> list[events.Which]:

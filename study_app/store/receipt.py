@@ -89,18 +89,20 @@ def plug_ins_of(protocol: Protocol, device: str, outlets: Iterable[str]) -> list
     ]
     if others := set(outlets) - {kind.title for kind in sinks.own.values()}:
         asked += [("outlet", kind.name) for kind in sinks.others.values() if kind.title in others]
-    found = {one for kind, name in asked if (one := registry(kind).plug_in(name)) is not None}
-    return [one.described for one in sorted(found, key=lambda one: (one.kind, one.name))]
+    plug_ins = {plug_in for kind, name in asked if (plug_in := registry(kind).plug_in(name)) is not None}
+    return [plug_in.described for plug_in in sorted(plug_ins, key=lambda plug_in: (plug_in.kind, plug_in.name))]
 
 
 def recorded_plug_ins(receipts: Iterable[Path]) -> dict[str, list[str]]:
     """Return the plug-ins that receipts name: kinds and names by package and version."""
-    found: dict[str, set[str]] = {}
+    by_package: dict[str, set[str]] = {}
     for path in receipts:
         with suppress(StoreError, KeyError, TypeError):
-            for one in read(path).get("plug_ins", ()):
-                found.setdefault(f"{one['package']} {one['version']}", set()).add(f"{one['kind']} {one['name']}")
-    return {package: sorted(names) for package, names in sorted(found.items())}
+            for plug_in in read(path).get("plug_ins", ()):
+                by_package.setdefault(f"{plug_in['package']} {plug_in['version']}", set()).add(
+                    f"{plug_in['kind']} {plug_in['name']}"
+                )
+    return {package: sorted(names) for package, names in sorted(by_package.items())}
 
 
 @cache

@@ -174,8 +174,8 @@ class Recorder:
     def kept(self) -> tuple[Kept, ...]:
         """Return the recordings completed or lost since the last call."""
         with self.changed:
-            found, self._kept = tuple(self._kept), []
-        return found
+            completed, self._kept = tuple(self._kept), []
+        return completed
 
     def settled(self) -> bool:
         """End the running recording; return without waiting whether all is on the disk, or the time limit has passed.

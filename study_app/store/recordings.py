@@ -54,7 +54,7 @@ FRAMES: tuple[Column, ...] = (
     ),
 )
 FORMAT = 4
-RECORDED = tuple(field for field in SAMPLE_FIELDS if field.words)
+RECORDED = tuple(field for field in SAMPLE_FIELDS if field.meaning)
 ROUNDED_TO = {field.name: field.step for field in RECORDED if field.step}
 """Fields of ``layout.SAMPLE`` that are recorded rounded, and the step."""
 FRAME = np.dtype([(column.name, np.int64) for column in FRAMES])
@@ -70,7 +70,7 @@ _COMPRESSION = ("zstd", 9)
 def _columns(field: SampleField) -> list[Column]:
     """Return the columns that a recording has of a field of ``layout.SAMPLE``."""
     kind: Kind = "flag" if field.stored is np.bool_ else "integer" if issubclass(field.stored, np.integer) else "number"
-    meanings = [field.words.replace("*", words) for words in field.parts.values()] or [field.words]
+    meanings = [field.meaning.replace("*", meaning) for meaning in field.parts.values()] or [field.meaning]
     return [
         Column(name, kind, meaning, unit=field.unit, levels=field.levels, minimum=field.minimum, maximum=field.maximum)
         for name, meaning in zip(field.named(), meanings, strict=True)
@@ -162,8 +162,8 @@ def read_written(path: Path, secret: bytes | None = None) -> Written:
     """Return what the journal tells of a recording that is on the disk."""
     rows = read_facts(path, secret)["rows"]
     content = read_regular(path)
-    found, opened = (hashlib.sha256(it).hexdigest() for it in (content, opened_content(path, content, secret)))
-    return Written(path, rows, found, None if opened == found else opened)
+    file_hash, opened = (hashlib.sha256(it).hexdigest() for it in (content, opened_content(path, content, secret)))
+    return Written(path, rows, file_hash, None if opened == file_hash else opened)
 
 
 def read_checks(path: Path, secret: bytes | None = None) -> Checks:
@@ -253,9 +253,9 @@ def _facts(path: Path, metadata: Any) -> dict[str, Any]:
     try:
         facts = parse_json(metadata.metadata[FACTS_KEY])
         if facts["format"] not in range(1, FORMAT + 1):
-            found, readable = facts["format"], f"1 to {FORMAT}"
+            version, readable = facts["format"], f"1 to {FORMAT}"
             raise StoreError(
-                f"{path} has format {found!r}, this version reads {readable}: use a newer version of liquid-study"
+                f"{path} has format {version!r}, this version reads {readable}: use a newer version of liquid-study"
             )
         if facts["kind"] == "samples":
             _check_facts_of_samples(facts, metadata.num_rows)

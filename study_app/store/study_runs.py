@@ -68,20 +68,20 @@ def runs(results: Path, study: str) -> tuple[Run, ...]:
     """
     if not _NAME.fullmatch(study):
         return ()
-    found: dict[str, Run] = {}
+    by_hash: dict[str, Run] = {}
     others = (folder for kind in ("pilot", "rehearsal") for folder in sorted(results.glob(f"{study}-{kind}-*")))
     for folder in (results / study, results / f"{study}-pilot", *others):
         for session in StudyFolder(folder).sessions():
-            if (one := run_of(session.receipt)) is not None:
-                run = found.get(one.hash, replace(one, sessions=0, pilots=0, rehearsals=0))
-                found[one.hash] = replace(
+            if (session_run := run_of(session.receipt)) is not None:
+                run = by_hash.get(session_run.hash, replace(session_run, sessions=0, pilots=0, rehearsals=0))
+                by_hash[session_run.hash] = replace(
                     run,
-                    sessions=run.sessions + one.sessions,
-                    pilots=run.pilots + one.pilots,
-                    rehearsals=run.rehearsals + one.rehearsals,
-                    last=max(run.last, one.last),
+                    sessions=run.sessions + session_run.sessions,
+                    pilots=run.pilots + session_run.pilots,
+                    rehearsals=run.rehearsals + session_run.rehearsals,
+                    last=max(run.last, session_run.last),
                 )
-    return tuple(sorted(found.values(), key=lambda run: run.last))
+    return tuple(sorted(by_hash.values(), key=lambda run: run.last))
 
 
 def run_of(path: Path) -> Run | None:
@@ -110,13 +110,13 @@ def _run(path: Path, _changed_ns: int) -> Run:
 
 def recorded_items(known: Iterable[Run]) -> dict[tuple[str, str], int]:
     """Return how many sessions of participants were asked each item, by its questionnaire and id."""
-    found: dict[tuple[str, str], int] = {}
+    counts: dict[tuple[str, str], int] = {}
     for run in known:
         held = run.protocol if run.sessions else None
         for name, questionnaire in (held or {}).get("questionnaires", {}).items():
             for item in questionnaire.get("items", ()):
-                found[name, item["id"]] = found.get((name, item["id"]), 0) + run.sessions
-    return found
+                counts[name, item["id"]] = counts.get((name, item["id"]), 0) + run.sessions
+    return counts
 
 
 def source_of(run: Run) -> str | None:

@@ -91,7 +91,7 @@ def keep_version(file: Path, content: bytes, origin: Origin) -> None:
     """
     keep_content(content)
     hash_ = content_hash(content)
-    if any(one.hash == hash_ for one in kept_versions(file)):
+    if any(version.hash == hash_ for version in kept_versions(file)):
         return
     line = {"hash": hash_, "origin": origin, "at": datetime.now(UTC).astimezone().isoformat(timespec="seconds")}
     path = _list_file(file)
@@ -105,13 +105,13 @@ def kept_versions(file: Path) -> tuple[Kept, ...]:
         lines = _list_file(file).read_bytes().splitlines()
     except OSError:
         return ()
-    found: list[Kept] = []
+    versions: list[Kept] = []
     for line in lines:
         with contextlib.suppress(ValueError):
             held = parse_json(line)
             if isinstance(held, dict) and held.get("origin") in _ORIGINS:
-                found.append(Kept(str(held.get("hash")), held["origin"], str(held.get("at"))))
-    return tuple(found)
+                versions.append(Kept(str(held.get("hash")), held["origin"], str(held.get("at"))))
+    return tuple(versions)
 
 
 def keep_content(content: bytes) -> None:

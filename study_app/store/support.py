@@ -76,13 +76,13 @@ def _settings(settings: workstation.MachineSettings) -> dict[str, object]:
 
 def _crashes(results: Path) -> Iterator[str]:
     """Yield the newest traces of crashes of the sessions in ``results``, line by line what is a place in the source."""
-    found = []
+    traces = []
     for path in results.glob("*/data/sub-*/ses-*/crash.txt"):
         try:
-            found.append((path.stat().st_mtime_ns, path.read_text(encoding="utf-8", errors="replace")))
+            traces.append((path.stat().st_mtime_ns, path.read_text(encoding="utf-8", errors="replace")))
         except OSError:
             continue
-    for _, trace in sorted(found, reverse=True)[:CRASHES]:
+    for _, trace in sorted(traces, reverse=True)[:CRASHES]:
         lines = [line for line in trace.splitlines() if _PLACE.match(line) or _HEADING.match(line)]
         yield re.sub(r'(?<=File ")[^"]*', lambda path: source_place(path[0]), "\n".join(lines))
 

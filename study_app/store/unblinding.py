@@ -119,17 +119,17 @@ def unblind_folder(folder: Path, by: str, reason: str) -> dict[str, Unblinded]:
     if "" not in folders:
         for place in folders.values():
             verified_key(StudyFolder(place))
-    found: dict[str, Unblinded] = {}
+    by_site: dict[str, Unblinded] = {}
     for prefix, place in folders.items():
         of_site = unblind(place, by, reason)
         excluded = tuple(replace(row, participant=f"{prefix}{row.participant}") for row in of_site.excluded)
-        found[prefix] = replace(of_site, excluded=excluded)
-    return found
+        by_site[prefix] = replace(of_site, excluded=excluded)
+    return by_site
 
 
 def decided_late(folder: Path, rows: Sequence[Exclusion]) -> tuple[Exclusion, ...]:
     """Return the exclusions that a person decided or reversed after the key was opened; none of a merged study."""
-    opened_at = min(filter(None, (_moment(one["at"]) for one in reveals(folder))), default=None)
+    opened_at = min(filter(None, (_moment(reveal["at"]) for reveal in reveals(folder))), default=None)
     dated = (*((row, row.excluded_at) for row in rows if row.rule_or_person not in RULES), *dated_reversals(folder))
     times = ((row, _moment(text)) for row, text in dated)  # reveals are recorded in whole seconds
     return tuple(row for row, at in times if opened_at and at and at.replace(microsecond=0) > opened_at)
@@ -149,11 +149,11 @@ def reveals_of(folder: Path) -> tuple[dict[str, str], ...]:
     StoreError
         They cannot be read.
     """
-    found: list[dict[str, str]] = []
+    of_sites: list[dict[str, str]] = []
     for prefix, place in folders_of(folder).items():
         named: Mapping[str, str] = {"site": prefix[:-1]} if prefix else {}
-        found += [{**named, **one} for one in reveals(place)]
-    return tuple(found)
+        of_sites += [{**named, **reveal} for reveal in reveals(place)]
+    return tuple(of_sites)
 
 
 def all_opened(folder: Path) -> bool:
@@ -196,10 +196,10 @@ def _missed(session: SessionFolder, key: Key) -> Iterator[str]:
     protocol = whole_protocol(published, key)
     lines = opened(journal.read(session.journal), key)
     blocks = {line.trial: line.block for line in lines if isinstance(line, TrialStarted)}
-    heard = [one for one in trial_results(protocol, lines) if one.catch]
+    heard = [result for result in trial_results(protocol, lines) if result.catch]
     for block in protocol.blocks.values():
-        answered = [one for one in heard if blocks[one.trial] == block.id]
-        wrong = sum(not one.correct for one in answered)
+        answered = [result for result in heard if blocks[result.trial] == block.id]
+        wrong = sum(not result.correct for result in answered)
         if block.catch is not None and answered and wrong / len(answered) > block.catch.wrong_most:
             yield (
                 f'block "{block.id}": {wrong} of {len(answered)} catch trials answered incorrectly, '
@@ -224,7 +224,7 @@ def _rewrite(place: Place, lines: list[Event], key: Key) -> list[str]:
     """Write the sealed columns and open the recordings; a table stays without columns unknown to its version."""
     left: list[str] = []
     ours: dict[str, tuple[str, str]] = {}
-    before, after = (dict(table_files(place, lines, one)) for one in (None, key))
+    before, after = (dict(table_files(place, lines, reader)) for reader in (None, key))
     for path, columns in zip(after, table_columns(lines, opened=True).values(), strict=True):
         held = read_if_there(path) or b""
         written = [replace(column, later=False) if column.sealed else column for column in columns]
@@ -262,10 +262,10 @@ def _open_recording(path: Path, hashes: tuple[str, str], key: Key) -> None:
     from study_app.store.recordings import opened_content  # noqa: PLC0415 - loads the Parquet library
 
     content = read_own(path, study_root(path.parent))
-    found = hashlib.sha256(content).hexdigest()
-    if found not in hashes:
+    content_hash = hashlib.sha256(content).hexdigest()
+    if content_hash not in hashes:
         raise StoreError(f"{path} has changed since it was recorded, so it was not opened: restore it from a copy")
-    if found == hashes[0]:
+    if content_hash == hashes[0]:
         write_file(path, opened_content(path, content, key.nonce))
 
 

@@ -127,8 +127,8 @@ def withdraw(
     if not folder.is_dir():
         raise StoreError(f"{folder} is not a folder: give a study's folder, such as results/rek2024")
     copies, shared = _found(study, also)
-    for one in (study, *copies):
-        refuse_special(one.data / f"sub-{participant}")
+    for place in (study, *copies):
+        refuse_special(place.data / f"sub-{participant}")
     at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="seconds")
     with open_alone(folder):
         tombstone = _tombstone(study, participant, at, by, reason)
@@ -147,8 +147,11 @@ def withdraw(
             elif _erase(copy, replace(tombstone, at=at)):
                 erased.append(copy.path)
                 left += _names(copy, participant)
-            known, begun = tombstones(copy).get(participant), {one.begun for one in tombstone.sessions if one.begun}
-            if known is not None and any(one.begun in begun for one in known.sessions):
+            known, begun = (
+                tombstones(copy).get(participant),
+                {session.begun for session in tombstone.sessions if session.begun},
+            )
+            if known is not None and any(session.begun in begun for session in known.sessions):
                 reached.append(copy.path)
     for merged in dict.fromkeys(filter(None, map(merged_above, reached))):
         of_merged, merged_elsewhere = _outputs(merged)
@@ -170,12 +173,12 @@ def tombstones(study: StudyFolder) -> dict[str, Tombstone]:
         The list cannot be read, or a line of it is not a withdrawal.
     """
     content = read_if_there(study.withdrawals) or b""
-    found: dict[str, Tombstone] = {}
+    by_participant: dict[str, Tombstone] = {}
     for number, line in enumerate(content.splitlines(), start=1):
         if line.strip():
             tombstone = _parsed(study.withdrawals, number, line)
-            found[tombstone.participant] = tombstone
-    return found
+            by_participant[tombstone.participant] = tombstone
+    return by_participant
 
 
 def describe_session(session: SessionFolder) -> ErasedSession:
@@ -207,11 +210,13 @@ def proof_of_withdrawal(tombstone: Tombstone) -> tuple[str, str]:
 def _parsed(path: Path, number: int, line: bytes) -> Tombstone:
     try:
         held: dict[str, Any] = parse_json(line)
-        sessions = tuple(ErasedSession(**one) for one in held.pop("sessions"))
+        sessions = tuple(ErasedSession(**fields) for fields in held.pop("sessions"))
         made = Tombstone(**held, sessions=sessions)
-        proofs = (text for one in sessions for text in (one.begun, one.checksums, one.fingerprint))
+        proofs = (text for session in sessions for text in (session.begun, session.checksums, session.fingerprint))
         texts = (made.participant, made.by, made.reason, *proofs)
-        typed = all(isinstance(text, str) for text in texts) and all(isinstance(one.session, int) for one in sessions)
+        typed = all(isinstance(text, str) for text in texts) and all(
+            isinstance(session.session, int) for session in sessions
+        )
         if typed and holds("at", made.at) and ID_PATTERN.fullmatch(made.participant):
             return made
     except (ValueError, KeyError, TypeError, AttributeError):
@@ -224,17 +229,17 @@ def _parsed(path: Path, number: int, line: bytes) -> Tombstone:
 
 def _found(study: StudyFolder, also: Iterable[Path]) -> tuple[list[StudyFolder], list[StudyFolder]]:
     """Return the study folders below ``also``, without the study's own, and the Psych-DS exports of the study."""
-    found: dict[Path, StudyFolder] = {}
+    by_path: dict[Path, StudyFolder] = {}
     for folder in also:
         if not folder.is_dir():
             raise StoreError(f"{folder} is not a folder: --also names a folder with copies of the study")
         for description in sorted(folder.rglob(DATASET)):
             place = description.parent.resolve()
             if place != study.path.resolve() and StudyFolder(place).data.is_dir():
-                found[place] = StudyFolder(description.parent)
-    copies = [one for one in found.values() if is_there(one.key) or one.sessions()]
+                by_path[place] = StudyFolder(description.parent)
+    copies = [study for study in by_path.values() if is_there(study.key) or study.sessions()]
     name = _name(study)
-    return copies, [one for one in found.values() if one not in copies and _name(one) == name]
+    return copies, [study for study in by_path.values() if study not in copies and _name(study) == name]
 
 
 def _name(study: StudyFolder) -> str | None:
@@ -263,7 +268,7 @@ def _sessions(study: StudyFolder, participant: str) -> list[SessionFolder]:
 
 def _others(copy: StudyFolder, tombstone: Tombstone) -> list[Path]:
     """Return the folders of the participant's sessions in a copy that are not those that were erased."""
-    begun = {one.begun for one in tombstone.sessions if one.begun}
+    begun = {session.begun for session in tombstone.sessions if session.begun}
     return [
         session.path
         for session in _sessions(copy, tombstone.participant)

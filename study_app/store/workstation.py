@@ -144,13 +144,13 @@ class MachineSettings(_Strict):
 
     def with_bench(self, bench: DeviceBench) -> MachineSettings:
         """Return the settings with this measurement in place of an earlier one of the same device."""
-        others = (one for one in self.benches if (one.name, one.serial) != (bench.name, bench.serial))
+        others = (other for other in self.benches if (other.name, other.serial) != (bench.name, bench.serial))
         return self.model_copy(update={"benches": (bench, *others)})
 
     def bench_of(self, described: Mapping[str, Any]) -> DeviceBench | None:
         """Return the measurement of a device by what it says of itself; None where it was not measured."""
         own = described.get("name"), described.get("serial") or ""
-        return next((one for one in self.benches if (one.name, one.serial) == own), None)
+        return next((bench for bench in self.benches if (bench.name, bench.serial) == own), None)
 
     def screen_among(self, names: Sequence[str]) -> int:
         """Return which of the screens with these names is the participant's, from 1; the last where it is not there."""
@@ -303,7 +303,7 @@ def recent_protocols() -> tuple[str, ...]:
 
 def _first(error: ValidationError, document: dict[str, Any]) -> str:
     """Return what is wrong with a file, in a line: first what can be hinted at."""
-    fault = min(faults_of(error, document, MachineSettings.model_json_schema()), key=lambda found: not found.hint)
+    fault = min(faults_of(error, document, MachineSettings.model_json_schema()), key=lambda fault: not fault.hint)
     hint = f" ({fault.hint})" if fault.hint else ""
     return f"{'.'.join(str(step) for step in fault.path)}: {fault.message}{hint}"
 

@@ -270,8 +270,10 @@ def session_protocol(study: StudyFolder, protocol: Protocol, participant: str, s
 def claims(study: StudyFolder) -> list[Claim]:
     """Return the contents of all entries' files, by group and entry; replacements after the participant replaced."""
     paths = [path for path in study.allocated.glob("*.json") if _STEM.fullmatch(path.stem)]
-    found = [_claim(study, path) for path in paths]
-    return sorted(found, key=lambda claim: (claim.group or "", claim.entry, claim.replaces is not None, claim.path))
+    all_claims = [_claim(study, path) for path in paths]
+    return sorted(
+        all_claims, key=lambda claim: (claim.group or "", claim.entry, claim.replaces is not None, claim.path)
+    )
 
 
 def counts_places(held: Iterable[Claim]) -> bool:
@@ -289,7 +291,7 @@ def is_unchanged(claim: Claim, key: Key) -> bool:
 
 def entries_begun(study: StudyFolder) -> dict[str, Begun]:
     """Return what the first lines of the journals say of the entry of each participant with a session."""
-    found: dict[str, Begun] = {}
+    by_participant: dict[str, Begun] = {}
     for session in study.sessions():
         try:
             with open_regular(session.journal) as file:
@@ -298,8 +300,8 @@ def entries_begun(study: StudyFolder) -> dict[str, Begun]:
             continue
         if isinstance(start, dict) and isinstance(start.get("entry"), int):
             replaces = start.get("row_of") if start.get("place_in_group") else None
-            found[session.participant] = Begun(start["entry"], start.get("group"), replaces)
-    return found
+            by_participant[session.participant] = Begun(start["entry"], start.get("group"), replaces)
+    return by_participant
 
 
 def _claim_of(held: Iterable[Claim], participant: str | None) -> Claim | None:

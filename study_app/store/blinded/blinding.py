@@ -444,7 +444,7 @@ def opened_key(folder: StudyFolder) -> Key | None:
 
 
 def _opened(start: events.SessionStarted, line: events.Event, key: Key) -> events.Event:
-    found: dict[str, Any] = {}
+    opened: dict[str, Any] = {}
     for name, more, names in (
         ("sealed", [], _SEALED_IN.get(type(line), frozenset())),
         ("sealed_code", ["code"], frozenset({"code"})),
@@ -456,8 +456,8 @@ def _opened(start: events.SessionStarted, line: events.Event, key: Key) -> event
                 f"line {line.n} of the journal cannot be decrypted with the study's key: it was changed; restore it "
                 "from a copy"
             )
-        found |= {**measured, name: None}
-    return events.read_event({**line.line(), **found}) if found else line
+        opened |= {**measured, name: None}
+    return events.read_event({**line.line(), **opened}) if opened else line
 
 
 def _whose(start: events.SessionStarted, line: Any) -> list[object]:
@@ -518,12 +518,12 @@ def reading_what_ran(receipt: Path) -> Iterator[None]:
 
 def _resolved(protocol: Protocol) -> dict[str, Any]:
     chosen = [effect.name for effect in EFFECTS if effect.choose is not None]
-    found = {}
+    by_liquid = {}
     for name in sorted(protocol.liquids):
         (liquid,) = resolve(protocol.scene_of(name)).liquids
         laws = {table: getattr(liquid, table).model_dump(mode="json") for table in chosen}
-        found[name] = {"effects": list(liquid.effects), **laws}
-    return found
+        by_liquid[name] = {"effects": list(liquid.effects), **laws}
+    return by_liquid
 
 
 def _session_owner(participant: str, session: int) -> list[object]:

@@ -361,15 +361,15 @@ class Journal:
         """Refuse to write into a file that no longer has the journal's name, or that another program wrote."""
         torn = self._torn  # then the file may be longer
         try:
-            found = self.path.stat()
-            there = os.path.samestat(found, os.fstat(self.file.fileno()))
+            status = self.path.stat()
+            is_same_file = os.path.samestat(status, os.fstat(self.file.fileno()))
         except FileNotFoundError:
-            there = False
+            is_same_file = False
         except OSError as error:
             raise cannot_write(self.path, error) from error
-        if not there:
+        if not is_same_file:
             raise StoreError(f"{self.path} was moved, deleted or replaced while the session ran: put it back")
-        if found.st_size != self._size and not torn:
+        if status.st_size != self._size and not torn:
             raise StoreError(f"{self.path} was written by another program while the session ran: end this session")
 
     def _write(self, content: bytes) -> bool:

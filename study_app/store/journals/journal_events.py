@@ -41,9 +41,9 @@ _RESPONSE = ("item", "number", "kind", "value", "onset_s", "first_s", "last_s", 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """What a field may be: in words, whether a value is so, and the type of JSON Schema, with more of its keys."""
+    """A kind of value: its description, its check, and its type in JSON Schema with further keywords."""
 
-    words: str
+    description: str
     holds: Callable[[object], bool]
     type: str
     more: Mapping[str, Any] = field(default_factory=dict, hash=False)
@@ -101,7 +101,7 @@ Checks: TypeAlias = Annotated[
     Sequence[Mapping[str, Any]],
     Kind(
         "list of objects",
-        lambda value: isinstance(value, list) and all(isinstance(one, dict) for one in value),
+        lambda value: isinstance(value, list) and all(isinstance(item, dict) for item in value),
         "array",
         {"items": {"type": "object"}},
     ),
@@ -215,12 +215,12 @@ class Event:
 
     def __init_subclass__(cls, *, group: bool = False) -> None:
         declared = [
-            one
-            for one in dataclasses.fields(dataclass(frozen=True, kw_only=True)(cls))
-            if one.name not in (*_OF_ALL, "others")
+            declaration
+            for declaration in dataclasses.fields(dataclass(frozen=True, kw_only=True)(cls))
+            if declaration.name not in (*_OF_ALL, "others")
         ]
-        cls.declared = tuple(one.name for one in declared)
-        cls.required = tuple(one.name for one in declared if one.default is dataclasses.MISSING)
+        cls.declared = tuple(declaration.name for declaration in declared)
+        cls.required = tuple(declaration.name for declaration in declared if declaration.default is dataclasses.MISSING)
         if not group:
             EVENTS[_journal_name(cls)] = cls
 
@@ -606,7 +606,7 @@ class SessionEnded(Event):
 
 def _known_kinds() -> Iterator[tuple[str, tuple[Kind, bool]]]:
     aliases: tuple[Any, ...] = (Text, Time, Number, Integer, Flag)
-    of_columns = {alias.__metadata__[0].words: alias.__metadata__[0] for alias in aliases}
+    of_columns = {alias.__metadata__[0].description: alias.__metadata__[0] for alias in aliases}
     yield from ((column.name, (of_columns[column.kind], True)) for column in (*TRIALS, *DELIVERED, *VIDEO))
     for owner in (Response, Event, *EVENTS.values()):
         for name, hint in get_type_hints(owner, include_extras=True).items():
@@ -635,7 +635,7 @@ def problem(line: Mapping[str, Any]) -> str | None:
         return f"({event}) is not about one of {', '.join(kind.one_of)}"
     for name in line:
         if not holds(known := _kind_name(line, name), line[name]):
-            return f"({event}) holds {name} {shortened(line[name])}, expected: {_KINDS[known][0].words}"
+            return f"({event}) holds {name} {shortened(line[name])}, expected: {_KINDS[known][0].description}"
     return None if 0 <= line["t_s"] <= _MOST_SECONDS else f"({event}) has t_s {line['t_s']:g}"
 
 
@@ -654,7 +654,7 @@ def journal_schema() -> dict[str, Any]:
     for name, kind in EVENTS.items():
         wanted: dict[str, Any] = {"description": inspect.getdoc(kind), "required": list(kind.required)}
         if kind.one_of:
-            wanted["oneOf"] = [{"required": [one]} for one in kind.one_of]
+            wanted["oneOf"] = [{"required": [key]} for key in kind.one_of]
         of_events.append({"if": {"properties": {"event": {"const": name}}}, "then": wanted})
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -209,8 +209,8 @@ def note_allocation(store: SessionStore) -> None:
     study, folder, start = store.place.study_folder, store.place.folder, start_of(store.lines)
     if start.entry is None or start.group is not None:
         return
-    sessions = [one for one in study.sessions() if one.participant == folder.participant]
-    known = [line for one in sessions if is_there(one.journal) for line in journal.scan(one.journal).lines]
+    sessions = [session for session in study.sessions() if session.participant == folder.participant]
+    known = [line for session in sessions if is_there(session.journal) for line in journal.scan(session.journal).lines]
     if any(isinstance(line, Allocated) for line in known):
         return
     allocation = allocated(study, store.key, folder.participant)
@@ -267,7 +267,7 @@ class UsedIds:
 
     def numbers(self, participant: str) -> tuple[int, ...]:
         """Return the numbers of a participant's sessions."""
-        return tuple(sorted(number for one, number in self.held if one == participant))
+        return tuple(sorted(number for holder, number in self.held if holder == participant))
 
     def suggested(self) -> str:
         """Return the next free id: P001, P002 ...; those of sessions that were never begun are free again."""
@@ -319,8 +319,10 @@ class UsedIds:
 def used_ids(folder: StudyFolder) -> UsedIds:
     """Return which ids and session numbers of a study are used; nothing is touched."""
     sessions = folder.sessions()
-    held = frozenset((one.participant, one.number) for one in sessions if not abandoned(one.path))
-    return UsedIds(folder.path, held, tuple(sorted({one.participant for one in sessions})), tuple(tombstones(folder)))
+    held = frozenset((session.participant, session.number) for session in sessions if not abandoned(session.path))
+    return UsedIds(
+        folder.path, held, tuple(sorted({session.participant for session in sessions})), tuple(tombstones(folder))
+    )
 
 
 def check_participant(participant: str, *, pilot: bool = False) -> None:

@@ -273,10 +273,10 @@ class SessionStore:
     def _write_proofs(self) -> None:
         """Write the receipt, and then its proofs: without it these would be of the receipt before."""
         self._write_receipt()
-        found = fingerprint(write_checksums(self.folder), self._lines)
+        value = fingerprint(write_checksums(self.folder), self._lines)
         if not self.fingerprint:
-            note_fingerprint(self.place.study_folder, self.folder, found)
-        self.fingerprint = found
+            note_fingerprint(self.place.study_folder, self.folder, value)
+        self.fingerprint = value
 
     def _keep_recordings(self) -> None:
         """Journal the results of recordings, their files or why there are none; and failures of outlets."""

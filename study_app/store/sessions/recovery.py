@@ -250,8 +250,8 @@ def beyond(place: Place, lines: Sequence[events.Event]) -> Iterator[tuple[Path, 
     rows = session_tables.SessionRows(lines)
     for name, spare in (("responses", 0), ("trials", 1), ("intervals", 1)):
         path, given = folder.table(place.study, name), len(rows.table(name))
-        if (there := _rows(path, place.study_folder.path)) > given + spare:
-            yield path, f"has {there} rows, and the journal gives {given}"
+        if (row_count := _rows(path, place.study_folder.path)) > given + spare:
+            yield path, f"has {row_count} rows, and the journal gives {given}"
 
 
 def _ended_or_recorded(place: Place, lines: Sequence[events.Event]) -> Iterator[tuple[Path, str]]:
@@ -327,13 +327,13 @@ def _same_protocol(
     """Reject a protocol whose file is not the one the session began with, with the differences."""
     if protocol_hash(source) == start.protocol_hash:
         return
-    found = list(differences(first["protocol"], json.loads(json.dumps(receipt.without_conditions(protocol)))))
+    changes = list(differences(first["protocol"], json.loads(json.dumps(receipt.without_conditions(protocol)))))
     if not same_conditions(place.study_folder.path, protocol):
-        found.append(CONDITIONS_DIFFER)
-    if not found:
-        found.append("only comments, order or notation")
-    listed = "; ".join(found[:SHOWN_DIFFERENCES])
-    more = f"; and {len(found) - SHOWN_DIFFERENCES} more" if len(found) > SHOWN_DIFFERENCES else ""
+        changes.append(CONDITIONS_DIFFER)
+    if not changes:
+        changes.append("only comments, order or notation")
+    listed = "; ".join(changes[:SHOWN_DIFFERENCES])
+    more = f"; and {len(changes) - SHOWN_DIFFERENCES} more" if len(changes) > SHOWN_DIFFERENCES else ""
     raise StoreError(
         f"{place.folder.path} began with another protocol file and can be resumed only with that one: restore it, "
         f"or use a new session number. Differences: {listed}{more}"
@@ -391,8 +391,8 @@ def _renew_proof(place: Place, lines: list[events.Event], rewritten: list[Path])
     Sessions of format 1 have none.
     """
     study, folder = place.study_folder, place.folder
-    there = {session for _, session in listed(study.fingerprints)}
-    has_none = lines[-1].previous is not None and place_of(study, folder) not in there
+    listed_places = {session for _, session in listed(study.fingerprints)}
+    has_none = lines[-1].previous is not None and place_of(study, folder) not in listed_places
     noted = [folder.rebuilt] if has_none else []
     if has_none:
         note_rebuilt(folder, f"{study.fingerprints.name} had no fingerprint of the session")

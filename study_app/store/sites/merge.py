@@ -78,15 +78,17 @@ def merge(given: Mapping[str, Path], to: Path) -> Merged:
     merged = read_merged(to)
     _check_names(given, merged)
     _check_places(given, to, merged)
-    there = () if merged is None else tuple(_source(name, merged.folder(name)) for name in merged.names)
+    present = () if merged is None else tuple(_source(name, merged.folder(name)) for name in merged.names)
     new = tuple(_source(name, path) for name, path in given.items())
-    if empty := next((name for name, one in zip(given, new, strict=True) if not one.begun), None):
+    if empty := next((name for name, source in zip(given, new, strict=True) if not source.begun), None):
         raise StoreError(f"site {empty}: {given[empty]} holds no sessions: merge it when it does")
     ran = new[0].protocol_hash if merged is None else merged.protocol_hash
-    _check_alike((*there, *new), ran)
-    _check_sessions((*there, *new))
+    _check_alike((*present, *new), ran)
+    _check_sessions((*present, *new))
     at = datetime.now().astimezone().isoformat(timespec="seconds")
-    sites = tuple(Site(name=one.name, merged_at=at, key_hash=one.key.hash, sessions=len(one.begun)) for one in new)
+    sites = tuple(
+        Site(name=source.name, merged_at=at, key_hash=source.key.hash, sessions=len(source.begun)) for source in new
+    )
     if merged is None:
         made = Merged(to, new[0].study, ran, sites)
         _create(made, new)
@@ -149,7 +151,7 @@ def _source(name: str, path: Path) -> _Source:
     for session in sessions:
         refuse_if_open(session.path)
     receipts = [receipt.read(session.receipt) for session in sessions]
-    hashes = dict.fromkeys(str(one["protocol_hash"]) for one in receipts)
+    hashes = dict.fromkeys(str(held["protocol_hash"]) for held in receipts)
     if len(hashes) > 1:
         raise StoreError(
             f"site {name}: sessions in {path} ran under {len(hashes)} protocols (SHA-256 {', '.join(hashes)}): only "
@@ -161,7 +163,7 @@ def _source(name: str, path: Path) -> _Source:
         state=state,
         study=described,
         protocol_hash=next(iter(hashes), ""),
-        pilot=any(one["pilot"] for one in receipts) if receipts else None,
+        pilot=any(held["pilot"] for held in receipts) if receipts else None,
         key=verified_key(study),
         begun={describe_session(session).begun or str(session.path): session.path for session in sessions},
     )
@@ -169,7 +171,7 @@ def _source(name: str, path: Path) -> _Source:
 
 def _check_alike(sources: tuple[_Source, ...], protocol_hash: str) -> None:
     """Reject sites of other protocols, and rehearsals or pilots mixed with participants."""
-    first = next((one for one in sources if one.protocol_hash), sources[0])
+    first = next((source for source in sources if source.protocol_hash), sources[0])
     for other in sources:
         if other.study != first.study or other.protocol_hash not in ("", protocol_hash):
             raise StoreError(
@@ -191,8 +193,8 @@ def _kind(source: _Source) -> str:
 def _check_sessions(sources: tuple[_Source, ...]) -> None:
     """Reject a session that is in two sites: it would count twice."""
     seen: dict[str, Path] = {}
-    for one in sources:
-        for begun, path in one.begun.items():
+    for source in sources:
+        for begun, path in source.begun.items():
             if (other := seen.get(begun)) is not None:
                 raise StoreError(
                     f"{path} is a copy of {other}, and would count twice: name only one of the two folders"
@@ -254,7 +256,7 @@ def _add(merged: Merged, sources: tuple[_Source, ...]) -> None:
 def _copy(source: _Source, to: Path) -> None:
     """Copy a results folder and flush it to the disk; links stay links, for `verify` to judge."""
     shutil.copytree(source.path, to, symlinks=True, ignore=LEFT_BEHIND, copy_function=_copy_file)
-    for place in (to, *(one for one in paths_in(to) if one.is_dir() and not one.is_symlink())):
+    for place in (to, *(path for path in paths_in(to) if path.is_dir() and not path.is_symlink())):
         sync_folder(place)
     refuse_if_open(source.path)
     if _state(source.path) != source.state:
@@ -263,8 +265,8 @@ def _copy(source: _Source, to: Path) -> None:
 
 def _state(path: Path) -> list[tuple[Path, int, int]]:
     """Return a state that changes when a file in a folder does."""
-    found = [(one, one.lstat()) for one in paths_in(path)]
-    return [(one, held.st_size, held.st_mtime_ns) for one, held in found if not one.is_dir()]
+    states = [(entry, entry.lstat()) for entry in paths_in(path)]
+    return [(entry, held.st_size, held.st_mtime_ns) for entry, held in states if not entry.is_dir()]
 
 
 def _copy_file(source: str, to: str, *, follow_symlinks: bool = True) -> str:

@@ -214,8 +214,8 @@ def _combined(name: str, values: list[Any]) -> Any:
     if _OF_TRIAL[name] == "max":
         return max(values)
     total = sum(values)
-    found = total / len(values) if _OF_TRIAL[name] == "mean" else total
-    return round(found, 6) if isinstance(found, float) else found
+    combined = total / len(values) if _OF_TRIAL[name] == "mean" else total
+    return round(combined, 6) if isinstance(combined, float) else combined
 
 
 def _session(start: events.SessionStarted) -> Row:

@@ -63,10 +63,10 @@ def participants(folder: StudyFolder) -> list[csv_files.Row]:
 def _row_of(session: SessionFolder, key: Key | None) -> list[csv_files.Row]:
     """Return the row of one session as `row_of`; a journal that this program has read is not read again."""
     try:
-        found = session.journal.lstat()
+        status = session.journal.lstat()
     except OSError:
         return row_of(session, key)
-    stamp = found.st_mtime_ns, found.st_size, None if key is None else key.hash
+    stamp = status.st_mtime_ns, status.st_size, None if key is None else key.hash
     if (held := _READ.get(session.path)) is not None and held[0] == stamp:
         return held[1]
     rows = row_of(session, key)
@@ -186,19 +186,20 @@ def describes_alike(content: bytes, expected: bytes) -> bool:
     is no property of schema.org's PropertyValue; units and ranges are the same in all.
     """
     try:
-        found, wanted = parse_json(content), parse_json(expected)
+        description, wanted = parse_json(content), parse_json(expected)
         columns, wanted_columns = (
             [
                 (variable["name"], {key: variable[key] for key in variable.keys() - {"description", "valuePattern"}})
                 for variable in it.pop("variableMeasured")
             ]
-            for it in (found, wanted)
+            for it in (description, wanted)
         )
     except (AttributeError, KeyError, TypeError, ValueError):
         return False
     names = [name for name, _ in columns]
     return bool(
-        found == wanted and columns == [one for one in wanted_columns if one[0] in names or one[0] not in LATER]
+        description == wanted
+        and columns == [column for column in wanted_columns if column[0] in names or column[0] not in LATER]
     )
 
 

@@ -59,13 +59,13 @@ def telltales(protocol: Protocol, recorded: Iterable[float] = ()) -> Telltales:
 
     ``recorded`` are `recorded_numbers`.
     """
-    words = _words(protocol.model_dump(mode="json", include={"liquids", "conditions"}, exclude_unset=True))
-    return Telltales(words | _all_spelled({*presented_numbers(protocol), *recorded}))
+    terms = _words(protocol.model_dump(mode="json", include={"liquids", "conditions"}, exclude_unset=True))
+    return Telltales(terms | _all_spelled({*presented_numbers(protocol), *recorded}))
 
 
 def presented_numbers(protocol: Protocol) -> frozenset[float]:
     """Return every level, standard and comparison that trials of a protocol can present, 0 aside."""
-    found: set[float] = set()
+    numbers: set[float] = set()
     for block in protocol.blocks.values():
         if block.design is None or block.stimulus is None:
             continue
@@ -75,9 +75,9 @@ def presented_numbers(protocol: Protocol) -> frozenset[float]:
         levels |= {stimulus.levels[1]} if block.catch is not None else set()
         levels |= set() if first is None else {first.level}
         standards = standards_of(protocol, block)
-        found |= levels | {one for one in standards if one is not None}
-        found |= {stimulus.comparison(standard, level) for standard in standards for level in levels}
-    return frozenset(found - {0.0})
+        numbers |= levels | {standard for standard in standards if standard is not None}
+        numbers |= {stimulus.comparison(standard, level) for standard in standards for level in levels}
+    return frozenset(numbers - {0.0})
 
 
 def recorded_numbers(protocol: Protocol, opened: Iterable[Event]) -> frozenset[float]:
@@ -85,17 +85,17 @@ def recorded_numbers(protocol: Protocol, opened: Iterable[Event]) -> frozenset[f
 
     Those that a participant set, step by step, are among them.
     """
-    found: set[float] = set()
+    numbers: set[float] = set()
     setting, place = None, 0
     for line in opened:
         if isinstance(line, TrialStarted) and line.level:
             block, standard = protocol.blocks[line.block], line.standard
-            found |= {line.level, stimulus_of(protocol, block).comparison(standard, line.level)}
+            numbers |= {line.level, stimulus_of(protocol, block).comparison(standard, line.level)}
             setting, place = adjusting_of(protocol, block, standard, line.level), 0
         elif isinstance(line, Stepped) and setting is not None:
             place = setting.moved(place, line.steps)
-            found |= {setting.level(place), setting.comparison(place)}
-    return frozenset(found - {0.0})
+            numbers |= {setting.level(place), setting.comparison(place)}
+    return frozenset(numbers - {0.0})
 
 
 def certain_telltales(tables: Tables, published: Any, levels: Iterable[float] = ()) -> Telltales:
@@ -105,33 +105,33 @@ def certain_telltales(tables: Tables, published: Any, levels: Iterable[float] = 
     """
     known = " ".join(text for _, text in _texts(published, "", frozenset()))
     every = _words(tables) | _all_spelled(levels)
-    words = (word for word in every if not word[0].isdigit() or _digits(word) >= _TELLING_DIGITS)
-    return Telltales(word for word in words if not Telltales([word]).in_text(known))
+    certain = (word for word in every if not word[0].isdigit() or _digits(word) >= _TELLING_DIGITS)
+    return Telltales(word for word in certain if not Telltales([word]).in_text(known))
 
 
-def find_leaks(folder: Path, words: Telltales) -> list[Leak]:
-    """Return where in ``folder`` one of ``words`` stands: in a name or in a text, statements and recordings aside."""
-    found: list[Leak] = []
+def find_leaks(folder: Path, telling: Telltales) -> list[Leak]:
+    """Return where in ``folder`` one of ``telling`` stands: in a name or in a text, statements and recordings aside."""
+    leaks: list[Leak] = []
     key = StudyFolder(folder).key
     for path in paths_in(folder):
         name = path.relative_to(folder).as_posix()
-        found += [Leak(f"the name {name}", word) for word in words.in_text(name)]
+        leaks += [Leak(f"the name {name}", word) for word in telling.in_text(name)]
         if path.is_file() and path != key and path.suffix != ".parquet":
-            found += _in_file(path, name, words)
-    return found
+            leaks += _in_file(path, name, telling)
+    return leaks
 
 
-def _in_file(path: Path, name: str, words: Telltales) -> Iterator[Leak]:
+def _in_file(path: Path, name: str, telling: Telltales) -> Iterator[Leak]:
     try:
         content = path.read_bytes().decode("utf-8", "replace")
     except FileNotFoundError:  # a running program has just taken it away
         return
     except OSError as error:
         raise cannot_read(path, error) from error
-    if not words.in_text(content):
+    if not telling.in_text(content):
         return
     for place, text in _fragments(path.suffix, content):
-        for word in words.in_text(text):
+        for word in telling.in_text(text):
             yield Leak(f"{name}{place}", word)
 
 
@@ -180,7 +180,7 @@ def _texts(value: Any, place: str, passed_over: frozenset[str]) -> Iterator[tupl
 
 
 def _words(tables: Tables) -> set[str]:
-    found: set[str] = set()
+    spellings: set[str] = set()
 
     def collect(value: Any) -> None:
         if isinstance(value, Mapping):
@@ -191,14 +191,14 @@ def _words(tables: Tables) -> set[str]:
             for inner in value:
                 collect(inner)
         elif isinstance(value, str):
-            found.add(value)
+            spellings.add(value)
         elif isinstance(value, int | float) and not isinstance(value, bool) and value:
-            found.update(_spelled(value))
+            spellings.update(_spelled(value))
 
     for table in ("liquids", "conditions"):
         collect(tables[table])
-        found.update(tables[table])
-    return found
+        spellings.update(tables[table])
+    return spellings
 
 
 def _all_spelled(values: Iterable[float]) -> set[str]:

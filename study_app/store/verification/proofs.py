@@ -41,13 +41,13 @@ def records(study: StudyFolder) -> Proofs:
     rows = (*exclusions(study.path), *reversals(study.path))
     name = study.exclusions.name
     excluded = [(proof_of(json.dumps(asdict(row)).encode()), f"{name}/sub-{row.participant}") for row in rows]
-    opened = [(proof_of(json.dumps(one).encode()), study.reveals.name) for one in reveals(study.path)]
+    opened = [(proof_of(json.dumps(reveal).encode()), study.reveals.name) for reveal in reveals(study.path)]
     return (*map(proof_of_withdrawal, tombstones(study).values()), *opened, *dict.fromkeys(excluded))
 
 
 def lines_of(study: StudyFolder) -> str:
     """Return the lines that prove a study as it is now."""
-    lines = [checked_line(*one) for one in (*listed(study.fingerprints), *records(study))]
+    lines = [checked_line(*proof) for proof in (*listed(study.fingerprints), *records(study))]
     if not lines:
         raise StoreError(f"{study.path} has no session that ended: there is nothing to prove yet")
     return "".join(f"{line}\n" for line in lines)

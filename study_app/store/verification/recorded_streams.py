@@ -30,8 +30,8 @@ LATE: Final = 1.5
 """Intervals between successive ticks from so many periods on are late."""
 
 
-def check_recording(file: Path, folder: Path, found: Findings) -> list[str]:
-    """Compare the recording ``file`` with the study in ``folder``; add to ``found``, and return the measurements.
+def check_recording(file: Path, folder: Path, findings: Findings) -> list[str]:
+    """Compare the recording ``file`` with the study in ``folder``; add to ``findings``, and return the measurements.
 
     Raises
     ------
@@ -45,17 +45,17 @@ def check_recording(file: Path, folder: Path, found: Findings) -> list[str]:
         raise StoreError(f"{file} has no stream '{MARKERS}' or '{SAMPLES}'; its streams: {names}")
     merged = read_merged(folder)
     places = [folder] if merged is None else [it for it in map(merged.folder, merged.names) if it.is_dir()]
-    sessions = [one for place in places for one in StudyFolder(place).sessions()]
+    sessions = [session for place in places for session in StudyFolder(place).sessions()]
     expected: dict[SessionFolder, list[str]] = {}
-    for one in sessions:
-        with found.reading(one.path):
-            lines = journal.read(one.journal)
+    for session in sessions:
+        with findings.reading(session.path):
+            lines = journal.read(session.journal)
             made = (marker_of(line.event, line.t_s, 0, line.fields()) for line in lines)
-            expected[one] = [it.text for it in made if it is not None]
+            expected[session] = [it.text for it in made if it is not None]
     said = []
     for name, stream in ours:
         try:
-            of = _markers(file, stream, expected, found) if name == MARKERS else _samples(file, stream, found)
+            of = _markers(file, stream, expected, findings) if name == MARKERS else _samples(file, stream, findings)
             said += [*of, f"clock of '{name}': {clock_drift(stream)}"]
         except (ArithmeticError, LookupError, TypeError, ValueError) as error:
             why = f"{type(error).__name__}: {error}"
@@ -65,7 +65,7 @@ def check_recording(file: Path, folder: Path, found: Findings) -> list[str]:
     markers = [text for name, stream in ours if name == MARKERS for text in _texts(stream)]
     sent = {text for texts in expected.values() for text in texts}
     if any(name == MARKERS for name, _ in ours) and sent.isdisjoint(markers):
-        found.errors += (Finding(file.name, "it has no marker of this study's sessions"),)
+        findings.errors += (Finding(file.name, "it has no marker of this study's sessions"),)
     return said
 
 
@@ -90,39 +90,39 @@ def _read(file: Path) -> list[Any]:
 
 
 def _markers(
-    file: Path, stream: Mapping[str, Any], expected: Mapping[SessionFolder, Sequence[str]], found: Findings
+    file: Path, stream: Mapping[str, Any], expected: Mapping[SessionFolder, Sequence[str]], findings: Findings
 ) -> Iterator[str]:
     """Compare a stream of markers with the journals: none may lack, and none be added, between the first and last."""
     texts = _texts(stream)
     if not texts:  # of a program that was killed before its session, for example
         yield "markers: none recorded"
         return
-    known = Counter(text for one in expected.values() for text in one)
+    known = Counter(text for texts in expected.values() for text in texts)
     unknown = sum(text not in known and not text.startswith(_TARGET) for text in texts)
     for session, all_sent in expected.items():
         sent = [text for text in all_sent if known[text] == 1]  # sessions begin with the same text
         wanted = set(sent)
         at = {text: place for place, text in enumerate(texts) if text in wanted}
-        there = [number for number, text in enumerate(sent) if text in at]
+        known_numbers = [number for number, text in enumerate(sent) if text in at]
         name = f"{session.path.parent.name}/{session.path.name}"
-        if not there:
+        if not known_numbers:
             continue
-        first, last = there[0], there[-1]
+        first, last = known_numbers[0], known_numbers[-1]
         if lost := [text for text in sent[first : last + 1] if text not in at]:
             what = f"{file.name} lacks {counted(len(lost), 'marker')} of its journal"
-            found.error(session.path, f"{what}; the first: {lost[0]}")
+            findings.error(session.path, f"{what}; the first: {lost[0]}")
         span = texts[min(at.values()) : max(at.values()) + 1]
         if added := [text for text in span if text not in known and not text.startswith(_TARGET)]:
             what = f"{file.name} has {counted(len(added), 'marker')} that its journal lacks; the first: {added[0]}"
-            found.error(session.path, f"{what}. The journal was changed, or another program sent them")
+            findings.error(session.path, f"{what}. The journal was changed, or another program sent them")
             unknown -= len(added)
         if outside := len(sent) - 1 - (last - first):
             when = f"{first} before the recording and {len(sent) - 1 - last} after it"
-            found.warning(session.path, f"{file.name} does not cover {outside} of its {len(sent)} markers: {when}")
-        counts = f"{len(there)} of {len(sent)} recorded, {len(lost)} lost"
+            findings.warning(session.path, f"{file.name} does not cover {outside} of its {len(sent)} markers: {when}")
+        counts = f"{len(known_numbers)} of {len(sent)} recorded, {len(lost)} lost"
         yield f"markers of {name}: {counts}; time within {_error_ms(session, stream, at):.2g} ms"
     if unknown:
-        found.warnings += (Finding(file.name, f"{counted(unknown, 'marker')} of no session of this study"),)
+        findings.warnings += (Finding(file.name, f"{counted(unknown, 'marker')} of no session of this study"),)
 
 
 def _texts(stream: Mapping[str, Any]) -> list[str]:
@@ -141,10 +141,10 @@ def _error_ms(session: SessionFolder, stream: Mapping[str, Any], at: Mapping[str
     return max(1e3 * float(np.abs(np.array(part) - np.median(part)).max()) for part in parts if part)
 
 
-def _samples(file: Path, stream: Mapping[str, Any], found: Findings) -> Iterator[str]:
+def _samples(file: Path, stream: Mapping[str, Any], findings: Findings) -> Iterator[str]:
     """Count lost and late samples of a stream."""
     stamps_s = np.asarray(stream["time_stamps"], float)
-    labels = [one["label"][0] for one in stream["info"]["desc"][0]["channels"][0]["channel"]]
+    labels = [channel["label"][0] for channel in stream["info"]["desc"][0]["channels"][0]["channel"]]
     if "tick" not in labels:
         yield f"samples: {len(stamps_s)} recorded; this version sent no tick numbers, by which losses are found"
         return
@@ -157,8 +157,8 @@ def _samples(file: Path, stream: Mapping[str, Any], found: Findings) -> Iterator
     lost = int((steps[gaps] - 1).sum())
     if lost:
         first_s = stamps_s[int(np.argmax(gaps))] - stamps_s[0]
-        words = f"{counted(lost, 'sample')} lost in {counted(int(gaps.sum()), 'gap')}"
-        found.errors += (Finding(file.name, f"{words}; the first after {first_s:.3f} s of the stream"),)
+        loss = f"{counted(lost, 'sample')} lost in {counted(int(gaps.sum()), 'gap')}"
+        findings.errors += (Finding(file.name, f"{loss}; the first after {first_s:.3f} s of the stream"),)
     late_s = intervals_s[(steps == 1) & (intervals_s > LATE / float(stream["info"]["nominal_srate"][0]))]
     worst = f", at most {1e3 * late_s.max():.3g} ms between two ticks" if len(late_s) else ""
     yield f"samples: {len(stamps_s)} recorded, {lost} lost, {len(late_s)} late{worst}"

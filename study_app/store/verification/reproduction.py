@@ -61,35 +61,35 @@ def reproduced(session_folder: Path) -> Reproduced:
         raise StoreError(
             f"{folder.path}: receipt, key and journal do not give the session: verify the study's folder"
         ) from None
-    found = Reproduced([*reproduce(protocol, seed, participant, recorded, complete=complete, place=place)])
+    reproduction = Reproduced([*reproduce(protocol, seed, participant, recorded, complete=complete, place=place)])
     if lines and events.start_of(lines).intervals:
         compared = _Compared(protocol, Key(key.codes, key.nonce), schedule)
-        _levels(compared, lines, key, found)
+        _levels(compared, lines, key, reproduction)
         versions = ran["versions"]  # where receipts of 0.2.1 may have the rules, as a text
         if compared.differences and str(ran.get("level_rules", versions.get("level rules"))) != str(LEVEL_RULES):
-            found.followed.append(
+            reproduction.followed.append(
                 f"liquid-study {versions.get('liquid-study')} ran the session and chose levels by other rules: run "
                 "reproduce of that version"
             )
-    return found
+    return reproduction
 
 
-def _levels(compared: "_Compared", lines: list[events.Event], key: blinding.Key, found: Reproduced) -> None:
+def _levels(compared: "_Compared", lines: list[events.Event], key: blinding.Key, reproduction: Reproduced) -> None:
     """Compare what each trial of intervals presented with what was due."""
     try:
         lines = opened(lines, key)
         for index, line in enumerate(lines):
             compared.take(line, lines[:index])
     except StoreError as error:
-        found.differences.append(f"levels cannot be compared: {error}")
+        reproduction.differences.append(f"levels cannot be compared: {error}")
         return
     except (KeyError, TypeError, AttributeError, ValueError, StopIteration):  # the reason could reveal a level
-        found.differences.append("levels cannot be compared: receipt, key and journal do not give the levels")
+        reproduction.differences.append("levels cannot be compared: receipt, key and journal do not give the levels")
         return
-    found.differences += compared.differences
+    reproduction.differences += compared.differences
     for block, trials in compared.trials.items():
         follows = sum(trials.values())
-        found.followed.append(f"{block}: {follows} of {len(trials)} levels follow from the answers")
+        reproduction.followed.append(f"{block}: {follows} of {len(trials)} levels follow from the answers")
 
 
 class _Compared:
@@ -141,15 +141,17 @@ class _Compared:
         if isinstance(line, events.IntervalEnded) and set_to is None:
             return
         which = line.trial, line.attempt
-        own = [one for one in before if isinstance(one, events.OfAttempt) and (one.trial, one.attempt) == which]
-        started = next(one for one in own if isinstance(one, events.TrialStarted))
+        own = [
+            event for event in before if isinstance(event, events.OfAttempt) and (event.trial, event.attempt) == which
+        ]
+        started = next(event for event in own if isinstance(event, events.TrialStarted))
         block = self._protocol.blocks[started.block]
         if block.stimulus is None or started.level is None:
             return
         setting = adjusting_of(self._protocol, block, started.standard, started.level)
         if setting is None:
             return
-        steps = [one.steps for one in own if isinstance(one, events.Stepped)]
+        steps = [event.steps for event in own if isinstance(event, events.Stepped)]
         if isinstance(line, events.Responses):
             follows, wrong = bool(line.items) and line.items[0].value == sum(steps), "the answer is not the sum of its"
         else:

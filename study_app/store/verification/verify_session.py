@@ -124,64 +124,64 @@ class CheckedSession:
     fingerprint: str = ""
 
 
-def check_session(place: Place, key: Key | None, found: Findings, *, recordings: bool = True) -> CheckedSession:
+def check_session(place: Place, key: Key | None, findings: Findings, *, recordings: bool = True) -> CheckedSession:
     """Check one session; again where there is an error and a program has opened it meanwhile.
 
     Without ``recordings`` these are not read, which takes a while.
     """
-    errors = Findings(found.folder)
+    errors = Findings(findings.folder)
     checked = CheckedSession(place=place, running=is_open(place.folder.path))
     with errors.reading(place.folder.path):
         checked = _check(place, key, errors, running=checked.running, recordings=recordings)
     if errors.errors and not checked.running and is_open(place.folder.path):
-        return check_session(place, key, found, recordings=recordings)
-    found.take(errors)
+        return check_session(place, key, findings, recordings=recordings)
+    findings.take(errors)
     return checked
 
 
-def _check(place: Place, key: Key | None, found: Findings, *, running: bool, recordings: bool) -> CheckedSession:
+def _check(place: Place, key: Key | None, findings: Findings, *, running: bool, recordings: bool) -> CheckedSession:
     folder = place.folder
     if running:
-        found.warning(folder.path, "is open in another program")
+        findings.warning(folder.path, "is open in another program")
     else:
         for path in (*temporaries(folder.path), *temporaries(folder.recordings)):
-            found.warning(path, "is an incomplete file of a program that was ended; rebuild removes it")
+            findings.warning(path, "is an incomplete file of a program that was ended; rebuild removes it")
         if is_there(folder.crash) and folder.crash.stat().st_size:
-            found.warning(folder.crash, "shows where the program crashed: send it to the developers")
-    contents = _journal(folder, found, running=running)
+            findings.warning(folder.crash, "shows where the program crashed: send it to the developers")
+    contents = _journal(folder, findings, running=running)
     lines = contents.lines
     if not running:
-        _receipt(folder, lines, key, found)
+        _receipt(folder, lines, key, findings)
     if not lines:
         return CheckedSession(place=place, readable=running or never_begun(folder.path), running=running)
     start = events.start_of(lines)
     expected = {"participant": folder.participant, "session": folder.number, "study": place.study}
     for name, value in expected.items():
         if (told := getattr(start, name)) != value:
-            found.error(folder.journal, f"is of {name} {told!r}, but is stored with those of {value!r}")
+            findings.error(folder.journal, f"is of {name} {told!r}, but is stored with those of {value!r}")
     told = lines
-    with found.reading(folder.journal):
+    with findings.reading(folder.journal):
         told = opened(lines, key)
     for wrong in (*wrong_responses(lines), *_removed(lines)):
-        found.error(folder.journal, wrong)
+        findings.error(folder.journal, wrong)
     ended = isinstance(lines[-1], events.SessionEnded)
     hashes = {}
     if ended or not running:
         names = (*files(folder), *_listed_system_files(folder))
         hashes = {name: _hash(folder, name) for name in names if recordings or not name.endswith(".parquet")}
     if not running:
-        _tables(place, lines, found, ended=ended)
+        _tables(place, lines, findings, ended=ended)
         if ended:
-            _checksums(folder, told, hashes, found, recordings=recordings)
+            _checksums(folder, told, hashes, findings, recordings=recordings)
         if recordings:
-            _recordings(folder, told, key, hashes, found, ended=ended)
+            _recordings(folder, told, key, hashes, findings, ended=ended)
     for name in system_files(folder):
         if name not in hashes:
-            found.warning(folder.path / name, "is a file of an operating system or of a program that shares files")
+            findings.warning(folder.path / name, "is a file of an operating system or of a program that shares files")
     if is_there(folder.rebuilt):
-        with found.reading(folder.rebuilt):
+        with findings.reading(folder.rebuilt):
             for line in read_own(folder.rebuilt, study_root(folder.rebuilt)).decode("utf-8", "replace").splitlines():
-                found.warning(folder.rebuilt, f"{events.shortened(line)}; only a copy of {FINGERPRINTS} proves more")
+                findings.warning(folder.rebuilt, f"{events.shortened(line)}; only a copy of {FINGERPRINTS} proves more")
     return CheckedSession(
         place=place,
         readable=True,
@@ -193,68 +193,68 @@ def _check(place: Place, key: Key | None, found: Findings, *, running: bool, rec
     )
 
 
-def _journal(folder: SessionFolder, found: Findings, *, running: bool) -> Contents:
+def _journal(folder: SessionFolder, findings: Findings, *, running: bool) -> Contents:
     """Return what the journal holds: no line where it says nothing of the session."""
     nothing = Contents([], 0)
     if not is_there(folder.journal):
         if never_begun(folder.path):
             if not running:
-                found.warning(
+                findings.warning(
                     folder.path,
                     "was created, but the program ended before it wrote a journal: begin it again, or delete it",
                 )
         else:
-            found.error(folder.journal, f"is missing, {_BEGUN}")
+            findings.error(folder.journal, f"is missing, {_BEGUN}")
         return nothing
     try:
         contents = journal.scan(folder.journal)
     except StoreError as error:
-        found.failure(folder.journal, error)
+        findings.failure(folder.journal, error)
         return nothing
     if contents.damage is not None:
-        found.error(folder.journal, contents.damage.removeprefix(f"{folder.journal}, "))
+        findings.error(folder.journal, contents.damage.removeprefix(f"{folder.journal}, "))
     if contents.torn_bytes and not running:
-        found.warning(folder.journal, f"it ends with an incomplete line of {counted(contents.torn_bytes, 'byte')}")
+        findings.warning(folder.journal, f"it ends with an incomplete line of {counted(contents.torn_bytes, 'byte')}")
     if not contents.lines:
         if running or never_begun(folder.path):
             if not running:
-                found.warning(folder.journal, "has no complete line: nothing was recorded")
+                findings.warning(folder.journal, "has no complete line: nothing was recorded")
         elif contents.damage is None:
-            found.error(folder.journal, f"has no complete line, {_BEGUN}")
+            findings.error(folder.journal, f"has no complete line, {_BEGUN}")
         return nothing
     for name in events.unknown_events(contents.lines):
-        found.warning(folder.journal, f"has events {name!r}, which this version does not know")
+        findings.warning(folder.journal, f"has events {name!r}, which this version does not know")
     try:
         done = progress_of(contents.lines)
     except StoreError as error:
-        found.error(folder.journal, str(error))
+        findings.error(folder.journal, str(error))
         return nothing
     missing = done.missing_trials
     if missing.count:
-        found.warning(folder.path, str(missing))
+        findings.warning(folder.path, str(missing))
     if done.reached_end and missing.exceed != (done.ended == events.INCOMPLETE):
-        found.error(folder.journal, f"its status is {done.ended!r}, though {missing or 'no trial is missing'}")
+        findings.error(folder.journal, f"its status is {done.ended!r}, though {missing or 'no trial is missing'}")
     if done.ended is None:
         if not running:
-            found.warning(folder.path, "is unfinished: resume it, or leave it unfinished")
+            findings.warning(folder.path, "is unfinished: resume it, or leave it unfinished")
     elif not isinstance(contents.lines[-1], events.SessionEnded):
-        found.error(folder.journal, "lines follow the session's end")
+        findings.error(folder.journal, "lines follow the session's end")
     return contents
 
 
-def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, found: Findings) -> None:
+def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, findings: Findings) -> None:
     path = folder.receipt
     if not lines and not is_there(path):
         return  # claimed and never begun
     try:
         held = receipt.read(path)
     except StoreError as error:
-        found.failure(path, error)
+        findings.failure(path, error)
         return
     if missing := [name for name in receipt.FIELDS if name not in held]:
-        found.error(path, f"lacks {', '.join(missing)}")
+        findings.error(path, f"lacks {', '.join(missing)}")
     if key is not None and held["key_hash"] != key.hash:
-        found.error(path, "contains the hash of another key")
+        findings.error(path, "contains the hash of another key")
     if not lines:
         return
     start = events.start_of(lines)
@@ -265,24 +265,24 @@ def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, 
     if not differing and start.receipt_hash not in (None, receipt.digest(held)):
         differing = ["what the session began with"]
     if differing:
-        found.error(path, f"{', '.join(differing)}: differ from the journal")
+        findings.error(path, f"{', '.join(differing)}: differ from the journal")
     told = {str(entry.get("at")) for entry in held.get("resumed", ()) if isinstance(entry, dict)}
-    again = [one.at for one in lines if isinstance(one, events.SessionResumed) and one.receipt_hash is not None]
+    again = [line.at for line in lines if isinstance(line, events.SessionResumed) and line.receipt_hash is not None]
     if lacking := [at for at in again if at not in told]:
-        found.warning(
+        findings.warning(
             path,
             f"lacks what the session was resumed with at {', '.join(lacking)}: the program was ended meanwhile, or it "
             "was removed",
         )
     if key is not None and not _is_protocol(held, start, key):
-        found.error(path, "its protocol was changed: restore it from a copy")
+        findings.error(path, "its protocol was changed: restore it from a copy")
     if receipt.other_format(held, start):
-        found.error(
+        findings.error(
             folder.journal, f"has another format than {path.name} states: it was changed; restore it from a copy"
         )
     last = lines[-1]
     if isinstance(last, events.SessionEnded) and held.get("status") != last.status:
-        found.error(path, f"its status is {held.get('status')!r}, the journal's {last.status!r}; rebuild renews it")
+        findings.error(path, f"its status is {held.get('status')!r}, the journal's {last.status!r}; rebuild renews it")
     sequence = protocol.get("sequence") if isinstance(protocol := held.get("protocol"), dict) else None
     steps = sequence if isinstance(sequence, list) else []
     left = sum(isinstance(line, events.PageLeft) and line.page in steps[-1:] for line in lines)
@@ -291,7 +291,7 @@ def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, 
     breaks = [block.get("break_page") for block in tables if isinstance(block, dict)]
     was_last = bool(steps) and steps[-1] not in breaks and left >= steps.count(steps[-1])
     if isinstance(last, events.SessionEnded) and last.status not in events.REACHED_END and was_last:
-        found.error(folder.journal, f"its status is {last.status!r}, though the last page was left: it was changed")
+        findings.error(folder.journal, f"its status is {last.status!r}, though the last page was left: it was changed")
 
 
 def _differing(held: Mapping[str, Any], lines: Sequence[events.Event]) -> list[str]:
@@ -301,20 +301,20 @@ def _differing(held: Mapping[str, Any], lines: Sequence[events.Event]) -> list[s
     expected: dict[str, Any] = {"started_at": start.at}
     if not isinstance(lines[-1], events.SessionEnded):
         expected |= {"status": receipt.UNFINISHED, "reason": "", "ended_at": None}
-    found = [name for name, value in expected.items() if held.get(name) != value]
+    names = [name for name, value in expected.items() if held.get(name) != value]
     if start.version == study_app.__version__ and held.get("generator") != receipt.GENERATOR:
-        found.append("generator")
+        names.append("generator")
     parts = {
         "device": ("name", start.device),
         "clock": ("origin_at", start.at),
         "versions": ("liquid-study", start.version),
     }
-    found += [name for name, (part, value) in parts.items() if held.get(name, {}).get(part) != value]
+    names += [name for name, (part, value) in parts.items() if held.get(name, {}).get(part) != value]
     for entry in held.get("resumed", ()):
         at = str(entry.get("at")) if isinstance(entry, dict) else ""
         if at not in resumed or resumed[at] not in (None, receipt.digest(entry)):
-            found.append("resumed")
-    return found
+            names.append("resumed")
+    return names
 
 
 def _is_protocol(held: Mapping[str, Any], start: events.SessionStarted, key: Key) -> bool:
@@ -378,26 +378,26 @@ def _same_answer(listed_answer: events.Answer, given: events.Answer) -> bool:
     )
 
 
-def _tables(place: Place, lines: list[events.Event], found: Findings, *, ended: bool) -> None:
+def _tables(place: Place, lines: list[events.Event], findings: Findings, *, ended: bool) -> None:
     """Compare the tables with what the journal gives; one that tells more than the journal is named as such."""
     telling: set[Path] = set()
     with contextlib.suppress(StoreError):  # said of receipt or journal already
         for path, what in beyond(place, lines):
-            found.error(path, f"{what}: {RESTORE}")
+            findings.error(path, f"{what}: {RESTORE}")
             telling.add(path)
     try:
         expected = table_files(place, lines, opened_key(place.study_folder))
     except StoreError as error:
-        found.error(place.folder.journal, f"gives no tables: {error}")
+        findings.error(place.folder.journal, f"gives no tables: {error}")
         return
     columns = table_columns(lines, opened=True)
     for (path, content), name in zip(expected, columns, strict=True):
         if path not in telling:
-            check_table(path, content, columns[name], found, may_differ=lambda _: not ended)
+            check_table(path, content, columns[name], findings, may_differ=lambda _: not ended)
 
 
 def check_table(
-    path: Path, expected: bytes, columns: tuple[Column, ...], found: Findings, *, may_differ: Callable[[int], bool]
+    path: Path, expected: bytes, columns: tuple[Column, ...], findings: Findings, *, may_differ: Callable[[int], bool]
 ) -> None:
     """Compare a table with what the journals give, and its cells with the dictionary.
 
@@ -407,18 +407,18 @@ def check_table(
     try:
         content = read_regular(path)
     except OSError:
-        found.error(path, "is missing or cannot be read; rebuild makes it again")
+        findings.error(path, "is missing or cannot be read; rebuild makes it again")
         return
     expected, columns = csv_files.in_columns_of(content, expected, columns)
     pairs = zip_longest(content.split(b"\n"), expected.split(b"\n"))
     differing = [number for number, (held, whole) in enumerate(pairs, start=1) if held != whole]
     follows = all(map(may_differ, differing))
     if differing:
-        report = found.warning if follows else found.error
+        report = findings.warning if follows else findings.error
         report(path, f"differs from the journal, from line {differing[0]} on; rebuild renews it")
     if not (differing and follows):  # else a row may be half written: earlier versions wrote in place
         for problem in csv_files.problems(content, columns):
-            found.error(path, problem)
+            findings.error(path, problem)
 
 
 def _hash(folder: SessionFolder, name: str) -> str:
@@ -431,17 +431,17 @@ def _hash(folder: SessionFolder, name: str) -> str:
 
 def _listed_system_files(folder: SessionFolder) -> Iterator[str]:
     """Yield the system's files that were there when the session ended, so that its list has them."""
-    if there := system_files(folder):
+    if names := system_files(folder):
         with contextlib.suppress(StoreError):
             listed = read_checksums(folder)
-            yield from (name for name in there if name in listed)
+            yield from (name for name in names if name in listed)
 
 
 def _checksums(
     folder: SessionFolder,
     lines: Sequence[events.Event],
     hashes: Mapping[str, str],
-    found: Findings,
+    findings: Findings,
     *,
     recordings: bool,
 ) -> None:
@@ -449,27 +449,27 @@ def _checksums(
     opened_hashes = {line.sha256: line.opened_sha256 for line in kept}
     opened_hashes |= {line.frames_sha256: line.opened_frames_sha256 for line in kept}
     if not is_there(folder.checksums):
-        found.error(
+        findings.error(
             folder.checksums, "is missing: was the program killed at the end of the session? rebuild creates it"
         )
         return
-    with found.reading(folder.checksums):
+    with findings.reading(folder.checksums):
         listed = read_checksums(folder)
         for name in sorted(listed.keys() | hashes.keys()):
             if name.endswith(".parquet") and not recordings:
                 continue
             path = folder.path / name
             if name not in hashes:
-                found.error(path, "is missing")
+                findings.error(path, "is missing")
             elif name not in listed:
-                found.error(path, "was added after the session ended")
+                findings.error(path, "was added after the session ended")
             elif not hashes[name]:
-                found.error(path, "cannot be read")
+                findings.error(path, "cannot be read")
             elif hashes[name] == opened_hashes.get(listed[name]):
-                found.warning(path, "was opened by an unblinding that did not finish: unblind again")
+                findings.warning(path, "was opened by an unblinding that did not finish: unblind again")
             elif hashes[name] != listed[name]:
                 unchanged = hashlib.sha256(read_regular(path).replace(b"\r\n", b"\n")).hexdigest() == listed[name]
-                found.error(path, OTHER_LINE_ENDINGS if unchanged else CHANGED)
+                findings.error(path, OTHER_LINE_ENDINGS if unchanged else CHANGED)
 
 
 def _recordings(
@@ -477,7 +477,7 @@ def _recordings(
     lines: list[events.Event],
     key: Key | None,
     hashes: Mapping[str, str],
-    found: Findings,
+    findings: Findings,
     *,
     ended: bool,
 ) -> None:
@@ -486,28 +486,28 @@ def _recordings(
     known = {line.which for line in lines if isinstance(line, events.Recorded | events.RecordingLost)}
     for line in lines:
         if isinstance(line, events.RecordingLost):
-            found.warning(folder.recordings, f"{named(*line.which)} has none: {line.reason}")
+            findings.warning(folder.recordings, f"{named(*line.which)} has none: {line.reason}")
         if not isinstance(line, events.Recorded):
             continue
         which = named(*line.which)
         if line.samples_unrecorded:
-            found.warning(folder.path / line.recording, f"lacks {line.samples_unrecorded} samples")
+            findings.warning(folder.path / line.recording, f"lacks {line.samples_unrecorded} samples")
         for kind, name, rows, digests in (
             ("samples", line.recording, line.samples_recorded, (line.sha256, line.opened_sha256)),
             ("frames", line.recording_frames, line.frames_recorded, (line.frames_sha256, line.opened_frames_sha256)),
         ):
             listed.add(name)
             if name not in hashes:
-                found.error(folder.path / name, f"is missing, but the journal mentions it ({which})")
+                findings.error(folder.path / name, f"is missing, but the journal mentions it ({which})")
                 continue
             if hashes[name] not in digests:
-                found.error(folder.path / name, f"has changed since it was recorded ({which})")
+                findings.error(folder.path / name, f"has changed since it was recorded ({which})")
             if rows is not None:  # else what is sealed cannot be read, as was said
-                _facts(folder, line, kind, name, rows, key, found)
+                _facts(folder, line, kind, name, rows, key, findings)
     if events.start_of(lines).recordings:
         for planned in recordable(lines)[: None if ended else -1]:
             if planned not in known:
-                found.warning(folder.recordings, f"{named(*planned)} has none, and the journal gives no reason")
+                findings.warning(folder.recordings, f"{named(*planned)} has none, and the journal gives no reason")
     of_trials = {
         path.relative_to(folder.path).as_posix()
         for recorded in recordable(lines)
@@ -515,25 +515,25 @@ def _recordings(
     }
     for name in sorted(name for name in hashes.keys() - listed if name.endswith(".parquet")):
         if name not in of_trials:
-            found.error(folder.path / name, "is of a trial that the journal never started")
+            findings.error(folder.path / name, "is of a trial that the journal never started")
         else:
             then = "" if ended else "; resuming the session adds it"
-            found.warning(folder.path / name, f"is in no line of the journal{then}")
+            findings.warning(folder.path / name, f"is in no line of the journal{then}")
 
 
 def _facts(
-    folder: SessionFolder, line: events.Recorded, kind: str, name: str, rows: int, key: Key | None, found: Findings
+    folder: SessionFolder, line: events.Recorded, kind: str, name: str, rows: int, key: Key | None, findings: Findings
 ) -> None:
     from study_app.store import recordings  # noqa: PLC0415 - loads the Parquet library, where there are recordings
 
     path = folder.path / name
     expected = {"participant": folder.participant, "session": folder.number, "kind": kind, "rows": rows}
     expected |= {"trial": line.trial, "attempt": line.attempt, "interval": line.interval}
-    with found.reading(path):
+    with findings.reading(path):
         facts: dict[str, Any] = recordings.read_facts(path, key.nonce if key else None)
         for fact, value in expected.items():
             if facts.get(fact) != value:
-                found.error(path, f"holds {fact} {facts.get(fact)!r}, the journal says {value!r}")
+                findings.error(path, f"holds {fact} {facts.get(fact)!r}, the journal says {value!r}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -559,18 +559,21 @@ def doubts(place: Place) -> tuple[Discrepancy, ...]:
     folder = place.folder
     if is_open(folder.path):
         return ()
-    found = (Discrepancy(folder.rebuilt, REBUILT_AFTER, COMPARE),) if is_there(folder.rebuilt) else ()
+    discrepancies = (Discrepancy(folder.rebuilt, REBUILT_AFTER, COMPARE),) if is_there(folder.rebuilt) else ()
     if _as_ended(place):
-        return found
+        return discrepancies
     told = Findings(folder.path)
     check_session(place, None, told, recordings=False)
     first: dict[str, Finding] = {}
-    for one in (*told.errors, *(warning for warning in told.warnings if warning.place.endswith(".csv"))):
-        first.setdefault(one.place, one)
+    for finding in (*told.errors, *(warning for warning in told.warnings if warning.place.endswith(".csv"))):
+        first.setdefault(finding.place, finding)
     if (of_journal := first.get(folder.journal.name)) is not None:
         first = {of_journal.place: of_journal}
     remedy = f"liquid-study verify {place.study_folder.path} checks everything"
-    return (*found, *(Discrepancy(folder.path / error.place, error.message, remedy) for error in first.values()))
+    return (
+        *discrepancies,
+        *(Discrepancy(folder.path / error.place, error.message, remedy) for error in first.values()),
+    )
 
 
 def _as_ended(place: Place) -> bool:

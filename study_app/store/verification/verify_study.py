@@ -70,26 +70,26 @@ def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
         It is not a study folder, or ``fingerprints`` no copy of fingerprints.
     """
     merged = read_merged(folder)
-    found = Findings(folder)
+    findings = Findings(folder)
     if merged is None:
         copy = None if fingerprints is None else (fingerprints, read_proof(fingerprints))
-        sessions = _verify_study(folder, copy, found)
+        sessions = _verify_study(folder, copy, findings)
     elif fingerprints is None:
-        _between(merged, found)
+        _between(merged, findings)
         sessions = []
         for site in filter(Path.is_dir, map(merged.folder, merged.names)):  # `_between` says which are missing
-            with found.reading(site):
-                sessions += _verify_study(site, None, found)
+            with findings.reading(site):
+                sessions += _verify_study(site, None, findings)
     else:
         raise StoreError(
             f"{folder} holds several sites: compare each with the copy of its own fingerprints, such as {fingerprints} "
             f"with {merged.folder(merged.names[0])}"
         )
-    found.sessions, found.running = len(sessions), sum(one.running for one in sessions)
-    return found
+    findings.sessions, findings.running = len(sessions), sum(session.running for session in sessions)
+    return findings
 
 
-def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, found: Findings) -> Sessions:
+def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findings) -> Sessions:
     study = StudyFolder(folder)
     name = described_study(study)
     if name is None:
@@ -97,46 +97,46 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, found: Findings
             f"{folder} is not a study folder (no {study.description.name}): name one such as results/rek2024"
         )
     key = None
-    with found.reading(study.key):
+    with findings.reading(study.key):
         key = blinding.read_key(study.path)
     early = listed(study.fingerprints)
-    withdrawn = _withdrawn(study, found)
-    sessions = [check_session(Place(study, one, name), key, found) for one in study.sessions()]
-    _plug_ins(study, found)
-    _contents(study, found)
-    _participants(study, name, sessions, found)
-    if early_journals := sum(one.row is not None and not one.chained for one in sessions):
+    withdrawn = _withdrawn(study, findings)
+    sessions = [check_session(Place(study, session, name), key, findings) for session in study.sessions()]
+    _plug_ins(study, findings)
+    _contents(study, findings)
+    _participants(study, name, sessions, findings)
+    if early_journals := sum(session.row is not None and not session.chained for session in sessions):
         many = "1 journal is" if early_journals == 1 else f"{early_journals} journals are"
-        found.warning(study.data, f"{many} of format 1, whose lines cannot show whether an earlier line was changed")
-    _fingerprints(study, sessions, early, found)
+        findings.warning(study.data, f"{many} of format 1, whose lines cannot show whether an earlier line was changed")
+    _fingerprints(study, sessions, early, findings)
     if copy is not None:
-        _copy(study, sessions, withdrawn, *copy, found)
-    _description(study, found)
-    _exclusions(study, sessions, found)
-    _reveals(study, key, found)
-    check_allocation(study, key, withdrawn, found)
-    _blinding(study, key, found)
+        _copy(study, sessions, withdrawn, *copy, findings)
+    _description(study, findings)
+    _exclusions(study, sessions, findings)
+    _reveals(study, key, findings)
+    check_allocation(study, key, withdrawn, findings)
+    _blinding(study, key, findings)
     for path in (*temporaries(folder), *temporaries(study.data)):
-        found.warning(path, "is an incomplete file of a program that was ended, or is being written")
+        findings.warning(path, "is an incomplete file of a program that was ended, or is being written")
     return sessions
 
 
-def _plug_ins(study: StudyFolder, found: Findings) -> None:
+def _plug_ins(study: StudyFolder, findings: Findings) -> None:
     """Name the plug-ins that the sessions used, and those that are not here."""
-    used = receipt.recorded_plug_ins(one.receipt for one in study.sessions())
-    found.plug_ins |= used
+    used = receipt.recorded_plug_ins(session.receipt for session in study.sessions())
+    findings.plug_ins |= used
     for package, names in used.items():
         asked = {name: name.partition(" ") for name in names}
         if missing := [
             name for name, (kind, _, own) in asked.items() if kind in IN_FILES and own not in registry(kind)
         ]:
             what = f"sessions used {', '.join(missing)} of {package}, which is not installed"
-            found.warning(study.data, f"{what}: what only the plug-in can tell was not checked")
+            findings.warning(study.data, f"{what}: what only the plug-in can tell was not checked")
 
 
-def _contents(study: StudyFolder, found: Findings) -> None:
+def _contents(study: StudyFolder, findings: Findings) -> None:
     """Name versions under which different files were run."""
-    runs = filter(None, (run_of(one.receipt) for one in study.sessions()))
+    runs = filter(None, (run_of(session.receipt) for session in study.sessions()))
     hashes: dict[str, set[str]] = {}
     for run in runs:
         hashes.setdefault(run.version, set()).add(run.hash)
@@ -145,10 +145,10 @@ def _contents(study: StudyFolder, found: Findings) -> None:
             what = (
                 f"sessions of version {version} ran {len(contents)} different study files (protocol_hash in receipts)"
             )
-            found.warning(study.data, f"{what}: change study.version with each change of the file")
+            findings.warning(study.data, f"{what}: change study.version with each change of the file")
 
 
-def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[str], found: Findings) -> None:
+def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[str], findings: Findings) -> None:
     """Check that every participant with a session has one entry, that of the journals, and that none was changed.
 
     Those of the participants who have ``withdrawn`` stay used.
@@ -160,74 +160,78 @@ def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[
     for claim in claims(study):
         if not claim.participant:
             if claim.path.lstat().st_size:
-                found.error(claim.path, "was changed: restore it from a copy")
+                findings.error(claim.path, "was changed: restore it from a copy")
             else:
-                found.warning(claim.path, "was claimed by a program that ended before it wrote it; it stays unused")
+                findings.warning(claim.path, "was claimed by a program that ended before it wrote it; it stays unused")
             continue
         if not is_unchanged(claim, key):
-            found.error(claim.path, "was changed: restore it from a copy")
+            findings.error(claim.path, "was changed: restore it from a copy")
         elif claim.participant in holders:
             first = holders[claim.participant].path.stem
-            found.error(claim.path, f"is a second entry of participant {claim.participant}, who has entry {first}")
+            findings.error(claim.path, f"is a second entry of participant {claim.participant}, who has entry {first}")
         elif claim.participant not in begun and claim.participant not in withdrawn:
-            found.warning(claim.path, f"belongs to participant {claim.participant}, who has no session yet")
+            findings.warning(claim.path, f"belongs to participant {claim.participant}, who has no session yet")
         holders.setdefault(claim.participant, claim)
     for claim in holders.values():
         if claim.replaces is not None and not _same_entry(claim, holders.get(claim.replaces)):
-            found.error(claim.path, f"replaces participant {claim.replaces}, who has no such entry")
+            findings.error(claim.path, f"replaces participant {claim.replaces}, who has no such entry")
     shared = Counter((own.group, own.entry) for own in begun.values() if own.replaces is None)
     for participant, own in begun.items():
         path = study.allocation(own.entry, own.group, None if own.replaces is None else participant)
         if not is_there(path):
-            found.error(path, f"is missing, though participant {participant} has entry {own.entry}")
+            findings.error(path, f"is missing, though participant {participant} has entry {own.entry}")
         elif (holder := holders.get(participant)) is None or holder.path != path or holder.replaces != own.replaces:
-            found.error(path, f"is not of participant {participant}, whose journal has entry {own.entry}")
+            findings.error(path, f"is not of participant {participant}, whose journal has entry {own.entry}")
         if shared[own.group, own.entry] > 1 and own.replaces is None:
             what = f"entry {own.entry} of participant {participant} is another participant's, too"
-            found.error(study.allocated, what)
+            findings.error(study.allocated, what)
 
 
 def _same_entry(claim: Claim, replaced: Claim | None) -> bool:
     return replaced is not None and (claim.group, claim.entry) == (replaced.group, replaced.entry)
 
 
-def _withdrawn(study: StudyFolder, found: Findings) -> dict[str, Tombstone]:
+def _withdrawn(study: StudyFolder, findings: Findings) -> dict[str, Tombstone]:
     """Return the withdrawals, and report those that are not finished."""
     try:
         withdrawn = tombstones(study)
     except StoreError as error:
-        found.failure(study.withdrawals, error)
+        findings.failure(study.withdrawals, error)
         return {}
     for participant, tombstone in withdrawn.items():
         if not is_there(study.data / f"sub-{participant}"):
             when = f"at {tombstone.at} (recorded by {tombstone.by})"
-            found.warning(study.withdrawals, f"participant {participant} withdrew {when}; the data were erased")
+            findings.warning(study.withdrawals, f"participant {participant} withdrew {when}; the data were erased")
         else:
             again = "the withdrawal was interrupted: run liquid-study withdraw again"
-            found.error(study.data / f"sub-{participant}", f"is there, although {participant} withdrew; {again}")
+            findings.error(study.data / f"sub-{participant}", f"is there, although {participant} withdrew; {again}")
     return withdrawn
 
 
-def _participants(study: StudyFolder, name: str, sessions: Sessions, found: Findings) -> None:
+def _participants(study: StudyFolder, name: str, sessions: Sessions, findings: Findings) -> None:
     """Check the table of all sessions, where each session's journal could be read.
 
     Lines of sessions that have not ended may be behind their journals. The table is not judged where a program writes
     it when it ends: it has the study open, or has had a session open since the check began.
     """
-    if is_open(study.path) or not all(one.readable for one in sessions):
+    if is_open(study.path) or not all(session.readable for session in sessions):
         return
-    rows = [one.row for one in sessions if one.row is not None]
+    rows = [session.row for session in sessions if session.row is not None]
     content, columns = table_bytes(study, rows), columns_of(study, rows)
     late = {number for number, row in enumerate(rows, start=2) if row["status"] == receipt.UNFINISHED}
-    told = Findings(found.folder)
+    told = Findings(findings.folder)
     check_table(study.participants(name), content, columns, told, may_differ=late.__contains__)
     now = study.sessions()
-    written = len(now) != len(sessions) or any(one.running for one in sessions) or any(is_open(one.path) for one in now)
+    written = (
+        len(now) != len(sessions)
+        or any(session.running for session in sessions)
+        or any(is_open(session.path) for session in now)
+    )
     if not (told.errors and written):
-        found.take(told)
+        findings.take(told)
 
 
-def _fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, found: Findings) -> None:
+def _fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, findings: Findings) -> None:
     """Compare the sessions with the study's own list, as it was before they were checked.
 
     A program lists a session once its files are final, just before it lets go of it: a listed one is judged even where
@@ -235,14 +239,19 @@ def _fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, found: 
     """
     path = study.fingerprints
     for number in unreadable(path):
-        found.error(path, f"line {number} is not a fingerprint: restore it from a copy")
-    _compare(study, sessions, early, path.name, found)
+        findings.error(path, f"line {number} is not a fingerprint: restore it from a copy")
+    _compare(study, sessions, early, path.name, findings)
     if is_open(study.path):  # by a program that lists a session just after it is there
         return
     known = {place for _, place in listed(path)}
-    for one in sessions:
-        if one.fingerprint and one.chained and not one.running and place_of(study, one.place.folder) not in known:
-            found.error(path, f"lacks {place_of(study, one.place.folder)}, which has ended; rebuild adds it")
+    for session in sessions:
+        if (
+            session.fingerprint
+            and session.chained
+            and not session.running
+            and place_of(study, session.place.folder) not in known
+        ):
+            findings.error(path, f"lacks {place_of(study, session.place.folder)}, which has ended; rebuild adds it")
 
 
 def _copy(
@@ -251,65 +260,67 @@ def _copy(
     withdrawn: Mapping[str, Tombstone],
     path: Path,
     proof: Proof,
-    found: Findings,
+    findings: Findings,
 ) -> None:
     """Compare sessions and records with what was kept elsewhere; a withdrawal must be in it, too."""
     for told in proof.told:
-        found.warning(study.path, f"{path} {told}")
+        findings.warning(study.path, f"{path} {told}")
     erased: set[tuple[str, str]] = set()
-    there: Proofs = ()
+    recorded: Proofs = ()
     with contextlib.suppress(StoreError):  # said already
-        there = records(study)
-    kept = _as_named(proof.lines, [*withdrawn, *(one.place.folder.participant for one in sessions)], there)
+        recorded = records(study)
+    kept = _as_named(proof.lines, [*withdrawn, *(session.place.folder.participant for session in sessions)], recorded)
     for participant, tombstone in withdrawn.items():
-        folders = [study.session(participant, one.session) for one in tombstone.sessions]
-        own = {(one.fingerprint, place_of(study, at)) for one, at in zip(tombstone.sessions, folders, strict=True)}
+        folders = [study.session(participant, erased.session) for erased in tombstone.sessions]
+        own = {
+            (erased.fingerprint, place_of(study, at)) for erased, at in zip(tombstone.sessions, folders, strict=True)
+        }
         if own.isdisjoint(kept):
             continue
         erased |= {*own, *(line for line in kept if line[1] == f"{study.exclusions.name}/sub-{participant}")}
         if (told_of := proof_of_withdrawal(tombstone)) not in kept:
             add = "write a new proof" if proof.told else f"add the line: {checked_line(*told_of)}"
             advice = f"if {participant} asked for it, {add}"
-            found.error(study.withdrawals, f"the withdrawal of {participant} is not in {path}: {advice}")
+            findings.error(study.withdrawals, f"the withdrawal of {participant} is not in {path}: {advice}")
     copy = [line for line in kept if line not in erased]
     for record, place in copy:
-        if not place.startswith("data/") and (record, place) not in there:
+        if not place.startswith("data/") and (record, place) not in recorded:
             what = f"lacks what {path} lists as {record} ({place}): it was deleted or changed"
-            found.error(study.path / place.partition("/")[0], what)
-    _compare(study, sessions, copy, str(path), found)
+            findings.error(study.path / place.partition("/")[0], what)
+    _compare(study, sessions, copy, str(path), findings)
     known = {place for _, place in copy}
-    for one in sessions:
-        if one.fingerprint and not one.running and place_of(study, one.place.folder) not in known:
-            lacks = f"(its fingerprint is {one.fingerprint}) is not in {path}"
-            found.error(one.place.folder.path, f"{lacks}: it was added, or ended, after that copy was made")
+    for session in sessions:
+        if session.fingerprint and not session.running and place_of(study, session.place.folder) not in known:
+            lacks = f"(its fingerprint is {session.fingerprint}) is not in {path}"
+            findings.error(session.place.folder.path, f"{lacks}: it was added, or ended, after that copy was made")
 
 
-def _as_named(lines: Proofs, participants: Iterable[str], there: Proofs) -> Proofs:
+def _as_named(lines: Proofs, participants: Iterable[str], recorded: Proofs) -> Proofs:
     """Return lines that may have been typed in capitals with the participants as they are written in the study."""
-    known = {*participants, *(place.rpartition("sub-")[2] for _, place in there)}
+    known = {*participants, *(place.rpartition("sub-")[2] for _, place in recorded)}
     names = {name.lower(): name for name in known} | {name: name for name in known}
     return tuple(
-        (proof, re.sub(r"(?<=/sub-)\w+", lambda found: names.get(found[0], found[0]), place)) for proof, place in lines
+        (proof, re.sub(r"(?<=/sub-)\w+", lambda match: names.get(match[0], match[0]), place)) for proof, place in lines
     )
 
 
 def _compare(
-    study: StudyFolder, sessions: Sessions, proofs: Iterable[tuple[str, str]], name: str, found: Findings
+    study: StudyFolder, sessions: Sessions, proofs: Iterable[tuple[str, str]], name: str, findings: Findings
 ) -> None:
-    there = {place_of(study, one.place.folder): one for one in sessions}
+    by_place = {place_of(study, session.place.folder): session for session in sessions}
     for proof, place in proofs:
         if not place.startswith("data/"):
             continue
-        one, path = there.get(place), study.path / place
-        if one is None:
-            found.error(path, f"is missing, but {name} lists it: it was deleted after it had ended")
+        session, path = by_place.get(place), study.path / place
+        if session is None:
+            findings.error(path, f"is missing, but {name} lists it: it was deleted after it had ended")
             continue
-        if proof != one.fingerprint:
-            now = f"its fingerprint is {one.fingerprint}" if one.fingerprint else "it no longer has an end"
-            found.error(path, f"is not the session that {name} lists as {proof}: it was changed ({now})")
+        if proof != session.fingerprint:
+            now = f"its fingerprint is {session.fingerprint}" if session.fingerprint else "it no longer has an end"
+            findings.error(path, f"is not the session that {name} lists as {proof}: it was changed ({now})")
 
 
-def _description(study: StudyFolder, found: Findings) -> None:
+def _description(study: StudyFolder, findings: Findings) -> None:
     """Compare the description with what this version writes for the study as one of the receipts has it."""
     held = read_own(study.description, study.path)
     sealed = not (blinding.reveals(study.path) or names_sealed(held))
@@ -322,9 +333,11 @@ def _description(study: StudyFolder, found: Findings) -> None:
     if not heads or held in heads:
         return
     if any(describes_alike(held, head) for head in heads):
-        found.warning(study.description, "describes the columns as an earlier version of the program did", shares=True)
+        findings.warning(
+            study.description, "describes the columns as an earlier version of the program did", shares=True
+        )
     else:
-        found.error(study.description, "differs from what this version writes for the study in the receipts")
+        findings.error(study.description, "differs from what this version writes for the study in the receipts")
 
 
 def _published(study: StudyFolder) -> Iterator[dict[str, Any]]:
@@ -336,35 +349,39 @@ def _published(study: StudyFolder) -> Iterator[dict[str, Any]]:
                 yield protocol
 
 
-def _exclusions(study: StudyFolder, sessions: Sessions, found: Findings) -> None:
-    with found.reading(study.reversed_exclusions):
+def _exclusions(study: StudyFolder, sessions: Sessions, findings: Findings) -> None:
+    with findings.reading(study.reversed_exclusions):
         exclusions.reversals(study.path)
-    with found.reading(study.exclusions):
+    with findings.reading(study.exclusions):
         rows = exclusions.exclusions(study.path)
         if not is_there(study.exclusions):
             return
         for problem in csv_files.problems(without_mark(read_regular(study.exclusions)), EXCLUSIONS):
-            found.error(study.exclusions, problem)
-        trials = {(one.place.folder.participant, one.place.folder.number): one.trials for one in sessions}
+            findings.error(study.exclusions, problem)
+        trials = {
+            (session.place.folder.participant, session.place.folder.number): session.trials for session in sessions
+        }
         for row in rows:
             known = trials.get((row.participant, row.session))
             if known is None or (row.trial is not None and row.trial not in known):
-                found.error(study.exclusions, f"there is no {exclusions.named(row)}")
+                findings.error(study.exclusions, f"there is no {exclusions.named(row)}")
 
 
-def _reveals(study: StudyFolder, key: Key | None, found: Findings) -> None:
-    with found.reading(study.reveals):
+def _reveals(study: StudyFolder, key: Key | None, findings: Findings) -> None:
+    with findings.reading(study.reveals):
         for number, torn in blinding.unreadable_reveals(study.path):
             if torn:
-                found.warning(study.reveals, f"line {number} is not a reveal: it is incomplete after a power failure")
+                findings.warning(
+                    study.reveals, f"line {number} is not a reveal: it is incomplete after a power failure"
+                )
             else:
-                found.error(study.reveals, f"line {number} is not a reveal: it was changed; restore it from a copy")
+                findings.error(study.reveals, f"line {number} is not a reveal: it was changed; restore it from a copy")
         for number, record in enumerate(blinding.reveals(study.path), start=1):
             if key is not None and record["key_hash"] != key.hash:
-                found.error(study.reveals, f"reveal {number} was of another key")
+                findings.error(study.reveals, f"reveal {number} was of another key")
 
 
-def _blinding(study: StudyFolder, key: Key | None, found: Findings) -> None:
+def _blinding(study: StudyFolder, key: Key | None, findings: Findings) -> None:
     """Say where a condition is revealed before the key was, but not which."""
     published = next(_published(study), None)
     if key is None or blinding.reveals(study.path) or published is None:
@@ -377,45 +394,49 @@ def _blinding(study: StudyFolder, key: Key | None, found: Findings) -> None:
             with contextlib.suppress(StoreError):  # said of the journal already
                 levels |= recorded_numbers(protocol, opened(journal.read(session.journal), key))
     for leak in find_leaks(study.path, certain_telltales(key.tables, published, levels)):
-        found.warning(study.path, f"{leak.place} reveals a condition, although the key is sealed")
+        findings.warning(study.path, f"{leak.place} reveals a condition, although the key is sealed")
 
 
-def _between(merged: Merged, found: Findings) -> None:
+def _between(merged: Merged, findings: Findings) -> None:
     """Check what the list of sites says of them, and that no session is in two."""
     seen: dict[str, Path] = {}
     for site in merged.sites:
         folder = merged.folder(site.name)
         if not folder.is_dir():
             lists = f"{merged.manifest.name} lists site {site.name}"
-            found.error(folder, f"is missing, but {lists}: restore it from a copy")
+            findings.error(folder, f"is missing, but {lists}: restore it from a copy")
             continue
         if sealed_hash(folder) != site.key_hash:
             key = StudyFolder(folder).key
-            found.error(key, f"is not the key that site {site.name} was merged with: restore it from a copy")
-        _compare_site(merged, site, found)
+            findings.error(key, f"is not the key that site {site.name} was merged with: restore it from a copy")
+        _compare_site(merged, site, findings)
         for session in StudyFolder(folder).sessions():
             with contextlib.suppress(StoreError):  # said when the site is checked
                 if (other := receipt.read(session.receipt)["protocol_hash"]) != merged.protocol_hash:
-                    found.error(session.receipt, f"is of protocol {other}, not of {merged.protocol_hash} as merged")
+                    findings.error(session.receipt, f"is of protocol {other}, not of {merged.protocol_hash} as merged")
             begun = describe_session(session).begun
             if begun and (twin := seen.get(begun)) is not None:
-                found.error(session.path, f"is a copy of {twin.relative_to(merged.path).as_posix()}: it counts twice")
+                findings.error(
+                    session.path, f"is a copy of {twin.relative_to(merged.path).as_posix()}: it counts twice"
+                )
             seen[begun] = session.path
     for path in unlisted(merged):
-        found.warning(path, f"is not a site that {merged.manifest.name} lists, so it is ignored")
+        findings.warning(path, f"is not a site that {merged.manifest.name} lists, so it is ignored")
     for path in temporaries(merged.path):
-        found.warning(path, "is an incomplete file of a program that was ended, or is being written")
+        findings.warning(path, "is an incomplete file of a program that was ended, or is being written")
 
 
-def _compare_site(merged: Merged, site: Site, found: Findings) -> None:
+def _compare_site(merged: Merged, site: Site, findings: Findings) -> None:
     """Compare a site's folder with what the list of sites says of it; sessions are only erased there."""
     study = StudyFolder(merged.folder(site.name))
     if (name := described_study(study)) not in (None, merged.study):
-        found.error(study.path, f"is of study {name}, but {merged.manifest.name} lists sites of {merged.study}")
+        findings.error(study.path, f"is of study {name}, but {merged.manifest.name} lists sites of {merged.study}")
     with contextlib.suppress(StoreError):  # said when the site is checked
         merged_at = datetime.fromisoformat(site.merged_at)
-        since = [one for one in tombstones(study).values() if datetime.fromisoformat(one.at) >= merged_at]
-        erased = sum(len(one.sessions) for one in since)
-        if (there := len(study.sessions())) + erased < site.sessions:
-            which = f"{there} of the {site.sessions} sessions that {merged.manifest.name} lists"
-            found.error(study.path, f"has {which}: restore the others from a copy")
+        since = [
+            tombstone for tombstone in tombstones(study).values() if datetime.fromisoformat(tombstone.at) >= merged_at
+        ]
+        erased = sum(len(tombstone.sessions) for tombstone in since)
+        if (present := len(study.sessions())) + erased < site.sessions:
+            which = f"{present} of the {site.sessions} sessions that {merged.manifest.name} lists"
+            findings.error(study.path, f"has {which}: restore the others from a copy")
