@@ -171,9 +171,9 @@ def checks(facts: Measurements, protocol: Protocol) -> tuple[Check, ...]:
     return tuple(check for of in (_servo, _levels, _surroundings, _outlets, _costs) for check in of(facts, protocol))
 
 
-def refused(found: Iterable[Check]) -> str:
+def refused(checks: Iterable[Check]) -> str:
     """Return why the session may not begin, in one line; empty if it may."""
-    return "; ".join(f"{check.name.lower()}: {check.advice}" for check in found if check.verdict == "failure")
+    return "; ".join(f"{check.name.lower()}: {check.advice}" for check in checks if check.verdict == "failure")
 
 
 def _warned(name: str, value: str, about: str, advice: str, *, well: bool, share: float | None = None) -> Check:
@@ -232,8 +232,8 @@ def _levels(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     if highest_nspm == 0:
         return
     value, about = f"up to {highest_nspm:g} N·s/m", f"with a delay of {counted(facts.delay_ticks, 'tick')}"
-    found = (beyond_slope_limit(protocol, alike, facts.delay_ticks) for alike in by_stimulus(protocol))
-    beyond = next(filter(None, found), None)
+    problems = (beyond_slope_limit(protocol, alike, facts.delay_ticks) for alike in by_stimulus(protocol))
+    beyond = next(filter(None, problems), None)
     advice = "" if beyond is None else f"{beyond.message}: {beyond.hint}"
     yield Check("Levels", "ok" if beyond is None else "failure", value, about=about, advice=advice)
 
@@ -287,23 +287,25 @@ def _surroundings(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
 
 def _outlets(facts: Measurements, _protocol: Protocol) -> Iterator[Check]:
     """Say of each outlet who listens, why it does not work, or why a double-blind study has none."""
-    for one in facts.outlets:
-        if one.withheld:
+    for outlet in facts.outlets:
+        if outlet.withheld:
             yield Check(
-                one.title, "ok", "off", about="in a double-blind study: whoever sees the force can tell the liquid"
+                outlet.title, "ok", "off", about="in a double-blind study: whoever sees the force can tell the liquid"
             )
-        elif one.lost:
-            yield Check(one.title, "warning", "not available", about=one.lost, advice="The session can run without it.")
-        elif one.shows_force:
+        elif outlet.lost:
+            yield Check(
+                outlet.title, "warning", "not available", about=outlet.lost, advice="The session can run without it."
+            )
+        elif outlet.shows_force:
             advice = "A viewer of the force can tell the liquid: show the stream to no one."
-            who = "listener" if one.listens else "no listener"
-            yield Check(one.title, "warning", who, about="the study is double-blind", advice=advice)
-        elif one.listens is False:
+            who = "listener" if outlet.listens else "no listener"
+            yield Check(outlet.title, "warning", who, about="the study is double-blind", advice=advice)
+        elif outlet.listens is False:
             advice = "Start the program that records it, such as LabRecorder, and select this stream."
-            yield Check(one.title, "warning", "no listener", about="no program receives the stream", advice=advice)
+            yield Check(outlet.title, "warning", "no listener", about="no program receives the stream", advice=advice)
         else:
-            about = "open" if one.listens is None else "a program receives the stream"
-            yield Check(one.title, "ok", "ready" if one.listens is None else "listener", about=about)
+            about = "open" if outlet.listens is None else "a program receives the stream"
+            yield Check(outlet.title, "ok", "ready" if outlet.listens is None else "listener", about=about)
 
 
 def _costs(facts: Measurements, protocol: Protocol) -> Iterator[Check]:

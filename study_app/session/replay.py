@@ -102,8 +102,8 @@ def as_one_scene(samples: Any, steps: Sequence[Step]) -> Any:
 
 def places_of(samples: Any, steps: Sequence[Step]) -> list[tuple[int, Scene]]:
     """Return the first of the samples (n,) of each step with its scene; steps that no sample follows are left out."""
-    found = ((np.flatnonzero(samples.scene >= step.serial), step.scene) for step in steps)
-    return [(int(at[0]), scene) for at, scene in found if at.size]
+    begins = ((np.flatnonzero(samples.scene >= step.serial), step.scene) for step in steps)
+    return [(int(at[0]), scene) for at, scene in begins if at.size]
 
 
 def interval_samples(samples: Any, duration_s: float) -> Any:
@@ -141,17 +141,17 @@ def error_again(scene: Scene, rate_hz: float, samples: Any, ended: Mapping[str, 
     return delivered_error(own, rate_hz, scene.fade_s, partial(law_along, scene))
 
 
-def different(found: Mapping[str, float | None], ended: Mapping[str, Any]) -> Iterator[str]:
+def different(recomputed: Mapping[str, float | None], ended: Mapping[str, Any]) -> Iterator[str]:
     """Yield the columns in which the journal differs from the recomputed values; none if it lacks them."""
-    for name, value in found.items():
+    for name, value in recomputed.items():
         if name in ended and not _same(value, ended[name]):
             yield name
 
 
-def _same(one: float | None, other: float | None) -> bool:
-    if one is None or other is None:
-        return one is other
-    return bool(np.isclose(one, other, rtol=TOLERANCE, atol=TOLERANCE))
+def _same(value: float | None, other: float | None) -> bool:
+    if value is None or other is None:
+        return value is other
+    return bool(np.isclose(value, other, rtol=TOLERANCE, atol=TOLERANCE))
 
 
 NAMED_SECONDS = 8
@@ -211,7 +211,7 @@ def replay(session_folder: Path) -> Replayed:
     lines = opened(journal.read(session.journal), key)
     protocol, devices, (drawn_from, participant) = _ran(session.receipt, kept, key, lines)
     _again(records(SAMPLE, 0), Scene(), devices[None], None)  # loads the compiled code: no part of what is measured
-    found = Replayed()
+    replayed = Replayed()
     ends = {line.which: line for line in lines if isinstance(line, events.TrialEnded | events.IntervalEnded)}
     before: _Before | None = None
     resumed_at: str | None = None
@@ -223,11 +223,11 @@ def replay(session_folder: Path) -> Replayed:
         name = named(*which)
         if not isinstance(line, events.Recorded):
             why = "the journal gives no reason" if line is None else line.reason
-            found.uncompared += (f"{name}: has no recording: {why}",)
+            replayed.uncompared += (f"{name}: has no recording: {why}",)
             continue
         path = session.path / line.recording
         if not is_there(path):
-            found.missing += (f"{name}: {line.recording} is missing, but the journal mentions it",)
+            replayed.missing += (f"{name}: {line.recording} is missing, but the journal mentions it",)
             continue
         seed = link_seed(drawn_from, participant, *which)
         interval = which[-1]
@@ -240,9 +240,9 @@ def replay(session_folder: Path) -> Replayed:
             before = _again(samples, scene, devices[resumed], before, places_of(recorded, steps))
         except StudyError as refused:
             before = None
-            found.uncompared += (f"{name}: not recomputable: {refused}",)
+            replayed.uncompared += (f"{name}: not recomputable: {refused}",)
             continue
-        _compare(found, name, samples, before, checks)
+        _compare(replayed, name, samples, before, checks)
         if (ended := ends.get(which)) is not None and _until_gap(samples.tick) == len(samples):
             again: dict[str, float | None] = {}
             measured = ended.others
@@ -251,10 +251,12 @@ def replay(session_folder: Path) -> Replayed:
                 again |= delivered_again(protocol, presented, started, interval, samples, measured).columns
             if measured.get("delivered_error") is not None and ended.outcome != "interrupted":
                 again["delivered_error"] = error_again(scene, protocol.device.rate_hz, samples, measured)
-            found.differences += tuple(f"{name}: the column {one} differs" for one in different(again, measured))
-        found.computed_s += time.perf_counter() - start
-    found.took_s = time.perf_counter() - began
-    return found
+            replayed.differences += tuple(
+                f"{name}: the column {column} differs" for column in different(again, measured)
+            )
+        replayed.computed_s += time.perf_counter() - start
+    replayed.took_s = time.perf_counter() - began
+    return replayed
 
 
 class _Device(NamedTuple):
@@ -356,21 +358,21 @@ def _run_steps(
     recompute_scenes(*models, *serials, safety, out, first)
 
 
-def _compare(found: Replayed, name: str, samples: Any, again: _Before, checks: recordings.Checks) -> None:
+def _compare(replayed: Replayed, name: str, samples: Any, again: _Before, checks: recordings.Checks) -> None:
     """Compare one recording's checks with those of the forces computed again."""
     if len(samples) == 0:
-        found.uncompared += (f"{name}: holds no sample",)
+        replayed.uncompared += (f"{name}: holds no sample",)
         return
     if not again.knows_its_start:
-        found.uncompared += (f"{name}: continues from the force of a recording that is missing or has a gap",)
+        replayed.uncompared += (f"{name}: continues from the force of a recording that is missing or has a gap",)
         return
-    found.recordings += 1
-    found.lasted_s += float(samples.time_ns[-1] - samples.time_ns[0]) * 1e-9
+    replayed.recordings += 1
+    replayed.lasted_s += float(samples.time_ns[-1] - samples.time_ns[0]) * 1e-9
     whole = _until_gap(samples.tick)
     if whole < len(samples):
         lost_s = whole / checks.rows
-        found.uncompared += (f"{name}: samples are missing after {lost_s:.1f} s; what follows was not compared",)
-    found.seconds += sum(
+        replayed.uncompared += (f"{name}: samples are missing after {lost_s:.1f} s; what follows was not compared",)
+    replayed.seconds += sum(
         min((second + 1) * checks.rows, len(samples)) <= whole for second in range(len(checks.device_force))
     )
     differing = _other_sums(checks, again.samples) | _other_columns(checks, samples, again.samples)
@@ -378,19 +380,21 @@ def _compare(found: Replayed, name: str, samples: Any, again: _Before, checks: r
         seconds = [second for second in differ if min((second + 1) * checks.rows, len(samples)) <= whole]
         if seconds:
             lasted = len(checks.device_force)
-            found.differences += (f"{name}: the {what} differs in {_listed(seconds)} of {lasted} seconds",)
+            replayed.differences += (f"{name}: the {what} differs in {_listed(seconds)} of {lasted} seconds",)
 
 
 def _other_sums(checks: recordings.Checks, again: Any) -> dict[str, list[int]]:
     """Return the seconds whose exact forces have another CRC."""
-    found = {}
+    seconds_of = {}
     for what, kept, forces in (
         ("force on the hand", checks.device_force, again.device_force_n),
         ("force of the liquids", checks.effect_force, again.force_n),
     ):
         sums = recordings.crcs(forces, checks.rows)
-        found[what] = [second for second, (one, other) in enumerate(zip(kept, sums, strict=True)) if one != other]
-    return found
+        seconds_of[what] = [
+            second for second, (recorded, other) in enumerate(zip(kept, sums, strict=True)) if recorded != other
+        ]
+    return seconds_of
 
 
 def _other_columns(checks: recordings.Checks, samples: Any, again: Any) -> dict[str, list[int]]:
@@ -398,18 +402,18 @@ def _other_columns(checks: recordings.Checks, samples: Any, again: Any) -> dict[
 
     Of the samples before the trial's own scene nothing but the forces is known.
     """
-    found = {}
+    seconds_of = {}
     own = samples.scene == samples.scene[-1]
     for name, step in recordings.ROUNDED_TO.items():
         recorded, computed = (np.nan_to_num(it[name].reshape(len(samples), -1)) for it in (samples, again))
         permitted = step * (0.5 + _ROUNDING) + np.abs(computed) * _FLOAT32
         known = True if name in _FORCES else own
         rows = np.flatnonzero((np.abs(recorded - computed) > permitted).any(axis=1) & known)
-        found[f"column {name}"] = np.unique(rows // checks.rows).tolist()
+        seconds_of[f"column {name}"] = np.unique(rows // checks.rows).tolist()
     for name in ("limiters", "status"):
         rows = np.flatnonzero((samples[name] != again[name]) & own)
-        found[f"column {name}"] = np.unique(rows // checks.rows).tolist()
-    return found
+        seconds_of[f"column {name}"] = np.unique(rows // checks.rows).tolist()
+    return seconds_of
 
 
 def _until_gap(ticks: NDArray[np.int64]) -> int:

@@ -64,7 +64,7 @@ def resume_at(
                 if isinstance(other, Trial) and other.block == within.block
             )
         before = {trial.number for trial in schedule.steps[:step] if isinstance(trial, Trial)}
-        heard = tuple(one for one in heard if one.trial in before)
+        heard = tuple(result for result in heard if result.trial in before)
     return Start(step, progress.presented, heard, progress.invalid if step == progress.step == reached else 0)
 
 

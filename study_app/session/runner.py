@@ -293,7 +293,7 @@ class Runner:
             paints=self._ports.paints,
             hides_ball=condition.ball == "hidden",
             video=self._ports.video(condition.view) if self._ports.video and condition.shows_video else None,
-            videos=any(one.shows_video for one in self._protocol.conditions.values()),
+            videos=any(condition.shows_video for condition in self._protocol.conditions.values()),
         )
 
     def _done(self, running: RunningTrial, outcome: Outcome) -> events.TaskDone:
@@ -302,10 +302,10 @@ class Runner:
         reasons: tuple[str, ...] = ()
         if command.interval is not None and limits.attempts is not None:
             what = command.presented, command.task
-            found = delivered(self._protocol, *what, running.samples, adjusted=command.adjusts)
-            summary |= found.columns
+            delivery = delivered(self._protocol, *what, running.samples, adjusted=command.adjusts)
+            summary |= delivery.columns
             reasons = (
-                *undelivered(limits, *what, found, adjusted=command.adjusts),
+                *undelivered(limits, *what, delivery, adjusted=command.adjusts),
                 *broken_limits(summary, limits.model_dump()),
             )
         return events.TaskDone(self._ports.clock(), outcome, summary, reasons)
@@ -315,8 +315,8 @@ class Runner:
             return
         self._carry_out_all(
             [
-                events.Write(TargetReached(trial=running.trial, target=one.target, t_task_s=one.t_task_s))
-                for one in running.follow(samples)
+                events.Write(TargetReached(trial=running.trial, target=reached.target, t_task_s=reached.t_task_s))
+                for reached in running.follow(samples)
             ],
             self._ports.clock(),
         )

@@ -51,7 +51,7 @@ class Mark:
 
     at_s: float
     kind: Kind
-    words: str
+    text: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,7 +140,7 @@ def watched(session_folder: Path, trial: int, attempt: int = 1, interval: int = 
     started = own[0]
     assert isinstance(started, events.TrialStarted)  # noqa: S101 - it was looked for
     which: events.Which = (trial, attempt, interval if started.has_intervals else None)
-    stored = next((one for one in lines if isinstance(one, _STORED) and one.which == which), None)
+    stored = next((line for line in lines if isinstance(line, _STORED) and line.which == which), None)
     if not isinstance(stored, events.Recorded):
         why = "none was requested, or it was interrupted" if stored is None else stored.reason
         raise StoreError(f"{named} has no recording ({why}): choose another trial")
@@ -149,7 +149,7 @@ def watched(session_folder: Path, trial: int, attempt: int = 1, interval: int = 
     if why := motion_hidden(events.start_of(lines), shown):
         raise StoreError(why.rstrip("."))
     begins = [line for line in own if isinstance(line, _BEGINS)][started.has_intervals :]
-    at = next(number for number, one in enumerate(begins) if one.which == which)
+    at = next(number for number, line in enumerate(begins) if line.which == which)
     ended = next((line for line in own if isinstance(line, _ENDS) and line.which == which), None)
     samples, times_s = _timed(recorded, own, last=at + 1 == len(begins))
     if not len(samples):
@@ -159,7 +159,7 @@ def watched(session_folder: Path, trial: int, attempt: int = 1, interval: int = 
     tracker = track(page.task)
     tracker.feed(samples[(times_s >= 0) & (times_s <= (np.inf if lasted_s is None else lasted_s))])
     until_s = begins[at + 1].t_s if at + 1 < len(begins) else np.inf
-    found = Watched(
+    watched_task = Watched(
         page=page,
         language=progress_of(lines).language,
         blinded=shown is None,
@@ -175,14 +175,14 @@ def watched(session_folder: Path, trial: int, attempt: int = 1, interval: int = 
         ),
     )
     if shown is None:  # the delay between a sample and its frame is sealed
-        return found
+        return watched_task
     try:
         frames = recordings.read_frames(session.path / stored.recording_frames, secret)
     except StoreError as error:
-        return replace(found, lacking=f"Without the frames of the participant's screen: {error}.")
-    start_ns = samples["time_ns"][0] - round(found.begins_s * 1e9)
+        return replace(watched_task, lacking=f"Without the frames of the participant's screen: {error}.")
+    start_ns = samples["time_ns"][0] - round(watched_task.begins_s * 1e9)
     painted_s, shown_s = ((frames[name] - start_ns) * 1e-9 for name in ("painted_ns", "sample_ns"))
-    return replace(found, painted_s=painted_s, shown_s=shown_s)
+    return replace(watched_task, painted_s=painted_s, shown_s=shown_s)
 
 
 _STORED: Final = events.Recorded | events.RecordingLost
@@ -215,8 +215,8 @@ def _marks(own: Sequence[events.Event], begun: events.Event, ended: Any, until_s
             if isinstance(line, events.TargetReached) and line.t_task_s is not None:
                 at_s = line.t_task_s
             if line is ended or not isinstance(line, _ENDS):
-                kind, words = told
-                yield Mark(at_s, kind, words)
+                kind, text = told
+                yield Mark(at_s, kind, text)
 
 
 def _target_marks(ended: events.EndOfTask | None, task: Task) -> Iterator[Mark]:

@@ -182,7 +182,7 @@ class Stage(QWidget):
         force = () if shown.blinded else (f"sent {sent:.3f} N", f"requested {requested:.3f} N")
         self.numbers.setText("   ".join((f"{at_s:.3f} s", f"sample {shown.index(at_s) + 1}", *force, speed)))
         before = [mark for mark in shown.marks if mark.at_s <= at_s]
-        self.happened.show_text(f"{before[-1].at_s:.2f} s: {before[-1].words}" if before else "")
+        self.happened.show_text(f"{before[-1].at_s:.2f} s: {before[-1].text}" if before else "")
 
     def describe(self) -> None:
         """Tell screen readers the moment that is shown."""

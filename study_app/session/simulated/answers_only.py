@@ -211,7 +211,7 @@ class Answering(SimulatedParticipant):
         return self._feels
 
     def _sensed(self, block: Block) -> Mapping[int, Sequence[float]]:
-        return {number: one for number, one in self._sensed_in.items() if self._trials[number].block == block.id}
+        return {number: sensed for number, sensed in self._sensed_in.items() if self._trials[number].block == block.id}
 
     def _sense(self, trial: int, presented: Stimulated) -> None:
         """Take what a trial presents: a varied number exactly as it was requested, a condition as it was felt."""

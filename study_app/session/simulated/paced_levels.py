@@ -31,7 +31,7 @@ def undelivered_levels(protocol: Protocol) -> Iterator[str]:
         if stimulus.vary in OF_CONDITION:
             continue
         t_s = np.arange(round(task.limit_s * protocol.device.rate_hz)) / protocol.device.rate_hz
-        hand_m, missed = np.array([task.target_m(one) for one in t_s.tolist()]), list[str]()
+        hand_m, missed = np.array([task.target_m(time_s) for time_s in t_s.tolist()]), list[str]()
         for standard, level, scene in ends(protocol, block):
             if not any(INERTIAL & set(liquid.effects) for liquid in resolve(scene).liquids):
                 continue
@@ -40,8 +40,8 @@ def undelivered_levels(protocol: Protocol) -> Iterator[str]:
             )
             samples = judged(samples_along(scene, Motion(t_s, scene.origin_m + scene.scale * hand_m)))
             samples["time_ns"], samples["position_m"] = np.rint(1e9 * t_s), hand_m
-            found = delivered(protocol, presented, task, samples)
-            if "level_error_percent" in undelivered(protocol.limits, presented, task, found):
+            delivery = delivered(protocol, presented, task, samples)
+            if "level_error_percent" in undelivered(protocol.limits, presented, task, delivery):
                 missed.append(f"{level:.3g}")
         if missed:
             yield (

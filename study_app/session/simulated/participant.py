@@ -116,7 +116,7 @@ class SimulatedParticipant(ABC):
         known = self._sensed(block)
         if design_of(self._study, block).intervals > 1:
             return known[trial][0]
-        earlier = [one for number in sorted(known) if number < trial for one in known[number]]
+        earlier = [magnitude for number in sorted(known) if number < trial for magnitude in known[number]]
         return sum(earlier) / len(earlier) if earlier else sensed
 
     def _fill_in(self, page: QuestionnairePage | DesignPage) -> None:
@@ -152,7 +152,7 @@ class SimulatedParticipant(ABC):
         sensed, design = self._sensed(block), design_of(self._study, block)
         before: list[float] = []
         last: str | int | float | None = None
-        for number in sorted(one for one in sensed if one <= trial):
+        for number in sorted(known for known in sensed if known <= trial):
             answered = len(sensed[number]) == design.intervals  # else it was passed over after its last attempt
             if number == trial or (answered and number not in self._said):
                 source = draw if number == trial else self._stream(f"{number}/answers")

@@ -44,7 +44,8 @@ def predicted_delivery(protocol: Protocol, delay_ticks: int) -> PredictedDeliver
         failing = _FailingScenes(protocol, rig)
         shares = {block.id: _lost_share(protocol, block, failing) for block in protocol.main_blocks}
     return max(
-        (_in_session(one.protocol, shares) for one in variants(protocol)), key=lambda one: (one.missing, one.out)
+        (_in_session(variant.protocol, shares) for variant in variants(protocol)),
+        key=lambda prediction: (prediction.missing, prediction.out),
     )
 
 
@@ -141,8 +142,10 @@ def _lost_share(protocol: Protocol, block: Block, scenes: _FailingScenes) -> flo
     design, attempts = design_of(protocol, block), protocol.limits.attempts or 1
 
     def missing(standard: float, comparison: float) -> float:
-        delivered = [prod(1 - (comparison if held else standard) for held in one) for one in design.arrangements]
-        return mean((1 - one) ** attempts for one in delivered)
+        delivered = [
+            prod(1 - (comparison if held else standard) for held in arrangement) for arrangement in design.arrangements
+        ]
+        return mean((1 - share) ** attempts for share in delivered)
 
     if block.standard is None:
         return mean(missing(0.0, failing(scene)) for scene in _scenes(protocol, block))

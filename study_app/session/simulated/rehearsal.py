@@ -118,7 +118,7 @@ def _plain(value: Any) -> Any:
     """Return an answer with Python's own numbers and texts; several, in a list or an array, as a tuple."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
-    return tuple(_plain(one) for one in value) if isinstance(value, list | tuple) else value
+    return tuple(_plain(item) for item in value) if isinstance(value, list | tuple) else value
 
 
 class HeldSignals:
@@ -190,7 +190,7 @@ class DiscardingStore:
 def rehearsal_rig(study: Protocol, person: str, seed: int, device: str) -> Rig:
     """Return a device with a simulated hand, and its servo on a virtual clock that only the servo advances."""
     if not descriptor_of(device).moves_by_itself:
-        alone = " or ".join(one.name for one in all_devices() if one.moves_by_itself)
+        alone = " or ".join(device.name for device in all_devices() if device.moves_by_itself)
         raise SessionError(f"device '{device}' waits for a person: rehearse with {alone}")
     settings = study_settings(study, stream(seed, f"rehearsal/{person}/hand"))
     rig = open_rig(device, settings, clock=VirtualClock())
@@ -425,7 +425,7 @@ def condition_features(
     """
     codes = draw_key(protocol, stream(seed, "blinding").random)
     key = LevelKey(codes, b"what each condition feels like")
-    found: dict[Where, list[TrialFeatures]] = {}
+    by_condition: dict[Where, list[TrialFeatures]] = {}
     for number in range(1, people + 1):
         person = f"P{number:03d}"
         schedule = build_schedule(protocol, person, seed)
@@ -434,7 +434,7 @@ def condition_features(
         def feel(
             trial: int, features: tuple[TrialFeatures, ...], places: Mapping[int, tuple[Where, ...]] = places
         ) -> None:
-            found.setdefault(places[trial][len(features) - 1], []).append(features[-1])
+            by_condition.setdefault(places[trial][len(features) - 1], []).append(features[-1])
 
         with rehearsal_rig(protocol, person, seed, "scripted") as machine:
             RehearsedSession(
@@ -442,7 +442,7 @@ def condition_features(
             ).run()
         if progress is not None:
             progress(f"{number} of {people} sessions simulated")
-    return {where: tuple(features) for where, features in found.items()}
+    return {where: tuple(features) for where, features in by_condition.items()}
 
 
 def _presented(protocol: Protocol, key: LevelKey, schedule: Schedule, trial: Trial) -> tuple[Where, ...]:
@@ -450,7 +450,7 @@ def _presented(protocol: Protocol, key: LevelKey, schedule: Schedule, trial: Tri
     if protocol.blocks[trial.block].design is None:
         return ((trial.block, key.codes[trial.block][trial.code]),)
     due = next_level(protocol, key, schedule, trial, ())
-    return () if due is None else tuple((trial.block, one.condition) for one in due.intervals)
+    return () if due is None else tuple((trial.block, stimulus.condition) for stimulus in due.intervals)
 
 
 def rehearse(

@@ -243,7 +243,7 @@ def call_operator(state: SessionState, event: Broke) -> Result:
     before = state.interrupted if waits else state.phase
     interrupted = before if event.by == "device" else None
     trouble = replace(state, phase=Phase.TROUBLE, interrupted=interrupted, force_off=True)
-    videos = any(one.shows_video for one in state.plan.protocol.conditions.values())
+    videos = any(condition.shows_video for condition in state.plan.protocol.conditions.values())
     what = CAUSE_WITHHELD if videos and event.by == "device" else event.what
     written = (Write(journal.Broke(what=what)), WriteTables())
     return trouble, (StopForce(), *break_off(state), *written, show(trouble))

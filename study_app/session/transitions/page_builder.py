@@ -273,12 +273,12 @@ def moments(shown: Preview, index: int) -> tuple[Moment, ...]:
     design = state.design
     if design is None:
         return (Moment("tank"), *([Moment("questions")] if state.asks else []))
-    found = [Moment("tank", number) for number in range(1, design.intervals + 1)]
+    sequence = [Moment("tank", number) for number in range(1, design.intervals + 1)]
     if state.asks and not design.adjusts:
-        found.append(Moment("questions"))
+        sequence.append(Moment("questions"))
         if design.has_correct_answer and design.shows_feedback(step.phase == "practice"):
-            found.append(Moment("feedback"))
-    return tuple(found)
+            sequence.append(Moment("feedback"))
+    return tuple(sequence)
 
 
 def previewed_page(

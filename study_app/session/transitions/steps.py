@@ -201,7 +201,7 @@ def _passed_over(
 def _presented(state: SessionState, last: Trial) -> bool:
     """Return whether any trial was answered, or given up, from the page before trial ``last`` on."""
     steps = state.plan.schedule.steps
-    answered = {*state.plan.start.presented, *(one.trial for one in state.heard)}
+    answered = {*state.plan.start.presented, *(result.trial for result in state.heard)}
     if state.invalid:
         answered.add(state.trial.number)
     for step in reversed(steps[: steps.index(last) + 1]):

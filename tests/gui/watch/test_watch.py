@@ -98,11 +98,11 @@ def test_every_moment_is_the_recordings(opened, whole):
         assert np.cross(force.vector_m, samples.device_force_n[at]) == pytest.approx(0, abs=1e-9)
         assert stage.forces.cursor.value() == pytest.approx(times_s[at])
     assert stage.forces.sent.yData.max() == pytest.approx(np.linalg.norm(samples.device_force_n, axis=1).max())
-    assert [mark.words for mark in stage.shown.marks if mark.kind == "target"][:2] == [
+    assert [mark.text for mark in stage.shown.marks if mark.kind == "target"][:2] == [
         "target 1 reached",
         "target 2 reached",
     ]
-    answers = [mark.words for mark in stage.shown.marks if mark.kind == "answer"]
+    answers = [mark.text for mark in stage.shown.marks if mark.kind == "answer"]
     assert answers[-1] == "answers confirmed"
     assert {one.split(":")[0] for one in answers[:-1]} == {"harder", "comfortable"}
     window.go(stage.shown.marks[1].at_s + 0.001)
