@@ -69,14 +69,14 @@ class Report:
         if not self.well:
             return f"Found: {len(self.found)}."
         if self.unseen:
-            return f"Nothing wrong was found. Not checked: {'; '.join(one.tested for one in self.unseen)}."
+            return f"Nothing wrong was found. Not checked: {'; '.join(finding.tested for finding in self.unseen)}."
         return NOTHING_WRONG
 
 
-def lines(found: Report) -> list[str]:
+def lines(report: Report) -> list[str]:
     """Return a report as text of 100 columns; commands to paste are on one line."""
-    lines = ["", *(f"seen: {words}" for words in found.seen), ""]
-    for finding in found.in_order:
+    lines = ["", *(f"seen: {observation}" for observation in report.seen), ""]
+    for finding in report.in_order:
         word = "FOUND" if finding.state == "found" else finding.state
         lines.append(f"{finding.number:>2}  {word:<13}  {finding.words}")
         if finding.state == "found":
@@ -86,15 +86,15 @@ def lines(found: Report) -> list[str]:
             if finding.paste:
                 lines += ["", finding.paste, ""]  # in one line, to be copied
     lines.append("")
-    if found.failure is not None:
-        lines.append(_indented(found.failure, 0))
-    lines.append(_indented(found.conclusion, 0))
+    if report.failure is not None:
+        lines.append(_indented(report.failure, 0))
+    lines.append(_indented(report.conclusion, 0))
     return lines
 
 
-def _indented(words: str, by: int) -> str:
+def _indented(text: str, by: int) -> str:
     space = " " * by
-    return fill(words, WIDTH, initial_indent=space, subsequent_indent=space, break_long_words=False)
+    return fill(text, WIDTH, initial_indent=space, subsequent_indent=space, break_long_words=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,11 +134,11 @@ class FailureTable:
     not_found: frozenset[str]
 
     def mode(self, mode: str) -> FailureMode:
-        return next(one for one in self.modes if one.id == mode)
+        return next(known for known in self.modes if known.id == mode)
 
     def before(self, mode: str) -> set[str]:
         """Return the ids of the modes that are tested before this one."""
-        ids = [one.id for one in self.modes]
+        ids = [known.id for known in self.modes]
         return set(ids[: ids.index(mode)])
 
     def sentence(self, mode: str, seen: str = "") -> str:
@@ -151,11 +151,11 @@ class FailureTable:
         kind = DeviceFailureNotFound if mode in self.not_found else DeviceFailure
         return kind(mode, f"{self.device} cannot be used: {self.sentence(mode, seen)}")
 
-    def findings(self, found: Container[str] = (), passed: Container[str] = ()) -> tuple[Finding, ...]:
+    def findings(self, observed: Container[str] = (), passed: Container[str] = ()) -> tuple[Finding, ...]:
         """Return every mode in its order, ``found``, ``passed`` (tested and not found), or not checked."""
 
         def finding(number: int, mode: FailureMode) -> Finding:
-            state: State = "found" if mode.id in found else "ok" if mode.id in passed else "not checked"
+            state: State = "found" if mode.id in observed else "ok" if mode.id in passed else "not checked"
             return Finding(
                 number=number,
                 id=mode.id,
@@ -171,18 +171,18 @@ class FailureTable:
         return tuple(finding(number, mode) for number, mode in enumerate(self.modes, start=1))
 
 
-def read_failures(file: Path, platform: str = sys.platform, **words: object) -> FailureTable:
+def read_failures(file: Path, platform: str = sys.platform, **phrases: object) -> FailureTable:
     """Return the table in a TOML file.
 
     ``[[mode]]`` has the fields of a `FailureMode`, and the systems that it is ``only`` of. A text that differs is a
-    table by system, with ``other``; braces name ``words``, or those in the file's ``[words]``.
+    table by system, with ``other``; braces name ``phrases``, or those in the file's ``[words]``.
     """
 
     def here(text: str | dict[str, str]) -> str:
         return text if isinstance(text, str) else text.get(platform, text.get("other", ""))
 
     document = tomllib.loads(file.read_text("utf-8"))
-    words |= {name: here(text) for name, text in document.get("words", {}).items()}
+    phrases |= {name: here(text) for name, text in document.get("words", {}).items()}
     modes = [mode for mode in document["mode"] if platform in mode.pop("only", [platform])]
-    filled = [FailureMode(**{name: here(text).format_map(words) for name, text in mode.items()}) for mode in modes]
+    filled = [FailureMode(**{name: here(text).format_map(phrases) for name, text in mode.items()}) for mode in modes]
     return FailureTable(document["device"], tuple(filled), frozenset(document["not_found"]))

@@ -323,12 +323,12 @@ def examine(
     with device:
         progress(MOVE)
         samples, fault_found = run_at_rest(device, seconds)
-        found, fresh_hz = device.appeared(samples), fresh_rate_hz(samples)
+        modes, fresh_hz = device.appeared(samples), fresh_rate_hz(samples)
         seen = (*device.observed(), f"new positions per second: {fresh_hz:.0f}")
-    if not found and fresh_hz < LEAST_HZ:
-        found = {"rate"}
-    passed = {one.id for one in table.modes} if fault_found is None else table.before(device.running)
-    return Report(seen, table.findings(found, passed), fault_found)
+    if not modes and fresh_hz < LEAST_HZ:
+        modes = {"rate"}
+    passed = {mode.id for mode in table.modes} if fault_found is None else table.before(device.running)
+    return Report(seen, table.findings(modes, passed), fault_found)
 
 
 def run_at_rest(device: Device, seconds: float) -> tuple[Any, str | None]:

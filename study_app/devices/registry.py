@@ -44,15 +44,15 @@ def descriptor_of(name: str) -> DeviceDescriptor:
         No device has this name.
     """
     kind, _, argument = name.partition(":")
-    found = DEVICES.get(kind)
-    if found is None and kind in REMOVED:
+    descriptor = DEVICES.get(kind)
+    if descriptor is None and kind in REMOVED:
         raise DeviceNotFound(f"device '{name}' was removed: choose {REMOVED[kind]}")
-    if found is None or (argument and not found.argument):
+    if descriptor is None or (argument and not descriptor.argument):
         known = ", ".join(device.usage for device in all_devices())
         raise DeviceNotFound(f"device '{name}' is not known; choose one of: {known}")
-    if found.argument_required and not argument:
-        raise DeviceNotFound(f"device '{kind}' needs more than its name: give it as {found.usage}")
-    return found
+    if descriptor.argument_required and not argument:
+        raise DeviceNotFound(f"device '{kind}' needs more than its name: give it as {descriptor.usage}")
+    return descriptor
 
 
 def title_of(name: str) -> str:
@@ -76,13 +76,13 @@ def open_device(name: str, **request: Any) -> Device:
     device = descriptor_of(name)
     asked = OpenRequest(**request)
     check_options(name, asked.options)
-    found = device.open(replace(asked, argument=name.partition(":")[2]))
-    if not hasattr(found, "failure"):  # of another package, made for an earlier version
-        found.close()
+    opened = device.open(replace(asked, argument=name.partition(":")[2]))
+    if not hasattr(opened, "failure"):  # of another package, made for an earlier version
+        opened.close()
         raise DeviceError(
-            f"device '{name}' has no 'failure': let {type(found).__name__} inherit study_app.devices.base.Device"
+            f"device '{name}' has no 'failure': let {type(opened).__name__} inherit study_app.devices.base.Device"
         )
-    return found
+    return opened
 
 
 def doctor_of(name: str) -> Doctor:
@@ -121,24 +121,24 @@ def check_options(name: str, options: Iterable[str]) -> None:
     taken = {option.name for option in descriptor_of(name).options}
     for option in options:
         if option not in taken:
-            takers = [device.title for device in all_devices() if option in {one.name for one in device.options}]
+            takers = [device.title for device in all_devices() if option in {known.name for known in device.options}]
             only = f"; only these do: {', '.join(takers)}" if takers else ""
             raise DeviceError(f"device '{name}' takes no {option}{only}: leave --{option} out")
 
 
 def backends() -> list[Backend]:
     """Return the results of all devices' probes, the default device first, then those that could not be loaded."""
-    found = [backend for device in all_devices() for backend in _probed(device)]
-    return found + [
+    probed = [backend for device in all_devices() for backend in _probed(device)]
+    return probed + [
         Backend(
-            f"{one.name} ({one.package})",
+            f"{plug_in.name} ({plug_in.package})",
             "entry point",
             state=NOT_AVAILABLE,
-            can=f"a device of the plug-in {one.package}",
-            why=f"it cannot be used ({one.fault}): update or uninstall the package {one.package}",
+            can=f"a device of the plug-in {plug_in.package}",
+            why=f"it cannot be used ({plug_in.fault}): update or uninstall the package {plug_in.package}",
         )
-        for one in DEVICES.plug_ins
-        if one.fault
+        for plug_in in DEVICES.plug_ins
+        if plug_in.fault
     ]
 
 

@@ -136,10 +136,10 @@ def motion_under_force(stretches: Sequence[Any], axis: int, rate_hz: float) -> M
     """
     step_s = 1.0 / rate_hz
     prepared = [_prepared(samples, axis, step_s) for samples in stretches]
-    orthogonal, triangle = np.linalg.qr(np.concatenate([one.terms for one in prepared]))
+    orthogonal, triangle = np.linalg.qr(np.concatenate([system.terms for system in prepared]))
 
     def force_n(delay_s: float) -> Floats:
-        return np.concatenate([one.force_n(delay_s) for one in prepared])
+        return np.concatenate([system.force_n(delay_s) for system in prepared])
 
     def residual_n2(delay_s: float) -> float:
         force = force_n(delay_s)

@@ -106,13 +106,13 @@ class Found:
     @property
     def count_m(self) -> float | None:
         """The coarsest encoder count of the three axes [m]; None where the handle moved too little."""
-        counts_um = [one.count_um for one in self.motions if one.count_um > 0.0]
+        counts_um = [motion.count_um for motion in self.motions if motion.count_um > 0.0]
         return 1e-6 * max(counts_um) if counts_um else None
 
     @property
     def fits(self) -> bool:
         """Whether mass, damping and friction explain the handle's motion: it was not touched and reached no stop."""
-        return all(one.explained >= LEAST_EXPLAINED and one.mass_kg > 0.0 for one in self.motions)
+        return all(motion.explained >= LEAST_EXPLAINED and motion.mass_kg > 0.0 for motion in self.motions)
 
 
 def run_bench(
@@ -208,10 +208,10 @@ def _damping(stand: Stand, axis: int, lasts: Durations, ask: Ask, progress: Call
 
 def _gain(stand: Stand, lasts: Durations, ask: Ask, progress: Callable[[str], object]) -> Gain | None:
     """Push down on a scale, and ask for its reading."""
-    words = (
+    request = (
         "Rest the handle on a kitchen scale, near the middle of its range, and set the scale to zero; none: type 'no'."
     )
-    if _wait(stand, ask("scale", words)).lower().startswith("n"):
+    if _wait(stand, ask("scale", request)).lower().startswith("n"):
         progress("Force against a scale: left out.")
         return None
     sent_n, shown_g = [], []
@@ -243,7 +243,7 @@ def _grams(answer: str) -> float:
         ) from None
 
 
-def as_json(found: Found, day: str) -> str:
+def as_json(results: Found, day: str) -> str:
     """Return the results as JSON text; ``day`` is the date of the bench, such as 2026-11-21."""
     document = {
         "format": FORMAT,
@@ -251,34 +251,34 @@ def as_json(found: Found, day: str) -> str:
         "measured": day,
         "program": __version__,
         "system": _system(),
-        **asdict(found),
+        **asdict(results),
     }
     return json.dumps(_plain(document), indent=2, ensure_ascii=False) + "\n"
 
 
-def as_markdown(found: Found, day: str) -> str:
+def as_markdown(results: Found, day: str) -> str:
     """Return the report as Markdown text."""
-    return "\n".join(_lines(found, day)) + "\n"
+    return "\n".join(_lines(results, day)) + "\n"
 
 
-def kept(found: Found, day: str) -> dict[str, Any]:
+def kept(results: Found, day: str) -> dict[str, Any]:
     """Return the results of a bench for this machine's settings (`store.workstation.DeviceBench`)."""
     own = ("mass_kg", "damping_nspm", "friction_n", "delay_ms")
     return {
-        "name": found.device["name"],
-        "serial": found.device.get("serial") or "",
+        "name": results.device["name"],
+        "serial": results.device.get("serial") or "",
         "measured": day,
-        **{name: tuple(float(getattr(one, name)) for one in found.motions) for name in own},
-        "count_m": found.count_m,
-        "stable_nspm": tuple(one.damping_nspm for one in found.damping),
-        "gain": None if found.gain is None else found.gain.gain,
+        **{name: tuple(float(getattr(motion, name)) for motion in results.motions) for name in own},
+        "count_m": results.count_m,
+        "stable_nspm": tuple(axis.damping_nspm for axis in results.damping),
+        "gain": None if results.gain is None else results.gain.gain,
     }
 
 
-def _lines(found: Found, day: str) -> Iterator[str]:
-    regular, still = found.regularity, found.noise
-    yield from (f"# Bench of {found.device.get('name')}", "")
-    serial = f", serial number {found.device['serial']}" if found.device.get("serial") else ""
+def _lines(results: Found, day: str) -> Iterator[str]:
+    regular, still = results.regularity, results.noise
+    yield from (f"# Bench of {results.device.get('name')}", "")
+    serial = f", serial number {results.device['serial']}" if results.device.get("serial") else ""
     yield from (f"{day}{serial}; liquid-study {__version__}; {_system()}.", "")
     yield from ("## Loop", "", "| | median | 99 % | greatest |", "| --- | ---: | ---: | ---: |")
     yield f"| lateness of a tick [ms] | {_row(regular.lateness_ms, 3)} |"
@@ -288,7 +288,7 @@ def _lines(found: Found, day: str) -> Iterator[str]:
     delay = f"{least}" if least == most else f"{least} to {most}"
     yield (
         f"{regular.ticks} ticks; {100 * regular.new_share:.2f} % with a new position, at most "
-        f"{regular.longest_gap_ms:.2f} ms apart; the driver's delay: {delay} ticks; {found.overruns} overruns."
+        f"{regular.longest_gap_ms:.2f} ms apart; the driver's delay: {delay} ticks; {results.overruns} overruns."
     )
     yield from ("", "## At rest, without force", "", "| | x | y | z |", "| --- | ---: | ---: | ---: |")
     yield f"| standard deviation of the position [µm] | {_row(still.position_um, 2)} |"
@@ -303,15 +303,15 @@ def _lines(found: Found, day: str) -> Iterator[str]:
         ("encoder count, from the noise in motion [µm]", "count_um", 1),
         ("explained variance of the force", "explained", 4),
     ):
-        yield f"| {label} | {_row(tuple(getattr(one, name) for one in found.motions), digits)} |"
-    if not found.fits:
+        yield f"| {label} | {_row(tuple(getattr(motion, name) for motion in results.motions), digits)} |"
+    if not results.fits:
         yield from ("", NOT_FREE)
     yield from ("", "## Greatest stable damping", "", "| axis | N·s/m | ended |", "| --- | ---: | --- |")
-    for axis, one in zip(AXES, found.damping, strict=True):
-        yield f"| {axis} | {one.damping_nspm:.0f} | {_ENDED[one.ended]} |"
+    for axis, damping in zip(AXES, results.damping, strict=True):
+        yield f"| {axis} | {damping.damping_nspm:.0f} | {_ENDED[damping.ended]} |"
     yield from ("", f"A free handle and a damper that grows; more than {SHAKE_N:g} N RMS above 20 Hz is oscillation.")
     yield from ("", "## Force on a scale", "")
-    gain = found.gain
+    gain = results.gain
     yield (
         "Not measured."
         if gain is None
@@ -319,7 +319,7 @@ def _lines(found: Found, day: str) -> Iterator[str]:
         f"{gain.residual_n:.3f} N; {gain.readings} readings."
     )
     yield from ("", "## What the device reports", "", "```json")
-    yield json.dumps(_plain(found.device), indent=2, ensure_ascii=False)
+    yield json.dumps(_plain(results.device), indent=2, ensure_ascii=False)
     yield "```"
 
 
@@ -334,11 +334,11 @@ def _system() -> str:
 def _plain(value: Any) -> Any:
     """Return a value with replacements for types unknown to JSON: numpy's numbers, NaN."""
     if isinstance(value, dict):
-        return {str(name): _plain(one) for name, one in value.items()}
+        return {str(name): _plain(entry) for name, entry in value.items()}
     if hasattr(value, "_asdict"):
         return _plain(value._asdict())
     if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
+        return [_plain(entry) for entry in value]
     if hasattr(value, "item"):
         value = value.item()
     return None if isinstance(value, float) and value != value else value  # noqa: PLR0124 - NaN
@@ -351,10 +351,10 @@ def asks_hand(device: Any, progress: Callable[[str], object]) -> Ask:
     """
     hand = getattr(device, "hand", device)
 
-    def ask(kind: str, words: str) -> Callable[[], str | None]:
+    def ask(kind: str, request: str) -> Callable[[], str | None]:
         if kind in ("let-go", "scale"):
             hand.held = kind == "scale"
-            progress(words)
+            progress(request)
         if kind == "scale":
             hand.reach_to(0.0, 0.0, 0.0)
         if kind == "damping":

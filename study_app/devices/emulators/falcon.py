@@ -97,9 +97,9 @@ def _check(code: int) -> None:
         return
     if code == constants.ERROR_NOT_SUPPORTED:
         raise NotImplementedError("Operation not supported or unimplemented on this platform")
-    number, words = _ERRORS[code]
+    number, message = _ERRORS[code]
     kind = usb.core.USBTimeoutError if code == constants.ERROR_TIMEOUT else usb.core.USBError
-    raise kind(words, code, number)
+    raise kind(message, code, number)
 
 
 class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]

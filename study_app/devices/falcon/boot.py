@@ -44,10 +44,10 @@ _HEX_DUMP: Final = re.compile(rb"[0-9A-Fa-f\s:|.,x]{32,}")
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """``words`` 16-bit words for ``destination``."""
+    """A block of ``word_count`` 16-bit words for the address ``destination``."""
 
     destination: int
-    words: int
+    word_count: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,14 +105,14 @@ def _blocks(data: bytes) -> tuple[Block, ...]:
         number = len(blocks) + 1
         if len(data) < at + 2:
             raise _refusal(f"it is cut short: after {len(blocks)} blocks, at byte {len(data)}, there is no end mark")
-        (words,) = struct.unpack_from("<H", data, at)
-        if words == 0:
+        (word_count,) = struct.unpack_from("<H", data, at)
+        if word_count == 0:
             break
-        end = at + _BLOCK_HEAD.size + 2 * words
+        end = at + _BLOCK_HEAD.size + 2 * word_count
         if len(data) < end:
             raise _refusal(f"it is cut short in block {number}: {len(data)} bytes, of which block {number} needs {end}")
         _, high, low = _BLOCK_HEAD.unpack_from(data, at)
-        blocks.append(Block(high << 16 | low, words))
+        blocks.append(Block(high << 16 | low, word_count))
         at = end
     if not blocks:
         raise _refusal("it has no block: there is nothing in it to load")
@@ -261,7 +261,7 @@ def boot(
     attempts : their greatest number
     progress : receives a line about each failed attempt
     """
-    found = check(firmware)
+    image = check(firmware)
     for attempt in range(1, attempts + 1):
         try:
             _attempt(transport, firmware)
@@ -274,7 +274,7 @@ def boot(
             transport.pause(_BETWEEN_ATTEMPTS_S)
         else:
             break
-    return found
+    return image
 
 
 def _attempt(transport: Transport, firmware: bytes) -> None:

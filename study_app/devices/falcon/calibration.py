@@ -121,12 +121,12 @@ def fit(
     )
 
 
-def left_over(found: Calibration, poses: Any, forces_n: Any, units: Any) -> Any:
-    """Return the residual forces (n, 3) [N] of ``found``; arguments as for `fit`."""
+def left_over(calibration: Calibration, poses: Any, forces_n: Any, units: Any) -> Any:
+    """Return the residual forces (n, 3) [N] of ``calibration``; arguments as for `fit`."""
     counts, pulled_n, held = (np.asarray(given, np.float64) for given in (poses, forces_n, units))
-    return _solve(mechanics.geometry_named(found.geometry), found.arm_offset_rad, counts, pulled_n, held)[1].reshape(
-        -1, 3
-    )
+    return _solve(mechanics.geometry_named(calibration.geometry), calibration.arm_offset_rad, counts, pulled_n, held)[
+        1
+    ].reshape(-1, 3)
 
 
 def _solve(geometry: mechanics.Geometry, offset_rad: float, counts: Any, pulled_n: Any, held: Any) -> tuple[Any, Any]:
@@ -179,16 +179,16 @@ def load(serial: str) -> Calibration | None:
     """Return the calibration of the Falcon with this serial number; None where it has none."""
     file = calibration_file(serial)
     try:
-        found = Calibration(**json.loads(file.read_text(encoding="utf-8")))
-        mechanics.geometry_named(found.geometry)
-        whole = _GAINS[0] <= found.units_per_nm <= _GAINS[1] and abs(found.arm_offset_rad) <= _OFFSETS_RAD
+        calibration = Calibration(**json.loads(file.read_text(encoding="utf-8")))
+        mechanics.geometry_named(calibration.geometry)
+        whole = _GAINS[0] <= calibration.units_per_nm <= _GAINS[1] and abs(calibration.arm_offset_rad) <= _OFFSETS_RAD
     except FileNotFoundError:
         return None
     except (OSError, ValueError, TypeError, RecursionError) as error:
         raise _unusable(file) from error
     if not whole:
         raise _unusable(file)
-    return found
+    return calibration
 
 
 def _unusable(file: Path) -> DeviceError:
@@ -369,8 +369,10 @@ def pull(grip: Grip, ask: Ask) -> Notes:
         grip.come(place)
         counts, units = grip.weigh()
         notes.append((counts, 0.0, units))
-        words = f"Place {number} of {len(PLACES_M)}: pull straight down with the scale, at 200 to 500 g, and hold it so"
-        grip.wait(ask("pull", words))
+        request = (
+            f"Place {number} of {len(PLACES_M)}: pull straight down with the scale, at 200 to 500 g, and hold it so"
+        )
+        grip.wait(ask("pull", request))
         counts, units = grip.weigh()
         notes.append((counts, _read_scale(grip, ask), units))
         grip.wait(ask("let-go", "Take the scale off, and let go."))
@@ -380,16 +382,16 @@ def pull(grip: Grip, ask: Ask) -> Notes:
 
 def _read_scale(grip: Grip, ask: Ask) -> float:
     """Return the scale's reading [N], asking until it is a valid weight."""
-    words = "What did the scale show, in grams?"
+    question = "What did the scale show, in grams?"
     while True:
-        reading = grip.wait(ask("reading", words))
+        reading = grip.wait(ask("reading", question))
         try:
             load_n = float(reading.replace(",", ".")) / 1000 * GRAVITY_MPS2
         except ValueError:
             load_n = -1.0
         if 0.0 < load_n <= MOST_N:
             return load_n
-        words = f"'{reading}' is not a reading of the scale in grams, above 0 and up to 600. What did it show?"
+        question = f"'{reading}' is not a reading of the scale in grams, above 0 and up to 600. What did it show?"
 
 
 def _noted(notes: list[tuple[Any, float, Any]]) -> Notes:

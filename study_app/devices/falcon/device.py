@@ -91,7 +91,7 @@ class FalconDevice(FramedDevice):
     def _prepare(self, connection: Transport) -> dict[str, Any]:
         """Load the firmware if needed, measure the round trip, start the guard, and home it with instructions."""
         serial = connection.serial
-        found: dict[str, Any] = {"serial": serial, "firmware": self._run_firmware(connection)}
+        facts: dict[str, Any] = {"serial": serial, "firmware": self._run_firmware(connection)}
         round_trip_s, event_character = boot.choose_event_character(connection)
         used = calibration.load(serial) if serial else None
         geometry = self._geometry if used is None else mechanics.geometry_named(used.geometry)
@@ -108,8 +108,8 @@ class FalconDevice(FramedDevice):
         self._home(connection)
         self._begin_anew()
         calibrated = "none" if used is None else used.describe()
-        found |= {"geometry": geometry.name, "calibration": calibrated, "units_per_nm": gain}
-        return found | event_character
+        facts |= {"geometry": geometry.name, "calibration": calibrated, "units_per_nm": gain}
+        return facts | event_character
 
     def _finish(self, connection: Transport) -> AtClose:
         """Send zero torque several times, if it was used."""
@@ -141,13 +141,13 @@ class FalconDevice(FramedDevice):
         return super().describe() | {"delay_ticks": int(self.exchange.delay)}
 
     def observed(self) -> tuple[str, ...]:
-        found, serial = self.found, self.found["serial"]
-        used = found["calibration"]
+        facts, serial = self.found, self.found["serial"]
+        used = facts["calibration"]
         return (
             f"opened, serial number {serial}" if serial else "opened",
-            f"program: {found['firmware']}",
-            f"round trip {min(found['round_trip_ms'].values()):.2f} ms; event character "
-            f"{'kept' if found['event_character'] else 'of no use'}",
+            f"program: {facts['firmware']}",
+            f"round trip {min(facts['round_trip_ms'].values()):.2f} ms; event character "
+            f"{'kept' if facts['event_character'] else 'of no use'}",
             f"calibration: {used['measured'] if isinstance(used, dict) else 'none'}",
             f"incomplete replies: {self._broken_share:.2%}",
         )
@@ -198,9 +198,9 @@ class FalconDevice(FramedDevice):
             data = Path(self._firmware).read_bytes()
         except OSError as error:
             raise FAILURES.failure("firmware-file", f"{self._firmware} cannot be read: {error.strerror}") from error
-        found = boot.check(data)
-        unknown = f"SHA-256 {found.sha256[:16]}…, which is none of those that are known to work"
-        self._progress(f"Loading the Falcon's firmware, {found.name or unknown}.")
+        image = boot.check(data)
+        unknown = f"SHA-256 {image.sha256[:16]}…, which is none of those that are known to work"
+        self._progress(f"Loading the Falcon's firmware, {image.name or unknown}.")
         return boot.boot(transport, data, progress=self._progress).sha256
 
     def _home(self, transport: Transport) -> None:

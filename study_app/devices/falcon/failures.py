@@ -36,13 +36,13 @@ FURTHER_KINDS: Final = ("kernel-driver", "no-libusb", "no-ftd2xx", "two-drivers"
 
 def failures_on(platform: str) -> FailureTable:
     """Return the modes of failure on a system, which is named as by ``sys.platform``."""
-    words = {
+    phrases = {
         "rule": UDEV_RULE,
         "rules_file": RULES_FILE,
         "MOST_BROKEN": MOST_BROKEN,
         "slow_ms": 1000 * LONGEST_ROUND_TRIP_S,
     }
-    return read_failures(Path(__file__).with_name("failures.toml"), platform, **words)
+    return read_failures(Path(__file__).with_name("failures.toml"), platform, **phrases)
 
 
 FAILURES: Final = failures_on(sys.platform)
@@ -66,7 +66,7 @@ class UsbFailure(DeviceFailure):
         mode = modes.get(kind, "transfer" if kind in KINDS.values() and kind != "busy" else kind)
         libusb = "" if code is None else f", libusb error {code}"
         tables = FAILURES, failures_on("win32"), failures_on("linux")
-        table = next(one for one in tables if mode in {known.id for known in one.modes})
+        table = next(table for table in tables if mode in {known.id for known in table.modes})
         super().__init__(mode, str(table.failure(mode, where + libusb)))
 
 

@@ -217,17 +217,17 @@ def _few_owed(falcon: Any) -> bool:
 @kernel
 def _measure_delay(falcon: Any, packets: int) -> None:
     """Wait for a read without a reply: then no reply to an earlier packet is pending."""
-    found = falcon.testing
-    if packets > 0 and found <= MOST_DELAY:
+    delay = falcon.testing
+    if packets > 0 and delay <= MOST_DELAY:
         falcon.testing += 1
         return
     falcon.testing = 0
     if packets == 0:
         _write_off(falcon)
-    if found >= falcon.delay or found == falcon.measured:
-        _adopt_delay(falcon, found)
+    if delay >= falcon.delay or delay == falcon.measured:
+        _adopt_delay(falcon, delay)
     else:  # a reply lost may look like that: once more
-        falcon.measured = found
+        falcon.measured = delay
         falcon.unsure = 1
         falcon.retest = MOST_DELAY
 
@@ -241,8 +241,8 @@ def give_up_measurement(falcon: Any) -> None:
 
 
 @kernel
-def _adopt_delay(falcon: Any, found: int) -> None:
-    falcon.delay = found
+def _adopt_delay(falcon: Any, delay: int) -> None:
+    falcon.delay = delay
     falcon.measured = 0
     falcon.unsure = 0
     falcon.astray = 0

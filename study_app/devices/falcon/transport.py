@@ -151,15 +151,15 @@ class PyUsbTransport(Transport):
     def reopen(self) -> None:
         self.close()
         with _failures("looking for it"):
-            found = find_falcons(self._backend)
+            devices = find_falcons(self._backend)
         if self.serial is None:
-            found = found[self._index :]
+            devices = devices[self._index :]
         else:  # one that does not tell its number may be the one, and say why when it is opened
-            found = [device for device in found if serial_of(device) in {self.serial, None}]
-            found.sort(key=lambda device: serial_of(device) is None)
-        if not found:
+            devices = [device for device in devices if serial_of(device) in {self.serial, None}]
+            devices.sort(key=lambda device: serial_of(device) is None)
+        if not devices:
             raise FalconNotFound("not-found", "looking for it")
-        self._open(found[0])
+        self._open(devices[0])
 
     def _open(self, device: Any) -> None:
         try:
@@ -223,8 +223,10 @@ class PyUsbTransport(Transport):
 
 def find_falcons(backend: Any) -> list[Any]:
     """Return pyusb's device of each Falcon that ``backend`` sees, opened or not."""
-    found = usb.core.find(find_all=True, backend=backend, idVendor=constants.VENDOR_ID, idProduct=constants.PRODUCT_ID)
-    return list(found)
+    devices = usb.core.find(
+        find_all=True, backend=backend, idVendor=constants.VENDOR_ID, idProduct=constants.PRODUCT_ID
+    )
+    return list(devices)
 
 
 def serial_of(device: Any) -> str | None:
@@ -452,10 +454,10 @@ def probe(usb: Any = None, platform: str = sys.platform) -> Backend:
     usb = usb if usb is not None else libusb_package.get_libusb1_backend()
     if usb is None:
         return Backend("falcon", by, state=NOT_AVAILABLE, can=can, why=failures_on(platform).mode("no-libusb").cure)
-    found = find_falcons(usb)
-    if not found:
+    falcons = find_falcons(usb)
+    if not falcons:
         return Backend("falcon", by, state=NONE, can=can, why=failures_on(platform).mode("not-connected").cure)
-    serials = [serial_of(one) for one in found]
+    serials = [serial_of(falcon) for falcon in falcons]
     why = ""
     if None in serials:
         cause = failures_on(platform).mode("driver" if platform == "win32" else "permission").cause

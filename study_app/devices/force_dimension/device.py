@@ -71,19 +71,19 @@ class ForceDimensionDevice(FramedDevice):
 
     def _prepare(self, connection: Functions) -> dict[str, Any]:
         """Check the device and enable its force; a device without a watchdog gets a guard."""
-        found = connection.prepare(self.force_limit_n)
-        serial = found.get("serial")
-        measured = (found.pop(name) for name in ("delay_s", "count_m", "mass_kg"))
+        facts = connection.prepare(self.force_limit_n)
+        serial = facts.get("serial")
+        measured = (facts.pop(name) for name in ("delay_s", "count_m", "mass_kg"))
         self._dynamics = dynamics_of(*measured, name=self.name, serial=serial)
         self.memory[:] = new_exchange(self.force_limit_n)
         for field, name in FUNCTIONS.items():
             self.exchange[field] = connection.address(name)
         self.exchange.id = connection.id
-        self.exchange.wrist, self.exchange.gripper = found["wrist"], found["gripper"]
-        self.exchange.active = found["active_wrist"] or found["active_gripper"]
+        self.exchange.wrist, self.exchange.gripper = facts["wrist"], facts["gripper"]
+        self.exchange.active = facts["active_wrist"] or facts["active_gripper"]
         path = "" if self._path is None else str(self._path)
-        self._start_guard(path, serial or "", needed=found.get("watchdog_s") is None)
-        return {"guard": self.guard is not None} | found
+        self._start_guard(path, serial or "", needed=facts.get("watchdog_s") is None)
+        return {"guard": self.guard is not None} | facts
 
     def _finish(self, connection: Functions) -> AtClose:
         """Send zero force, and take the current off the motors."""
@@ -95,11 +95,11 @@ class ForceDimensionDevice(FramedDevice):
         return CAUSES.get(int(self.exchange.off_cause), "") if mode == "force-off" else ""
 
     def observed(self) -> tuple[str, ...]:
-        found, counters = self.found, self.counters
-        watchdog_s = found.get("watchdog_s")
+        facts, counters = self.found, self.counters
+        watchdog_s = facts.get("watchdog_s")
         return (
-            f"opened: {found['system']}, serial number {found.get('serial')}, SDK {found['sdk']}",
-            f"velocity threshold {found.get('velocity_threshold')}, "
+            f"opened: {facts['system']}, serial number {facts.get('serial')}, SDK {facts['sdk']}",
+            f"velocity threshold {facts.get('velocity_threshold')}, "
             f"watchdog {'none' if watchdog_s is None else f'{1000 * watchdog_s:.1f} ms'}",
             f"readings answered by the time guard: {counters['guarded']}",
             f"forces beyond what the motors give: {counters['saturated']}",

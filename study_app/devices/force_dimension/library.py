@@ -133,10 +133,10 @@ class Library:
         DeviceFailure
             There is none that can be opened.
         """
-        found = self._functions.dhdOpenSerial(int(serial)) if serial else self._functions.dhdOpen()
-        if found < 0:
+        device_id = self._functions.dhdOpenSerial(int(serial)) if serial else self._functions.dhdOpen()
+        if device_id < 0:
             raise FAILURES.failure("no-device", self._last_error())
-        self.id = int(found)
+        self.id = int(device_id)
         return self
 
     def prepare(self, force_limit_n: float) -> dict[str, Any]:
@@ -245,7 +245,7 @@ class Library:
             moved = (count + COUNTS * (axis == i) for i, count in enumerate(counts))
             if call.dhdDeltaEncoderToPosition(*moved, *place, device) < 0:
                 return None, None
-            places.append([one.value for one in place])
+            places.append([coordinate.value for coordinate in place])
         rates_m = (np.array(places[1:]) - places[0]).T / COUNTS
         longest_m = float(np.linalg.norm(rates_m, 2)) if np.isfinite(rates_m).all() else math.nan
         joints, inertia = (c_double * MOST_JOINTS)(), (c_double * 36)()
@@ -278,10 +278,10 @@ class Library:
             time.sleep(0.01)
 
     def _status(self) -> list[int]:
-        words = (c_int * STATUS_WORDS)()
-        if self._functions.dhdGetStatus(words, self.id) < 0:
+        status = (c_int * STATUS_WORDS)()
+        if self._functions.dhdGetStatus(status, self.id) < 0:
             raise FAILURES.failure("error", f"dhdGetStatus: {self._last_error()}")
-        return list(words)
+        return list(status)
 
     def _last_error(self) -> str:
         return (self._functions.dhdErrorGetLastStr() or b"").decode(errors="replace")
@@ -299,10 +299,10 @@ def probe() -> Backend:
         library = Library()
     except DeviceFailure as failed:
         return Backend("force-dimension", "libdrd", state=NOT_AVAILABLE, can=_CAN, why=FAILURES.sentence(failed.mode))
-    by, found = f"libdrd {library.version}", library.devices
-    if found < 1:
+    by, count = f"libdrd {library.version}", library.devices
+    if count < 1:
         return Backend("force-dimension", by, state=NONE, can=_CAN, why=FAILURES.sentence("no-device"))
-    return Backend("force-dimension", by, state=f"connected: {found}", can=_CAN)
+    return Backend("force-dimension", by, state=f"connected: {count}", can=_CAN)
 
 
 def _within(value: float, limits: tuple[float, float]) -> float | None:

@@ -75,7 +75,7 @@ class Inverse3Device(FramedDevice):
         messages = Messages(connection)
         messages.upgrade(f"{self._host}:{self._port}")
         session = open_session(messages, connection, self._wanted_id)
-        found = session.described | {"force_scale": service.check_force_scale(self._force_scale())}
+        facts = session.described | {"force_scale": service.check_force_scale(self._force_scale())}
         self._dynamics = dynamics_of(session.round_trip_s, None, None, name=self.name, serial=session.device_id)
         self.memory[:] = new_exchange(session.device_id, self.force_limit_n, secrets.randbits(64))
         self.exchange.scan.own_id = text_hash(session.device_id.encode())
@@ -83,9 +83,9 @@ class Inverse3Device(FramedDevice):
         self.exchange.inbox[: left.size] = left
         self.exchange.filled = left.size
         self.exchange.handle, self.exchange.send, self.exchange.receive = connection.calls()
-        if not found["service_settings"]["confirmed"] and self._progress is not None:
+        if not facts["service_settings"]["confirmed"] and self._progress is not None:
             self._progress("The service did not confirm its settings: compare them in Haply Hub.")
-        return found
+        return facts
 
     def _finish(self, connection: service.Link) -> AtClose:
         """Send zero force and a close frame."""
@@ -99,11 +99,11 @@ class Inverse3Device(FramedDevice):
         return 1e-9 * float(self.exchange.age_ns)
 
     def observed(self) -> tuple[str, ...]:
-        found = self.found
+        facts = self.found
         return (
-            f"opened, device {found['device_id']}, round trip {found['round_trip_ms']:.2f} ms",
-            f"settings {'confirmed' if found['service_settings']['confirmed'] else 'not confirmed by the service'}",
-            f"force scale: {found['force_scale']:g}",
+            f"opened, device {facts['device_id']}, round trip {facts['round_trip_ms']:.2f} ms",
+            f"settings {'confirmed' if facts['service_settings']['confirmed'] else 'not confirmed by the service'}",
+            f"force scale: {facts['force_scale']:g}",
         )
 
     def _force_scale(self) -> Any:

@@ -240,8 +240,8 @@ def _take_state(device: Any, begin: int, end: int) -> int:
 
 
 @kernel
-def _denied(found: Any, place: int) -> bool:
-    return bool(found.known >> place & 1 and found.value[place] == 0.0)
+def _denied(scanned: Any, place: int) -> bool:
+    return bool(scanned.known >> place & 1 and scanned.value[place] == 0.0)
 
 
 @kernel

@@ -87,12 +87,12 @@ def differing(config: Mapping[str, Any], required: Mapping[str, Any]) -> list[st
 
 def _differing(place: str, value: Any, required: Any) -> list[str]:
     if isinstance(required, Mapping):
-        found: list[str] = []
+        paths: list[str] = []
         for key, wanted in required.items():
             name = f"{place}.{key}" if place else key
             inner = value.get(key) if isinstance(value, Mapping) else None
-            found += _differing(name, inner, wanted)
-        return found
+            paths += _differing(name, inner, wanted)
+        return paths
     return [] if value == required else [f"{place} is {shortened(value)}, and {required!r} is required"]
 
 
@@ -190,13 +190,13 @@ class Messages:
 
 def _object(text: bytes) -> dict[str, Any]:
     try:
-        found = json.loads(text)
-        json.dumps(found, ensure_ascii=False, allow_nan=False).encode()  # as a receipt holds it
+        message = json.loads(text)
+        json.dumps(message, ensure_ascii=False, allow_nan=False).encode()  # as a receipt holds it
     except (ValueError, RecursionError) as error:
         raise FAILURES.failure("not-json", shortened(str(error))) from None
-    if not isinstance(found, dict):
+    if not isinstance(message, dict):
         raise FAILURES.failure("not-json", "it is not an object")
-    return found
+    return message
 
 
 def open_session(messages: Messages, link: Link, wanted_id: str = "") -> Session:

@@ -138,11 +138,11 @@ CAN: Final = "force as commanded by the Inverse Service 3.5 or later (Haply Hub)
 
 def probe(host: str = "127.0.0.1", ports: tuple[int, ...] = PORTS) -> Backend:
     """Return what the service at ``host`` lists (docs.haply.co 3.4.x, "HTTP", Devices: GET /devices)."""
-    found = ask(host, "/devices", ports)
+    answer = ask(host, "/devices", ports)
     by = "Inverse Service"
-    if not isinstance(found, dict):
+    if not isinstance(answer, dict):
         return Backend("inverse3", by, state=NOT_AVAILABLE, can=CAN, why=FAILURES.sentence("no-service"))
-    listed = found.get("inverse3")
+    listed = answer.get("inverse3")
     ids = [entry.get("device_id") for entry in listed if isinstance(entry, dict)] if isinstance(listed, list) else []
     if names := [name for name in ids if isinstance(name, str) and ID.fullmatch(name)]:
         return Backend("inverse3", by, state=f"connected: {', '.join(names)}", can=CAN)

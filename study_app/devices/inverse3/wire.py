@@ -197,12 +197,12 @@ _TENS = np.array([float(f"1e{power}") for power in range(309)] + [np.inf])
 
 
 @kernel
-def scan(data: Any, begin: int, end: int, found: Any) -> int:
+def scan(data: Any, begin: int, end: int, state: Any) -> int:
     """Read the message from ``begin`` to ``end``; return `UNDERSTOOD` or why it says nothing of the device.
 
-    ``found`` is a record of `SCAN`, whose ``own_id`` says which device is meant.
+    ``state`` is a record of `SCAN`; its ``own_id`` says which device is meant.
     """
-    found.known = found.found = found.infinite = found.seen = found.is_own = 0
+    state.known = state.found = state.infinite = state.seen = state.is_own = 0
     at, depth, path, value_due = _skip(data, begin, end), 0, _NOTHING, True
     while True:
         if at >= end:
@@ -213,16 +213,16 @@ def scan(data: Any, begin: int, end: int, found: Any) -> int:
                 if depth + 1 >= DEEPEST:
                     return NOT_JSON
                 depth += 1
-                found.kinds[depth] = _OBJECT if byte == 123 else _ARRAY
-                found.paths[depth] = path
+                state.kinds[depth] = _OBJECT if byte == 123 else _ARRAY
+                state.paths[depth] = path
                 if path == _DEVICE:
-                    found.seen = found.is_own = 0
+                    state.seen = state.is_own = 0
                 at = _skip(data, at + 1, end)
                 if at < end and data[at] == (125 if byte == 123 else 93):
                     value_due = False
                     continue
             else:
-                at = _skip(data, _scalar(data, at, end, path, found), end)
+                at = _skip(data, _scalar(data, at, end, path, state), end)
                 value_due = False
                 if at < 0:
                     return NOT_JSON
@@ -231,25 +231,25 @@ def scan(data: Any, begin: int, end: int, found: Any) -> int:
                 continue
         elif byte == 44:  # ,
             at = _skip(data, at + 1, end)
-        elif byte == (125 if found.kinds[depth] == _OBJECT else 93):  # } ]
-            if found.paths[depth] == _DEVICE:
-                _keep(found)
+        elif byte == (125 if state.kinds[depth] == _OBJECT else 93):  # } ]
+            if state.paths[depth] == _DEVICE:
+                _keep(state)
             depth -= 1
             at = _skip(data, at + 1, end)
             if depth == 0:
-                return _verdict(found) if at == end else NOT_JSON
+                return _verdict(state) if at == end else NOT_JSON
             continue
         else:
             return NOT_JSON
         # the next member or element
         value_due = True
-        if found.kinds[depth] == _ARRAY:
-            path = (found.paths[depth] ^ _ELEMENT) * _PRIME
+        if state.kinds[depth] == _ARRAY:
+            path = (state.paths[depth] ^ _ELEMENT) * _PRIME
             continue
         close = _string_end(data, at, end)
         if close < 0:
             return NOT_JSON
-        path = (found.paths[depth] ^ _hash(data, at + 1, close)) * _PRIME
+        path = (state.paths[depth] ^ _hash(data, at + 1, close)) * _PRIME
         at = _skip(data, close + 1, end)
         if at >= end or data[at] != 58:  # :
             return NOT_JSON
@@ -257,26 +257,26 @@ def scan(data: Any, begin: int, end: int, found: Any) -> int:
 
 
 @kernel
-def _verdict(found: Any) -> int:
-    if found.found == 0:
+def _verdict(state: Any) -> int:
+    if state.found == 0:
         return NO_DEVICE
-    if found.infinite:
+    if state.infinite:
         return NOT_FINITE
-    return UNDERSTOOD if found.known & _NEEDED == _NEEDED else WITHOUT_POSITION
+    return UNDERSTOOD if state.known & _NEEDED == _NEEDED else WITHOUT_POSITION
 
 
 @kernel
-def _keep(found: Any) -> None:
+def _keep(state: Any) -> None:
     """Take over what was read of a device, if it is the one."""
-    if found.is_own == 0:
+    if state.is_own == 0:
         return
-    found.found = 1
-    found.known |= found.seen
+    state.found = 1
+    state.known |= state.seen
     for place in range(_OF_DEVICE):
-        if found.seen >> place & 1:
-            found.value[place] = found.candidate[place]
-            if not abs(found.value[place]) < np.inf:
-                found.infinite = 1
+        if state.seen >> place & 1:
+            state.value[place] = state.candidate[place]
+            if not abs(state.value[place]) < np.inf:
+                state.infinite = 1
 
 
 @kernel
@@ -330,41 +330,41 @@ def _hash(data: Any, begin: int, end: int) -> Any:
 
 
 @kernel
-def _scalar(data: Any, at: int, end: int, path: Any, found: Any) -> int:
+def _scalar(data: Any, at: int, end: int, path: Any, state: Any) -> int:
     """Read a string, number or literal, and keep it where its place is known; return where it ends, -1: nowhere."""
     byte = data[at]
     if byte == 34:
         close = _string_end(data, at, end)
         if close < 0:
             return -1
-        if path == _ID and _hash(data, at + 1, close) == found.own_id:
-            found.is_own = 1
+        if path == _ID and _hash(data, at + 1, close) == state.own_id:
+            state.is_own = 1
         return close + 1
     if byte == 116:  # true
-        return _literal(data, at, end, _TRUE, 1.0, path, found)
+        return _literal(data, at, end, _TRUE, 1.0, path, state)
     if byte == 102:  # false
-        return _literal(data, at, end, _FALSE, 0.0, path, found)
+        return _literal(data, at, end, _FALSE, 0.0, path, state)
     if byte == 110:  # null
-        return _literal(data, at, end, _NULL, np.nan, path, found)
-    return _number(data, at, end, path, found)
+        return _literal(data, at, end, _NULL, np.nan, path, state)
+    return _number(data, at, end, path, state)
 
 
 _TRUE, _FALSE, _NULL = (np.frombuffer(word, np.uint8) for word in (b"true", b"false", b"null"))
 
 
 @kernel
-def _literal(data: Any, at: int, end: int, word: Any, value: float, path: Any, found: Any) -> int:
+def _literal(data: Any, at: int, end: int, word: Any, value: float, path: Any, state: Any) -> int:
     if at + word.size > end:
         return -1
     for k in range(word.size):
         if data[at + k] != word[k]:
             return -1
-    _note(found, path, value)
+    _note(state, path, value)
     return at + int(word.size)
 
 
 @kernel
-def _number(data: Any, at: int, end: int, path: Any, found: Any) -> int:
+def _number(data: Any, at: int, end: int, path: Any, state: Any) -> int:
     """Read a number: right to 1 part in 10^15, which is far below what a device resolves."""
     negative = data[at] == 45
     if negative:
@@ -401,17 +401,17 @@ def _number(data: Any, at: int, end: int, path: Any, found: Any) -> int:
     if power != 0 and mantissa != 0.0:
         tens = _TENS[min(abs(power), _TENS.size - 1)]
         value = mantissa / tens if power < 0 else mantissa * tens
-    _note(found, path, -value if negative else value)
+    _note(state, path, -value if negative else value)
     return at
 
 
 @kernel
-def _note(found: Any, path: Any, value: float) -> None:
+def _note(state: Any, path: Any, value: float) -> None:
     for place in range(PLACES):
         if path == _CODES[place]:
             if place < _OF_DEVICE:
-                found.candidate[place] = value
-                found.seen |= 1 << place
+                state.candidate[place] = value
+                state.seen |= 1 << place
             else:
-                found.value[place] = value
-                found.known |= 1 << place
+                state.value[place] = value
+                state.known |= 1 << place

@@ -146,23 +146,25 @@ def load_hid() -> Any:
 def find_space_mice(hid: Any) -> list[tuple[Model, dict[str, Any]]]:
     """Return model and hidapi's description of every interface of every SpaceMouse that is connected."""
     known = {(model.vendor, model.product): model for model in MODELS}
-    listed = [(known.get((one["vendor_id"], one["product_id"])), one) for one in hid.enumerate()]
-    return [(model, one) for model, one in listed if model is not None]
+    listed = [
+        (known.get((interface["vendor_id"], interface["product_id"])), interface) for interface in hid.enumerate()
+    ]
+    return [(model, interface) for model, interface in listed if model is not None]
 
 
-def choose(found: list[tuple[Model, dict[str, Any]]]) -> tuple[Model, bytes]:
+def choose(interfaces: list[tuple[Model, dict[str, Any]]]) -> tuple[Model, bytes]:
     """Return the first interface that reports motion; one that does not tell what it reports may be one."""
-    if not found:
+    if not interfaces:
         raise DeviceNotFound(
             "no SpaceMouse is connected: connect it, or turn it on; known models are "
             + ", ".join(m.name for m in MODELS)
         )
-    usages = [(one.get("usage_page") or 0, one.get("usage") or 0) for _, one in found]
+    usages = [(interface.get("usage_page") or 0, interface.get("usage") or 0) for _, interface in interfaces]
     for wanted in (USAGE, (0, 0)):
         if wanted in usages:
-            model, chosen = found[usages.index(wanted)]
+            model, chosen = interfaces[usages.index(wanted)]
             return model, chosen["path"]
-    raise DeviceError(f"the {found[0][0].name} {_NO_MOTION_INTERFACE}")
+    raise DeviceError(f"the {interfaces[0][0].name} {_NO_MOTION_INTERFACE}")
 
 
 def opened(hid: Any, model: Model, path: bytes) -> Any:
@@ -186,12 +188,12 @@ def probe(hid: Any = None) -> list[Backend]:
     can = "visual only, no force: pushing the cap further moves the ball faster"
     by = f"hidapi {_version()}"
     try:
-        found = find_space_mice(load_hid() if hid is None else hid)
+        interfaces = find_space_mice(load_hid() if hid is None else hid)
     except (DeviceError, OSError) as error:
         return [Backend("spacemouse", by, state=NOT_AVAILABLE, can=can, why=str(error))]
-    if not found:
+    if not interfaces:
         return [Backend("spacemouse", by, state=NONE, can=can, why="connect a 3Dconnexion SpaceMouse, or turn it on")]
-    names = sorted({model.name for model, _ in found})
+    names = sorted({model.name for model, _ in interfaces})
     return [Backend("spacemouse", by, state="connected: " + ", ".join(names), can=can)]
 
 
