@@ -110,9 +110,9 @@ def record_at(dtype: np.dtype[Any]) -> Any:
     return intrinsic(cast)
 
 
-def stack_memory(words: int) -> Any:
+def stack_memory(word_count: int) -> Any:
     """Return a function for compiled code: -> the address (intp) of ``words`` 8-byte words on its own stack."""
-    block = ir.ArrayType(ir.IntType(64), words)
+    block = ir.ArrayType(ir.IntType(64), word_count)
 
     def allocate(_typing_context: Any) -> Any:
         def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:

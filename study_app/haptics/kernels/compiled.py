@@ -69,15 +69,15 @@ def compiled_sources(package: Path) -> dict[str, bytes]:
                 if file.endswith(".py"):
                     sources[f"{within}.{file[:-3]}"] = Path(folder, file).read_bytes()
     covered: set[str] = set()
-    left = {name for name, source in sources.items() if any(words in source for words in _COMPILES)}
+    left = {name for name, source in sources.items() if any(call in source for call in _COMPILES)}
     while left:
         covered |= left
         imported: set[str] = set()
         for name in left:
             if b"iter_modules" in sources[name]:  # it imports all modules of its folder
-                imported.update(each for each in sources if each.rpartition(".")[0] == name.rpartition(".")[0])
+                imported.update(source for source in sources if source.rpartition(".")[0] == name.rpartition(".")[0])
             for module, names in _IMPORTS.findall(sources[name].decode()):
-                imported.update((module, *(f"{module}.{each}" for each in names.replace(",", " ").split())))
+                imported.update((module, *(f"{module}.{member}" for member in names.replace(",", " ").split())))
         imported |= {f"{name}.__init__" for name in imported}
         left = (imported & sources.keys()) - covered
     return {name: sources[name] for name in sorted(covered)}
@@ -193,8 +193,8 @@ class PackageCacheLocator(UserProvidedCacheLocator):
             or ".".join(file.relative_to(_PACKAGE).with_suffix("").parts) not in SOURCES
         ):
             return None
-        found = super().from_function(py_func, py_file)  # type: ignore[no-untyped-call]
-        return cast("PackageCacheLocator | None", found)
+        locator = super().from_function(py_func, py_file)  # type: ignore[no-untyped-call]
+        return cast("PackageCacheLocator | None", locator)
 
 
 if CACHE is not None:  # numba before 0.61.1 ignores it, and compiles again after the package is moved

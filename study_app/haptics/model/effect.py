@@ -73,10 +73,10 @@ class Rows:
     """Rows that an effect owns in arrays of the model: the same rows in each of ``arrays``.
 
     ``needed`` returns the number that a liquid needs at a rate [Hz]; ``most`` the greatest number that any liquid
-    needs, None if only the caller that packs the scenes knows it. ``words`` name them in messages.
+    needs, None if only the caller that packs the scenes knows it. ``noun`` names them in messages.
     """
 
-    words: str
+    noun: str
     arrays: Mapping[str, Fields]
     needed: Callable[[Liquid, float], int]
     most: Callable[[float], int] | None = None

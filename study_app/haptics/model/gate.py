@@ -43,14 +43,14 @@ class Extremes:
     def bounds_n(self) -> Mapping[Effect, float]:
         """The bound [N] of every effect of the scene's format that the liquid has parameters for, by name."""
         known = [it for it in EFFECTS if it.format <= self.scene.format or it.name in self.liquid.effects]
-        found = {effect.name: effect.bound_n(self) for effect in known}
-        return {name: bound_n for name, bound_n in found.items() if bound_n is not None}
+        bounds = {effect.name: effect.bound_n(self) for effect in known}
+        return {name: bound_n for name, bound_n in bounds.items() if bound_n is not None}
 
     @cached_property
     def exerted_n(self) -> Mapping[Effect, float]:
         """About the greatest force [N] that each effect exerts by itself."""
-        found = {effect.name: effect.exerted_n(self) for effect in EFFECTS if effect.exerted_n is not None}
-        return {name: newtons for name, newtons in found.items() if newtons is not None}
+        exerted = {effect.name: effect.exerted_n(self) for effect in EFFECTS if effect.exerted_n is not None}
+        return {name: newtons for name, newtons in exerted.items() if newtons is not None}
 
     @cached_property
     def has_top(self) -> bool:
@@ -227,45 +227,45 @@ def _budget_n(scene: Scene, total_n: float) -> float:
 
 
 def _verdicts(scene: Scene, liquid: Liquid) -> tuple[Verdict, ...]:
-    found = bounds(scene, liquid)
-    barred = _barred(scene, liquid, found)
-    total_n = sum(bound_n for effect, bound_n in found.items() if effect not in barred)
-    judged = _chosen(scene, liquid, found, barred, total_n) if liquid.effects == "auto" else _named(liquid, found)
+    bound_of = bounds(scene, liquid)
+    barred = _barred(scene, liquid, bound_of)
+    total_n = sum(bound_n for effect, bound_n in bound_of.items() if effect not in barred)
+    judged = _chosen(scene, liquid, bound_of, barred, total_n) if liquid.effects == "auto" else _named(liquid, bound_of)
     return tuple(
         Verdict(
             liquid=liquid.id,
             effect=effect,
-            bound_n=found[effect],
-            share=found[effect] / total_n if total_n > 0 else 0.0,
+            bound_n=bound_of[effect],
+            share=bound_of[effect] / total_n if total_n > 0 else 0.0,
             included=included,
             why=why,
         )
         for effect in NAMED
-        if effect in found
+        if effect in bound_of
         for included, why in (judged[effect],)
     )
 
 
-def _barred(scene: Scene, liquid: Liquid, found: Mapping[Effect, float]) -> dict[Effect, str]:
+def _barred(scene: Scene, liquid: Liquid, bound_of: Mapping[Effect, float]) -> dict[Effect, str]:
     """Return the effects that cannot be chosen, with reasons."""
     if liquid.effects != "auto":
-        rivals = {it.name: it.excludes for it in EFFECTS if it.excludes and it.name in found}
-        names = [name for one, others in rivals.items() for name in (others if one in liquid.effects else (one,))]
+        rivals = {it.name: it.excludes for it in EFFECTS if it.excludes and it.name in bound_of}
+        names = [name for rival, others in rivals.items() for name in (others if rival in liquid.effects else (rival,))]
         return dict.fromkeys(names, "another model of the same thing is named")
     barred = {
         name: why
         for effect in EFFECTS
-        if effect.bars is not None and effect.name in found
+        if effect.bars is not None and effect.name in bound_of
         for names, why in (effect.bars(Extremes(scene, liquid)),)
         for name in names
     }
     return barred | dict.fromkeys(NEVER_BY_ITSELF, "not determined by density and viscosity: name it to use it")
 
 
-def _named(liquid: Liquid, found: Mapping[Effect, float]) -> dict[Effect, tuple[bool, str]]:
+def _named(liquid: Liquid, bound_of: Mapping[Effect, float]) -> dict[Effect, tuple[bool, str]]:
     """Return the verdicts on effects that the file names."""
-    judged: dict[Effect, tuple[bool, str]] = dict.fromkeys(found, (False, "not named"))
-    for name in found:
+    judged: dict[Effect, tuple[bool, str]] = dict.fromkeys(bound_of, (False, "not named"))
+    for name in bound_of:
         if name in liquid.effects:
             note = NAMED[name].note
             judged[name] = True, f"named{note(liquid) if note is not None else ''}"
@@ -273,17 +273,17 @@ def _named(liquid: Liquid, found: Mapping[Effect, float]) -> dict[Effect, tuple[
 
 
 def _chosen(
-    scene: Scene, liquid: Liquid, found: Mapping[Effect, float], barred: Mapping[Effect, str], total_n: float
+    scene: Scene, liquid: Liquid, bound_of: Mapping[Effect, float], barred: Mapping[Effect, str], total_n: float
 ) -> dict[Effect, tuple[bool, str]]:
     """Omit the smallest effects while their sum stays within the target."""
     budget_n = _budget_n(scene, total_n)
     judged: dict[Effect, tuple[bool, str]] = {name: (False, why) for name, why in barred.items()}
     left_out_n = 0.0
-    for effect in sorted((effect for effect in found if effect not in judged), key=lambda effect: found[effect]):
-        with_it_n = left_out_n + found[effect]
+    for effect in sorted((effect for effect in bound_of if effect not in judged), key=lambda effect: bound_of[effect]):
+        with_it_n = left_out_n + bound_of[effect]
         if with_it_n <= budget_n:
             left_out_n = with_it_n
-            judged[effect] = False, _left_out(found[effect], left_out_n, budget_n)
+            judged[effect] = False, _left_out(bound_of[effect], left_out_n, budget_n)
         else:
             judged[effect] = True, f"without it {with_it_n:.3g} N would be missing, more than {budget_n:.3g} N"
     for name in [name for name, (taken, _) in judged.items() if taken and NAMED[name].through]:

@@ -126,10 +126,10 @@ class SampleField:
     Attributes
     ----------
     name : of the field
-    words : meaning of its column in recordings, with ``*`` for the words of the component; "": it is not recorded
+    meaning : meaning of its column in recordings, with ``*`` for that of the component; "": it is not recorded
     column : name of the column, with ``*`` for the letter; "": the field's
     kind : type of its numbers
-    parts : of a vector: the letter of each component, and its words
+    parts : of a vector: the letter of each component, and its meaning
     unit : of the column, "" without one
     stored : type of the column's numbers
     step : to which the column is rounded; 0: exact
@@ -141,7 +141,7 @@ class SampleField:
     """
 
     name: str
-    words: str = ""
+    meaning: str = ""
     _: KW_ONLY
     column: str = ""
     kind: type = np.int64

@@ -74,8 +74,8 @@ def read(path: Path) -> Motion:
     header = table.names
     if header not in {PLACES, PLACES + VELOCITIES}:
         permitted = f"the first line must be {','.join(PLACES)}, or that and {','.join(VELOCITIES)}"
-        found = ",".join(header)[:SHOWN] or "nothing"
-        raise ProtocolError(str(path), (Problem("header", f"is {found}; {permitted}", line=1),))
+        columns = ",".join(header)[:SHOWN] or "nothing"
+        raise ProtocolError(str(path), (Problem("header", f"is {columns}; {permitted}", line=1),))
     if not table.lines:
         raise ProtocolError(str(path), (Problem("rows", "there are none", hint="give at least one"),))
     rows = _numbers(path, table.lines, len(header))

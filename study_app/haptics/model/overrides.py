@@ -115,9 +115,9 @@ def _places(tables: Tables, name: str) -> list[tuple[dict[str, Any], str]]:
     """Return the (table, field) pairs that ``name`` means."""
     place, _, field = name.rpartition(".")
     for table_name, rows in tables.items():
-        found = [(row, field) for row in rows if field in row and place in {"", table_name}]
-        if found and field not in _FIXED and (place or field != "kind"):
-            return found
+        places = [(row, field) for row in rows if field in row and place in {"", table_name}]
+        if places and field not in _FIXED and (place or field != "kind"):
+            return places
     leaves = {key for rows in tables.values() for row in rows for key in row}
     known = sorted(leaves - _FIXED - {"kind"} - tables.keys())
     near = difflib.get_close_matches(field, known, n=1)

@@ -79,15 +79,16 @@ def damping_limits(period_s: float, delay_ticks: int, velocity: Velocity | Devic
     """
     if isinstance(velocity, Withdrawn):
         raise StudyError(": ".join(velocity.refusal))
-    found = [one for row in _rows(velocity, period_s) for one in _neighbours(row, period_s, delay_ticks)]
-    if not found:
+    limits = [limit for row in _rows(velocity, period_s) for limit in _neighbours(row, period_s, delay_ticks)]
+    if not limits:
         raise StudyError(
             f"no stable force is known for {1 / period_s:g} ticks per second with {delay_ticks} ticks of delay: "
             "run at 250 Hz or more, with a delay of 4 ticks at most"
         )
     beyond = min(1.0, period_s / min(entry.period_s for entry in table()))
     return DampingLimits(
-        drag_nspm=beyond * min(it.drag_nspm for it in found), inertia_nspm=beyond * min(it.inertia_nspm for it in found)
+        drag_nspm=beyond * min(it.drag_nspm for it in limits),
+        inertia_nspm=beyond * min(it.inertia_nspm for it in limits),
     )
 
 

@@ -189,7 +189,7 @@ def pack_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> No
         for name in kind.arrays:
             if rows[name] > len(getattr(model.rows, name)):
                 raise StudyError(
-                    f"the scene needs {rows[name]} {kind.words}; the model was packed with room for "
+                    f"the scene needs {rows[name]} {kind.noun}; the model was packed with room for "
                     f"{len(getattr(model.rows, name))}: pack it with a greater capacity"
                 )
     _fill(model, scene, _by_delay(scene, dynamics, CURRENT), dynamics, CURRENT)
@@ -317,12 +317,12 @@ def _inertia_fit(record: layout.Record, limits: DampingLimits, scene: Scene, rul
     """
 
     def damping_nspm(rate: float) -> float:
-        found = (
+        parts = (
             effect.damping_nspm(record[effect.name], rate)
             for effect in EFFECTS
             if effect.damping_nspm is not None and record.effects & effect.bit
         )
-        return sum(found, 0.0) * scene.scale
+        return sum(parts, 0.0) * scene.scale
 
     whole_nspm = damping_nspm(1.0)
     if whole_nspm <= limits.inertia_nspm:
