@@ -70,7 +70,7 @@ def open_sink(address: str, now_ns: Callable[[], int]) -> Sink:
     name, _, place = address.partition(":")
     kind = SINKS.get(name)
     if kind is None or not address.isprintable():
-        examples = ", ".join(one.example for one in SINKS.values())
+        examples = ", ".join(sink.example for sink in SINKS.values())
         raise OutletError(f"{address!r} is not an address of markers: use one like {examples}")
     return kind.open(place, now_ns)
 
@@ -104,32 +104,32 @@ class Outlets:
 
     @property
     def described(self) -> dict[str, Any]:
-        there = {one.title: dict(one.described) for one in self._open()}
-        return there | {title: {"failed": reason} for title, reason in self._failed.items()}
+        descriptions = {sink.title: dict(sink.described) for sink in self._open()}
+        return descriptions | {title: {"failed": reason} for title, reason in self._failed.items()}
 
     @property
     def lost(self) -> dict[str, str]:
         """The reasons why outlets do not work, by title; without those that work."""
-        failed = {one.sink.title: one.lost for one in self._threads if one.lost}
+        failed = {thread.sink.title: thread.lost for thread in self._threads if thread.lost}
         if self._samples is not None and self._samples.lost:
             failed[self._samples.title] = self._samples.lost
         return self._failed | failed
 
     def statuses(self) -> tuple[OutletStatus, ...]:
         lost = self.lost
-        found = [
+        statuses = [
             OutletStatus(
-                title=one.title,
-                listens=one.listens,
-                lost=lost.get(one.title, ""),
-                shows_force=self._double and one is self._samples,
+                title=sink.title,
+                listens=sink.listens,
+                lost=lost.get(sink.title, ""),
+                shows_force=self._double and sink is self._samples,
             )
-            for one in self._open()
+            for sink in self._open()
         ]
-        found += [OutletStatus(title=title, lost=reason) for title, reason in self._failed.items()]
+        statuses += [OutletStatus(title=title, lost=reason) for title, reason in self._failed.items()]
         if self._withheld:
-            found.append(OutletStatus(title=SampleStream.title, withheld=True))
-        return tuple(found)
+            statuses.append(OutletStatus(title=SampleStream.title, withheld=True))
+        return tuple(statuses)
 
     def mark(self, marker: Marker) -> None:
         for thread in self._threads:
@@ -143,6 +143,6 @@ class Outlets:
             self._samples.close()
 
     def _open(self) -> Iterator[Sink | SampleStream]:
-        yield from (one.sink for one in self._threads)
+        yield from (thread.sink for thread in self._threads)
         if self._samples is not None:
             yield self._samples

@@ -62,9 +62,9 @@ def stream_info(lsl: Any, name: str, kind: str, labels: Sequence[str], rate_hz: 
     about.append_child_value("version", study_app.__version__)
     channels = about.append_child("channels")
     for label in labels:
-        words, _, unit = label.partition(" ")
+        title, _, unit = label.partition(" ")
         channel = channels.append_child("channel")
-        channel.append_child_value("label", words)
+        channel.append_child_value("label", title)
         if unit:
             channel.append_child_value("unit", unit)
     return info
