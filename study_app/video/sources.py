@@ -376,12 +376,14 @@ class Videos:
     """
 
     def __init__(self, protocol: Protocol, folder: Path, camera: str, now_ns: Callable[[], int]) -> None:
-        shown = [one for one in protocol.conditions.values() if one.shows_video]
-        self.views = tuple(sorted({one.view for one in shown}))
-        self._hashes = {one.view: one.footage_sha256 for one in shown if one.footage_sha256}
+        shown = [condition for condition in protocol.conditions.values() if condition.shows_video]
+        self.views = tuple(sorted({condition.view for condition in shown}))
+        self._hashes = {condition.view: condition.footage_sha256 for condition in shown if condition.footage_sha256}
         self._folder, self._camera, self._now_ns = folder, camera or USUAL, now_ns
         varied = any(stimulus.vary == DELAY for stimulus in protocol.stimuli.values())
-        self._holds_s = MOST_DELAY_MS / 1000 if varied else max((one.delay_ms for one in shown), default=0.0) / 1000
+        self._holds_s = (
+            MOST_DELAY_MS / 1000 if varied else max((condition.delay_ms for condition in shown), default=0.0) / 1000
+        )
         self._open: dict[str, Camera | Footage] = {}
         self._opening = threading.Lock()
         self._changing = threading.Lock()
@@ -417,28 +419,28 @@ class Videos:
         return self._open[view]
 
     def fit(self, width: int, height: int) -> None:
-        for one in self._open.values():
-            one.fit(width, height)
+        for source in self._open.values():
+            source.fit(width, height)
 
     def describe(self) -> dict[str, Any]:
         """Return the record for the receipt, which does not reveal the video of a condition."""
-        found: dict[str, Any] = {"footage_sha256": sorted(set(self._hashes.values()))} if self._hashes else {}
+        description: dict[str, Any] = {"footage_sha256": sorted(set(self._hashes.values()))} if self._hashes else {}
         if isinstance(camera := self._open.get(CAMERA), Camera):
             age_ns = camera.newest.age_ns
-            found["camera"] = {
+            description["camera"] = {
                 "source": without_login(camera.source),
                 "size": list(camera.size),
                 "rate_hz": round(1e9 / camera.newest.period_ns, 3),
                 "age": "unknown" if age_ns is None else "by the source's time stamps",
             }
-        return found
+        return description
 
     def close(self) -> None:
         with self._changing:
             self._closed = True
             every = tuple(self._open.values())
-        for one in every:
-            one.close()
+        for source in every:
+            source.close()
 
     def _keep(self, view: str, source: Camera | Footage) -> None:
         """Store an open source; close it if all were closed meanwhile."""
@@ -459,12 +461,12 @@ class Videos:
         return Footage(path)
 
     def _words(self) -> Iterable[str]:
-        for view, one in self._open.items():
-            if isinstance(one, Camera) and view == CAMERA:
-                age_ns = one.newest.age_ns
+        for view, source in self._open.items():
+            if isinstance(source, Camera) and view == CAMERA:
+                age_ns = source.newest.age_ns
                 age = "age unknown" if age_ns is None else f"{age_ns / 1e6:.0f} ms old"
-                yield f"camera, {one.size[0]} × {one.size[1]}, {1e9 / one.newest.period_ns:.3g} Hz, {age}"
-        if count := sum(isinstance(one, Footage) for one in self._open.values()):
+                yield f"camera, {source.size[0]} × {source.size[1]}, {1e9 / source.newest.period_ns:.3g} Hz, {age}"
+        if count := sum(isinstance(source, Footage) for source in self._open.values()):
             yield f"footage, {counted(count, 'file')}"
 
 
@@ -476,7 +478,7 @@ def missing_here(protocol: Protocol, folder: Path, camera: str, now_ns: Callable
     VideoError
         Why footage cannot be shown on any machine, in one line.
     """
-    views = {one.view for one in protocol.conditions.values() if one.shows_video}
+    views = {condition.view for condition in protocol.conditions.values() if condition.shows_video}
     if views and not installed():
         return f"a video {EXTRA}"
     for view in sorted(views - {CAMERA}):
