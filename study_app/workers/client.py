@@ -84,20 +84,20 @@ class WorkerClient(Generic[Order, Answer]):
         """
         if self._closed:
             return []
-        found: list[tuple[int, Answer | Refused | Crashed]] = []
+        answers: list[tuple[int, Answer | Refused | Crashed]] = []
         with suppress(EOFError, OSError):
             wait([self._answers], wait_s)
             while self._answers.poll():
                 number, answer, last = self._answers.recv()
-                found.append((number, answer))
+                answers.append((number, answer))
                 if last:
                     self._open.remove(number)
-            return found
+            return answers
         if self.process.is_alive():  # the process closed its end, and is about to end
-            return found
-        found += [(number, Crashed(self.process.exitcode)) for number in self._open]
+            return answers
+        answers += [(number, Crashed(self.process.exitcode)) for number in self._open]
         self._open = []
-        return found
+        return answers
 
     def close(self) -> None:
         """Ask the process to end, even during a request; a thread waits for it, and kills it after ``PATIENCE_S``."""
