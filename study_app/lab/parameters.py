@@ -67,7 +67,7 @@ def sections(scene: Scene) -> tuple[Section, ...]:
     effects = resolve(scene).liquids[0].effects
     with_liquid = (name for effect in EFFECTS if effect.with_liquid for name in _names(scene, effect.name))
     apart = (it for it in EFFECTS if it.name in effects and it.model is not None and not it.with_liquid)
-    found = [
+    rows = [
         ("Liquid", ("liquid.density_kg_m3", "liquid.viscosity_pa_s", *with_liquid)),
         *((it.label, _names(scene, it.name)) for it in apart if getattr(liquid, it.name) is not None),
         ("Body", _names(scene, "body")),
@@ -77,7 +77,7 @@ def sections(scene: Scene) -> tuple[Section, ...]:
         ("Region", _names(scene, "region")),
         ("Hand", ("scene.scale", "scene.force_limit_n")),
     ]
-    return tuple(Section(title, tuple(_parameter(scene, it) for it in names)) for title, names in found if names)
+    return tuple(Section(title, tuple(_parameter(scene, it) for it in names)) for title, names in rows if names)
 
 
 def parameter(scene: Scene, name: str) -> Parameter:
@@ -106,12 +106,12 @@ def value_of(scene: Scene, name: str) -> Value:
         if not field:
             return AUTO if liquid.effects == "auto" else ON
         return ON if field in resolve(scene).liquids[0].effects else OFF
-    found = read(resolve(scene) if place in NAMED and NAMED[place].choose is not None else scene, name)
-    if found is None and place in NAMED and field in NAMED[place].open_values:
+    value = read(resolve(scene) if place in NAMED and NAMED[place].choose is not None else scene, name)
+    if value is None and place in NAMED and field in NAMED[place].open_values:
         return NAMED[place].open_values[field](scene)
-    if found is None and place == "motion":
+    if value is None and place == "motion":
         return float(getattr(scene.motion_in(liquid), field))
-    return found if found is None or isinstance(found, str) else float(found)
+    return value if value is None or isinstance(value, str) else float(value)
 
 
 def read(scene: Scene, name: str) -> Any:
@@ -119,8 +119,8 @@ def read(scene: Scene, name: str) -> Any:
     liquid = the_liquid(scene)
     place, field, *axis = name.split(".")
     table = {"liquid": liquid, "scene": scene}.get(place) or getattr(liquid, place, None) or getattr(scene, place, None)
-    found = getattr(table, field, None)
-    return found[AXES.index(axis[0])] if axis and found is not None else found
+    value = getattr(table, field, None)
+    return value[AXES.index(axis[0])] if axis and value is not None else value
 
 
 def the_liquid(scene: Scene) -> Liquid:
@@ -254,8 +254,8 @@ def changed(scene: Scene, name: str, value: Value) -> Scene:
 def _checked(it: Parameter, value: Value) -> Value:
     if it.choices:
         if value not in {choice for choice, _ in it.choices}:
-            words = ", ".join(repr(choice) for choice, _ in it.choices)
-            raise StudyError(f"{it.label} must be one of {words}, not {value!r}")
+            choices = ", ".join(repr(choice) for choice, _ in it.choices)
+            raise StudyError(f"{it.label} must be one of {choices}, not {value!r}")
         return value
     if isinstance(value, str) or value is None or not math.isfinite(value):
         raise StudyError(f"{it.label} must be a number, not {value!r}")

@@ -51,11 +51,11 @@ def liquids_at_hand(folders: tuple[Path, ...] | None = None, saved: tuple[str, .
     """
     folders = (workspace().protocols,) if folders is None else folders
     own = [str(path) for folder in folders for path in sorted(folder.glob("*.toml")) if path.stem not in shipped()]
-    found: list[Choice] = []
+    choices: list[Choice] = []
     for source in dict.fromkeys([*shipped(), *own, *saved]):
         with suppress(ProtocolError):
-            found += liquids_of(source)
-    return tuple(found)
+            choices += liquids_of(source)
+    return tuple(choices)
 
 
 def liquids_of(source: str) -> tuple[Choice, ...]:
@@ -94,5 +94,5 @@ def save(path: Path, text: str) -> None:
 
 def spoken(liquid_id: str) -> str:
     """Return the displayed name of a liquid."""
-    words = liquid_id.replace("_", " ")
-    return words[:1].upper() + words[1:]
+    name = liquid_id.replace("_", " ")
+    return name[:1].upper() + name[1:]

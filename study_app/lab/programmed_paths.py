@@ -49,12 +49,12 @@ def programme(name: str, scene: Scene, half_m: Vector) -> Motion:
         "zigzag": {"leg_s": min(2 * x_m / (_LEGS * _HALF_TURN), 2 * z_m / _HALF_TURN), "legs": _LEGS},
         "reach": {"distance_m": min(0.6, 2 * x_m)},
     }
-    found = path(name, rate_hz=_RATE_HZ, **sized[name])
-    way_m = found.position_m
+    course = path(name, rate_hz=_RATE_HZ, **sized[name])
+    way_m = course.position_m
     if name == "zigzag":  # from left to right instead of away, since a workspace is widest there
         way_m = way_m[:, [2, 1, 0]] * [-1.0, 1.0, 1.0]
     places_m = way_m - (way_m.max(axis=0) + way_m.min(axis=0)) / 2
-    return Motion(found.t_s, places_m / scene.scale)
+    return Motion(course.t_s, places_m / scene.scale)
 
 
 def led_to(motion: Motion, from_m: Any) -> Motion:

@@ -48,15 +48,15 @@ def tail_of(trail: Any, places: Any, elements: int) -> Tail:
     """Return the tail of a trail (``haptics.runtime.offline``) of at most ``elements`` elements."""
     left, held = int(trail.left), int(trail.held)
     numbers = np.arange(left - held, left)
-    found = places[numbers % len(places)]
-    moving = found.moving != 0
-    numbers, found = numbers[moving], found[moving]
-    breaks = np.ones(len(found), bool)
-    breaks[1:] = found.segment[1:] != found.segment[:-1]
+    samples = places[numbers % len(places)]
+    moving = samples.moving != 0
+    numbers, samples = numbers[moving], samples[moving]
+    breaks = np.ones(len(samples), bool)
+    breaks[1:] = samples.segment[1:] != samples.segment[:-1]
     kept = _thinned(breaks)
     ages = (left - 1 - numbers[kept]) / max(elements - 1, 1)
     return Tail(
-        positions_m=np.array(found.hand_m[kept], np.float64).reshape(-1, 3),
+        positions_m=np.array(samples.hand_m[kept], np.float64).reshape(-1, 3),
         breaks=breaks[kept],
         ages=np.clip(ages, 0.0, 1.0),
         elements=elements,

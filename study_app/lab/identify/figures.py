@@ -29,9 +29,9 @@ LEAST_IN_BIN: Final = 20
 
 
 @style.own_settings(style.PLOT_SETTINGS)
-def draw_force(found: Fit) -> Figure:
+def draw_force(fit: Fit) -> Figure:
     """Draw the force, measured and fitted, over time; below it the residual over time, and along the motion."""
-    caption = textwrap.wrap(_caption(found), CAPTION_LETTERS)
+    caption = textwrap.wrap(_caption(fit), CAPTION_LETTERS)
     height_pt = TOP_PT + FORCE_PT + GAP_PT + RESIDUAL_PT + FOOT_PT + LINE_PT * len(caption)
     figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, height_pt / 72), facecolor="white")
     time_pt = style.PAGE_WIDTH_PT - SIDE_PT - RIGHT_PT - SPEED_PT - GAP_PT
@@ -41,76 +41,76 @@ def draw_force(found: Fit) -> Figure:
         box = (left_pt / style.PAGE_WIDTH_PT, bottom, width_pt / style.PAGE_WIDTH_PT, tall_pt / height_pt)
         return figure.add_axes(box)
 
-    def write(left_pt: float, down_pt: float, words: str, **look: Any) -> None:
-        figure.text(left_pt / style.PAGE_WIDTH_PT, 1 - down_pt / height_pt, words, va="top", **look)
+    def write(left_pt: float, down_pt: float, text: str, **look: Any) -> None:
+        figure.text(left_pt / style.PAGE_WIDTH_PT, 1 - down_pt / height_pt, text, va="top", **look)
 
     below_pt = TOP_PT + FORCE_PT + GAP_PT
     right_pt = SIDE_PT + time_pt + GAP_PT
-    write(SIDE_PT, 6, f"{found.liquid_id}: measured and fitted force", fontsize=9, fontweight="bold")
-    _force(place(SIDE_PT, TOP_PT, time_pt, FORCE_PT), found)
-    _residual(place(SIDE_PT, below_pt, time_pt, RESIDUAL_PT), found)
-    _along(place(right_pt, below_pt, SPEED_PT, RESIDUAL_PT), found)
-    limit_n = 1.05 * float(np.abs(found.residual_n).max()) or 1.0
+    write(SIDE_PT, 6, f"{fit.liquid_id}: measured and fitted force", fontsize=9, fontweight="bold")
+    _force(place(SIDE_PT, TOP_PT, time_pt, FORCE_PT), fit)
+    _residual(place(SIDE_PT, below_pt, time_pt, RESIDUAL_PT), fit)
+    _along(place(right_pt, below_pt, SPEED_PT, RESIDUAL_PT), fit)
+    limit_n = 1.05 * float(np.abs(fit.residual_n).max()) or 1.0
     for axes in figure.axes[1:]:
         axes.set_ylim(-limit_n, limit_n)
     write(right_pt, TOP_PT - 13, "Fitted, with 95 % intervals", color=style.TEXT_SOFT)
-    write(right_pt, TOP_PT + 3, "\n".join(_values(found)), linespacing=1.45)
+    write(right_pt, TOP_PT + 3, "\n".join(_values(fit)), linespacing=1.45)
     write(SIDE_PT, below_pt + RESIDUAL_PT + FOOT_PT - 8, "\n".join(caption), color=style.TEXT_SOFT, linespacing=1.25)
     return figure
 
 
-def _values(found: Fit) -> list[str]:
+def _values(fit: Fit) -> list[str]:
     """Return two lines for each parameter: name and value, then the interval."""
     lines = []
-    for it in found.parameters:
-        value, interval = found.row(it)
+    for it in fit.parameters:
+        value, interval = fit.row(it)
         lines += [f"{it.name}  {value}", f"   {interval}"]
     return lines
 
 
-def _caption(found: Fit) -> str:
+def _caption(fit: Fit) -> str:
     text = (
         "Grey: measured. Lines: fitted by least squares through the servo's own tick. The residual, measured − fitted, "
-        f"is {found.rms_n:.3g} N RMS, {100 * found.share:.1f} % of the force; its correlation from row to row is "
-        f"{found.following:.2f}."
+        f"is {fit.rms_n:.3g} N RMS, {100 * fit.share:.1f} % of the force; its correlation from row to row is "
+        f"{fit.following:.2f}."
     ).replace("-", "−")
     along = " Right: its part along the motion over speed, dots are medians; a slope or bend there is a wrong law."
-    return text + along + "".join(f" Warning: {warning}." for warning in found.warnings)
+    return text + along + "".join(f" Warning: {warning}." for warning in fit.warnings)
 
 
-def _axes(found: Fit) -> list[tuple[int, str]]:
-    return [(axis, "xyz"[axis]) for axis in found.axes]
+def _axes(fit: Fit) -> list[tuple[int, str]]:
+    return [(axis, "xyz"[axis]) for axis in fit.axes]
 
 
-def _force(axes: Axes, found: Fit) -> None:
+def _force(axes: Axes, fit: Fit) -> None:
     """Draw each axis of the force, the measured one as a wide line behind."""
-    t_s = found.motion.t_s
-    _time_axis(axes, found)
+    t_s = fit.motion.t_s
+    _time_axis(axes, fit)
     axes.set_title("Force on the ball [N]", pad=6)
-    for axis, _ in _axes(found):
-        axes.plot(t_s, found.measured_n[:, axis], color=MEASURED, linewidth=2.4, rasterized=True)
-    for axis, name in _axes(found):
-        axes.plot(t_s, found.fitted_n[:, axis], **style.AXES[name], label=name)
-    _name_curves(axes, len(found.axes))
+    for axis, _ in _axes(fit):
+        axes.plot(t_s, fit.measured_n[:, axis], color=MEASURED, linewidth=2.4, rasterized=True)
+    for axis, name in _axes(fit):
+        axes.plot(t_s, fit.fitted_n[:, axis], **style.AXES[name], label=name)
+    _name_curves(axes, len(fit.axes))
 
 
-def _residual(axes: Axes, found: Fit) -> None:
+def _residual(axes: Axes, fit: Fit) -> None:
     """Draw each axis of the residual as dots, since a line through noise would fill the plot."""
-    _time_axis(axes, found)
+    _time_axis(axes, fit)
     axes.set_title("Measured − fitted [N]", pad=6)
     axes.set_xlabel("Time [s]", loc="right", labelpad=1)
-    for axis, name in _axes(found):
+    for axis, name in _axes(fit):
         look = {"color": style.AXES[name]["color"], "markersize": 1.1, "alpha": 0.55, "rasterized": True}
-        axes.plot(found.motion.t_s, found.residual_n[:, axis], ".", markeredgewidth=0, label=name, **look)
-    _name_curves(axes, len(found.axes))
+        axes.plot(fit.motion.t_s, fit.residual_n[:, axis], ".", markeredgewidth=0, label=name, **look)
+    _name_curves(axes, len(fit.axes))
 
 
-def _along(axes: Axes, found: Fit) -> None:
+def _along(axes: Axes, fit: Fit) -> None:
     """Draw the residual's part along the motion over the speed."""
-    velocity_mps = _velocity_mps(found)
+    velocity_mps = _velocity_mps(fit)
     speed_mps = np.linalg.norm(velocity_mps, axis=1)
     moves = speed_mps > 1e-3
-    along_n = np.sum(found.residual_n[moves] * velocity_mps[moves], axis=1) / speed_mps[moves]
+    along_n = np.sum(fit.residual_n[moves] * velocity_mps[moves], axis=1) / speed_mps[moves]
     axes.axhline(0, color=style.ZERO, linewidth=0.6, zorder=1)
     axes.set_title("along the motion, over speed [m/s]", pad=6)
     axes.xaxis.set_major_locator(MaxNLocator(4))
@@ -132,16 +132,16 @@ def _medians(speed_mps: Floats, along_n: Floats) -> Floats:
     return np.array([(np.median(speed_mps[it]), np.median(along_n[it])) for it in held]).reshape(-1, 2)
 
 
-def _velocity_mps(found: Fit) -> Floats:
+def _velocity_mps(fit: Fit) -> Floats:
     """Return the velocities (n, 3): as measured, or the slopes of the places."""
-    if found.motion.velocity_mps is not None:
-        return found.motion.velocity_mps
-    slopes: Floats = np.gradient(found.motion.position_m, found.motion.t_s, axis=0)
+    if fit.motion.velocity_mps is not None:
+        return fit.motion.velocity_mps
+    slopes: Floats = np.gradient(fit.motion.position_m, fit.motion.t_s, axis=0)
     return slopes
 
 
-def _time_axis(axes: Axes, found: Fit) -> None:
-    axes.set_xlim(found.motion.t_s[0], found.motion.t_s[-1])
+def _time_axis(axes: Axes, fit: Fit) -> None:
+    axes.set_xlim(fit.motion.t_s[0], fit.motion.t_s[-1])
     axes.xaxis.set_major_locator(MaxNLocator(7))
     axes.yaxis.set_major_locator(MaxNLocator(5))
     axes.axhline(0, color=style.ZERO, linewidth=0.6, zorder=1)
@@ -167,19 +167,19 @@ CURVE_LETTERS: Final = 96
 
 
 @style.own_settings(style.PLOT_SETTINGS)
-def draw_curve(found: CurveFit) -> Figure:
+def draw_curve(fit: CurveFit) -> Figure:
     """Draw measured and fitted stress over the shear rate, both logarithmic, and the residual in per cent below."""
     figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, 4.2), facecolor="white", layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-    figure.suptitle(f"{found.liquid_id}: measured and fitted flow curve", fontsize=9, fontweight="bold")
-    rates = found.curve.rate_per_s
-    (liquid,) = (it for it in found.scene.liquids if it.id == found.liquid_id)
+    figure.suptitle(f"{fit.liquid_id}: measured and fitted flow curve", fontsize=9, fontweight="bold")
+    rates = fit.curve.rate_per_s
+    (liquid,) = (it for it in fit.scene.liquids if it.id == fit.liquid_id)
     fine = np.geomspace(rates.min() / MARGIN, rates.max() * MARGIN, 200)
     look = {"color": style.AXES["x"]["color"]}
     above.loglog(
         fine, [stress_pa(getattr(liquid, CURVE_TABLE), rate) for rate in fine.tolist()], **look, label="fitted"
     )
-    above.loglog(rates, found.curve.stress_pa, "o", color=style.ZERO, markersize=3.2, label="measured")
+    above.loglog(rates, fit.curve.stress_pa, "o", color=style.ZERO, markersize=3.2, label="measured")
     above.yaxis.set_major_formatter(ScalarFormatter())
     above.yaxis.set_minor_formatter(ScalarFormatter())
     above.set_ylabel("Shear stress [Pa]")
@@ -187,21 +187,21 @@ def draw_curve(found: CurveFit) -> Figure:
     above.text(
         0.99,
         0.03,
-        "\n".join(f"{it.name}  {' · '.join(found.row(it))}" for it in found.parameters),
+        "\n".join(f"{it.name}  {' · '.join(fit.row(it))}" for it in fit.parameters),
         transform=above.transAxes,
         ha="right",
         va="bottom",
     )
-    _curve_residual(below, found)
+    _curve_residual(below, fit)
     caption = "Least squares of the residual as a share of the stress, with 95 % intervals."
-    caption += "".join(f" Warning: {warning}." for warning in found.warnings)
+    caption += "".join(f" Warning: {warning}." for warning in fit.warnings)
     below.set_xlabel("Shear rate [1/s]\n" + "\n".join(textwrap.wrap(caption, CURVE_LETTERS)))
     return figure
 
 
-def _curve_residual(axes: Axes, found: CurveFit) -> None:
-    residual = 100 * (1 - found.fitted_pa / found.curve.stress_pa)
+def _curve_residual(axes: Axes, fit: CurveFit) -> None:
+    residual = 100 * (1 - fit.fitted_pa / fit.curve.stress_pa)
     axes.axhline(0, color=style.ZERO, linewidth=0.6, zorder=1)
-    axes.semilogx(found.curve.rate_per_s, residual, "o", color=style.ZERO, markersize=3.2)
+    axes.semilogx(fit.curve.rate_per_s, residual, "o", color=style.ZERO, markersize=3.2)
     axes.xaxis.set_major_formatter(ScalarFormatter())
     axes.set_ylabel("Residual [%]")

@@ -153,7 +153,7 @@ def _of_branches(curve: FlowCurve) -> Iterator[str]:
     """
     if (branches := curve.branches()) is None:
         return
-    (rate_per_s, stress_pa), (other_per_s, other_pa) = branches.one, branches.other
+    (rate_per_s, stress_pa), (other_per_s, other_pa) = branches.first, branches.second
     common = (rate_per_s >= other_per_s[0]) & (rate_per_s <= other_per_s[-1])
     log_rate = np.log(rate_per_s[common])
     gap = np.log(stress_pa[common]) - np.interp(log_rate, np.log(other_per_s), np.log(other_pa))
@@ -163,7 +163,7 @@ def _of_branches(curve: FlowCurve) -> Iterator[str]:
     size = math.sqrt(float(np.mean(gap**2)))
     if size > APART * noise and size > LEAST_GAP:
         yield (
-            f"{branches.words} differ by {100 * math.expm1(size):.0f} % of the stress, which noise does not explain: "
+            f"{branches.description} differ by {100 * math.expm1(size):.0f} % of the stress, which noise does not explain: "
             "thixotropy or hysteresis; the fit lies between them, and the intervals do not cover both: fit one branch"
         )
 

@@ -66,13 +66,13 @@ class FlowCurve:
         if len(repeated) > len(rates) / 2:
             stresses = [self.stress_pa[self.rate_per_s == rate] for rate in repeated]
             least, greatest = (np.array([end(values) for values in stresses]) for end in (np.min, np.max))
-            words = "the greatest and the least stress at repeated shear rates"
-            return Branches(words=words, one=(repeated, greatest), other=(repeated, least))
+            description = "the greatest and the least stress at repeated shear rates"
+            return Branches(description=description, first=(repeated, greatest), second=(repeated, least))
         turns = np.flatnonzero(np.diff(np.sign(np.diff(self.rate_per_s))))
         if len(turns) != 1:
             return None
         ways = [self._sorted(slice(turns[0] + 2)), self._sorted(slice(turns[0] + 1, None))]
-        return Branches(words="stresses at rising and at falling shear rates", one=ways[0], other=ways[1])
+        return Branches(description="stresses at rising and at falling shear rates", first=ways[0], second=ways[1])
 
     def _sorted(self, rows: slice) -> tuple[Floats, Floats]:
         order = np.argsort(self.rate_per_s[rows])
@@ -81,11 +81,11 @@ class FlowCurve:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Branches:
-    """Two branches of a flow curve, each as increasing shear rates and stresses; ``words`` name both."""
+    """Two branches of a flow curve, each as increasing shear rates and stresses; ``description`` names both."""
 
-    words: str
-    one: tuple[Floats, Floats]
-    other: tuple[Floats, Floats]
+    description: str
+    first: tuple[Floats, Floats]
+    second: tuple[Floats, Floats]
 
 
 def read(path: Path) -> Measured | FlowCurve:

@@ -53,17 +53,17 @@ def find(scene: Scene, liquid_id: str, names: Sequence[str]) -> tuple[Parameter,
     tables = dict(_tables(scene, _liquid(scene, liquid_id)))
     if not names:
         raise StudyError("no parameter is named: name one to fit, such as drag_coefficient")
-    found = tuple(_parameter(tables, name) for name in names)
-    for k, one in enumerate(found):
-        for other in found[:k]:
-            if (one.table, one.field) == (other.table, other.field):
-                raise StudyError(f"{other.name} and {one.name} are the same parameter: name it once")
-    return tuple(_narrowed(it, tables[it.table], found) for it in found)
+    parameters = tuple(_parameter(tables, name) for name in names)
+    for k, parameter in enumerate(parameters):
+        for other in parameters[:k]:
+            if (parameter.table, parameter.field) == (other.table, other.field):
+                raise StudyError(f"{other.name} and {parameter.name} are the same parameter: name it once")
+    return tuple(_narrowed(it, tables[it.table], parameters) for it in parameters)
 
 
 def _narrowed(it: Parameter, table: BaseModel, fitted: Sequence[Parameter]) -> Parameter:
     """Return a parameter with its range limited by the fixed fields of `NO_LESS_THAN`."""
-    fields = {one.field for one in fitted if one.table == it.table}
+    fields = {parameter.field for parameter in fitted if parameter.table == it.table}
     for greater, less in NO_LESS_THAN.items():
         if it.field == greater and less not in fields:
             return dataclasses.replace(it, least=float(getattr(table, less)), above=False)
@@ -91,8 +91,8 @@ def _liquid(scene: Scene, liquid_id: str) -> Liquid:
     for liquid in scene.liquids:
         if liquid.id == liquid_id:
             return liquid
-    there = ", ".join(liquid.id for liquid in scene.liquids) or "none"
-    raise StudyError(f"the scene has no liquid {liquid_id!r}: there is {there}")
+    liquids = ", ".join(liquid.id for liquid in scene.liquids) or "none"
+    raise StudyError(f"the scene has no liquid {liquid_id!r}: there is {liquids}")
 
 
 def _tables(scene: Scene, liquid: Liquid) -> Iterator[tuple[str, BaseModel]]:
@@ -106,8 +106,8 @@ def _tables(scene: Scene, liquid: Liquid) -> Iterator[tuple[str, BaseModel]]:
 
 def _closed(scene: Scene, effect: Effect, table: BaseModel) -> BaseModel:
     """Return a table with unset parameters computed from the scene."""
-    found = {name: of(scene) for name, of in effect.open_values.items() if getattr(table, name) is None}
-    return table.model_copy(update=found)
+    values = {name: of(scene) for name, of in effect.open_values.items() if getattr(table, name) is None}
+    return table.model_copy(update=values)
 
 
 def _parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:

@@ -19,20 +19,22 @@ COLUMNS: Final = ("t_s", *(f"{kind}_{axis}_n" for kind in ("measured", "fitted",
 CURVE_COLUMNS: Final[tuple[str, ...]] = (*FLOW_CURVE, "fitted_pa", "residual_pa")
 
 
-def text(found: Estimates) -> str:
+def text(estimates: Estimates) -> str:
     """Return the report: the parameters before and after with their intervals, the residual, and warnings."""
     rows = [
         ["parameter", "from", "fitted", f"{100 * CONFIDENCE:g} % interval"],
-        *([it.name, f"{it.value:.5g}", *found.row(it)] for it in found.parameters),
+        *([it.name, f"{it.value:.5g}", *estimates.row(it)] for it in estimates.parameters),
     ]
     widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
     table = [
         "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
     ]
-    return "\n".join((f"{found.liquid_id}: {found.summary()}", *table, *(f"warning: {it}" for it in found.warnings)))
+    return "\n".join(
+        (f"{estimates.liquid_id}: {estimates.summary()}", *table, *(f"warning: {it}" for it in estimates.warnings))
+    )
 
 
-def write(found: Fit | CurveFit, to: Path, source: Path) -> tuple[Path, ...]:
+def write(fit: Fit | CurveFit, to: Path, source: Path) -> tuple[Path, ...]:
     """Write preset (TOML), report (text), residuals (CSV) and figure into the folder ``to``; return the files.
 
     ``source`` is the file that was measured: the preset names it with its hash.
@@ -43,38 +45,38 @@ def write(found: Fit | CurveFit, to: Path, source: Path) -> tuple[Path, ...]:
         The folder cannot be made, or written.
     """
     make_folder(to, waits=False)
-    name = f"{found.liquid_id}-fit"
-    if isinstance(found, CurveFit):
-        residual_pa = found.curve.stress_pa - found.fitted_pa
-        values = [found.curve.rate_per_s, found.curve.stress_pa, found.fitted_pa, residual_pa]
-        columns, figure, what = CURVE_COLUMNS, figures.draw_curve(found), "flow curve"
+    name = f"{fit.liquid_id}-fit"
+    if isinstance(fit, CurveFit):
+        residual_pa = fit.curve.stress_pa - fit.fitted_pa
+        values = [fit.curve.rate_per_s, fit.curve.stress_pa, fit.fitted_pa, residual_pa]
+        columns, figure, what = CURVE_COLUMNS, figures.draw_curve(fit), "flow curve"
     else:
-        values = [found.motion.t_s, *found.measured_n.T, *found.fitted_n.T, *found.residual_n.T]
-        columns, figure, what = COLUMNS, figures.draw_force(found), "force"
+        values = [fit.motion.t_s, *fit.measured_n.T, *fit.fitted_n.T, *fit.residual_n.T]
+        columns, figure, what = COLUMNS, figures.draw_force(fit), "force"
     table = csv_text_of([columns, *zip(*(column.tolist() for column in values), strict=True)])
-    title = f"{found.liquid_id}: measured and fitted {what}"
+    title = f"{fit.liquid_id}: measured and fitted {what}"
     drawn = {f"{name}.{kind}": style.file_bytes(figure, kind, title, style.PLOT_SETTINGS) for kind in style.FORMATS}
-    texts = {f"{found.liquid_id}.toml": preset(found, source), f"{name}.txt": f"{text(found)}\n"}
+    texts = {f"{fit.liquid_id}.toml": preset(fit, source), f"{name}.txt": f"{text(fit)}\n"}
     contents = {file: said.encode() for file, said in texts.items()}
     return write_files(to, {**contents, f"{name}.csv": table.encode(), **drawn})
 
 
-def preset(found: Estimates, source: Path) -> str:
+def preset(estimates: Estimates, source: Path) -> str:
     """Return the fitted scene as a scene file, each fitted number with its interval in a comment.
 
     The fit takes velocities from the measured motion, never from an estimator; the file names that of new files.
     """
     digest = hashlib.sha256(source.read_bytes()).hexdigest()
     said = (
-        f"Fitted to {source.name} (SHA-256 {digest[:16]}…), {found.summary()}.",
-        *(f"Warning: {warning}." for warning in found.warnings),
+        f"Fitted to {source.name} (SHA-256 {digest[:16]}…), {estimates.summary()}.",
+        *(f"Warning: {warning}." for warning in estimates.warnings),
     )
-    notes = {_place(it, found): f"{100 * CONFIDENCE:g} %: {found.row(it)[1]}" for it in found.parameters}
-    return scene_text(for_new_file(found.scene), said=said, notes=notes)
+    notes = {_place(it, estimates): f"{100 * CONFIDENCE:g} %: {estimates.row(it)[1]}" for it in estimates.parameters}
+    return scene_text(for_new_file(estimates.scene), said=said, notes=notes)
 
 
-def _place(it: Parameter, found: Estimates) -> tuple[str, ...]:
+def _place(it: Parameter, estimates: Estimates) -> tuple[str, ...]:
     """Return the place of a parameter in a scene file."""
     if it.table == "body":
         return "scene", "body", it.field
-    return "liquids", found.liquid_id, *(() if it.table == "liquid" else (it.table,)), it.field
+    return "liquids", estimates.liquid_id, *(() if it.table == "liquid" else (it.table,)), it.field

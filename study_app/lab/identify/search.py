@@ -286,7 +286,7 @@ def _search(problem: Problem, start: Floats, free: NDArray[np.bool_], most: int 
         z[free] = part
         return z
 
-    found = least_squares(
+    solution = least_squares(
         lambda part: problem.misfit(whole(part)),
         np.clip(start, problem.least, problem.most)[free],
         jac=lambda part: problem.slopes(whole(part))[:, free],
@@ -297,5 +297,5 @@ def _search(problem: Problem, start: Floats, free: NDArray[np.bool_], most: int 
         gtol=1e-14,
         max_nfev=most,
     )
-    found.x = whole(found.x)
-    return found
+    solution.x = whole(solution.x)
+    return solution
