@@ -11,29 +11,29 @@ from study_app.session.transitions.state import Phase, SessionState
 
 CONTINUE: Final = 1 << 0
 ANSWERS: Final = (1 << 1, 1 << 2)
-"""The device's second button is the first of two answers or less, its third the second answer or more."""
+"""Bits of the device's second button (first of two answers, or "less") and third (second answer, or "more")."""
 STEP_S: Final = 0.125
-"""A button or key that is held makes a step of an adjustment so often [s]."""
+"""Interval between the steps of an adjustment while a button or key is held [s]."""
 
 
 class DeviceButtons:
-    """Follows the buttons in telemetry."""
+    """Detects presses of the device's buttons in telemetry."""
 
     def __init__(self) -> None:
         self._down = 0
-        self._next_ns: dict[int, int] = {}  # by button, when it makes its next step
+        self._next_ns: dict[int, int] = {}  # time of the next step by button [ns]
 
     def events(
         self, samples: Any, since_ns: int, now_s: float, where: Callable[[], tuple[SessionState, bool]]
     ) -> Iterator[Event]:
-        """Yield what buttons that went down in ``samples`` (n,) of telemetry mean.
+        """Yield the events for the buttons pressed in ``samples`` (n,) of telemetry.
 
-        A press from before the present page, presented at ``since_ns``, is no answer to it. ``where`` returns the
+        A press before ``since_ns``, when the current page was presented, is not an answer to it. ``where`` returns the
         session's state after each event that was yielded, and whether an interval can be adjusted.
         """
         down = np.concatenate(([self._down], samples["buttons"]))
         self._down = int(down[-1])
-        pressed = down[1:] & ~down[:-1]  # which went down at each sample, as bits
+        pressed = down[1:] & ~down[:-1]  # the buttons pressed at each sample, as bits
         if (pressed & BUTTON_STOP).any():
             yield ForceStopped(now_s, "device")
         pressed = pressed[samples["time_ns"] >= since_ns]
@@ -46,13 +46,13 @@ class DeviceButtons:
             return
         self._next_ns.clear()
         state = where()[0]
-        # a page to read is left, but a squeeze gives no consent
+        # a press leaves a text page, but does not give consent
         if continues and state.phase is Phase.READING and state.plan.protocol.pages[state.page_id].kind != "consent":
             yield Continue(now_s)
         yield from _answers(where()[0], pressed, now_s)
 
     def _steps(self, pressed: Any, now_ns: int) -> int:
-        """Return the steps that are due: one of each press, and of a button that stays down one every `STEP_S`."""
+        """Return the steps that are due: one for each press, and one every `STEP_S` while a button is held."""
         steps = 0
         for bit, way in zip(ANSWERS, (-1, 1), strict=True):
             if (pressed & bit).any():
@@ -66,7 +66,7 @@ class DeviceButtons:
 
 
 def _answers(state: SessionState, pressed: Any, now_s: float) -> Iterator[Event]:
-    """Answer where there are two answers: the device's second button is the first of them, its third the second."""
+    """Yield the answer to a choice between two: the second button chooses the first answer, the third the second."""
     if state.phase is not Phase.ANSWERING or state.due is None or state.design is None:
         return
     answers = state.design.answers

@@ -12,7 +12,7 @@ from study_app.protocol.trials.tasks import AnyTask
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Progress:
-    """Where we are: part ``part`` of ``parts``; within it setting ``index`` of ``of`` under a neutral label.
+    """The progress shown: part ``part`` of ``parts``, and in it setting ``index`` of ``of`` with a neutral label.
 
     ``part`` is None outside the parts, as in a practice; a page to read has no label, but for a break among trials of
     intervals, and the settings before ``index`` are done, all of them where it is ``of + 1``. ``at_most`` says that the
@@ -29,9 +29,9 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """Which interval of a trial is presented, or comes after the rest: ``number`` (from 1) of ``of``.
+    """The interval of a trial that is presented, or follows the rest: ``number`` (from 1) of ``of``.
 
-    ``announced`` is its name, or in the rest that it comes, or that the trial comes once more.
+    ``announced`` is its name or, in the rest, the announcement of the interval or of a repeated trial.
     """
 
     number: int
@@ -42,7 +42,7 @@ class Interval:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TaskPage:
-    """The tank: move the ball. Nothing of the condition is here: how late the tank is drawn is the runner's to know.
+    """The page of the tank, in which the ball is moved. It reveals nothing of the condition, not even the delay.
 
     ``workspace_m`` holds the full sizes of the tank along x, y, z, centred on the device's middle; ``interval`` is None
     in a trial without a design. ``question`` is what the participant sets an interval to, "" where nothing is set;
@@ -65,13 +65,13 @@ class TaskPage:
 
     @property
     def said(self) -> str:
-        """What the participant is to do."""
+        """The instruction to the participant."""
         return self.question if self.adjusts else self.instruction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextPage:
-    """A text to read and a button to go on: consent, instructions, announcements, breaks, the debrief.
+    """A text with a button to continue: consent, instructions, announcements, breaks, the debrief.
 
     ``language`` is the one all pages are in from here on; ``languages`` are those that may be chosen instead, with it
     among them, none where there is no choice. ``stays_until_s`` is when the page may be left at the earliest [s,
@@ -92,7 +92,7 @@ class TextPage:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class QuestionnairePage:
-    """The questions about one setting, or a form on its own.
+    """The questions about one setting, or a separate form.
 
     Where all are statements, ``labels`` name the points of their scale, lowest first; otherwise there are none.
     ``chosen`` holds (item id, value) of the choices already made, when the page comes back after a pause. ``trial`` is
@@ -112,7 +112,7 @@ class QuestionnairePage:
 
     @property
     def stream(self) -> str:
-        """The name of the random stream that simulated answers to it are drawn from."""
+        """The name of the random stream of simulated answers to this page."""
         return (
             f"{self.trial}/answers"
             if self.form is None
@@ -122,7 +122,7 @@ class QuestionnairePage:
 
 @dataclass(frozen=True, slots=True)
 class DesignPage:
-    """The one question after a trial of intervals; the first answer is the answer."""
+    """The question after a trial of intervals; the first answer counts."""
 
     trial: int
     item: ItemView
@@ -135,34 +135,34 @@ class DesignPage:
 
     @property
     def stream(self) -> str:
-        """The name of the random stream that simulated answers to it are drawn from."""
+        """The name of the random stream of simulated answers to this page."""
         return f"{self.trial}/answers"
 
 
 @dataclass(frozen=True, slots=True)
 class ChoicePage(DesignPage):
-    """Two to four answers, in temporal order: one press answers and goes on."""
+    """A choice between two to four answers in temporal order: one press answers and continues."""
 
     item: ChoiceView
 
 
 @dataclass(frozen=True, slots=True)
 class NumberPage(DesignPage):
-    """A number above 0."""
+    """A question for a number above 0."""
 
     item: NumberView
 
 
 @dataclass(frozen=True, slots=True)
 class FeedbackPage:
-    """Whether the answer was correct; it ends by time."""
+    """Feedback on whether the answer was correct, shown for a fixed time."""
 
     right: bool
 
 
 @dataclass(frozen=True, slots=True)
 class PausePage:
-    """The session waits; ``force_off`` says that the force was stopped and fades in only when asked for.
+    """The page of a pause; ``force_off`` says that the force was stopped and fades in only on request.
 
     ``held`` says what only the operator resumes, a pause or the force; then there is nothing to press. ``coming`` is
     the task that may come after it, so that it can be made ready.
@@ -175,7 +175,7 @@ class PausePage:
 
 @dataclass(frozen=True, slots=True)
 class TroublePage:
-    """Something broke and the operator is called: a calm sentence, no reason that could unsettle or unblind."""
+    """The page after a failure: it calls the operator, without a reason that could unsettle or unblind."""
 
     title: str
     paragraph: str
@@ -183,7 +183,7 @@ class TroublePage:
 
 @dataclass(frozen=True, slots=True)
 class EndPage:
-    """The session is over, one way or another."""
+    """The page after the end of a session, regular or not."""
 
     title: str
     paragraph: str

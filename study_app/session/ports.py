@@ -13,7 +13,7 @@ from study_app.video.frames import VideoFrame, VideoSource
 
 
 class ServoPort(Protocol):
-    """What is asked of the servo (``haptics.runtime.servo.Servo``)."""
+    """The interface of the servo (``haptics.runtime.servo.Servo``)."""
 
     rate_hz: float
     telemetry: Any
@@ -31,7 +31,7 @@ class ServoPort(Protocol):
 
 
 class JournalPort(Protocol):
-    """What is asked of the store (``store.sessions.open_session.SessionStore``)."""
+    """The interface of the store (``store.sessions.open_session.SessionStore``)."""
 
     @property
     def fingerprint(self) -> str: ...
@@ -43,7 +43,7 @@ class JournalPort(Protocol):
 
 
 class RecorderPort(Protocol):
-    """What is asked of the recorder (``store.recorder.Recorder``); nothing of it waits for the disk."""
+    """The interface of the recorder (``store.recorder.Recorder``); no method waits for the disk."""
 
     def start(self, trial: int, attempt: int, rate_hz: float, interval: int | None = None) -> None: ...
     def append(self, samples: Any) -> None: ...
@@ -52,7 +52,7 @@ class RecorderPort(Protocol):
 
 
 class KeptSession(JournalPort, Protocol):
-    """What is asked of the store of a rehearsed session (``store.sessions.open_session.SessionStore``)."""
+    """The interface of the store of a rehearsed session (``store.sessions.open_session.SessionStore``)."""
 
     clock: SessionClock
     recorder: Any
@@ -61,7 +61,7 @@ class KeptSession(JournalPort, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Ports:
-    """The world: ``present`` shows a page, ``clock`` gives seconds since the session's origin.
+    """The side effects of a session: ``present`` shows a page, ``clock`` gives seconds since the session's origin.
 
     ``recorder`` is None where no recordings are kept. Without ``paints`` there is no window: the first frame of a
     trial is reported, and a later one need not come. ``settled`` says whether all recordings are on the disk, so that

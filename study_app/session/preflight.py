@@ -30,11 +30,11 @@ from study_app.store.missing_trials import limit_words
 from study_app.video.sources import VideosFound
 
 if TYPE_CHECKING:
-    from study_app.haptics.runtime.telemetry import Timing  # the compiler: whoever measures has loaded it
+    from study_app.haptics.runtime.telemetry import Timing  # loads the compiler, as measuring has done
 
 Means: TypeAlias = Literal["no", "headphones", "noise"]
 MEANS: Final[dict[Means, str]] = {"no": "No", "headphones": "Headphones", "noise": "Noise"}
-"""The answers to "Motors masked?", with their words."""
+"""The answers to "Motors masked?", with their labels."""
 QUIETEST_DB, LOUDEST_DB, USUAL_DB = 30, 85, 60
 """Sound pressure levels of masking noise [dB]; above 85 dB hearing is at risk (Directive 2003/10/EC)."""
 Verdict: TypeAlias = Literal["ok", "warning", "failure"]
@@ -46,12 +46,12 @@ TABLES_BYTES = 20_000_000
 MOST_OF_A_TICK = 0.2  # share of a tick that the force model may take
 SAME = 1.1  # greatest ratio of two errors that count as equal
 _UNKNOWN = {"delay_s": "delay", "count_m": "encoder count", "mass_kg": "mass"}
-SPARE = 3  # times what a session of the expected length takes
+SPARE = 3  # required free space as a multiple of a session of the expected length
 
 
 @dataclass(frozen=True, slots=True)
 class Masking:
-    """The operator's answer; ``noise_db`` is the sound pressure level of the noise [dB], None without noise."""
+    """The operator's answer; ``noise_db`` is the sound pressure level of the masking noise [dB], None without it."""
 
     means: Means = "no"
     noise_db: int | None = None
@@ -63,7 +63,7 @@ class Masking:
 
 @dataclass(frozen=True, slots=True)
 class Screen:
-    """The participant's screen: frames a second, and device pixels a pixel."""
+    """The participant's screen: frames per second, and device pixels per logical pixel."""
 
     refresh_hz: float
     scaling: float
@@ -71,7 +71,7 @@ class Screen:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PredictedDelivery:
-    """How many main trials a simulated participant would lose because the safety layer withholds too much force.
+    """The predicted loss of main trials because the safety layer withholds too much force.
 
     ``missing`` of the ``asked`` trials of intervals would not be delivered, ``out`` of the ``judged`` other trials
     would be out of limits. The limit on the force withheld is ``limit_percent`` [%].
@@ -85,7 +85,7 @@ class PredictedDelivery:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What would be lost, as sentences without full stops: "26 of 40 trials would not be delivered: …"."""
+        """The predicted loss as sentences without full stops: "26 of 40 trials would not be delivered: …"."""
         why = limit_words("withheld_percent", {"withheld_percent": self.limit_percent})
         missing = f"{self.missing} of {counted(self.asked, 'trial')} would not be delivered: {why}"
         out = f"{self.out} of {counted(self.judged, 'trial')} would be out of limits: {why}"
@@ -94,22 +94,21 @@ class PredictedDelivery:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measurements:
-    """What was measured.
+    """The measurements before a session.
 
     ``fresh_share`` is the share of the servo's ticks in which the device had a new sample, ``sample_age_s`` how old the
     newest sample was when somebody looked (95th percentile). ``probe_s`` is how long a file took to be on the disk of
     the results, None where it could not be written for the reason ``probe_fault``; ``free_bytes`` None where unknown.
     ``tick_s`` is the time of a tick with the most expensive scene of the study, None if not measured; ``key_hash`` that
-    of the study's sealed key, None before its first session. ``lateness_ns`` (n,) is that of every tick [ns],
-    ``grant`` what the system lets the servo's thread do. ``dynamics`` are the device's, with its measured
-    delay, ``delay_ticks`` is the delay that the servo uses now. ``withheld`` is the share of
-    the force that limits and passivity controller are expected to withhold in the fastest stroke of a task, by
-    liquid; None where it was not computed. ``delivery`` is what a simulated participant would lose, None where it was
-    not computed. ``velocity_errors`` are the relative error of the velocity and what it would be if all of the device's
-    dynamics were known; None where all is. ``outlets`` are the streams and ports to other
-    programs; ``video`` is what was found of the study's videos, None without any. ``ran_otherwise`` is a participant
-    with whom the same version of the study ran from another file; ``untranslated`` are texts of the pages that are
-    still in another language.
+    of the study's sealed key, None before its first session. ``lateness_ns`` (n,) is that of every tick [ns], ``grant``
+    what the system lets the servo's thread do. ``dynamics`` are the device's, with its measured delay, ``delay_ticks``
+    is the delay that the servo uses now. ``withheld`` is the share of the force that limits and passivity controller
+    are expected to withhold in the fastest stroke of a task, by liquid; None where it was not computed. ``delivery`` is
+    what a simulated participant would lose, None where it was not computed. ``velocity_errors`` are the relative error
+    of the velocity and what it would be if all of the device's dynamics were known; None where all is. ``outlets`` are
+    the streams and ports to other programs; ``video`` is what was found of the study's videos, None without any.
+    ``ran_otherwise`` is a participant with whom the same version of the study ran from another file; ``untranslated``
+    are texts of the pages that are still in another language.
     """
 
     device: str
@@ -139,7 +138,7 @@ class Measurements:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One result of the pre-flight: the verdict, the value, and what it is about.
+    """One result of the pre-flight: the verdict, the value, and an explanation.
 
     ``share`` is the measured value as a share of its limit, None without a limit. ``advice`` says in a sentence what to
     do, or, for a failure, why no session can begin.
@@ -159,7 +158,7 @@ class Check:
 
     @property
     def entry(self) -> dict[str, str]:
-        """What the journal keeps of it."""
+        """The entry of this result in the journal."""
         return {"name": self.name, "verdict": self.verdict, "value": self.value, "about": self.about}
 
     def __str__(self) -> str:
@@ -167,22 +166,22 @@ class Check:
 
 
 def checks(facts: Measurements, protocol: Protocol) -> tuple[Check, ...]:
-    """Return what is to be said of ``facts``, for a session of ``protocol``."""
+    """Return the results of the pre-flight for a session of ``protocol`` with the measured ``facts``."""
     return tuple(check for of in (_servo, _levels, _surroundings, _outlets, _costs) for check in of(facts, protocol))
 
 
 def refused(checks: Iterable[Check]) -> str:
-    """Return why the session may not begin, in one line; empty if it may."""
+    """Return the reasons why the session cannot begin in one line; "" if it can."""
     return "; ".join(f"{check.name.lower()}: {check.advice}" for check in checks if check.verdict == "failure")
 
 
 def _warned(name: str, value: str, about: str, advice: str, *, well: bool, share: float | None = None) -> Check:
-    """Return a check that is a warning, with its advice, unless all is well."""
+    """Return a check whose verdict is "ok" if ``well``, else a warning with advice."""
     return Check(name, "ok" if well else "warning", value, about=about, advice="" if well else advice, share=share)
 
 
 def _servo(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
-    """Say how the device responds, how late its force acts, and how the servo keeps its rate."""
+    """Yield the checks of the device's response, its force delay and the servo's rate."""
     share = f"{100 * facts.fresh_share:.0f} %"
     about = f"{facts.device}, a new sample on {share} of ticks"
     if facts.timing.ticks == 0 or facts.fresh_share < LEAST_FRESH:
@@ -218,7 +217,7 @@ def _servo(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     advice = "Trials would be invalid: close other programs."
     yield _warned("Servo lateness", f"{late_ms:.2f} ms", about, advice, well=worst <= 1, share=worst)
 
-    grant = facts.grant  # others make an ordinary thread late
+    grant = facts.grant  # other processes delay a thread of normal priority
     memory = {None: "", True: ", memory locked", False: ", memory not locked"}[grant.locked]
     advice = "; ".join(f"{it[0].upper()}{it[1:]}" for it in grant.advice)
     verdict: Verdict = "ok" if grant.level in {"real-time", "none"} else "warning"
@@ -226,7 +225,7 @@ def _servo(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
 
 
 def _levels(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
-    """Say whether every level can be delivered with the device's delay: the highest one, of blocks with a damper."""
+    """Yield the check whether the highest damping can be delivered with the device's delay."""
     blocks = [block for block in protocol.blocks_in_order if block.stimulus is not None]
     highest_nspm = max((highest_damping(protocol, block) for block in blocks), default=0.0)
     if highest_nspm == 0:
@@ -239,9 +238,9 @@ def _levels(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
 
 
 def _surroundings(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
-    """Say what of screen, disk, key and videos would make trials invalid, or refuses the session."""
+    """Yield the checks of screen, disk, key and videos."""
     limit_ms, screen = protocol.limits.delay_error_ms, facts.screen
-    seen_ms = (facts.sample_age_s + 1 / max(screen.refresh_hz, 1.0)) * 1e3  # the age of a sample, and a frame
+    seen_ms = (facts.sample_age_s + 1 / max(screen.refresh_hz, 1.0)) * 1e3  # the age of a sample plus one frame
     about, advice = f"beyond the requested delay, limit {limit_ms:g} ms", "use a screen with a higher refresh rate."
     share = seen_ms / limit_ms
     advice = f"Trials would be invalid: {advice}"
@@ -260,7 +259,7 @@ def _surroundings(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         value, well = f"{facts.probe_s * 1e3:.1f} ms", facts.probe_s <= SLOW_PROBE_S
         yield _warned("Results folder", value, "time to write a file", "Use a local disk.", well=well)
 
-    rates = SAMPLE_BYTES * protocol.device.rate_hz, FRAMES_BYTES_PER_S  # while they are sealed
+    rates = SAMPLE_BYTES * protocol.device.rate_hz, FRAMES_BYTES_PER_S  # while measures are sealed
     planned = recordings_of(protocol) if facts.recordings else ()
     recorded = sum(count * sum(sealed_bytes(each_s, rate) for rate in rates) for count, each_s in planned)
     needed = SPARE * (TABLES_BYTES + recorded)
@@ -279,14 +278,14 @@ def _surroundings(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         about = f"the key is sealed; its hash begins with {facts.key_hash[:8]}"
     yield Check("Blinding", "ok", f"{protocol.study.blinding}-blind", about=about)
 
-    if facts.video is not None:  # nothing tells which condition shows one
+    if facts.video is not None:  # must not reveal which condition shows a video
         fault = facts.video.fault
         value = "not usable" if fault else "ready"
         yield Check("Video", "failure" if fault else "ok", value, about=facts.video.about, advice=fault)
 
 
 def _outlets(facts: Measurements, _protocol: Protocol) -> Iterator[Check]:
-    """Say of each outlet who listens, why it does not work, or why a double-blind study has none."""
+    """Yield the check of each outlet: its listeners, its failure, or that a double-blind study disables it."""
     for outlet in facts.outlets:
         if outlet.withheld:
             yield Check(
@@ -309,7 +308,7 @@ def _outlets(facts: Measurements, _protocol: Protocol) -> Iterator[Check]:
 
 
 def _costs(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
-    """Say what the scenes cost, what is not known of the device, what is withheld, and the row of a square."""
+    """Yield the checks of computing time, unknown properties of the device, withheld force, and the row of a square."""
     if facts.tick_s is not None:
         share = facts.tick_s * protocol.device.rate_hz
         value, about = (

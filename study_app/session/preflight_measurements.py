@@ -22,7 +22,7 @@ LOOK_S = 1 / 60
 
 
 class MeasuredServo(ServoPort, Protocol):
-    """What is asked of the servo here, beyond what a session asks."""
+    """The interface of the servo for measurements, in addition to that for sessions."""
 
     @property
     def grant(self) -> Grant: ...  # noqa: D102
@@ -43,7 +43,7 @@ def measure(
     lasts_s: float,
     sleep: Callable[[float], object] = time.sleep,
 ) -> Measurements:
-    """Look at a running servo for ``lasts_s`` and at the disk of the study folder ``results``, leaving no trace."""
+    """Measure a running servo for ``lasts_s`` and the disk of the study folder ``results``; leave no files."""
     law_along(Scene(), np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3)))  # compiled here, not at the end of a trial
     reader = servo.telemetry.reader()
     ages_s: list[float] = []

@@ -50,9 +50,9 @@ TOLERANCE: Final = 1e-9
 def scene_presented(
     protocol: Protocol, key: Key, started: events.TrialStarted, interval: int | None, link_seed: int
 ) -> Scene:
-    """Return the presented scene: of a condition, or of an interval of a trial whose sealed line is opened.
+    """Return the presented scene of a condition, or of an interval of a trial whose line was opened.
 
-    ``link_seed`` is that of jitter and loss of the force.
+    ``link_seed`` seeds the jitter and loss of the force.
     """
     if interval is None:
         return scene_of(protocol, Stimulated(key.condition(started.block, started.code)), link_seed)
@@ -62,7 +62,7 @@ def scene_presented(
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A step of a setting: the number of its scene in telemetry, from that tick on, and the scene."""
+    """A step of a setting: the number of its scene in telemetry, and the scene."""
 
     serial: int
     scene: Scene
@@ -71,7 +71,7 @@ class Step:
 def steps_of(
     protocol: Protocol, key: Key, started: events.TrialStarted, interval: int | None, lines: Sequence[events.Event]
 ) -> tuple[Step, ...]:
-    """Return the steps of an interval that a force depends on, in order; none where no level was set.
+    """Return the steps of an interval that change a force, in order; empty if no level was set.
 
     ``started`` is the opened line on the trial's beginning; ``interval`` is None in a trial without intervals;
     ``lines`` is the session's journal.
@@ -92,7 +92,7 @@ def steps_of(
 
 
 def as_one_scene(samples: Any, steps: Sequence[Step]) -> Any:
-    """Return samples (n,) in which the scenes of an interval have the number of the last of them."""
+    """Return samples (n,) in which all scenes of an interval have the number of the last one."""
     if not steps or len(samples) == 0:
         return samples
     out = samples.copy()
@@ -101,13 +101,13 @@ def as_one_scene(samples: Any, steps: Sequence[Step]) -> Any:
 
 
 def places_of(samples: Any, steps: Sequence[Step]) -> list[tuple[int, Scene]]:
-    """Return the first of the samples (n,) of each step with its scene; steps that no sample follows are left out."""
+    """Return the index of the first sample (n,) of each step with its scene, without steps that have no sample."""
     begins = ((np.flatnonzero(samples.scene >= step.serial), step.scene) for step in steps)
     return [(int(at[0]), scene) for at, scene in begins if at.size]
 
 
 def interval_samples(samples: Any, duration_s: float) -> Any:
-    """Return the samples of an interval's task from its recording, which begins before it and ends after it.
+    """Return the samples of an interval's task from its recording, which begins earlier and ends later.
 
     ``duration_s`` is the duration of the task in the journal.
     """
@@ -125,7 +125,7 @@ def delivered_again(
     samples: Any,
     measured: Mapping[str, Any],
 ) -> Delivered:
-    """Return the delivered values of an interval, from the samples of its recording.
+    """Recompute the delivered values of an interval from the samples of its recording.
 
     ``started`` is the opened line on the beginning of the trial, ``measured`` the measures on the interval's end.
     """
@@ -136,7 +136,7 @@ def delivered_again(
 
 
 def error_again(scene: Scene, rate_hz: float, samples: Any, ended: Mapping[str, Any]) -> float | None:
-    """Return the error of the force sent in a trial or interval, from its recording and the opened line on its end."""
+    """Recompute the force error of a trial or interval from its recording and the opened line on its end."""
     own = judged(interval_samples(samples, ended["duration_s"]))
     return delivered_error(own, rate_hz, scene.fade_s, partial(law_along, scene))
 
@@ -157,7 +157,7 @@ def _same(value: float | None, other: float | None) -> bool:
 NAMED_SECONDS = 8
 _FORCES = ("force_n", "command_n", "device_force_n")
 _ROUNDING = 1e-9
-_FLOAT32 = 2.0**-23  # of the greater ones, a column's own precision
+_FLOAT32 = 2.0**-23  # relative precision of recorded float32 values
 
 
 @dataclass(slots=True, kw_only=True)
@@ -210,13 +210,13 @@ def replay(session_folder: Path) -> Replayed:
         raise StoreError(f"{study.key} is not the key that {session.path} ran under: restore it from a copy")
     lines = opened(journal.read(session.journal), key)
     protocol, devices, (drawn_from, participant) = _ran(session.receipt, kept, key, lines)
-    _again(records(SAMPLE, 0), Scene(), devices[None], None)  # loads the compiled code: no part of what is measured
+    _again(records(SAMPLE, 0), Scene(), devices[None], None)  # loads the compiled code outside of the measured time
     replayed = Replayed()
     ends = {line.which: line for line in lines if isinstance(line, events.TrialEnded | events.IntervalEnded)}
     before: _Before | None = None
     resumed_at: str | None = None
     for started, which, line, resumed in _presented(lines):
-        if resumed != resumed_at:  # the servo was started anew: nothing goes on from the recording before
+        if resumed != resumed_at:  # the servo was restarted: nothing continues from the previous recording
             before, resumed_at = None, resumed
         if resumed not in devices:
             raise StoreError(f"{session.receipt} lacks the device since {resumed}: restore it from a copy")
@@ -260,7 +260,7 @@ def replay(session_folder: Path) -> Replayed:
 
 
 class _Device(NamedTuple):
-    """A device as a receipt records it, and the rules by which its forces were computed."""
+    """A device as recorded in a receipt, with the rules by which its forces were computed."""
 
     limit_n: float
     dynamics: Dynamics
@@ -269,7 +269,7 @@ class _Device(NamedTuple):
 
 @dataclass(slots=True, kw_only=True)
 class _Before:
-    """A recording computed again, and the models in the state it left them in: what the next one may go on from.
+    """A recomputed recording and the final state of its models, from which the next recording may continue.
 
     ``knows_its_start`` says that no force was under way as it began, or that it goes on from a recording of which that
     is so.
@@ -285,7 +285,7 @@ class _Before:
 def _again(
     samples: Any, scene: Scene, device: _Device, before: _Before | None, steps: Sequence[tuple[int, Scene]] = ()
 ) -> _Before:
-    """Return the forces of ``samples`` computed again, in a copy; the scene that is theirs is the last one's.
+    """Recompute the forces of ``samples`` in a copy; their own scene is that of the last sample.
 
     From the samples named in ``steps`` on it has other numbers.
     """
@@ -313,7 +313,7 @@ def _again(
 
 
 def _shared(before: _Before | None, out: Any) -> int | None:
-    """Return how many samples the recording before holds too, if this one goes on from it without a gap."""
+    """Return the number of samples shared with the previous recording; None if this one does not continue it."""
     if before is None or len(out) == 0 or len(before.samples) == 0:
         return None
     shared = int(before.samples.tick[-1] + 1 - out.tick[0])
@@ -326,7 +326,7 @@ def _copy_forces(known: Any, out: Any) -> None:
 
 
 def _assume(safety: Any, out: Any) -> None:
-    """Take the first of the samples ``out`` as it was recorded, exactly.
+    """Set the state of the safety layer to the first of the samples ``out``, which is recorded exactly.
 
     Of a fade under way nothing but its length counts, since nothing is felt before the trial's own scene, which begins
     its fade anew. The start's fade is over where a later sample before the next scene shows no fade.
@@ -350,7 +350,7 @@ def _run_steps(
     steps: Sequence[tuple[int, Scene]],
     device: _Device,
 ) -> None:
-    """Take each of ``out`` from ``first`` on, with other numbers of its own scene from each step on."""
+    """Run the models over ``out`` from ``first`` on, changing the scene's numbers at each step."""
     for place, scene in steps:
         recompute_scenes(*models, *serials, safety, out[:place], first)
         adjust_into(models[-1], scene, dynamics=device.dynamics, rules=device.rules)
@@ -359,7 +359,7 @@ def _run_steps(
 
 
 def _compare(replayed: Replayed, name: str, samples: Any, again: _Before, checks: recordings.Checks) -> None:
-    """Compare one recording's checks with those of the forces computed again."""
+    """Compare one recording's checks with those of the recomputed forces."""
     if len(samples) == 0:
         replayed.uncompared += (f"{name}: holds no sample",)
         return
@@ -384,7 +384,7 @@ def _compare(replayed: Replayed, name: str, samples: Any, again: _Before, checks
 
 
 def _other_sums(checks: recordings.Checks, again: Any) -> dict[str, list[int]]:
-    """Return the seconds whose exact forces have another CRC."""
+    """Return, for each kind of force, the seconds whose exact forces have another CRC."""
     seconds_of = {}
     for what, kept, forces in (
         ("force on the hand", checks.device_force, again.device_force_n),
@@ -398,7 +398,7 @@ def _other_sums(checks: recordings.Checks, again: Any) -> dict[str, list[int]]:
 
 
 def _other_columns(checks: recordings.Checks, samples: Any, again: Any) -> dict[str, list[int]]:
-    """Return the seconds in which a recorded column is further from what is recomputed than its rounding.
+    """Return, for each column, the seconds in which recorded and recomputed values differ by more than rounding.
 
     Of the samples before the trial's own scene nothing but the forces is known.
     """
@@ -417,7 +417,7 @@ def _other_columns(checks: recordings.Checks, samples: Any, again: Any) -> dict[
 
 
 def _until_gap(ticks: NDArray[np.int64]) -> int:
-    """Return how many samples come before the first one that is missing."""
+    """Return the number of samples before the first missing one."""
     gaps = np.flatnonzero(np.diff(ticks) != 1)
     return int(gaps[0]) + 1 if gaps.size else len(ticks)
 
@@ -431,7 +431,7 @@ def _listed(seconds: list[int]) -> str:
 def _presented(
     lines: Sequence[events.Event],
 ) -> Iterator[tuple[events.TrialStarted, events.Which, events.Recorded | events.RecordingLost | None, str | None]]:
-    """Yield the start of each trial or interval that was to be recorded, which it is, and the line about its recording.
+    """Yield the start of each trial or interval with an expected recording, its numbers, and the recording's event.
 
     In the order of presentation, each with the time at which the session had been resumed, or its device connected
     again, last; None before that.
@@ -455,7 +455,7 @@ def _presented(
 def _ran(
     path: Path, kept: Mapping[str, Any], key: blinding.Key, lines: Sequence[events.Event]
 ) -> tuple[Protocol, dict[str | None, _Device], tuple[int, str]]:
-    """Return what ran, by the receipt that was ``kept`` at ``path``: protocol, devices, and seed with participant.
+    """Return protocol, devices, and seed with participant of a session from its receipt ``kept`` at ``path``.
 
     Devices are by the time at which they were opened again; that of the session's beginning is under None.
     """

@@ -23,7 +23,7 @@ REHEARSED_SCREENS: dict[str, Any] = {"participant": "simulated", "refresh_hz": 6
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Where a session starts: the index of its first step, how often trials were presented before, and what was heard.
+    """The start of a session: its first step's index, earlier presentations of trials, and counted answers.
 
     ``presented`` is by trial number; ``heard`` are the answered trials of designs that still count. ``invalid`` counts
     the attempts at the first step's trial that were not delivered as requested.
@@ -41,7 +41,7 @@ FIRST = Start()
 def resume_at(
     protocol: Protocol, schedule: Schedule, lines: Iterable[Event], key: Key | None = None, *, exactly: bool = False
 ) -> Start:
-    """Return where the session with these journal lines goes on.
+    """Return the start from which the session with these journal lines continues.
 
     The levels of answered trials are those of the journal, opened with the study's ``key``; without it `Start.heard`
     is empty.
@@ -57,7 +57,7 @@ def resume_at(
     heard = () if key is None else trial_results(protocol, opened(lines, key))
     if protocol.study.resume == "block" and not exactly:
         within = _within(schedule.steps, step)
-        if within is not None:  # to the first trial of its block
+        if within is not None:  # back to the first trial of its block
             step = next(
                 index
                 for index, other in enumerate(schedule.steps)
@@ -69,17 +69,17 @@ def resume_at(
 
 
 def begun_schedule(protocol: Protocol, start: SessionStarted, key: Key) -> Schedule:
-    """Return the steps of the session whose journal begins with the line ``start``; ``key`` is the study's."""
+    """Return the schedule of the session whose journal begins with ``start``; ``key`` is the study's."""
     return build_schedule(protocol, start.participant, start.seed, own_place(start, key))
 
 
 def is_rehearsal(session_receipt: Mapping[str, Any]) -> bool:
-    """Return whether a session's receipt says that its participant was simulated, and so its screen."""
+    """Return whether a session's receipt has a simulated participant."""
     return bool(session_receipt.get("screens") == REHEARSED_SCREENS)
 
 
 def source_to_resume(session_folder: Path, name: str) -> bytes:
-    """Return the source of a protocol to go on with a session: with the liquid files as they were sealed."""
+    """Return the source of a protocol with which a session is resumed, with its liquid files as sealed."""
     return sealed_source(session_folder, source_bytes(name))
 
 
@@ -94,7 +94,7 @@ def find_protocol(
     names = dict.fromkeys((*at_hand(), *recent_protocols()) if candidates is None else candidates)
     sources: dict[str, bytes] = {}
     for name in names:
-        with contextlib.suppress(ProtocolError):  # a file that cannot be read is no study's
+        with contextlib.suppress(ProtocolError):  # an unreadable file is not a candidate
             sources[name] = read(name)
     for name, source in sources.items():
         if protocol_hash(source) == start.protocol_hash:
@@ -107,7 +107,7 @@ def find_protocol(
 
 
 def _next_step(protocol: Protocol, schedule: Schedule, progress: Progress) -> int:
-    """Return the index of the step that was not left behind, checked against what the journal calls it."""
+    """Return the index of the first unfinished step, checked against its name in the journal."""
     steps = schedule.steps
     here = steps[progress.step] if progress.step < len(steps) else None
     named = here.page_id if isinstance(here, PageStep) else here.form if isinstance(here, FormStep) else None
@@ -117,13 +117,13 @@ def _next_step(protocol: Protocol, schedule: Schedule, progress: Progress) -> in
             "the journal does not follow the order given by seed and participant, so the session cannot be resumed"
         )
     if number is not None and progress.invalid >= (protocol.limits.attempts or math.inf):
-        return progress.step + 1  # it was presented as often as permitted
+        return progress.step + 1  # it was presented the greatest permitted number of times
     asks = isinstance(here, Trial) and protocol.questionnaire_of(here.block) is not None
     return progress.step + 1 if number is not None and progress.task_done and not asks else progress.step
 
 
 def _within(steps: tuple[Step, ...], step: int) -> Trial | None:
-    """Return a trial of the block that ``step`` is within: a trial of it, or a break between two; None elsewhere."""
+    """Return a trial of the block that contains ``step`` (a trial, or a break between trials); None elsewhere."""
     here, before, after = (steps[at] if 0 <= at < len(steps) else None for at in (step, step - 1, step + 1))
     if isinstance(here, Trial):
         return here

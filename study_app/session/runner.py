@@ -37,12 +37,12 @@ from study_app.session.trial import Recording, RunningTrial, ball_is_back, resti
 from study_app.store.delivered import broken_limits, delivered, undelivered
 from study_app.store.journals.journal_events import TargetReached
 
-STOOD_STILL_S = 3.0  # between two trials, until it is noted; within one, `trial.FROZEN_S` interrupts it [choice]
-RETRY_S = 1.0  # a disk that took nothing is tried again so often
+STOOD_STILL_S = 3.0  # a longer gap between two trials is noted; in a trial see `trial.FROZEN_S` [choice]
+RETRY_S = 1.0  # interval between attempts to write after a failure [s]
 
 
 class Runner:
-    """Runs one session; ``key`` has the condition of each code by block, ``start`` is where a resumed session goes on.
+    """Run one session; ``key`` has the condition of each code by block, ``start`` is the step of a resumed session.
 
     ``secret`` is the sealed key's nonce, from which levels are drawn; a study without designs needs none.
     """
@@ -68,7 +68,7 @@ class Runner:
         self._page_since_ns = 0
         self._waiting: deque[events.Event] = deque()
         self._busy = False
-        self._retry_s = 0.0  # when a disk that took nothing is tried again
+        self._retry_s = 0.0  # time of the next attempt to write after a failure
         self._polled_s = math.inf
         self._ending: tuple[events.Finish, float] | None = None
         self._cause = ""
@@ -84,17 +84,17 @@ class Runner:
 
     @property
     def ending(self) -> bool:
-        """Whether the session's end is put off until its recordings are on the disk."""
+        """Whether the session's end waits until its recordings are on the disk."""
         return self._ending is not None
 
     @property
     def stalled(self) -> str | None:
-        """Why the disk accepts no data, for the operator; None while it does."""
+        """The reason why writing fails, for the operator; None if it does not."""
         return None if self._state.stall is None else self._state.stall.reason
 
     @property
     def cause(self) -> str:
-        """What failed last, for the operator and the log; "" where nothing did since the device was connected again."""
+        """The last failure, for the operator and the log; "" if there was none since the device was reconnected."""
         return self._cause
 
     @property
@@ -103,13 +103,13 @@ class Runner:
         return None if self._running is None else self._running.task
 
     def on_change(self, listener: Callable[[SessionState], None]) -> None:
-        """Call ``listener`` with the new state after every event that was taken."""
+        """Call ``listener`` with the new state after every accepted event."""
         self._listeners.append(listener)
 
     def post(self, event: events.Event) -> None:
-        """Let something have happened; SessionError says that it cannot happen now, and nothing was changed.
+        """Apply an event. Raise SessionError, leaving the state unchanged, if it is not allowed now.
 
-        StoreError says that the session was to end while it stalled: its end could not be written, it stays unfinished.
+        StoreError means that the session ended while it was stalled: it stays unfinished, without an end on the disk.
         """
         if isinstance(event, events.ForceStopped):
             self._ports.servo.stop_force()
@@ -130,8 +130,8 @@ class Runner:
             raise refused
 
     def poll(self) -> None:
-        """Look at the device: follow the task, hear its buttons, notice a fault. Call it once a frame."""
-        samples = np.asarray(self._reader.read())  # fields of a plain array are found faster
+        """Poll the device: update the task, handle buttons, detect faults. Call it once per frame."""
+        samples = np.asarray(self._reader.read())  # field access is faster on a plain array
         self._recording.take(samples)
         if self._ending is not None:
             if self._ports.settled():
@@ -170,9 +170,9 @@ class Runner:
         return self._state, self._running is not None and self._running.adjustable
 
     def view(self, now_ns: int) -> TankView | None:
-        """Return what is to be drawn at ``now_ns`` (servo's clock), as late as the trial asks; None without a trial.
+        """Return the view to draw at ``now_ns`` (servo's clock) with the trial's delay; None without a trial.
 
-        In a rest the ball is drawn without delay.
+        In a rest there is no delay.
         """
         if self._running is not None:
             return self._running.view(now_ns)
@@ -181,7 +181,7 @@ class Runner:
         return resting_view(self._ports.servo, self._state.task, now_ns)
 
     def frame_shown(self, painted_ns: int, sample_ns: int) -> None:
-        """Take a frame of the trial's tank: painted at one time, true of another [ns, servo's clock]."""
+        """Record a painted frame of the trial's tank and the time that it shows [ns, servo's clock]."""
         if self._running is None:
             return
         try:
@@ -191,7 +191,7 @@ class Runner:
 
     def _take(self, event: events.Event) -> None:
         if isinstance(event, events.Stepped) and not self._where()[1]:
-            return  # before its first frame and after its end an interval cannot be adjusted
+            return  # an interval can be adjusted only from its first frame until its end
         if isinstance(event, events.WriteRetried | events.EndRequested) and self._state.stall is not None:
             self._write_again(self._state.stall)
             if isinstance(event, events.WriteRetried):
@@ -211,12 +211,12 @@ class Runner:
             )
 
     def _write_again(self, stall: Stall) -> None:
-        """Carry out what the disk did not take; if it takes it now, go on."""
+        """Retry the pending writes; continue the session if they succeed."""
         waiting = tuple(self._waiting)
         self._state, commands = advance(self._state, events.WriteRetried(stall.at_s))
         done = self._carry_out_all(commands, stall.at_s)
         broke = [event for event in self._waiting if isinstance(event, events.Broke) and event not in waiting]
-        self._waiting = deque((*waiting, *broke))  # what a page said that is covered again at once is said again later
+        self._waiting = deque((*waiting, *broke))  # events of a page that is covered again at once are sent again later
         if done:
             self._take(events.WriteCompleted(self._ports.clock()))
 
@@ -225,7 +225,7 @@ class Runner:
             listener(self._state)
 
     def _carry_out_all(self, commands: Sequence[events.Command], at_s: float) -> bool:
-        """Carry out commands of a moment in order; return whether the disk took them. Other failures are reported."""
+        """Execute commands in order; return whether all writes succeeded. Other failures are reported as events."""
         for index, command in enumerate(commands):
             if isinstance(command, events.Finish) and not self._ports.settled():
                 self._ending = command, at_s
@@ -297,7 +297,7 @@ class Runner:
         )
 
     def _done(self, running: RunningTrial, outcome: Outcome) -> events.TaskDone:
-        """Return that a task is over; of an interval with what it delivered, and which limits it breaks."""
+        """Return the event of a completed task; for an interval, with delivered values and broken limits."""
         summary, limits, command = running.summary(), self._protocol.limits, running.command
         reasons: tuple[str, ...] = ()
         if command.interval is not None and limits.attempts is not None:

@@ -43,14 +43,14 @@ if TYPE_CHECKING:
     from study_app.haptics.runtime.servo import Servo
 
 MAX_SEED = 2_147_483_647
-MAX_DRAWN_SEED = 999_999  # short enough to be read aloud
-MEASURED_S = 2.0  # so long the servo is looked at before a session
-PLAYED_MEASURED_S = 0.5  # and before one that is played from the designer
+MAX_DRAWN_SEED = 999_999  # greatest seed, short enough to be read aloud
+MEASURED_S = 2.0  # duration of the servo's measurement before a session [s]
+PLAYED_MEASURED_S = 0.5  # the same before a session played from the designer [s]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NewSession:
-    """What the operator chose; ``results`` is the study's folder, ``screen`` counts from 1 (None: the last).
+    """The choices of the operator; ``results`` is the study's folder, ``screen`` counts from 1 (None: the last).
 
     ``resumes`` is the folder of the session that goes on, None for a new one; ``device_options`` are the values
     of the device's options, by name. ``row_of`` is the id of the participant who is replaced, ``group`` the
@@ -79,7 +79,7 @@ class NewSession:
     footage: Path | None = None
 
     def read_source(self) -> bytes:
-        """Return the protocol's source; of a session that goes on, with its liquid files as they were sealed."""
+        """Return the protocol's source; for a resumed session, with its liquid files as sealed."""
         return source_bytes(self.source) if self.resumes is None else source_to_resume(self.resumes, self.source)
 
     def read_protocol(self) -> Protocol:
@@ -87,12 +87,12 @@ class NewSession:
         return parse(self.read_source(), self.source)
 
     def tremor(self) -> Random:
-        """Return the random numbers of a hand that moves by itself."""
+        """Return the random generator of the tremor of a simulated hand."""
         return stream(self.seed, f"run/{self.participant}/tremor")
 
     @property
     def who(self) -> str:
-        """Whose session it is, in the operator's words."""
+        """The participant and session, as a text for the operator."""
         group = "" if self.group is None else f"  ·  group {self.group}"
         kind = "  ·  pilot" if self.pilot else ""
         return f"Participant {self.participant}{group}  ·  session {self.session}  ·  seed {self.seed}{kind}"
@@ -109,7 +109,7 @@ def resumed(
     screen: int | None = None,
     device_options: Mapping[str, str | Path] | None = None,
 ) -> NewSession:
-    """Return the choices to go on with the session in a folder: its own, and where its windows open now.
+    """Return the choices with which the session in a folder is resumed: its own, and the present screen.
 
     StoreError says that it cannot go on: it is not a session folder, open in another program, finished, damaged, or of
     another protocol; SessionError that no protocol at hand is of its study.
@@ -144,7 +144,7 @@ def resumed(
 
 
 def check_row(row_of: str | None, study: Protocol) -> None:
-    """Refuse (SessionError) an id of a participant who is replaced where that decides nothing.
+    """Raise SessionError for a replaced participant's id if it has no effect in this study.
 
     With groups the replaced participant's entry is looked up (`allocation.check_choice`), not the number in the id.
     """
@@ -176,7 +176,7 @@ def study_results(results: Path, study: str, device: str, *, pilot: bool = False
 
 @dataclass(frozen=True, slots=True)
 class Ready:
-    """Device and servo at rest, and what was measured of them; ``masking`` of its motors, where that was asked.
+    """Device and servo at rest with their measurements; ``masking`` is the operator's answer, if asked.
 
     ``outlets`` are open already, so that programs that record them can be connected before the session; ``videos`` are
     those of the study, None where it shows none.
@@ -189,18 +189,18 @@ class Ready:
     videos: Videos | None = None
 
     def facts_with(self, refresh_hz: float, scaling: float) -> Measurements:
-        """Return the facts with those of the outlets and of the screen: its refresh rate and scaling of its pixels."""
+        """Return the measurements with those of the outlets and of the screen: refresh rate and pixel scaling."""
         screen = Screen(refresh_hz=refresh_hz, scaling=scaling)
         return replace(self.facts, screen=screen, outlets=self.outlet_statuses)
 
     @property
     def outlet_statuses(self) -> tuple[OutletStatus, ...]:
-        """How the outlets are at present."""
+        """The current status of the outlets."""
         return () if self.outlets is None else self.outlets.statuses()
 
 
 def check(chosen: NewSession, study: Protocol) -> None:
-    """Refuse what cannot begin before any window opens; nothing is touched."""
+    """Raise an error for a session that cannot begin, before any window opens; change nothing."""
     check_options(chosen.device, chosen.device_options)
     if chosen.language not in study.study.languages:
         known = ", ".join(study.study.languages)
@@ -221,7 +221,7 @@ def check(chosen: NewSession, study: Protocol) -> None:
 
 
 def videos_of(chosen: NewSession, study: Protocol, camera: str, rig: Rig) -> Videos | None:
-    """Return the videos of a study, not open yet; None where it shows none. ``camera`` is that of this machine."""
+    """Return the unopened videos of a study, None if it shows none. ``camera`` is that of this computer."""
     if not any(condition.shows_video for condition in study.conditions.values()):
         return None
     folder = find(chosen.source).parent if chosen.footage is None else chosen.footage
@@ -231,7 +231,7 @@ def videos_of(chosen: NewSession, study: Protocol, camera: str, rig: Rig) -> Vid
 def measured(
     rig: Rig, chosen: NewSession, videos: Videos | None = None, *, sleep: Callable[[float], object] = time.sleep
 ) -> Measurements:
-    """Return what the pre-flight judges, but for the screen; a ``sleep`` that does not wait cuts it short.
+    """Return the measurements for the pre-flight except the screen's; a ``sleep`` that does not wait shortens them.
 
     ``videos`` that are not open yet, or failed, are opened.
     """
@@ -254,7 +254,7 @@ def measured(
 
 
 def ran_otherwise(chosen: NewSession) -> str:
-    """Return a participant whose session ran the same version of the study from another file; "" without one."""
+    """Return a participant whose session ran the same version with other contents of the file; "" if there is none."""
     if chosen.resumes is not None:
         return ""
     source = chosen.read_source()
@@ -267,7 +267,7 @@ def ran_otherwise(chosen: NewSession) -> str:
 
 
 def open_outlets(machine: MachineSettings, servo: Servo, blinding: str) -> Outlets | None:
-    """Open what this machine sends to other programs; None where it sends nothing."""
+    """Open the outlets configured on this computer; return None if there are none."""
     if not machine.marker_addresses and machine.lsl_samples == "off":
         return None
     return Outlets(machine.marker_addresses, machine.lsl_samples, servo, blinding)
@@ -283,7 +283,7 @@ def open_store(
     outlets: Outlets | None = None,
     videos: Videos | None = None,
 ) -> SessionStore:
-    """Claim a new session on the disk, or open the one that goes on; ``outlets`` get the markers of its events."""
+    """Claim a new session on the disk or open the resumed one; ``outlets`` get the markers of its events."""
     here: dict[str, Any] = {
         "operator": chosen.operator,
         "device": with_bench(rig.described),
@@ -314,6 +314,6 @@ def open_store(
 
 
 def with_bench(described: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a receipt says of a device, with what ``devices bench`` measured of it on this machine, if it did."""
+    """Return the receipt's entry of a device, with the measurements of ``devices bench`` on this computer, if any."""
     bench = workstation.load_or_default()[0].bench_of(described)
     return {**described} if bench is None else {**described, "bench": bench.entry}

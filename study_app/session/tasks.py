@@ -28,7 +28,7 @@ _NS = 1_000_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TaskView:
-    """What is to be drawn of a task at one moment.
+    """The view of a task at one time.
 
     ``lit`` is the index of the lit target or None, ``reached`` how many were reached and ``of`` how many there are to
     reach (None where time ends the task), ``dwell`` the closed share of the ring in 0 … 1, ``elapsed_s`` the time since
@@ -45,7 +45,7 @@ class TaskView:
 
 @dataclass(frozen=True, slots=True)
 class TankView:
-    """What is drawn in the tank: the proxy's place [m, hand frame] (3,), the task, and the time all this is of [ns].
+    """The view of the tank: the proxy's position (3,) [m, hand frame], the task, and the time of both [ns].
 
     ``ball_hidden`` is whether the proxy is not drawn; ``video`` is the frame of a video behind it, None without one.
     """
@@ -66,7 +66,7 @@ class TargetReached:
 
 
 class Tracker:
-    """Follows one task through the samples of its trial; ``track(task)`` makes the right one.
+    """Track one task through the samples of its trial; `track` makes the right tracker.
 
     ``outcome`` and ``end_ns`` (time of the sample that ended the task) are None while it goes on.
     """
@@ -84,7 +84,7 @@ class Tracker:
         return self.outcome is not None
 
     def feed(self, samples: Any) -> list[TargetReached]:
-        """Take the next samples, in order (fields ``time_ns`` and ``position_m``); say which targets were reached."""
+        """Process the next samples in order (fields ``time_ns`` and ``position_m``); return the reached targets."""
         if self.done or len(samples) == 0:
             return []
         times: NDArray[np.int64] = samples["time_ns"]
@@ -101,18 +101,18 @@ class Tracker:
         return reached
 
     def leave(self) -> bool:
-        """End the task because the participant wants to go on; say whether it may end so already."""
+        """End the task at the participant's request; return whether it may end already."""
         return False
 
     def finish(self, least_s: float) -> bool:
-        """End a task that the participant ends, if it has lasted for ``least_s``; say whether it may end so already."""
+        """End the task if it has lasted for ``least_s``; return whether it has."""
         if self.done or self._start_ns is None or self._newest_ns - self._start_ns < _nanoseconds(least_s):
             return False
         self._finish("complete", self._newest_ns)
         return True
 
     def at(self, time_ns: int) -> TaskView:
-        """Return what the task looked like at ``time_ns``; before it began as at its beginning."""
+        """Return the view of the task at ``time_ns``; earlier than its beginning, the view at the beginning."""
         start_ns = self._start_ns
         if start_ns is None:
             return self._view(0, 0)
@@ -120,11 +120,11 @@ class Tracker:
         return self._view(time_ns, time_ns - start_ns)
 
     def now(self) -> TaskView:
-        """Return what the task looks like at the newest sample: to decide by, never for the participant."""
+        """Return the view at the newest sample: for decisions, never for the participant."""
         return self.at(self._newest_ns)
 
     def summary(self) -> dict[str, Any]:
-        """Return the task's part of the trial row: duration [s] up to now, targets reached and asked for."""
+        """Return the task's columns of the trial row: duration so far [s], targets reached and required."""
         duration_ns = 0 if self._start_ns is None else self._newest_ns - self._start_ns
         return {"duration_s": duration_ns / _NS, "targets_reached": None, "targets": None}
 
@@ -139,7 +139,7 @@ class Tracker:
 
 
 class TimedTracker(Tracker):
-    """Time ends the task, or after its least time the participant; a target may move by the clock."""
+    """Tracker of a task that ends by time or, after its least time, at the participant's request."""
 
     def __init__(self, task: Task) -> None:
         super().__init__(task.limit_s, "complete")
@@ -158,7 +158,7 @@ class TimedTracker(Tracker):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Mark:
-    """From one moment on: how many were reached, which target is lit, since when the proxy is inside it [ns]."""
+    """The state from one time on: number of targets reached, the lit one, and when the proxy entered it [ns]."""
 
     reached: int
     lit: int | None
@@ -166,7 +166,7 @@ class _Mark:
 
 
 class ReachTracker(Tracker):
-    """Reaching: the lit target alternates through the list until enough were reached or the time is over."""
+    """Tracker of a reaching task: targets light up in turn until enough were reached or the time is over."""
 
     def __init__(self, task: Reach) -> None:
         if task.duration_s is None:

@@ -23,22 +23,22 @@ from study_app.session.transitions.events import StartTrial
 from study_app.store.delivered import JUDGED, delivered_error, judged
 from study_app.video.frames import VideoFrame, VideoSource, VideoStatistics
 
-LEAD_S = 0.6  # longer than the slowest fade
+LEAD_S = 0.6  # time of samples kept for the next recording [s]: longer than the slowest fade
 _OF_ROW = ("tick", "lateness_ns", "permitted_n", "withheld_n", "delay_ticks")
 _KEPT = np.dtype([(name, SAMPLE[name]) for name in (*(JUDGED.names or ()), *_OF_ROW)])
-"""What is kept of the samples of a trial: 128 of 320 bytes."""
+"""The fields kept of a trial's samples: 128 of 320 bytes."""
 # Everything is drawn this much later than the trial asks. Then the moment to draw lies between two samples at every
-# delay, none included, and is met exactly; else the newest sample, up to a tick old, would stand in where there is no
-# delay, and the error of the delay would tell such trials from all others. Two ticks at 1 kHz.
+# delay, including none, and is met exactly; else the newest sample, up to a tick old, would be drawn if there is no
+# delay, and the error of the delay would identify these trials. Two ticks at 1 kHz.
 SETTLED_S = 0.002
 LEAST_SET_S = 1.0
-"""A setting takes at least so long after the task's lead: less could not be judged. [choice]"""
+"""Least time of a setting after the task's lead [s]: a shorter one could not be judged. [choice]"""
 FROZEN_S = 1.0
-"""A tick or a frame that does not come for longer ends the attempt: no limit of a study permits more. [choice]"""
+"""Longest time without a tick or frame before the attempt ends [s]: no limit of a study permits more. [choice]"""
 
 
 class Recording:
-    """Hands the samples of trials, and the frames shown in them, to the recorder; without one it does nothing."""
+    """Pass samples and frames of trials to the recorder; without a recorder do nothing."""
 
     def __init__(self, recorder: RecorderPort | None, rate_hz: float) -> None:
         self._recorder = recorder
@@ -49,7 +49,7 @@ class Recording:
         self._running = False
 
     def take(self, samples: Any) -> None:
-        """Take the newest samples, in order (array of ``layout.SAMPLE``), which are not changed afterwards."""
+        """Add the newest samples in order (array of ``layout.SAMPLE``), which must not be changed afterwards."""
         if self._recorder is None or len(samples) == 0:
             return
         if self._running:
@@ -60,12 +60,12 @@ class Recording:
             self._held -= len(self._before.popleft())
 
     def forget(self) -> None:
-        """Drop what came before: the servo was started again, so nothing felt from here on goes on from it."""
+        """Discard earlier samples: the servo was restarted, so that the force does not continue from them."""
         self._before.clear()
         self._held = 0
 
     def start(self, trial: int, attempt: int, interval: int | None = None) -> None:
-        """Begin the recording of a trial or of one of its intervals, with what came just before it."""
+        """Begin the recording of a trial or of one of its intervals with the samples just before it."""
         if self._recorder is None:
             return
         self._recorder.start(trial, attempt, self._rate_hz, interval)
@@ -75,7 +75,7 @@ class Recording:
             self._recorder.append(samples[spare:] if index == 0 else samples)
 
     def frame(self, painted_ns: int, sample_ns: int, video: VideoFrame | None = None) -> None:
-        """Take a frame that was painted at one moment and showed another [ns], and the frame of a video in it."""
+        """Record a painted frame, the time that it shows [ns], and its video frame."""
         if self._recorder is not None and self._running:
             self._recorder.frame(painted_ns, sample_ns, video)
 
@@ -86,22 +86,19 @@ class Recording:
 
 
 class FrameStatistics:
-    """Adds up frames as they come.
-
-    Without a window that paints, only the first frame must be reported.
-    """
+    """Statistics of the frames of a trial. Without a window only the first frame needs to be reported."""
 
     def __init__(self, *, late_s: float, due_ns: int, paints: bool = True, videos: bool = False) -> None:
         self._video = VideoStatistics() if videos else None
         self._late_s = late_s
-        self._fewest = 1 if paints else 2  # frames before the first of them can have stood
+        self._fewest = 1 if paints else 2  # a gap before the first frame does not count
         self._errors_s: list[float] = []
         self._painted_ns = due_ns
         self._first_gap_ns = 0
         self._frame_gap_ns = 0
 
     def frame(self, painted_ns: int, shown_ns: int, delay_s: float, video: VideoFrame | None = None) -> None:
-        """Take a frame that was painted at one moment and showed another [ns], at the delay then asked for [s].
+        """Add a painted frame, the time that it shows [ns], and the requested delay [s].
 
         ``video`` is the frame of a video in it.
         """
@@ -116,11 +113,11 @@ class FrameStatistics:
         self._errors_s.append((painted_ns - shown_ns) * 1e-9 - delay_s)
 
     def frame_gap_ns(self, until_ns: int) -> int:
-        """Return the longest time that a frame stood, the newest one until a moment [ns]; 0 before the first frame."""
+        """Return the longest time between frames, including the one since the newest [ns]; 0 before the first frame."""
         return max(self._frame_gap_ns, until_ns - self._painted_ns) if len(self._errors_s) >= self._fewest else 0
 
     def columns(self, until_ns: int) -> dict[str, Any]:
-        """Return the columns of the trial row; until a moment [ns] the last frame stood."""
+        """Return the columns of the trial row; the last frame was shown until ``until_ns``."""
         errors_s = np.asarray(self._errors_s, np.float64)
         seen = errors_s.size > 0
         return {
@@ -136,9 +133,9 @@ class FrameStatistics:
 
 
 def sample_columns(samples: Any, rate_hz: float, samples_dropped: int, worst_gap_s: float) -> dict[str, Any]:
-    """Return the columns of a trial's row that its samples (array of ``layout.SAMPLE``) give; None where none do.
+    """Return the columns of a trial's row from its samples (array of ``layout.SAMPLE``); None without samples.
 
-    ``worst_gap_s`` is the longest time between two ticks, as the servo kept it.
+    ``worst_gap_s`` is the longest time between two ticks, as recorded by the servo.
     """
     timed = timing(samples.view(np.recarray), rate_hz)
     ticks = timed.ticks
@@ -206,11 +203,11 @@ class RunningTrial:
 
     @property
     def task(self) -> TaskView:
-        """The task on the device's clock: to decide by, never for the participant."""
+        """The task on the device's clock: for decisions, never for the participant."""
         return self._tracker.now()
 
     def view(self, now_ns: int) -> TankView:
-        """Return what is to be drawn at ``now_ns`` (servo's clock), as late as asked and ``SETTLED_S`` more."""
+        """Return the view to draw at ``now_ns`` (servo's clock), with the requested delay plus ``SETTLED_S``."""
         self._drawn_delay_s = self._delay_s
         drawn_ns = now_ns - round((self._delay_s + SETTLED_S) * 1e9)
         position_m, shown_ns = self._servo.telemetry.position_at(drawn_ns)
@@ -220,7 +217,7 @@ class RunningTrial:
         return TankView(position_m, task, shown_ns, hidden, self._drawn_video)
 
     def frame(self, painted_ns: int, sample_ns: int) -> None:
-        """Take a frame that was painted at one moment and showed another [ns, servo's clock]; the first one begins."""
+        """Add a painted frame and the time that it shows [ns, servo's clock]; the first one begins the trial."""
         if self._serial is None:
             self._serial = self._servo.load(self._scene)
             self._dropped_before = self._reader.dropped
@@ -231,7 +228,7 @@ class RunningTrial:
         self._recording.frame(painted_ns, sample_ns, self._drawn_video)
 
     def follow(self, samples: Any) -> list[TargetReached]:
-        """Take the newest samples, in order (array of ``layout.SAMPLE``); return which targets were reached."""
+        """Process the newest samples in order (array of ``layout.SAMPLE``); return the reached targets."""
         if self._serial is None or self._tracker.done:
             return []
         mine = samples[samples["scene"] >= self._serial]  # each adjustment adds one
@@ -246,13 +243,13 @@ class RunningTrial:
 
     @property
     def adjustable(self) -> bool:
-        """Whether the participant can set what is presented now: since the first frame, until the task is over."""
+        """Whether the participant can adjust the level now: from the first frame until the task is over."""
         return self.command.adjusts and self._serial is not None and not self._tracker.done
 
     def adjust(self, scene: Scene | None, delay_s: float) -> int | None:
-        """Present other numbers of the same scene (None: no force depends on what is set), and a delay [s].
+        """Change the numbers of the scene (None: no force depends on them) and the delay [s].
 
-        Returns the number of the scene in telemetry from then on; None where it stays what it is.
+        Return the new number of the scene in telemetry; None if it does not change.
         """
         self._delay_s = delay_s
         return None if scene is None else self._servo.adjust(scene)
@@ -265,7 +262,7 @@ class RunningTrial:
             self._tracker.leave()
 
     def outcome(self) -> Outcome | None:
-        """Return how the task ended, once that was drawn, as late as it may be in this block; None before."""
+        """Return the outcome of the task after its end was drawn with the block's longest delay; None before."""
         end_ns = self._tracker.end_ns
         linger_ns = round((self.command.linger_s + SETTLED_S) * 1e9)
         if end_ns is None or self._servo.now_ns() - end_ns < linger_ns:
@@ -275,7 +272,7 @@ class RunningTrial:
 
     @property
     def samples(self) -> Any:
-        """What is judged of the trial or interval so far (array of ``delivered.JUDGED``)."""
+        """The samples of the trial or interval so far (array of ``delivered.JUDGED``)."""
         return judged(self._samples)
 
     @property
@@ -285,9 +282,9 @@ class RunningTrial:
 
     @property
     def frozen(self) -> bool:
-        """Whether the program or the machine was suspended for so long that the trial was not presented as specified.
+        """Whether the program or computer was suspended so long that the trial was not presented as specified.
 
-        Telemetry has no record of missing ticks. The servo knows its longest gap, and the frames show the window's.
+        Telemetry has no missing ticks: the servo's longest gap and the frames' intervals are used.
         """
         if self._serial is None:
             return False
@@ -299,14 +296,14 @@ class RunningTrial:
         return self._servo.now_ns() if self._tracker.end_ns is None else self._tracker.end_ns
 
     def summary(self) -> dict[str, Any]:
-        """Return what its row records until now (``store.columns``)."""
+        """Return the columns of its row so far (``store.columns``)."""
         dropped = 0 if self._serial is None else self._reader.dropped - self._dropped_before
         measured = {
             **sample_columns(self._samples, self._servo.rate_hz, dropped, self._servo.worst_gap_s),
             **self._frames.columns(self._until_ns),
         }
         measured = {name: round(value, 6) if isinstance(value, float) else value for name, value in measured.items()}
-        error = None  # where the participant set the force, or the study delays it
+        error = None  # if the participant set the force, or the study delays it
         if self._serial is not None and not self.command.adjusts and not self._scene.link.acts:
             from study_app.haptics.runtime.offline import law_along  # noqa: PLC0415 - the compiler: the servo loaded it
 
@@ -316,7 +313,7 @@ class RunningTrial:
 
 
 def resting_view(servo: ServoPort, task: AnyTask, now_ns: int) -> TankView:
-    """Return what is drawn in a rest at ``now_ns`` (servo's clock): the ball, and the target where it starts."""
+    """Return the view in a rest at ``now_ns`` (servo's clock): the ball, and the target at its start."""
     position_m, shown_ns = servo.telemetry.position_at(now_ns - round(SETTLED_S * 1e9))
     lit = None if task.start_m is None else 0
     return TankView(
@@ -325,7 +322,7 @@ def resting_view(servo: ServoPort, task: AnyTask, now_ns: int) -> TankView:
 
 
 def ball_is_back(view: TankView, task: AnyTask) -> bool:
-    """Return whether the ball is where the next interval of a task begins; tasks without such a place need none."""
+    """Return whether the ball is at the start of the task's next interval; True for tasks without a fixed start."""
     if task.start_m is None:
         return True
     return math.dist(view.position_m.tolist(), task.start_m) <= task.radius_m

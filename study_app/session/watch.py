@@ -41,13 +41,13 @@ from study_app.store.progress import progress_of
 MOTION_HIDDEN: Final = (
     "Hidden while the study is blinded: with this device, the recorded motion would reveal the liquid."
 )
-_ASSUMED_FRAME_S: Final = 1 / 60  # of a session whose frames are not known
+_ASSUMED_FRAME_S: Final = 1 / 60  # frame rate for a session whose frames are unknown
 Kind: TypeAlias = Literal["target", "answer", "event"]
 
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """Something that happened ``at_s`` after the task began [s]."""
+    """An event ``at_s`` after the task began [s]."""
 
     at_s: float
     kind: Kind
@@ -87,23 +87,23 @@ class Watched:
         return max(float(self.times_s[-1]), *(mark.at_s for mark in self.marks), 0.0)
 
     def index(self, at_s: float) -> int:
-        """Return the number of the newest sample at a time."""
+        """Return the index of the newest sample at a time [s]."""
         return max(int(np.searchsorted(self.times_s, at_s, "right")) - 1, 0)
 
     def drawn_s(self, at_s: float) -> float:
-        """Return of which time the hand was that was seen at a time; before the first frame that time."""
+        """Return the time that the frame visible at ``at_s`` shows [s]; before the first frame ``at_s``."""
         frame = int(np.searchsorted(self.painted_s, at_s, "right")) - 1
         return at_s if frame < 0 else float(self.shown_s[frame])
 
     def view(self, at_s: float) -> TankView:
-        """Return the tank with hand and task of a time; between two samples the hand's position is interpolated."""
+        """Return the view of the tank at a time [s]; the hand's position is interpolated between samples."""
         places = self.samples["position_m"]
         position_m = np.array([np.interp(at_s, self.times_s, places[:, axis]) for axis in range(3)])
         time_ns = int(self.samples["time_ns"][0]) + round((at_s - self.begins_s) * 1e9)
         return TankView(position_m, self.tracker.at(time_ns), time_ns)
 
     def steps_s(self, kind: Literal["sample", "frame"]) -> NDArray[np.float64]:
-        """Return the times of samples, or of painted frames."""
+        """Return the times of samples or painted frames [s]."""
         if kind == "sample":
             return self.times_s
         if len(self.painted_s) > 1:
@@ -112,20 +112,19 @@ class Watched:
 
 
 def motion_hidden(start: events.SessionStarted, key: Key | None) -> str:
-    """Return why no motion of a session is shown, "" where it may be: ``key`` is the study's, None while sealed."""
+    """Return the reason why a session's motion cannot be shown, or ""; ``key`` is the study's, None while sealed."""
     device = DEVICES.get(start.device or "")
     seen = device is not None and not device.motion_shows_force
     return "" if seen or key is not None else MOTION_HIDDEN
 
 
 def watched(session_folder: Path, trial: int, attempt: int = 1, interval: int = 1) -> Watched:
-    """Read an attempt at a trial; of a trial of intervals the one with this number.
+    """Read an attempt at a trial, or its interval with this number.
 
     Raises
     ------
     StoreError
-        It has no recording, or that, the journal, receipt or key cannot be read; `SealedRecording` says that it can
-        once the study is unblinded.
+        It has no recording, or a file cannot be read; `SealedRecording` if it is readable after unblinding.
     """
     from study_app.store import recordings  # noqa: PLC0415 - pyarrow: only once it is needed
 
@@ -191,9 +190,9 @@ _ENDS: Final = events.TrialEnded | events.IntervalEnded
 
 
 def _timed(recorded: Any, own: Sequence[events.Event], *, last: bool) -> tuple[Any, NDArray[np.float64]]:
-    """Return the samples that are believed, with their times since the first one of the task's scene [s].
+    """Return the valid samples, with their times since the first one of the task's scene [s].
 
-    An adjustment, of the ``last`` interval, gives the scene other numbers from its first step on.
+    An adjustment, of the ``last`` interval, changes the scene's number from its first step on.
     """
     samples = recorded[np.isfinite(recorded["position_m"]).all(axis=1)]
     samples = samples[samples["limiters"] & LIMITER_GLITCH == 0]
@@ -204,9 +203,9 @@ def _timed(recorded: Any, own: Sequence[events.Event], *, last: bool) -> tuple[A
 
 
 def _marks(own: Sequence[events.Event], begun: events.Event, ended: Any, until_s: float) -> Iterator[Mark]:
-    """Yield what happened between two times [s, session's clock]; targets are on the task's own clock.
+    """Yield the marks of events after ``begun`` and before ``until_s`` [s, session's clock].
 
-    The task begins with its first frame, which is known to some milliseconds.
+    Targets are on the task's own clock. The task begins with its first frame, known to some milliseconds.
     """
     gap_ms = (ended.others.get("first_frame_gap_ms") if ended is not None else None) or 0.0
     for line in own:
@@ -220,13 +219,13 @@ def _marks(own: Sequence[events.Event], begun: events.Event, ended: Any, until_s
 
 
 def _target_marks(ended: events.EndOfTask | None, task: Task) -> Iterator[Mark]:
-    """Yield the targets whose times were sealed until the study was unblinded; they light up in turn."""
+    """Yield the marks of targets whose times were sealed until the study was unblinded; they light up in turn."""
     for number, at_s in enumerate((ended.reached_s if ended is not None else None) or ()):
         yield Mark(at_s, "target", f"target {number % len(task.targets_m) + 1} reached")
 
 
 def _told(line: events.Event) -> tuple[Kind, str] | None:
-    """Return what a mark says of a line; None of a line without one."""
+    """Return kind and text of the mark for a journal event, or None."""
     match line:
         case events.TargetReached():
             return "target", f"target {line.target + 1} reached"
@@ -250,7 +249,7 @@ def _told(line: events.Event) -> tuple[Kind, str] | None:
 def _page(
     study: StudyFolder, path: Path, lines: Sequence[events.Event], started: events.TrialStarted, interval: int | None
 ) -> TaskPage:
-    """Return the tank of a trial, or of its interval; while the study is sealed the ball has the scene's own size."""
+    """Return the tank page of a trial or interval; while the study is sealed the ball has the scene's own size."""
     start, key = events.start_of(lines), read_key(study.path)
     group = own_group(start, key)
     with reading_what_ran(path):

@@ -20,11 +20,11 @@ from typing import Any, BinaryIO
 
 from study_app.errors import StoreError
 
-OLD_S = 3600.0  # longer than from the last write of a temporary file to its renaming
-_NO_FLUSH = (errno.EINVAL, errno.EBADF, errno.ENOTSUP)  # of a folder that cannot be flushed
+OLD_S = 3600.0  # longer than any time between the last write of a temporary file and its renaming
+_NO_FLUSH = (errno.EINVAL, errno.EBADF, errno.ENOTSUP)  # error numbers of folders that cannot be flushed
 _REPLACE_AGAIN_S = (0.01, 0.05, 0.2)
-_MOST_LEVELS = 64  # of JSON, so that code may process a value recursively
-_TEMPORARY = re.compile(r"\.[^.].*\.[0-9a-f]{8}\.tmp")  # without those of hidden files: markers are created and removed
+_MOST_LEVELS = 64  # greatest depth of JSON, so that values can be processed recursively
+_TEMPORARY = re.compile(r"\.[^.].*\.[0-9a-f]{8}\.tmp")  # not of hidden files: markers are created and removed
 
 
 def write_file(path: Path, content: bytes | bytearray, *, waits: bool = True) -> None:
@@ -47,7 +47,7 @@ def write_file(path: Path, content: bytes | bytearray, *, waits: bool = True) ->
 
 
 def _replace(half: Path, path: Path) -> None:
-    """Rename over the old file, which a viewer or a virus scanner may hold for a moment on Windows."""
+    """Rename over the old file; retry while a viewer or virus scanner holds it on Windows."""
     for pause_s in _REPLACE_AGAIN_S:
         with contextlib.suppress(PermissionError):
             half.replace(path)
@@ -58,7 +58,7 @@ def _replace(half: Path, path: Path) -> None:
 
 @contextlib.contextmanager
 def _passing_file(path: Path, written: Path) -> Iterator[Path]:
-    """Yield a temporary name next to ``path`` and remove its file at the end; errors say that ``written`` failed."""
+    """Yield a temporary path next to ``path`` and remove its file at the end; errors name ``written``."""
     half = temporary_path(path)
     try:
         yield half
@@ -176,15 +176,15 @@ def temporary_path(path: Path) -> Path:
 
 
 def temporaries(folder: Path, of: str = "") -> tuple[Path, ...]:
-    """Return the temporary files in ``folder`` itself, ``of`` a name, of a program that writes now or was killed."""
+    """Return the temporary files directly in ``folder``, ``of`` a given name if set; their programs may still run."""
     paths = (path for path in folder.glob(".*.tmp") if _TEMPORARY.fullmatch(path.name))
     return tuple(sorted(path for path in paths if not of or path.name[1:-13] == of))  # without ".", and ".01234567.tmp"
 
 
 def sweep_old(folder: Path, of: str = "") -> None:
-    """Remove temporary files, ``of`` a name, of killed programs from ``folder``, into which others may write now.
+    """Remove old temporary files, ``of`` a name if set, from a folder into which other programs may be writing.
 
-    Only files too old to be in use are removed; what cannot be removed stays.
+    Only files too old to be in use are removed; a file that cannot be removed is left.
     """
     for path in temporaries(folder, of):
         with contextlib.suppress(OSError):
@@ -199,10 +199,7 @@ def paths_in(folder: Path) -> list[Path]:
 
 
 def sweep(folder: Path) -> tuple[Path, ...]:
-    """Remove temporary files of killed programs from ``folder`` itself; return them.
-
-    Only for a folder that no other program writes into now.
-    """
+    """Remove the temporary files directly in ``folder`` and return them; no other program may be writing there."""
     leftovers = temporaries(folder)
     for path in leftovers:
         try:
@@ -216,7 +213,7 @@ def sweep(folder: Path) -> tuple[Path, ...]:
 
 
 def probe(folder: Path) -> int:
-    """Return how many bytes are free in ``folder`` (or the nearest one above it that exists), having written there.
+    """Check that ``folder``, or its nearest existing parent, is writable, and return its free space in bytes.
 
     A small file is written, flushed to the disk and removed; nothing else is changed.
 
@@ -259,7 +256,7 @@ def cannot_write(path: Path, error: OSError) -> StoreError:
 
 
 def is_there(path: Path) -> bool:
-    """Return whether anything is at ``path``.
+    """Return whether ``path`` exists.
 
     Raises
     ------
@@ -276,7 +273,7 @@ def is_there(path: Path) -> bool:
 
 
 def refuse_special(path: Path) -> None:
-    """Refuse a folder that is or holds a link, a pipe or a device, before anything is copied or deleted.
+    """Raise an error if a folder is or contains a link, a pipe or a device: it must not be copied or deleted.
 
     Raises
     ------
@@ -296,20 +293,20 @@ def cannot_read(path: Path, error: OSError) -> StoreError:
 
 
 def open_regular(path: Path) -> BufferedReader:
-    """Open a file to read it; a folder, and a device or pipe, which may have no end, is an OSError."""
+    """Open a regular file for reading; raise OSError for a folder, device or pipe."""
     if not stat.S_ISREG(path.stat().st_mode):
         raise OSError(errno.EINVAL, "it is not a file")
     return path.open("rb")
 
 
 def read_regular(path: Path) -> bytes:
-    """Return the content of a file; as `open_regular`."""
+    """Return the content of a regular file; errors as in `open_regular`."""
     with open_regular(path) as file:
         return file.read()
 
 
 def read_if_there(path: Path) -> bytes | None:
-    """Return the content of a file, None where there is none; StoreError where it cannot be read."""
+    """Return the content of a file, or None if it does not exist. Raise StoreError if it cannot be read."""
     try:
         return read_regular(path)
     except (FileNotFoundError, NotADirectoryError):
@@ -319,7 +316,7 @@ def read_if_there(path: Path) -> bytes | None:
 
 
 def read_own(path: Path, root: Path) -> bytes:
-    """Return the content of a file that must lie under ``root``, wherever links lead."""
+    """Return the content of a file, which must lie under ``root`` after links are resolved."""
     try:
         real = Path(os.path.realpath(path, strict=True))  # raises OSError for a loop of links, with every Python
         if not real.is_relative_to(root.resolve()):
@@ -335,7 +332,7 @@ def read_own_if_there(path: Path, root: Path) -> bytes | None:
 
 
 def parse_json(content: bytes | str) -> Any:
-    """Return the value in ``content``.
+    """Return the value of a JSON text.
 
     Raises
     ------
@@ -364,7 +361,7 @@ def _refuse(constant: str) -> None:
 
 
 def study_root(path: Path) -> Path:
-    """Return the study's folder in which ``path``, a file of a session's folder, lies; else the file's own folder."""
+    """Return the study folder that contains a session's file ``path``; for another file, the folder that it is in."""
     parents = path.absolute().parents
     return parents[3] if len(parents) > 3 and parents[2].name == "data" else parents[0]
 

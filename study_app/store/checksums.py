@@ -42,18 +42,18 @@ _FINGERPRINT = re.compile(
     r"(?:withdrawals\.jsonl|exclusions\.csv)/sub-[A-Za-z0-9]{1,32}|reveals\.jsonl)\s*"
 )
 Proofs: TypeAlias = tuple[tuple[str, str], ...]
-"""Fingerprints, and the sessions or records that they are of."""
+"""Pairs of a fingerprint and the session or record that it belongs to."""
 
 
 def write_checksums(session: SessionFolder) -> dict[str, str]:
-    """Write the SHA-256 of every file of the session, and return them by path in its folder."""
+    """Write the SHA-256 of every file of the session; return path in the folder → SHA-256."""
     sums = {name: hashed(session, name) for name in files(session)}
     write_file(session.checksums, checksum_bytes(sums))
     return sums
 
 
 def renew_checksums(session: SessionFolder, rewritten: Collection[Path]) -> bool:
-    """Bring the list up to date with files that were ``rewritten``; return whether it changed.
+    """Update the list for the ``rewritten`` files; return whether it changed.
 
     Other entries stay, so that the list only covers files as they were when the session ended; a missing or invalid
     list is made again. Every change is noted in ``rebuilt.txt``, which is listed, too.
@@ -75,7 +75,7 @@ def renew_checksums(session: SessionFolder, rewritten: Collection[Path]) -> bool
 
 
 def replace_checksums(session: SessionFolder, changes: Mapping[str, tuple[str, str]]) -> None:
-    """Replace the SHA-256 of files by that of their new contents, if the list has that of the old.
+    """Replace the SHA-256 of changed files if the list has the SHA-256 of their old contents.
 
     ``changes`` are the old and the new by path in the session's folder. A file with another SHA-256 in the list was
     changed since the session ended, which must stay visible.
@@ -87,14 +87,14 @@ def replace_checksums(session: SessionFolder, changes: Mapping[str, tuple[str, s
 
 
 def note_rebuilt(session: SessionFolder, what: str) -> None:
-    """Note permanently which proofs of a session `rebuild` made again: they prove nothing about earlier changes."""
+    """Record permanently which proofs `rebuild` made again: they prove nothing about earlier changes."""
     at = datetime.now().astimezone().isoformat(timespec="seconds")
     line = f"{at} liquid-study {study_app.__version__} rebuild: {what}\n"
     append_line(session.rebuilt, line.encode("utf-8", "replace"))
 
 
 def checksum_bytes(sums: Mapping[str, str]) -> bytes:
-    """Return the list: SHA-256 and path in the folder, by path."""
+    """Return the content of the list: SHA-256 and path in the folder, sorted by path."""
     return "".join(f"{sums[name]}  {name}\n" for name in sorted(sums)).encode("utf-8", "surrogateescape")
 
 
@@ -104,7 +104,7 @@ def hashed(session: SessionFolder, name: str) -> str:
 
 
 def read_checksums(session: SessionFolder) -> dict[str, str]:
-    """Return path in the folder → SHA-256."""
+    """Read the list; return path in the folder → SHA-256."""
     text = read_own(session.checksums, study_root(session.checksums)).decode("utf-8", "surrogateescape")
     checksums: dict[str, str] = {}
     for line in text.splitlines():
@@ -118,7 +118,7 @@ def read_checksums(session: SessionFolder) -> dict[str, str]:
 
 
 def files(session: SessionFolder) -> tuple[str, ...]:
-    """Return the session's files, by path in its folder; not the list itself, a crash's trace, or a system's files."""
+    """Return the paths of the session's files in its folder, without the list itself, crash traces and system files."""
     left_out = {session.checksums.name, session.crash.name}
     return tuple(
         name.as_posix() for name in _paths(session) if name.name not in left_out and not _is_of_the_system(name)
@@ -126,7 +126,7 @@ def files(session: SessionFolder) -> tuple[str, ...]:
 
 
 def system_files(session: SessionFolder) -> tuple[str, ...]:
-    """Return the files of operating systems and of programs that share files, by path; without hidden ones."""
+    """Return the paths of visible files that operating systems or file-sharing programs left in the folder."""
     return tuple(name.as_posix() for name in _paths(session) if _is_of_the_system(name) and not _is_hidden(name))
 
 
@@ -181,7 +181,7 @@ def proof_of(content: bytes) -> str:
 
 
 def checked_line(proof: str, place: str) -> str:
-    """Return a line to print, scan or mail: with two characters that reveal one that was misread."""
+    """Return a line to print, scan or mail, with two check characters that reveal a misread character."""
     return f"{proof}-{_check(proof, place)}  {place}"
 
 
@@ -201,22 +201,22 @@ def note_fingerprint(
 
 
 def place_of(study: StudyFolder, session: SessionFolder) -> str:
-    """Return how a list of fingerprints names a session: its folder in the study's."""
+    """Return the name of a session in a list of fingerprints: its folder relative to the study's."""
     return session.path.relative_to(study.path).as_posix()
 
 
 def listed(path: Path) -> Proofs:
-    """Return fingerprint and session of every line of a list, none without a list; others are left out."""
+    """Return fingerprint and session of each valid line of a list; an absent list is empty."""
     return tuple((match[1], match[3]) for _, match in _matches(_text(path)) if match is not None)
 
 
 def unreadable(path: Path) -> tuple[int, ...]:
-    """Return the numbers of the lines of a list that hold no fingerprint."""
+    """Return the numbers of the lines of a list that are not fingerprints."""
     return tuple(number for number, match in _matches(_text(path)) if match is None)
 
 
 def parsed(path: Path, text: str) -> Proofs:
-    """Return fingerprint and place of every line of a copy with this text, which holds nothing else."""
+    """Return fingerprint and session or record of every line of a copy; raise StoreError for any other line."""
     proofs: list[tuple[str, str]] = []
     for number, match in _matches(text):
         if match is None:

@@ -94,7 +94,7 @@ PARTICIPANTS_2: tuple[Column, ...] = (
 
 
 def with_missing_trials(columns: tuple[Column, ...]) -> tuple[Column, ...]:
-    """Return the columns of sessions in a study with trials of intervals, which may be missing."""
+    """Return the columns of sessions in a study with trials of intervals, in which trials may be missing."""
     with_level = (
         replace(column, levels=(*column.levels, _INCOMPLETE)) if column.name == "status" else column
         for column in columns
@@ -310,7 +310,7 @@ DELIVERED: tuple[Column, ...] = (
     _measure("pace_mps", "RMS speed of the hand, after the lead.", "m/s", sealed=True, later=True),
     _signed("setting", "The level that the participant set; n/a in intervals that were not adjusted."),
 )
-"""What an interval delivered."""
+"""Columns of what was delivered in an interval."""
 
 
 VIDEO: tuple[Column, ...] = (
@@ -336,7 +336,7 @@ VIDEO: tuple[Column, ...] = (
         of_trial="mean",
     ),
 )
-"""What was seen of a video."""
+"""Columns of the video that was shown."""
 
 
 INTERVALS: tuple[Column, ...] = (
@@ -396,7 +396,7 @@ SEALED = frozenset(column.name for column in (*TRIALS_2, *DELIVERED) if column.s
 
 
 def every_column(protocol_format: int = 1, *, intervals: bool = False) -> tuple[Column, ...]:
-    """Return each column of all tables once, in the order of first use; only a study with designs has ``intervals``."""
+    """Return every column of all tables once, in order of use; ``intervals`` adds those of studies with designs."""
     tables = tables_of(protocol_format)
     if intervals:
         tables = tables | {"participants": with_missing_trials(tables["participants"])}

@@ -28,12 +28,12 @@ Row: TypeAlias = dict[str, Any]
 
 
 def guarded(text: str) -> str:
-    """Return a text for a cell, with an apostrophe first where a spreadsheet would compute it."""
+    """Return a cell's text, preceded by an apostrophe if a spreadsheet would evaluate it as a formula."""
     return f"'{text}" if _FORMULA.match(text) else text
 
 
 def unguarded(cell: str) -> str:
-    """Return the text that was `guarded`."""
+    """Return a cell's text without the apostrophe that `guarded` added."""
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
@@ -44,7 +44,7 @@ class _Cells(NamedTuple):
 
 
 def _number(cell: str) -> float:
-    """Return a number; a whole one as a whole number, so that it is written again as it was read."""
+    """Return a cell's number, as int if it has no fraction, so that it is written again exactly as it was read."""
     return int(cell) if re.fullmatch("-?[0-9]{1,15}", cell) else float(cell)
 
 
@@ -84,12 +84,12 @@ class Column:
     of_trial: Literal["sum", "max", "mean"] = "sum"
 
     def value(self, cell: str) -> Any:
-        """Return what a cell holds, None where it is missing.
+        """Return the value of a cell, or None for a missing value.
 
         Raises
         ------
         ValueError
-            The column permits no such cell.
+            The column does not permit this cell.
         """
         if cell == MISSING and self.may_miss:
             return None
@@ -108,7 +108,7 @@ class Column:
 
     @property
     def permitted(self) -> str:
-        """What a cell may be, in words."""
+        """The permitted values, as a phrase for messages."""
         levels = ", ".join(level for level, _ in self.levels)
         text = f"one of {levels}" if levels else _KINDS[self.kind].description
         if self.maximum is not None:
@@ -135,7 +135,7 @@ optional = partial(Column, may_miss=True)
 
 
 def unsealed(columns: tuple[Column, ...]) -> tuple[Column, ...]:
-    """Return the columns that a table has before the key was opened."""
+    """Return the columns that a table has before the key is opened."""
     return tuple(column for column in columns if not column.sealed)
 
 
@@ -145,7 +145,7 @@ def header(columns: tuple[Column, ...]) -> tuple[str, ...]:
 
 
 def csv_bytes(columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]) -> bytes:
-    """Return a table; half a surrogate pair, which no file can hold, becomes a question mark."""
+    """Return a table as CSV in UTF-8; a lone surrogate, which UTF-8 cannot encode, becomes a question mark."""
     names = header(tuple(columns))
     lines = [",".join(names), *(",".join([cell_text(row[name]) for name in names]) for row in rows), ""]
     return "\n".join(lines).encode("utf-8", "replace")
@@ -189,7 +189,7 @@ def cells(table: bytes) -> list[list[str]]:
 
 
 def read_table(table: bytes, columns: Sequence[Column]) -> list[Row]:
-    """Return the rows of a table that `csv_bytes` wrote, in these of its columns; None is what is missing."""
+    """Return the rows of a table written by `csv_bytes`, with the given columns; missing values are None."""
     names, *rows = cells(table)
     places = [(column, names.index(column.name)) for column in columns]
     return [
@@ -198,7 +198,7 @@ def read_table(table: bytes, columns: Sequence[Column]) -> list[Row]:
 
 
 def problems(table: bytes, columns: Sequence[Column]) -> Iterator[str]:
-    """Yield what is wrong with a table, a sentence each; a column's first bad cell stands for all of them."""
+    """Yield a sentence on each problem of a table; of each column only the first bad cell is reported."""
     expected = header(tuple(columns))
     try:
         names, *rows = cells(table)
@@ -225,10 +225,10 @@ def problems(table: bytes, columns: Sequence[Column]) -> Iterator[str]:
 
 
 def in_columns_of(held: bytes, table: bytes, columns: Sequence[Column]) -> tuple[bytes, tuple[Column, ...]]:
-    """Return ``table``, whose columns are ``columns``, with those that the table ``held`` must have; and these columns.
+    """Return ``table`` limited to the columns that the existing table ``held`` must have, and these columns.
 
-    ``held`` may lack later columns, which its version did not write, and ``table`` those that are sealed. Where
-    ``held`` has the same texts without apostrophes, as earlier versions wrote them, it is returned itself.
+    ``held`` may lack later columns, which its version did not write, and ``table`` those that are sealed. If ``held``
+    has the same texts without apostrophes, as earlier versions wrote them, ``held`` is returned.
     """
     names, ours = (content.partition(b"\n")[0].decode("utf-8", "replace").split(",") for content in (held, table))
     present = tuple(column for column in columns if column.name in ours)
@@ -242,12 +242,12 @@ def in_columns_of(held: bytes, table: bytes, columns: Sequence[Column]) -> tuple
 
 
 def write_columns(path: Path, table: np.recarray[Any, Any]) -> None:
-    """Write a table of named columns as CSV, every number to its last digit; either the whole file or nothing.
+    """Write a table of named columns as CSV in full precision; either the whole file or nothing.
 
     Raises
     ------
     StudyError
-        A number is not finite, or the file cannot be written; one that was there is untouched.
+        A number is not finite, or the file cannot be written; an existing file is untouched.
     """
     names = table.dtype.names or ()
     for name in names:
@@ -261,7 +261,7 @@ def write_columns(path: Path, table: np.recarray[Any, Any]) -> None:
 
 
 def csv_text_of(rows: Iterable[Iterable[Any]]) -> str:
-    """Return rows of cells, the first the columns' names, as CSV: comma, one line feed a record."""
+    """Return rows of cells, beginning with the header, as CSV text with commas and line feeds."""
     text = io.StringIO(newline="")
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()

@@ -19,21 +19,21 @@ from study_app.protocol.trials.tasks import AnyTask, Follow
 from study_app.psychophysics.delivery import Times, Vectors, at, damping, difference, lag, motion, share
 
 FORCES: Final = ("device_force_n", "force_n")
-"""The force sent to the hand, and that of the force model."""
+"""The fields of the force sent to the hand and of the force of the model."""
 DAMPING: Final = "damping_nspm"
 SETTLED_S: Final = 0.2
-"""Time after the fade-in from which a task without a lead is evaluated [s]."""
+"""Time after the fade-in at which the evaluation of a task without a lead begins [s]."""
 FELT_N: Final = 0.05
-"""RMS of a force below which it has no error: people do not feel it."""
+"""RMS of a force below which no error is computed, since people do not feel it [N]."""
 TRUE_HALF_S: Final = 0.018
-"""Half width of the filter [s] whose motion the error of a force is taken on: a longer one misses what the loop adds to
-the motion, a shorter one takes encoder counts for motion."""
+"""Half width of the filter of the motion on which a force's error is computed [s]. A longer one removes motion that the
+loop adds; a shorter one keeps encoder noise."""
 LONGEST_S: Final = 0.26
-"""The longest lag of a force that is searched: the longest delay with the longest jitter, plus a margin [s]."""
+"""Longest lag of a force that is searched for: the longest delay with the longest jitter, plus a margin [s]."""
 JUDGED: Final = np.dtype(
     [(name, SAMPLE[name]) for name in ("time_ns", "position_m", "force_n", "device_force_n", "limiters")]
 )
-"""The fields of a sample for computing the delivered level."""
+"""The fields of a sample from which the delivered level is computed."""
 Broken: TypeAlias = tuple[str, float, float]
 """A measured column that breaks a limit, its value and the limit, both in the limit's unit: ms or percent."""
 # Columns of a trial's row and the protocol's limit for each.
@@ -45,11 +45,11 @@ _JUDGED = (
     ("worst_frame_gap_ms", "frame_gap_ms"),
     ("withheld_share", "withheld_percent"),
 )
-_LEAST = "targets_reached"  # judged by "targets_percent": the only measure with a least value
+_LEAST = "targets_reached"  # limited by "targets_percent"; the only measure with a lower limit
 
 
 def judged(samples: Any) -> Any:
-    """Return the fields `JUDGED` of samples (n,): a third of the bytes."""
+    """Return the fields `JUDGED` of samples (n,), a third of their size."""
     rows = np.empty(len(samples), JUDGED)
     for name in JUDGED.fields or ():
         rows[name] = samples[name]
@@ -58,7 +58,7 @@ def judged(samples: Any) -> Any:
 
 @dataclass(frozen=True, slots=True, repr=False, kw_only=True)
 class Delivered:
-    """What an interval delivered; names and meanings are those of the columns of ``intervals``.
+    """The delivered values of an interval; names and meanings are those of the columns of ``intervals``.
 
     ``clipped`` is whether the force limit, or saturated motors, cut what was judged.
     """
@@ -71,7 +71,7 @@ class Delivered:
 
     @property
     def columns(self) -> dict[str, float | None]:
-        """What the interval's row records of it."""
+        """The values that the interval's row records."""
         return {name: value for name, value in asdict(self).items() if name != "clipped"}
 
 
@@ -169,7 +169,7 @@ def _lag_s(times_s: Times, sent_n: Vectors, model_n: Vectors, from_s: float, per
 
 
 def _plausible(samples: Any) -> Any:
-    """Return samples without rejected positions."""
+    """Return the samples without rejected positions."""
     glitches = samples["limiters"] & LIMITER_GLITCH != 0
     return samples[~glitches] if glitches.any() else samples
 
@@ -184,14 +184,14 @@ def delay_error_ms(presented: Stimulated, summary: Mapping[str, Any]) -> float |
 
 
 def varies_damping(presented: Stimulated) -> bool:
-    """Return whether the varied number is the damping of a linear law, which can be measured at the hand."""
+    """Return whether the varied quantity is the damping of a linear law, which can be measured at the hand."""
     return (presented.vary or "").rpartition(".")[2] == DAMPING
 
 
 def undelivered(
     limits: Limits, presented: Stimulated, task: AnyTask, delivery: Delivered, *, adjusted: bool = False
 ) -> Iterator[str]:
-    """Yield the keys of the file's limits that an interval breaks: reasons without a number.
+    """Yield the key of each limit in the study's file that an interval breaks.
 
     Of an ``adjusted`` interval the share of the force that was sent is judged, for any varied number.
     """
@@ -200,7 +200,7 @@ def undelivered(
         fitted = varies_damping(presented) and not adjusted
         measured = delivery.value_delivered if fitted else delivery.force_share
         requested = presented.value if fitted else 1.0
-        if abs((measured or 0.0) - requested) > abs(requested) * most / 100:  # nothing was delivered to a hand at rest
+        if abs((measured or 0.0) - requested) > abs(requested) * most / 100:  # a hand at rest receives no force
             yield "level_error_percent"
     if presented.vary not in {None, DELAY} and most is not None and delivery.clipped:
         yield "force_limit_n"
@@ -213,7 +213,7 @@ def undelivered(
 def missed(
     limits: Limits, due: Presentation, holds: Sequence[bool], errors_ms: Sequence[float | None], rate_hz: float
 ) -> Iterator[str]:
-    """Yield the key of the limit that a whole trial breaks: the delays of its intervals do not differ as requested.
+    """Yield the key of the limit that a trial breaks if the delays of its intervals do not differ as requested.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def missed(
 
 
 def within_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> bool | None:
-    """Return whether a trial's measured columns are within the protocol's limits, by size; None without measurements.
+    """Return whether a trial's measured columns are within the protocol's limits; None without measurements.
 
     ``limits`` are those of the journal's first line, or ``Limits`` of a protocol as a mapping.
     """
@@ -247,7 +247,7 @@ def within_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> b
 
 
 def beyond_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> tuple[Broken, ...]:
-    """Return which of a trial's measured columns break a limit: the column's name, its value and the limit.
+    """Return name, value and limit of each measured column of a trial that breaks its limit.
 
     Value and limit are in the limit's unit, ms or percent.
     """

@@ -44,7 +44,7 @@ class Draft:
 
 
 class Keeper:
-    """Writes the draft of one study at most `REST_S` after an edit, even if edits continue.
+    """Write the draft of one study at most `REST_S` after an edit, even if edits continue.
 
     ``others`` counts the drafts of other programs that were stored as versions.
     """
@@ -59,7 +59,7 @@ class Keeper:
         self._due_s = 0.0
 
     def take(self, draft: Draft) -> None:
-        """Continue with an existing draft."""
+        """Continue from an existing draft."""
         self._own = draft.text
 
     def edited(self, text: str, selected: Selection, now_s: float) -> None:
@@ -99,7 +99,7 @@ class Keeper:
         return True
 
     def saved(self, base: str) -> None:
-        """Delete the draft, whose text was saved. If it cannot be deleted it stays due; `write` reports why.
+        """Delete the draft after its text was saved. If that fails, deletion stays due and `write` reports why.
 
         The draft of another program stays.
         """
@@ -134,7 +134,7 @@ def keep(file: Path, draft: Draft) -> None:
 
 
 def draft_of(file: Path) -> Draft | None:
-    """Return the draft of a study's file; None if there is no readable one."""
+    """Return the draft of a study's file, or None if there is no readable draft."""
     try:
         kept: Any = parse_json(_draft_file(file).read_bytes())
         selected = tuple(step for step in kept["selected"] if isinstance(step, str | int))
@@ -158,12 +158,12 @@ def drafted_files() -> tuple[Path, ...]:
 
 
 def draft_files() -> tuple[Path, ...]:
-    """Return the files of drafts."""
+    """Return the paths of all draft files."""
     return tuple((data_folder() / "drafts").glob("*.json"))
 
 
 def unsaved_files(folder: Path) -> tuple[Path, ...]:
-    """Return the files in a folder that have a draft and were never saved."""
+    """Return the study files in a folder that exist only as a draft."""
     whole = folder.resolve()
     return tuple(file for file in drafted_files() if file.parent == whole and not file.exists())
 

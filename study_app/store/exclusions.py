@@ -27,7 +27,7 @@ MISSING_RULE = "missing"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exclusion:
-    """One session, or one trial of it, that is left out; a row of ``exclusions.csv``."""
+    """An excluded session or trial; a row of ``exclusions.csv``."""
 
     participant: str
     session: int
@@ -124,7 +124,7 @@ def include(
     Raises
     ------
     StoreError
-        It is not left out, ``by`` or ``reason`` is empty, or a file cannot be read or written.
+        It is not excluded, ``by`` or ``reason`` is empty, or a file cannot be read or written.
     """
     by, reason = readable(by, reason, "reversing an exclusion needs a name and a reason")
     study = StudyFolder(folder)
@@ -147,7 +147,7 @@ def include(
 
 
 def exclusions(folder: Path) -> tuple[Exclusion, ...]:
-    """Return the exclusions of the study in ``folder``, in the order of the decisions.
+    """Return the exclusions of the study in ``folder``, in the order in which they were decided.
 
     Raises
     ------
@@ -238,6 +238,6 @@ def _check_there(study: StudyFolder, participant: str, session: int, trial: int 
 
 
 def named(row: Exclusion) -> str:
-    """Return a description of the exclusion."""
+    """Return a description of the excluded session or trial, for messages."""
     trial = "" if row.trial is None else f", trial {row.trial}"
     return f"participant {row.participant}, session {row.session}{trial}"

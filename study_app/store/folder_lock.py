@@ -38,14 +38,14 @@ from study_app.store.atomic import (
 from study_app.store.journals import journal
 
 _MARKER = re.compile(r"\.open-[0-9a-f]{8}\.json")
-SAME_S = 0.05  # processes of one number that began within this time are the same one
+SAME_S = 0.05  # processes with the same ID that began within this time are the same process
 _BEFORE_THE_FIRST_LINE = ("receipt.json", "journal.jsonl")
-_NO_PROGRAM_TAKES_S = 3600.0  # to put its marker into a folder that it has created, or to take that folder away
+_NO_PROGRAM_TAKES_S = 3600.0  # time in which a program marks a folder that it created, or removes it
 
 
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """A folder that this program has open until ``release``, or the end of a ``with`` block."""
+    """A folder locked by this program until ``release`` or the end of a ``with`` block."""
 
     marker: Path
 
@@ -88,7 +88,7 @@ def open_alone(folder: Path) -> Opening:
 
 
 def create_opened(folder: Path) -> Opening | None:
-    """Create ``folder``, locked for this program from the start; None if it exists and is not empty."""
+    """Create ``folder``, locked by this program from the start; return None if it exists and is not empty."""
     opening = Opening(folder / f".open-{secrets.token_hex(4)}.json")
     try:
         created = create_folder(folder, {opening.marker.name: json.dumps(_this_program()).encode()})
@@ -120,14 +120,14 @@ def refuse_if_open(folder: Path) -> None:
 
 
 def never_begun(path: Path) -> bool:
-    """Return whether the session's folder ``path`` is there without a line of a journal, or anything later than that.
+    """Return whether the session folder ``path`` exists without a line in its journal or any file written later.
 
-    A receipt that tells of the session's end, or that it was resumed, is later than that.
+    A receipt with the session's end or a resumption is a later file.
 
     Raises
     ------
     StoreError
-        The system does not let us look.
+        The system denies access.
     """
     if not is_there(path):
         return False
@@ -149,12 +149,12 @@ def never_begun(path: Path) -> bool:
 
 
 def abandoned(path: Path) -> bool:
-    """Return whether the session's folder ``path`` was claimed and never begun, by a program that is gone."""
+    """Return whether a program that has ended claimed the session folder ``path`` without beginning the session."""
     return never_begun(path) and not is_open(path)
 
 
 def take_over(path: Path) -> Opening | None:
-    """Have the session's folder ``path`` for this program alone and empty it; None where it was begun, or is open."""
+    """Lock and empty the session folder ``path``; return None if it was begun or another program has it open."""
     if not abandoned(path):
         return None
     opening = open_alone(path)
@@ -175,12 +175,12 @@ def take_over(path: Path) -> Opening | None:
 
 
 def sweep_claims(participant: Path) -> None:
-    """Take away what programs that are gone left in a participant's folder as they claimed a session or let go of it.
+    """Remove what ended programs left in a participant's folder while they claimed or released a session.
 
-    Without a program's marker its owner is unknown; then only what is older than any such moment.
+    Without a marker the owner is unknown; then only folders older than any such operation are removed.
     """
     for half in temporaries(participant):
-        with contextlib.suppress(OSError):  # it has just become a session, or is gone
+        with contextlib.suppress(OSError):  # it was begun or removed in the meantime
             old = time.time() - half.stat().st_mtime > _NO_PROGRAM_TAKES_S
             if half.is_dir() and (old or markers(half)) and not is_open(half):  # in this order: markers come
                 shutil.rmtree(half, ignore_errors=True)
@@ -194,7 +194,7 @@ def _is_open(marker: Path, holder: dict[str, Any]) -> StoreError:
 
 
 def _holder(marker: Path) -> dict[str, Any]:
-    """Return the content of the marker; nothing if it was removed meanwhile."""
+    """Return the content of a marker, empty if it was removed in the meantime."""
     try:
         holder = parse_json(marker.read_bytes())
     except FileNotFoundError:
@@ -214,7 +214,7 @@ def _this_program() -> dict[str, Any]:
 
 
 def _lives(holder: dict[str, Any]) -> bool:
-    """Return whether the program that wrote a marker may still run; always true for another machine."""
+    """Return whether the program that wrote a marker may still run; always True for another machine."""
     if holder.get("gone"):
         return False
     if holder.get("host") != platform.node() or not isinstance(holder.get("pid"), int):
@@ -222,12 +222,12 @@ def _lives(holder: dict[str, Any]) -> bool:
     try:
         began = process_began(holder["pid"])
         return began is not None and abs(began - float(holder["began"])) < SAME_S
-    except (PermissionError, KeyError, TypeError, ValueError):  # it runs, but may be another process
+    except (PermissionError, KeyError, TypeError, ValueError):  # a process with this ID runs, but may be another one
         return True
 
 
 def process_began(process: int) -> float | None:
-    """Return when the running process of that number began; None if none runs."""
+    """Return the start time of the process with this ID [s since the epoch], or None if it does not run."""
     import psutil  # noqa: PLC0415 - slow to load: only where a folder is locked
 
     try:

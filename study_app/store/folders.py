@@ -37,7 +37,7 @@ _SESSION_FOLDER = re.compile(r"ses-([0-9]{2})")
 
 
 class _Within:
-    """A file or folder of a fixed name in the folder ``path`` of its owner."""
+    """Descriptor of a file or folder with a fixed name in its owner's folder ``path``."""
 
     def __init__(self, *names: str) -> None:
         self._names = names
@@ -48,22 +48,22 @@ class _Within:
 
 @dataclass(frozen=True, slots=True)
 class SessionFolder:
-    """One participant's one session."""
+    """The folder of one session of one participant."""
 
     path: Path
     participant: str
     number: int
 
     journal = _Within("journal.jsonl")
-    """What happened, line by line."""
+    """The journal: one line per event."""
     receipt = _Within("receipt.json")
-    """What ran: protocol, seed, versions, device, hashes."""
+    """The receipt: protocol, seed, versions, device, hashes."""
     checksums = _Within("checksums.sha256")
-    """SHA-256 of every file, when the session had ended."""
+    """SHA-256 of every file at the session's end."""
     rebuilt = _Within(REBUILT)
     """When and why checksums or fingerprint were made again after the session had ended."""
     crash = _Within("crash.txt")
-    """Where the program stood when it crashed; there while the session runs, and after a crash."""
+    """The stack trace of a crash; it exists while the session runs and after a crash."""
     recordings = _Within("recordings")
     """Samples and frames of the trials."""
 
@@ -76,20 +76,20 @@ class SessionFolder:
 
 @dataclass(frozen=True, slots=True)
 class StudyFolder:
-    """The results of one study."""
+    """The results folder of one study."""
 
     path: Path
 
     description = _Within("dataset_description.json")
     """The Psych-DS description of every column."""
     ignore = _Within(".psychds-ignore")
-    """What a validator of Psych-DS need not look at."""
+    """Paths that validators of Psych-DS ignore."""
     exclusions = _Within("exclusions.csv")
-    """What is left out of the analysis, by whom and why."""
+    """Exclusions from the analysis, by whom and why."""
     reversed_exclusions = _Within("exclusions_reversed.jsonl")
-    """The exclusions that were taken back, by whom and why."""
+    """Reversed exclusions, by whom and why."""
     fingerprints = _Within(FINGERPRINTS)
-    """A line for every session that ended: what tells it from any other."""
+    """The fingerprint of every session that ended."""
     withdrawals = _Within("withdrawals.jsonl")
     """A tombstone for each participant whose data were erased."""
     blinding = _Within("blinding")
@@ -100,7 +100,7 @@ class StudyFolder:
     """The folder of the participants' entries in the allocation to groups."""
 
     def allocation(self, entry: int, group: str | None = None, replacement: str | None = None) -> Path:
-        """Return the file of an entry: in the allocation or a pre-existing ``group``, of a ``replacement`` (an ID)."""
+        """Return the file of an entry in the allocation or a pre-existing ``group``; ``replacement`` is an ID."""
         parts = (group, f"{entry:03d}", replacement)
         return self.allocated / f"{'-'.join(part for part in parts if part is not None)}.json"
 
@@ -114,7 +114,7 @@ class StudyFolder:
         return self.data / f"study-{study}_description-participants_data.csv"
 
     def session(self, participant: str, number: int) -> SessionFolder:
-        """Return where that session lies or would lie."""
+        """Return the folder of a session, which need not exist."""
         return SessionFolder(self.data / f"sub-{participant}" / f"ses-{number:02d}", participant, number)
 
     def sessions(self) -> tuple[SessionFolder, ...]:
@@ -136,12 +136,12 @@ class StudyFolder:
 
 
 def check_study_name(name: object) -> str:
-    """Return the name of a study in a file of the results, if a protocol can have it.
+    """Return ``name`` if a protocol can have it as the study's name.
 
     Raises
     ------
     ValueError
-        No protocol has such a name, and no file may be called by it.
+        A study cannot have this name, nor can its files.
     """
     if not isinstance(name, str) or not STUDY_NAME.fullmatch(name):
         raise ValueError("no study has this name")
@@ -149,7 +149,7 @@ def check_study_name(name: object) -> str:
 
 
 def locate(path: Path) -> tuple[StudyFolder, SessionFolder]:
-    """Return the study and the session whose folder ``path`` is.
+    """Return the study folder and session folder of the session in ``path``.
 
     Raises
     ------
@@ -169,17 +169,17 @@ def locate(path: Path) -> tuple[StudyFolder, SessionFolder]:
 
 
 def study_folder(results: Path, study: str, *, pilot: bool = False) -> StudyFolder:
-    """Return the folder of ``study`` under ``results``; pilot sessions have one of their own."""
+    """Return the folder of ``study`` under ``results``; pilot sessions have their own."""
     return StudyFolder(results / (f"{study}-pilot" if pilot else study))
 
 
 def rehearsal_folder(results: Path, study: str) -> Path:
-    """Return a folder for a rehearsal that does not exist yet, apart from every participant's data."""
+    """Return a new path for the folder of a rehearsal, separate from participants' data."""
     return _free(results, f"{study}-rehearsal")
 
 
 def kept_pilot_folder(results: Path, study: str) -> Path:
-    """Return a folder for a pilot that was played and is kept; each has a key, and so a folder, of its own."""
+    """Return a new path for the folder of a stored pilot; each pilot has its own key and therefore its own folder."""
     return _free(results, f"{study}-pilot")
 
 
@@ -192,12 +192,12 @@ def _free(results: Path, name: str) -> Path:
 
 
 def readable(by: str, reason: str, why: str) -> tuple[str, str]:
-    """Return a name and a reason as they are kept with the data: with single spaces.
+    """Return a person's name and a reason as stored with the data, with single spaces.
 
     Raises
     ------
     StoreError
-        One is empty (``why`` says what they are needed for), or holds what cannot be printed.
+        One is empty (``why`` says what they are needed for) or contains unprintable characters.
     """
     for name, text in (("by", by), ("reason", reason)):
         if not text.strip():

@@ -43,7 +43,7 @@ class Site:
 
 @dataclass(frozen=True, slots=True)
 class Merged:
-    """A merged study: its folder, the study's name, the SHA-256 of the one protocol that all sites ran, the sites."""
+    """A merged study: its folder, name and sites, and the SHA-256 of the protocol that all sites ran."""
 
     path: Path
     study: str
@@ -52,7 +52,7 @@ class Merged:
 
     @property
     def manifest(self) -> Path:
-        """The list of sites."""
+        """The path of the list of sites."""
         return self.path / MANIFEST
 
     @property
@@ -65,7 +65,7 @@ class Merged:
         return self.path / FOLDER / site
 
     def content(self) -> bytes:
-        """Return ``sites.json``."""
+        """Return the content of ``sites.json``."""
         held = {
             "format": FORMAT,
             "study": self.study,
@@ -76,7 +76,7 @@ class Merged:
 
 
 def read_merged(folder: Path) -> Merged | None:
-    """Return the merged study in ``folder``; None where it is none.
+    """Return the merged study in ``folder``, or None if it is not one.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def _is_site(site: Site) -> bool:
 
 
 def _refuse_links(merged: Merged) -> None:
-    """Reject a folder of a site that lies elsewhere: it would be read as if it were the copy."""
+    """Raise an error if a site's folder is a link: the files elsewhere would be read as if they were the copy."""
     for folder in map(merged.folder, merged.names):
         if not (real := _real(folder)).is_relative_to(_real(merged.path)):
             raise StoreError(
@@ -121,12 +121,12 @@ def _refuse_links(merged: Merged) -> None:
 
 
 def _real(path: Path) -> Path:
-    """Return a path without links; a loop of links, for which `Path.resolve` raises RuntimeError, stays."""
+    """Return a path with links resolved; a loop of links, for which `Path.resolve` raises RuntimeError, is kept."""
     return Path(os.path.realpath(path))
 
 
 def folders_of(folder: Path) -> dict[str, Path]:
-    """Return the results folders in ``folder`` by what precedes their IDs: "A-" of site A, "" where it is not merged.
+    """Return the results folders in ``folder`` by the prefix of their IDs: "A-" for site A, "" if it is not merged.
 
     Raises
     ------
@@ -159,7 +159,7 @@ def own_place(folder: Path, participant: str) -> tuple[Path, str]:
 
 
 def session_in(folder: Path, participant: str, number: int) -> SessionFolder:
-    """Return where a session lies or would lie, in a merged study by the participant's ID with the site.
+    """Return the folder of a session, which need not exist; in a merged study the participant's ID includes the site.
 
     Raises
     ------
@@ -171,7 +171,7 @@ def session_in(folder: Path, participant: str, number: int) -> SessionFolder:
 
 
 def all_exclusions(folder: Path) -> tuple[Exclusion, ...]:
-    """Return what is left out of a study, merged or not.
+    """Return the exclusions of a study, merged or not.
 
     Raises
     ------
@@ -193,19 +193,19 @@ def all_exclusions(folder: Path) -> tuple[Exclusion, ...]:
 
 
 def sessions_in(folders: Iterable[Path]) -> tuple[SessionFolder, ...]:
-    """Return the sessions of some results folders."""
+    """Return the sessions in the given results folders."""
     return tuple(session for folder in folders for session in StudyFolder(folder).sessions())
 
 
 def merged_above(folder: Path) -> Path | None:
-    """Return the merged study of which ``folder`` is a copy of a site; None where it is none."""
+    """Return the merged study that contains ``folder`` as the copy of a site, or None."""
     place = _real(folder)
     inside = place.parent.name == FOLDER and (place.parents[1] / MANIFEST).is_file()
     return place.parents[1] if inside else None
 
 
 def refuse_merged(folder: Path) -> None:
-    """Refuse to run sessions in a merged study, or in its copy of a site."""
+    """Raise an error for a merged study or its copy of a site, in which no sessions can run."""
     if (folder / MANIFEST).is_file():
         raise StoreError(f"{folder} is a merged study, which holds copies: run sessions in the folder of a site")
     if (above := merged_above(folder)) is not None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 MISSING_PERCENT: Final = "missing_percent"
-"""The key in ``[limits]`` of the share of a session's trials that may be missing."""
+"""The key in ``[limits]`` of the percentage of a session's trials that may be missing."""
 REASONS: Final[Mapping[str, str]] = {
     "lateness_ms": "the servo was late",
     "worst_gap_ms": "the servo missed ticks",
@@ -22,13 +22,13 @@ REASONS: Final[Mapping[str, str]] = {
     "pace_error_percent": "the hand did not keep the pace",
     "force_limit_n": "the force limit was reached",
 }
-"""Why a presentation was invalid, by the key of the limit that it broke."""
+"""The reason why a presentation is invalid, by the key of the limit that it broke."""
 _UNITS: Final = {"percent": "%", "ms": "ms", "n": "N"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissingTrial:
-    """A main trial that nobody answered; ``broken`` are the limits that its presentations broke, by their keys."""
+    """A main trial without an answer; ``broken`` has the keys of the limits that its presentations broke."""
 
     trial: int
     block: str
@@ -38,7 +38,7 @@ class MissingTrial:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissingTrials:
-    """The missing trials of a session, of ``asked`` main trials of intervals that are over.
+    """The missing trials of a session, out of ``asked`` main trials of intervals that are over.
 
     ``limits`` are the study's, as the session recorded them. One that an earlier version of the program recorded does
     not state how many trials may be missing, and is never incomplete.
@@ -50,7 +50,7 @@ class MissingTrials:
 
     @property
     def count(self) -> int:
-        """How many trials are missing."""
+        """The number of missing trials."""
         return len(self.missing)
 
     @property
@@ -71,11 +71,11 @@ class MissingTrials:
 
     @property
     def brief(self) -> str:
-        """How many trials are missing, for a narrow place: "26 of 40 not delivered"; empty if none is."""
+        """The number of missing trials as a short text: "26 of 40 not delivered"; empty if none is missing."""
         return f"{self.count} of {self.asked} not delivered" if self.missing else ""
 
     def __str__(self) -> str:
-        """Return how many trials are missing, and why, as a sentence without a full stop; empty if none is."""
+        """Return number and reasons of the missing trials as a sentence without full stop; empty if there are none."""
         return missing_words(self.count, self.asked, self.reasons, self.limits) if self.missing else ""
 
 
@@ -100,7 +100,7 @@ def missing_words(count: int, asked: int, reasons: Mapping[str, int], limits: Ma
 
 
 def limit_words(limit: str, limits: Mapping[str, float]) -> str:
-    """Return why a presentation that broke a limit was invalid, with the limit: "frames were late (limit 250 ms)"."""
+    """Return the reason for which a presentation was invalid, with the limit: "frames were late (limit 250 ms)"."""
     reason = REASONS.get(limit, limit)
     unit = _UNITS.get(limit.rpartition("_")[2], "")
     return f"{reason} (limit {limits[limit]:g} {unit})" if limit in limits else reason

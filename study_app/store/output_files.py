@@ -33,17 +33,17 @@ NAME: Final = "outputs.jsonl"
 
 
 class FileCopy(NamedTuple):
-    """A file to copy in parts, since it may be larger than the memory, and the SHA-256 that it must have."""
+    """A file to copy in parts, since it may exceed the memory, with its expected SHA-256."""
 
     source: Path
     sha256: str
 
 
 def write_files(to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, ...]:
-    """Put ``files`` (name to content) into the folder ``to``, which is created; replace older files.
+    """Write ``files`` (name → content) into the folder ``to``, which is created; replace older files.
 
-    All are written under temporary names and flushed to the disk before the first takes its name, so that a full disk
-    changes nothing. Old temporary files of killed programs there are removed at the end.
+    All are written under temporary names and flushed before the first is renamed, so that a full disk changes
+    nothing. Old temporary files of killed programs there are removed at the end.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def write_files(to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, 
 
 
 def _parts(copied: FileCopy) -> Iterator[bytes]:
-    """Yield the content of a file to copy; its errors name it, not the folder that is written."""
+    """Yield the content of a file to copy in parts; errors name this file, not the folder that is written."""
     digest = hashlib.sha256()
     try:
         with open_regular(copied.source) as file:
@@ -117,12 +117,12 @@ class Output:
 
     @property
     def paths(self) -> tuple[Path, ...]:
-        """Those of its files that are still there."""
+        """The files of this output that still exist."""
         return tuple(path for name in self.files if (path := self.to / name).is_file())
 
 
 def write_output(study: Path, to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, ...]:
-    """Write ``files`` of the results in ``study`` into the folder ``to`` (as `write_files`), and note where they are.
+    """Write ``files`` made from the results in ``study`` into the folder ``to``, as `write_files`, and list them.
 
     Raises
     ------
@@ -132,14 +132,14 @@ def write_output(study: Path, to: Path, files: Mapping[str, bytes | FileCopy]) -
     written = write_files(to, files)
     at = datetime.now().astimezone().isoformat(timespec="seconds")
     line = {"study": str(study.resolve()), "to": str(to.resolve()), "at": at, "files": [*files]}
-    with contextlib.suppress(StoreError, OSError):  # the files are there; a list that cannot be written stops nobody
+    with contextlib.suppress(StoreError, OSError):  # the outputs exist; failing to write the list is not an error
         data_folder().mkdir(parents=True, exist_ok=True)
         append_line(data_folder() / NAME, json.dumps(line).encode() + b"\n", waits=False)
     return written
 
 
 def outputs(study: Path) -> tuple[Output, ...]:
-    """Return the noted outputs of a study's results, one for each folder and set of files, the newest last."""
+    """Return the listed outputs of a study's results, one for each folder and set of files, the newest last."""
     latest: dict[tuple[str, tuple[str, ...]], Output] = {}
     try:
         lines = (data_folder() / NAME).read_bytes().splitlines()
@@ -151,13 +151,13 @@ def outputs(study: Path) -> tuple[Output, ...]:
             if held["study"] == str(study.resolve()):
                 names = tuple(map(str, held["files"]))
                 latest[held["to"], names] = Output(Path(held["to"]), str(held["at"]), names)
-        except (ValueError, KeyError, TypeError):  # a torn line
+        except (ValueError, KeyError, TypeError):  # a partly written line
             continue
     return tuple(latest.values())
 
 
 def erase_outputs(study: Path, within: Path) -> tuple[tuple[Path, ...], tuple[Output, ...]]:
-    """Delete the noted outputs of a study below the folder ``within``; return the files, and the outputs elsewhere."""
+    """Delete a study's listed outputs below the folder ``within``; return these files, and the outputs elsewhere."""
     erased: list[Path] = []
     elsewhere: list[Output] = []
     for output in outputs(study):

@@ -19,12 +19,12 @@ from study_app.user_folder import user_folder
 MOST_BYTES: Final = 250_000
 KEPT: Final = 2  # files besides the newest
 OMITTED: Final = "…"
-DEVICE_FAILED: Final = "the device failed: %s"  # an error for support; the session reports it itself, and continues
+DEVICE_FAILED: Final = "the device failed: %s"  # support needs it as an error; the session reports it and continues
 _ERROR: Final = re.compile(rf"\S+ \S+ (ERROR|CRITICAL|\S+ \S+ {DEVICE_FAILED.partition('%')[0]})")
 
 
 class PlainFormatter(logging.Formatter):
-    """Writes a record without its arguments."""
+    """Format log records without their arguments."""
 
     def __init__(self) -> None:
         super().__init__("%(asctime)s %(levelname)s %(name)s: %(message)s")
@@ -61,7 +61,7 @@ def log_file() -> Path:
 
 
 def keep_log() -> None:
-    """Write the program's log to `log_file` from now on, and warnings still to the terminal."""
+    """Start writing the program's log to `log_file`; warnings still go to the terminal."""
     logger = logging.getLogger("study_app")
     if any(isinstance(handler, _Quiet) for handler in logger.handlers):
         return
@@ -76,20 +76,20 @@ def keep_log() -> None:
 
 
 def kept_log() -> str:
-    """Return the log, the oldest line first, without unreadable files."""
+    """Return the log of all readable files, oldest line first."""
     newest = log_file()
     files = [newest.with_name(f"{newest.name}.{number}") for number in range(KEPT, 0, -1)]
     return "".join(map(_read, (*files, newest)))
 
 
 def last_error(log: str) -> str:
-    """Return the last error in a log, a device's failure included, with the lines that belong to it; "" without one."""
+    """Return the last error in a log, or failure of a device, with the lines that belong to it; "" if there is none."""
     records = re.split(r"\n(?! )", log.strip("\n"))
     return next((record for record in reversed(records) if _ERROR.match(record)), "")
 
 
 def source_place(path: str) -> str:
-    """Return a source file relative to its package: the folder of the installation may contain the user's name."""
+    """Return the path of a source file relative to its package: the installation's path may contain the user's name."""
     parts = Path(path).parts
     for root in ("study_app", "site-packages"):
         if root in parts:

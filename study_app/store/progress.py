@@ -91,7 +91,7 @@ class Progress:
 
     @property
     def unconfirmed(self) -> dict[tuple[int, int], dict[str, events.Answer]]:
-        """The choices without a confirmation, by trial and attempt."""
+        """The unconfirmed choices, by trial and attempt."""
         choices = dict(self._left_open)
         chosen = {item: answer for item, answer in self.answers.items() if answer.given}
         if self.trial is not None and chosen:
@@ -100,9 +100,9 @@ class Progress:
 
     @property
     def missing_trials(self) -> MissingTrials:
-        """The main trials of intervals that were not delivered, and how many are over."""
+        """The main trials of intervals that were not delivered, with the number of those that are over."""
         limits = {} if self.start is None else self.start.limits
-        here = self.trial if self.invalid < limits.get("attempts", 1) else None  # it is presented again
+        here = self.trial if self.invalid < limits.get("attempts", 1) else None  # the current trial is presented again
         missing = tuple(
             MissingTrial(
                 trial=number,
@@ -117,7 +117,7 @@ class Progress:
 
     @property
     def reached_end(self) -> bool:
-        """Whether the session reached its last page, with all trials delivered or not."""
+        """Whether the session reached its last page, even if trials are missing."""
         return self.ended in events.REACHED_END
 
     def take(self, line: events.Event) -> None:
@@ -180,7 +180,7 @@ class Progress:
         self.t_s = max(self.t_s, at_s)
 
     def _confirm(self, line: events.Responses | events.FormAnswered) -> None:
-        """Take the answers of a trial or a form as confirmed."""
+        """Record the answers of a trial or form as confirmed."""
         of = (line.form, line.after) if isinstance(line, events.FormAnswered) else line.trial
         self.answered[of] = len(line.items)
         if isinstance(line, events.Responses) and line.items and line.trial == self.of_intervals:
@@ -191,7 +191,7 @@ class Progress:
         self._leave()
 
     def _go_to(self, page: str | None, trial: int | None) -> None:
-        """Go to a step, unless it is the current one, which is then shown again."""
+        """Go to a step; the current step is shown again instead."""
         if (self.page, self.trial) != (page, trial):
             if (self.page, self.trial) != (None, None):
                 self._leave()
@@ -212,7 +212,7 @@ class Progress:
         self.trial_since_s = self.trial_lasted_s = None
 
     def _start_trial(self, line: events.TrialStarted) -> None:
-        """Present a trial, perhaps again; an earlier one is repeated if its whole block is."""
+        """Present a trial, perhaps again; an earlier trial means that its whole block is repeated."""
         trial = line.trial
         self._go_to(None, trial)
         self._drop_answers()
@@ -252,7 +252,7 @@ class Progress:
         self.resumed += 1
         self._reason = "program ended"
         self.paused, self.broke, self.trial_since_s, self.trial_lasted_s = False, "", None, None
-        self.outlets_lost = {}  # they were opened again
+        self.outlets_lost = {}  # the questions were opened again
         self.here_since_s += gap_s
         self.away_s += gap_s
 
@@ -272,7 +272,7 @@ def progress_of(lines: Sequence[events.Event]) -> Progress:
     Raises
     ------
     StoreError
-        They do not begin as a session's do.
+        The first line is not that of a session.
     """
     events.start_of(lines)
     now = Progress()
@@ -306,7 +306,7 @@ def trial_results(protocol: Protocol, lines: Iterable[events.Event]) -> tuple[Tr
 
 
 def recordable(lines: Iterable[events.Event]) -> list[events.Which]:
-    """Return trial, attempt and interval of all planned or existing recordings; the interval is None for a trial."""
+    """Return trial, attempt and interval of every expected or existing recording; the interval is None for a trial."""
     return [
         line.which
         for line in lines
@@ -316,5 +316,5 @@ def recordable(lines: Iterable[events.Event]) -> list[events.Which]:
 
 
 def named(trial: int, attempt: int, interval: int | None) -> str:
-    """Return the words for an attempt: "trial 3, attempt 1", in a trial of intervals with the interval."""
+    """Return the name of an attempt: "trial 3, attempt 1", followed by the interval in a trial of intervals."""
     return f"trial {trial}, attempt {attempt}" + ("" if interval is None else f", interval {interval}")

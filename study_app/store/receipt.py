@@ -45,7 +45,7 @@ FIELDS = (
 
 
 def without_conditions(protocol: Protocol) -> dict[str, Any]:
-    """Return the protocol as a JSON value without what blinding hides; blocks say their codes and what they compare."""
+    """Return the protocol as a JSON value without blinded parts; blocks contain their codes and compared attributes."""
     shown = protocol.model_dump(
         mode="json",
         exclude={
@@ -62,7 +62,7 @@ def without_conditions(protocol: Protocol) -> dict[str, Any]:
         table["compares"] = protocol.compared_in(name)
         if block.design is not None:
             ordered = order_of(protocol, block)
-            asks = f"{name}/answer"  # no questionnaire of a file has such a name
+            asks = f"{name}/answer"  # a name that no questionnaire of a study can have
             table |= {"order": ordered.order, "slots": list(ordered.slots), "questionnaire": asks}
             shown["questionnaires"][asks] = protocol.design_questions[name].model_dump(mode="json")
     return shown
@@ -79,7 +79,7 @@ def versions() -> dict[str, str]:
 
 
 def plug_ins_of(protocol: Protocol, device: str, outlets: Iterable[str]) -> list[dict[str, str]]:
-    """Return the plug-ins that a session uses: by its protocol, its device and the titles of its outlets."""
+    """Return the plug-ins that a session uses for its protocol, device and outlets (by title)."""
     sinks = registry("outlet")
     asked = [
         *(("task", task.kind) for task in protocol.tasks.values()),
@@ -94,7 +94,7 @@ def plug_ins_of(protocol: Protocol, device: str, outlets: Iterable[str]) -> list
 
 
 def recorded_plug_ins(receipts: Iterable[Path]) -> dict[str, list[str]]:
-    """Return the plug-ins that receipts name: kinds and names by package and version."""
+    """Return kinds and names of the plug-ins in receipts, by package and version."""
     by_package: dict[str, set[str]] = {}
     for path in receipts:
         with suppress(StoreError, KeyError, TypeError):
@@ -107,7 +107,7 @@ def recorded_plug_ins(receipts: Iterable[Path]) -> dict[str, list[str]]:
 
 @cache
 def library_version(library: str) -> str:
-    """Return the version of a library; its description is read from the disk once."""
+    """Return the version of a library; its metadata are read from the disk once."""
     try:
         return metadata.version(library)
     except metadata.PackageNotFoundError:
@@ -121,7 +121,7 @@ def write(path: Path, receipt: Mapping[str, Any]) -> None:
 
 
 def digest(held: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of a receipt, or of one of its entries in ``resumed``, without what changes later."""
+    """Return the SHA-256 of a receipt, or of one entry of its ``resumed``, without the fields that change later."""
     lasting = {name: value for name, value in held.items() if name not in CHANGING}
     return hashlib.sha256(json.dumps(plain(lasting), sort_keys=True).encode()).hexdigest()
 
@@ -147,7 +147,7 @@ def read(path: Path) -> dict[str, Any]:
 
 
 def began_at(receipt: Mapping[str, Any]) -> str | None:
-    """Return when a person began a session, as ISO 8601; None if the receipt does not contain it.
+    """Return the time when a person began a session, as ISO 8601; None if the receipt does not contain it.
 
     A pilot played from a later step begins with steps answered by a simulated participant, and is resumed at once, at
     the time when it is played.
@@ -158,7 +158,7 @@ def began_at(receipt: Mapping[str, Any]) -> str | None:
 
 
 def other_format(receipt: Mapping[str, Any], start: SessionStarted) -> bool:
-    """Return whether the journal that begins with the line ``start`` has another format than its receipt says."""
+    """Return whether the journal that begins with ``start`` has another format than its receipt."""
     return bool(receipt.get("format", 1) != (start.format or 1))
 
 

@@ -28,10 +28,10 @@ if TYPE_CHECKING:
     from study_app.store.recordings import Written
     from study_app.video.frames import VideoFrame
 
-ROOM = 120_000  # capacity of the queue in samples: two minutes at 1 kHz, 37 MB
-ENOUGH = 5_000  # least number of samples for which the thread wakes
-PATIENCE_S = 30.0  # how long the end of a session waits for the disk
-LEAVING_S = 2.0  # the same without an end of the session: ending the program must not be delayed
+ROOM = 120_000  # capacity of the queue [samples]: two minutes at 1 kHz, 37 MB
+ENOUGH = 5_000  # smallest number of queued samples that wakes the thread
+PATIENCE_S = 30.0  # time that the end of a session waits for the disk [s]
+LEAVING_S = 2.0  # the same when the program ends during a session, which must not take long [s]
 
 
 Kept: TypeAlias = Recorded | RecordingLost
@@ -50,7 +50,7 @@ class _End:
 
 
 class Recorder:
-    """Writes the recordings of one session, one trial at a time: `start`, `append` and `frame`, `stop`.
+    """Write the recordings of one session, one trial at a time: `start`, `append` and `frame`, `stop`.
 
     All but `close` return at once; use it from one thread.
 
@@ -146,7 +146,7 @@ class Recorder:
                 self.changed.notify_all()
 
     def frame(self, painted_ns: int, sample_ns: int, video: VideoFrame | None = None) -> None:
-        """Record the times when a frame was painted and that it shows [ns, the servo's clock], with a ``video``."""
+        """Record when a frame was painted and the time it shows [ns, servo clock], and the frame of a ``video``."""
         if self._underway is not None:
             seen = (-1, 0, None) if video is None else (video.number, video.due_ns, video.age_ns)
             self._frames.extend((painted_ns, sample_ns, *seen[:2], -1 if seen[2] is None else seen[2]))
@@ -162,12 +162,12 @@ class Recorder:
 
     @property
     def dropped(self) -> int:
-        """Number of samples dropped from the running or last recording."""
+        """The number of samples dropped from the running or last recording."""
         return self._dropped
 
     @property
     def lost(self) -> tuple[RecordingLost, ...]:
-        """All recordings that could not be stored so far, updated as soon as one is lost."""
+        """All recordings lost so far, updated as soon as one is lost."""
         with self.changed:
             return tuple(self._lost)
 
@@ -178,7 +178,7 @@ class Recorder:
         return completed
 
     def settled(self) -> bool:
-        """End the running recording; return without waiting whether all is on the disk, or the time limit has passed.
+        """End the running recording; return, without waiting, whether it is written or the time limit has passed.
 
         Then `close` returns at once.
         """
@@ -194,7 +194,7 @@ class Recorder:
             self.changed.notify_all()
 
     def close(self, patience_s: float = PATIENCE_S) -> None:
-        """End the running recording and wait, for a limited time, until all is on the disk; `kept` reports it."""
+        """End the running recording and wait at most ``patience_s`` until it is written; `kept` reports it."""
         self._end(patience_s)
         if self.thread is not None:
             self.thread.join(max(0.0, min(patience_s, self._patient_until_s - time.monotonic())))
@@ -207,7 +207,7 @@ class Recorder:
         return self.thread is not None and self.thread.is_alive()
 
     def _work(self) -> None:
-        """Write all queued data, in the recorder's thread; the next trial restarts it after a failure."""
+        """Write queued data; runs in the recorder's thread, which the next trial restarts after a failure."""
         try:
             self._write()
         except BaseException as error:
@@ -216,7 +216,7 @@ class Recorder:
             raise
 
     def _lose_all(self, reason: str) -> None:
-        """Count everything that is being written or waits as lost; the caller holds the lock."""
+        """Count all running and queued recordings as lost; the caller holds the lock."""
         failed = [lost(which, reason) for which in self._expected]
         self._kept += failed
         self._lost += failed
@@ -226,10 +226,10 @@ class Recorder:
         self.changed.notify_all()
 
     def _write(self) -> None:
-        """Work through the queue until it is empty and closed."""
+        """Process the queue until it is empty and closed."""
         while (begin := self._next()) is not None:
             if not isinstance(begin, _Begin):
-                continue  # of a trial that was lost with an earlier thread
+                continue  # data of a trial that was lost with an earlier thread
             kept = self._record(begin)
             with self.changed:
                 if begin.which in self._expected:
@@ -238,12 +238,12 @@ class Recorder:
                     if isinstance(kept, RecordingLost):
                         self._lost.append(kept)
                     self.changed.notify_all()
-                else:  # `close` gave it up: no file without a line of the journal
+                else:  # `close` has given up: a file without a line in the journal must not remain
                     for path in recording_files(self._folder, *begin.which):
                         path.unlink(missing_ok=True)
 
     def _record(self, begin: _Begin) -> Kept:
-        """Write one trial's files; the queue is then past the trial's end, even if they were not written."""
+        """Write one trial's files; on return the queue is past the trial's end, even after a failure."""
         samples_path, frames_path = recording_files(self._folder, *begin.which)
         trial, attempt, interval = begin.which
         facts = {**self._facts, "trial": trial, "attempt": attempt}
@@ -262,7 +262,7 @@ class Recorder:
             shown = self._files.write_frames(frames_path, frames, facts, seconds, self._secret)
             return recorded(begin.which, file.finish(end.dropped), shown, end.dropped)
         except Exception as error:  # noqa: BLE001 - whatever it is, the next trial's recording is still to be written
-            with contextlib.suppress(Exception):  # a check of the folder reports files that cannot be removed either
+            with contextlib.suppress(Exception):  # `verify` reports files that cannot be removed
                 if shown is not None:
                     shown.path.unlink(missing_ok=True)
             if end is None:
@@ -272,7 +272,7 @@ class Recorder:
             return lost(begin.which, reason)
 
     def _give_samples(self, take: Callable[[Any], object]) -> _End:
-        """Give the queued samples of a trial to ``take``; return the trial's end, an empty one without it."""
+        """Pass the queued samples of a trial to ``take``; return the trial's end, or an empty one if it is missing."""
         while (thing := self._next()) is not None:
             if isinstance(thing, _End):
                 return thing
@@ -280,7 +280,7 @@ class Recorder:
         return _End(array("q"), 0)
 
     def _next(self) -> Any:
-        """Wait for the next thing in the queue; None when it is closed and empty."""
+        """Wait for the next item of the queue and return it; None when the queue is closed and empty."""
         with self.changed:
             while not self._queue and not self._closing:
                 self.changed.wait()
@@ -294,7 +294,7 @@ class Recorder:
 
 
 def recorded(which: Which, samples: Written, frames: Written, dropped: int) -> Recorded:
-    """Return the journal's line about a recording that is complete; files by their path in the session's folder."""
+    """Return the journal's event for a complete recording; files are given by their path in the session's folder."""
     trial, attempt, interval = which
     return Recorded(
         trial=trial,
@@ -313,7 +313,7 @@ def recorded(which: Which, samples: Written, frames: Written, dropped: int) -> R
 
 
 def lost(which: Which, reason: str) -> RecordingLost:
-    """Return the journal's line about a recording that could not be stored."""
+    """Return the journal's event for a recording that could not be stored."""
     trial, attempt, interval = which
     return RecordingLost(trial=trial, attempt=attempt, interval=interval, reason=reason)
 

@@ -63,12 +63,12 @@ NO_VIDEO = {"video_frame": -1, "video_ns": 0, "video_age_ns": -1}
 FACTS_KEY = b"liquid_study"
 _VIDEO_SINCE = 4
 """First format of recordings whose frames have numbers and times of a video."""
-GROUP_SECONDS = 30  # rows of so many seconds are compressed together
+GROUP_SECONDS = 30  # seconds of rows that are compressed together
 _COMPRESSION = ("zstd", 9)
 
 
 def _columns(field: SampleField) -> list[Column]:
-    """Return the columns that a recording has of a field of ``layout.SAMPLE``."""
+    """Return the columns of a recording that store a field of ``layout.SAMPLE``."""
     kind: Kind = "flag" if field.stored is np.bool_ else "integer" if issubclass(field.stored, np.integer) else "number"
     meanings = [field.meaning.replace("*", meaning) for meaning in field.parts.values()] or [field.meaning]
     return [
@@ -86,7 +86,7 @@ _STORED = {
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """A file that is complete on the disk, and of a sealed one the SHA-256 that it has once it is opened."""
+    """A complete recording on the disk; for a sealed one, also the SHA-256 of the opened file."""
 
     path: Path
     rows: int
@@ -95,7 +95,7 @@ class Written:
 
 
 class SealedRecording(StoreError):
-    """A recording that nobody can read before the study is unblinded."""
+    """A recording that cannot be read before the study is unblinded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +138,7 @@ def read_samples(path: Path, secret: bytes | None = None) -> Any:
 
 
 def read_frames(path: Path, secret: bytes | None = None) -> Any:
-    """Return the frames (n,) as a recarray of `FRAME`: when painted, of which moment, and what of a video [ns].
+    """Return the frames (n,) as a recarray of `FRAME`: times of painting, of the shown sample and of a video [ns].
 
     Raises
     ------
@@ -153,13 +153,13 @@ def read_frames(path: Path, secret: bytes | None = None) -> Any:
 
 
 def read_facts(path: Path, secret: bytes | None = None) -> dict[str, Any]:
-    """Return the file's metadata, without reading its rows: facts, ``kind``, ``rows``."""
+    """Return the file's metadata without reading its rows: facts, ``kind`` and ``rows``."""
     with _opened(path, secret) as file:
         return _facts(path, file.metadata)
 
 
 def read_written(path: Path, secret: bytes | None = None) -> Written:
-    """Return what the journal tells of a recording that is on the disk."""
+    """Return path, row count and checksums of a recording on the disk."""
     rows = read_facts(path, secret)["rows"]
     content = read_regular(path)
     file_hash, opened = (hashlib.sha256(it).hexdigest() for it in (content, opened_content(path, content, secret)))
@@ -188,7 +188,7 @@ def crcs(forces: NDArray[np.float64], rows: int) -> list[int]:
 
 
 def opened_content(path: Path, content: bytes, secret: bytes | None) -> bytes:
-    """Return the content of a recording; a sealed one is opened with the secret of the key (else StoreError)."""
+    """Return the content of a recording, opened with the key's ``secret`` if it is sealed (StoreError without one)."""
     if not content.startswith(MARK):
         return content
     if secret is None:
@@ -200,7 +200,7 @@ def opened_content(path: Path, content: bytes, secret: bytes | None) -> bytes:
 
 @contextlib.contextmanager
 def _opened(path: Path, secret: bytes | None) -> Iterator[Any]:
-    """Open a recording as Parquet; errors of reading it are StoreErrors."""
+    """Open a recording as Parquet, converting read errors to StoreError."""
     try:
         with parquet.ParquetFile(pa.BufferReader(opened_content(path, read_regular(path), secret))) as file:
             yield file
@@ -228,7 +228,7 @@ def _read(path: Path, kind: str, secret: bytes | None) -> tuple[dict[str, NDArra
 
 
 def _are_of(table: pa.Table, columns: Sequence[str], rows: int) -> bool:
-    """Return whether a table has these columns and no others, each once and whole."""
+    """Return whether a table has exactly these columns, each once and with all rows."""
     expected = {name: _STORED[name] for name in columns}
     held = {field.name: field.type for field in table.schema}
     return (
@@ -265,7 +265,7 @@ def _facts(path: Path, metadata: Any) -> dict[str, Any]:
 
 
 def _check_facts_of_samples(facts: Mapping[str, Any], rows: int) -> None:
-    """Reject facts that must be numbers and are not (KeyError, TypeError or ValueError)."""
+    """Raise KeyError, TypeError or ValueError if a fact that must be a number is not."""
     if rows and "first_device_force_n" not in facts:
         raise KeyError("first_device_force_n")
     checks = facts["crc32"]
@@ -279,7 +279,7 @@ def _check_facts_of_samples(facts: Mapping[str, Any], rows: int) -> None:
 
 
 class SamplesFile:
-    """A recording being written: in memory until ``finish``, and sealed with a ``secret`` then."""
+    """A recording in progress: in memory until ``finish``, which seals it if there is a ``secret``."""
 
     def __init__(self, path: Path, facts: Mapping[str, Any], rate_hz: float, secret: bytes | None = None) -> None:
         self.path = path
@@ -296,7 +296,7 @@ class SamplesFile:
         self._effect: list[int] = []
 
     def write(self, samples: Any) -> None:
-        """Add the next samples (array of ``SAMPLE``); whole groups of them are written."""
+        """Add the next samples (array of ``SAMPLE``); complete row groups are written."""
         self._held.append(samples)
         self.taken += len(samples)
         self._count += len(samples)
@@ -315,7 +315,7 @@ class SamplesFile:
         self.rows += len(samples)
 
     def finish(self, dropped: int = 0) -> Written:
-        """Close the file and put it in its place; ``dropped`` samples are known to be missing."""
+        """Complete the file and write it to its path; ``dropped`` is the number of missing samples."""
         if self._count:
             self._write_group(np.concatenate(self._held))
         checks = {"rows": self.check_rows, "device_force": self._device, "effect_force": self._effect}
@@ -328,7 +328,7 @@ class SamplesFile:
 def write_frames(
     path: Path, frames: NDArray[np.int64], facts: Mapping[str, Any], seconds: float = 0.0, secret: bytes | None = None
 ) -> Written:
-    """Write what was shown (n, 5): when painted, of which moment, and number, time and age of a video's frame [ns].
+    """Write the shown frames (n, 5): time painted, time shown, and number, time and age of the video frame [ns].
 
     With a ``secret`` they are sealed, into a size that follows from the ``seconds`` of the recording.
     """
@@ -341,9 +341,9 @@ def write_frames(
 
 
 def sample_columns(samples: Any) -> dict[str, NDArray[Any]]:
-    """Return the columns of ``samples`` as they are kept: times and positions exact, the rest rounded."""
+    """Return the columns of ``samples`` as recorded: times and positions exact, other fields rounded."""
     columns: dict[str, NDArray[Any]] = {}
-    with np.errstate(invalid="ignore", over="ignore"):  # values of a fault are stored unchanged
+    with np.errstate(invalid="ignore", over="ignore"):  # non-finite values of a fault are stored unchanged
         for field in RECORDED:
             values = _rounded(_rows(samples, field.name), field.step)
             if field.beside:
@@ -365,7 +365,7 @@ def _rounded(values: NDArray[Any], step: float) -> NDArray[Any]:
 
 
 class _Half:
-    """A Parquet file in memory, until it is whole: half an hour takes 60 MB."""
+    """A Parquet file in memory until it is complete: half an hour takes 60 MB."""
 
     def __init__(self, path: Path, columns: Sequence[Column]) -> None:
         self._path = path
@@ -383,7 +383,7 @@ class _Half:
 
     def write(self, columns: Mapping[str, NDArray[Any]]) -> None:
         arrays = []
-        for field in self._schema:  # without a copy, and without the library that Arrow would load to look at them
+        for field in self._schema:  # without a copy, and without the library that Arrow would load to inspect them
             values = columns[field.name]
             packs = pa.types.is_boolean(field.type)
             kept = np.packbits(values, bitorder="little") if packs else np.ascontiguousarray(values)
@@ -391,7 +391,7 @@ class _Half:
         self._writer.write_batch(pa.RecordBatch.from_arrays(arrays, schema=self._schema))
 
     def finish(self, facts: Mapping[str, Any], rows: int, size: int, secret: bytes | None) -> Written:
-        """Write the file in one step; with a ``secret`` sealed, so that no opened file ever is on the disk."""
+        """Write the file in one step, sealed if there is a ``secret``, so that an opened file is never on the disk."""
         self._writer.add_key_value_metadata({FACTS_KEY: json.dumps(facts, ensure_ascii=False)})
         self._writer.close()
         content = self._file.getvalue()

@@ -18,7 +18,7 @@ _NAME: Final = re.compile(r"[a-z][a-z0-9]*")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
-    """The sessions that were run with one content of a study's file, counted by what they were.
+    """The numbers of sessions, by type, that were run with one content of a study's file.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Run:
 
     @property
     def protocol(self) -> Mapping[str, Any] | None:
-        """The protocol of the receipt; None where it cannot be read any more."""
+        """The protocol in the receipt; None if it can no longer be read."""
         try:
             held = None if self.receipt is None else receipt.read(self.receipt).get("protocol")
         except StoreError:
@@ -54,7 +54,7 @@ class Run:
 
 
 def runs(results: Path, study: str) -> tuple[Run, ...]:
-    """Return every content of a study that sessions were run with, the newest last.
+    """Return the contents of a study's file with which sessions were run, the newest last.
 
     Nothing is read but receipts; no sealed key. A receipt that cannot be read is left out (`verify` reports it).
 
@@ -85,7 +85,7 @@ def runs(results: Path, study: str) -> tuple[Run, ...]:
 
 
 def run_of(path: Path) -> Run | None:
-    """Return the content that the session of a receipt was run with; None where the receipt cannot be read."""
+    """Return the content with which the session of a receipt was run; None if the receipt cannot be read."""
     try:
         return _run(path, path.stat().st_mtime_ns)
     except (StoreError, OSError):
@@ -109,7 +109,7 @@ def _run(path: Path, _changed_ns: int) -> Run:
 
 
 def recorded_items(known: Iterable[Run]) -> dict[tuple[str, str], int]:
-    """Return how many sessions of participants were asked each item, by its questionnaire and id."""
+    """Return the number of participants' sessions in which each item was asked, by questionnaire and id."""
     counts: dict[tuple[str, str], int] = {}
     for run in known:
         held = run.protocol if run.sessions else None
@@ -120,13 +120,13 @@ def recorded_items(known: Iterable[Run]) -> dict[tuple[str, str], int]:
 
 
 def source_of(run: Run) -> str | None:
-    """Return the text of a content that was run, with its liquid files; None where no copy is kept."""
+    """Return the text with which sessions were run, including its liquid files; None if no copy is stored."""
     content = kept_content(run.hash)
     return None if content is None else content.decode("utf-8", "replace")
 
 
 def keep_what_was_run(file: Path, known: Iterable[Run]) -> None:
-    """Keep the file's content where sessions were run with it, before another program can change it.
+    """Store the file's content if sessions were run with it, before another program can change it.
 
     Raises
     ------

@@ -12,7 +12,7 @@ from study_app.user_folder import data_folder
 
 
 def kept_original(file: Path) -> str:
-    """Return the name of the study that a study was copied from; "" if it is not known to be a copy."""
+    """Return the name of the study from which a study was copied; "" if it is not known to be a copy."""
     try:
         kept: Any = parse_json(_kept_file(file).read_bytes())
     except (OSError, ValueError):
@@ -27,7 +27,7 @@ def keep_original(file: Path, copy_of: str = "") -> None:
         if copy_of:
             write_whole(_kept_file(file), json.dumps({"file": str(file.resolve()), "copy_of": copy_of}).encode())
         else:
-            _kept_file(file).unlink(missing_ok=True)  # of another study that had this file
+            _kept_file(file).unlink(missing_ok=True)  # left by another study with this path
 
 
 def _kept_file(file: Path) -> Path:

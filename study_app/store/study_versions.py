@@ -15,13 +15,13 @@ from study_app.store.folder_lock import open_alone
 from study_app.user_folder import data_folder
 
 Origin: TypeAlias = Literal["saved", "found", "draft"]
-"""Saved here, found in the file when it was saved over, or the draft of another program that had the study open."""
+"""Saved by this program, found in the file when it was overwritten, or the draft of another program."""
 _ORIGINS: Final = frozenset({"saved", "found", "draft"})
 
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """A content of a study's file that is kept by its hash; ``at`` is ISO 8601 with the time zone."""
+    """A stored content of a study's file, identified by its hash; ``at`` is ISO 8601 with the time zone."""
 
     hash: str
     origin: Origin
@@ -29,7 +29,7 @@ class Kept:
 
 
 class ChangedOutsideError(StoreError):
-    """The file is not the one that was edited; nothing was written."""
+    """Another program has changed the file since it was read; nothing was written."""
 
 
 def content_hash(content: bytes) -> str:
@@ -38,12 +38,12 @@ def content_hash(content: bytes) -> str:
 
 
 def file_key(file: Path) -> str:
-    """Return the name under which the data folder holds what belongs to a study's file."""
+    """Return the key of a study's file in the user's data folder."""
     return content_hash(str(file.resolve()).encode("utf-8", "surrogatepass"))[:32]
 
 
 def save(file: Path, text: str, base: str) -> str:
-    """Write a study's file in one step and return its hash; its previous content is kept (`kept_content`).
+    """Write a study's file in one step and return its hash; the previous content is stored (`kept_content`).
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def save(file: Path, text: str, base: str) -> str:
             keep_version(file, content, "found")
         elif base:
             raise ChangedOutsideError(f"{file} was deleted or moved by another program: save it as another study")
-        keep_version(file, source, "saved")  # first: what fails after the file is written would look as if it were not
+        keep_version(file, source, "saved")  # first: an error after the file was written would suggest that it was not
         write_whole(target, source)
         if mode is not None:
             target.chmod(mode)
@@ -82,7 +82,7 @@ def save(file: Path, text: str, base: str) -> str:
 
 
 def keep_version(file: Path, content: bytes, origin: Origin) -> None:
-    """Keep the content of a study's file by its hash and list it (`kept_versions`); a listed content is not changed.
+    """Store a content of a study's file by its hash and list it (`kept_versions`); a listed content is not changed.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def keep_version(file: Path, content: bytes, origin: Origin) -> None:
 
 
 def kept_versions(file: Path) -> tuple[Kept, ...]:
-    """Return the contents of a study's file that are kept, the oldest first; lines that cannot be read are left out."""
+    """Return the stored contents of a study's file, the oldest first; unreadable lines are left out."""
     try:
         lines = _list_file(file).read_bytes().splitlines()
     except OSError:
@@ -115,7 +115,7 @@ def kept_versions(file: Path) -> tuple[Kept, ...]:
 
 
 def keep_content(content: bytes) -> None:
-    """Keep one content of a study's file by its hash.
+    """Store a content of a study's file by its hash.
 
     Raises
     ------
@@ -128,7 +128,7 @@ def keep_content(content: bytes) -> None:
 
 
 def kept_content(hash_: str) -> bytes | None:
-    """Return the content of a hash; None where none was kept, or it was changed since."""
+    """Return the stored content with this hash; None if it was not stored or has changed since."""
     try:
         content = _content_file(hash_).read_bytes()
     except OSError:
@@ -150,7 +150,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
 @contextlib.contextmanager
 def _alone(file: Path) -> Iterator[None]:
-    """Let no other program save the file meanwhile."""
+    """Lock the file so that no other program saves it."""
     folder = data_folder() / "saving" / file_key(file)
     make_folder(folder, waits=False)
     try:

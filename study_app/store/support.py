@@ -21,7 +21,7 @@ NAME: Final = "liquid-study-support.zip"
 CRASHES: Final = 3
 _DRIVERS: Final = ("pyusb", "libusb-package", "hidapi")
 _PRIVATE: Final = frozenset({"operator", "firmware", "workspace", "recent", "camera", "proofs", "stamps", "stamp_root"})
-"""Initials, paths that may name a person, and an address that may contain a password."""
+"""Settings with initials, paths that may name a person, or an address that may contain a password."""
 _PLACE: Final = re.compile(r'^ *(File "[^"]*", line \d+ in \S+|<no Python frame>)$')
 _HEADING: Final = re.compile(
     r"^(Fatal Python error: [\w \-]+|(Current thread|Thread) 0x[0-9a-f]+ \(most recent call first\):)$"
@@ -69,13 +69,13 @@ def _parts(diagnosis: str) -> Iterator[tuple[str, str]]:
 
 
 def _settings(settings: workstation.MachineSettings) -> dict[str, object]:
-    """Return the settings; of private ones whether they are set."""
+    """Return the settings; private ones only as whether they are set."""
     held = settings.model_dump(mode="json", exclude={"benches": {"__all__": {"report"}}})
     return {name: bool(value) if name in _PRIVATE else value for name, value in held.items()}
 
 
 def _crashes(results: Path) -> Iterator[str]:
-    """Yield the newest traces of crashes of the sessions in ``results``, line by line what is a place in the source."""
+    """Yield the lines with source locations of the newest crash traces of the sessions in ``results``."""
     traces = []
     for path in results.glob("*/data/sub-*/ses-*/crash.txt"):
         try:

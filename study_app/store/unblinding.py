@@ -39,12 +39,12 @@ from study_app.store.tables.study_files import (
 
 RULE: Final = "catch"
 RULES: Final = (RULE, MISSING_RULE)
-"""The rules that exclude sessions; a person decides every other exclusion."""
+"""The automatic rules that exclude sessions; every other exclusion is decided by a person."""
 
 
 @dataclass(frozen=True, slots=True)
 class Unblinded:
-    """What was opened.
+    """The result of unblinding a study.
 
     Attributes
     ----------
@@ -62,14 +62,14 @@ class Unblinded:
 
 
 def unblind(folder: Path, by: str, reason: str) -> Unblinded:
-    """Open a study's key, record who did so and why, and write the sealed columns into its tables.
+    """Open a study's key, record who opened it and why, and write the sealed columns into its tables.
 
     A table that differs from its journal is not changed, nor is a session that runs or cannot be read.
 
     Raises
     ------
     StoreError
-        As `blinding.reveal`, or another program writes to the folder; then nothing has changed.
+        As for `blinding.reveal`, or another program writes to the folder; nothing has changed.
     """
     study = StudyFolder(folder)
     with open_alone(folder) if is_there(study.key) else contextlib.nullcontext():
@@ -96,7 +96,7 @@ def unblind(folder: Path, by: str, reason: str) -> Unblinded:
 
 
 def is_unblinded(folder: Path) -> bool:
-    """Return whether `unblind` was called and came to its end: its last step describes the sealed columns.
+    """Return whether `unblind` was completed: its last step describes the sealed columns.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def is_unblinded(folder: Path) -> bool:
 
 
 def unblind_folder(folder: Path, by: str, reason: str) -> dict[str, Unblinded]:
-    """Open the key of a study, or of each site of a merged one, by what precedes the site's participants ("A-" or "").
+    """Open the key of a study, or of each site of a merged study; return results by the prefix of IDs ("A-" or "").
 
     Raises
     ------
@@ -128,7 +128,7 @@ def unblind_folder(folder: Path, by: str, reason: str) -> dict[str, Unblinded]:
 
 
 def decided_late(folder: Path, rows: Sequence[Exclusion]) -> tuple[Exclusion, ...]:
-    """Return the exclusions that a person decided or reversed after the key was opened; none of a merged study."""
+    """Return the exclusions decided or reversed by a person after the key was opened; none for a merged study."""
     opened_at = min(filter(None, (_moment(reveal["at"]) for reveal in reveals(folder))), default=None)
     dated = (*((row, row.excluded_at) for row in rows if row.rule_or_person not in RULES), *dated_reversals(folder))
     times = ((row, _moment(text)) for row, text in dated)  # reveals are recorded in whole seconds
@@ -136,13 +136,13 @@ def decided_late(folder: Path, rows: Sequence[Exclusion]) -> tuple[Exclusion, ..
 
 
 def _moment(text: str) -> datetime | None:
-    with contextlib.suppress(ValueError):  # `verify` names it
+    with contextlib.suppress(ValueError):  # `verify` reports it
         return datetime.fromisoformat(text).astimezone()
     return None
 
 
 def reveals_of(folder: Path) -> tuple[dict[str, str], ...]:
-    """Return the recorded reveals of a study; those of a merged one say of which ``site`` they are.
+    """Return the recorded reveals of a study; in a merged study each has its ``site``.
 
     Raises
     ------
@@ -157,7 +157,7 @@ def reveals_of(folder: Path) -> tuple[dict[str, str], ...]:
 
 
 def all_opened(folder: Path) -> bool:
-    """Return whether the key of a study, or the keys of all sites of a merged one, were opened.
+    """Return whether the key of a study, or the keys of all sites of a merged study, were opened.
 
     Raises
     ------
@@ -168,10 +168,10 @@ def all_opened(folder: Path) -> bool:
 
 
 def exclude_inattentive(folder: Path) -> tuple[Exclusion, ...]:
-    """Exclude the sessions that answered too many catch trials incorrectly; return what was added.
+    """Exclude the sessions with too many incorrect answers to catch trials; return the added exclusions.
 
-    A session that is excluded already, or was included again by a person, keeps that decision; one that runs is not
-    judged. The study's key must be open.
+    A session that is already excluded, or was included again by a person, keeps this decision; running sessions are
+    not judged. The study's key must be open.
     """
     study, key = StudyFolder(folder), read_key(folder)
     decided = {row.what[:2] for row in exclusions(folder) if row.trial is None}
@@ -181,7 +181,7 @@ def exclude_inattentive(folder: Path) -> tuple[Exclusion, ...]:
         if (session.participant, session.number) in decided or is_open(session.path):
             continue
         reason = ""
-        with contextlib.suppress(StoreError, KeyError, TypeError, ValueError, AttributeError):  # `verify` names damage
+        with contextlib.suppress(StoreError, KeyError, TypeError, ValueError, AttributeError):  # `verify` names it
             reason = "; ".join(_missed(session, key))
         if reason:
             added.append(exclude(folder, session.participant, session.number, by=RULE, reason=reason))
@@ -189,7 +189,7 @@ def exclude_inattentive(folder: Path) -> tuple[Exclusion, ...]:
 
 
 def _missed(session: SessionFolder, key: Key) -> Iterator[str]:
-    """Yield the number of incorrect answers to catch trials of each block with too many."""
+    """Yield a phrase with the number of incorrect answers to catch trials for each block with too many."""
     published = receipt.read(session.receipt)["protocol"]
     if not any("catch" in block for block in published["blocks"].values()):
         return
@@ -221,7 +221,7 @@ def _open_tables(study: StudyFolder, session: SessionFolder, key: Key) -> list[s
 
 
 def _rewrite(place: Place, lines: list[Event], key: Key) -> list[str]:
-    """Write the sealed columns and open the recordings; a table stays without columns unknown to its version."""
+    """Write the sealed columns and open the recordings; a table gets no columns that its version did not have."""
     left: list[str] = []
     ours: dict[str, tuple[str, str]] = {}
     before, after = (dict(table_files(place, lines, reader)) for reader in (None, key))
@@ -250,7 +250,7 @@ def _rewrite(place: Place, lines: list[Event], key: Key) -> list[str]:
 
 
 def _recordings(place: Place, lines: list[Event], key: Key) -> Iterator[tuple[Path, tuple[str, str]]]:
-    """Yield each file that was sealed when it was recorded, with its SHA-256 sealed and opened."""
+    """Yield each file that was recorded sealed, with its SHA-256 before and after it is opened."""
     for line in opened(lines, key):
         if isinstance(line, Recorded) and line.opened_sha256 and line.opened_frames_sha256:
             yield place.folder.path / line.recording, (line.sha256, line.opened_sha256)
@@ -258,7 +258,7 @@ def _recordings(place: Place, lines: list[Event], key: Key) -> Iterator[tuple[Pa
 
 
 def _open_recording(path: Path, hashes: tuple[str, str], key: Key) -> None:
-    """Replace a sealed recording by the opened one; one that is opened already stays."""
+    """Replace a sealed recording by the opened one; an opened recording is left unchanged."""
     from study_app.store.recordings import opened_content  # noqa: PLC0415 - loads the Parquet library
 
     content = read_own(path, study_root(path.parent))
@@ -270,7 +270,7 @@ def _open_recording(path: Path, hashes: tuple[str, str], key: Key) -> None:
 
 
 def _open_study(study: StudyFolder) -> None:
-    """Bring the table of participants and the description up to date."""
+    """Update the participants table and the description."""
     name = described_study(study)
     if name is not None:
         write_participants(study, name)

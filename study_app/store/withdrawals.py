@@ -48,7 +48,7 @@ RESULTS: Final = "results"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ErasedSession:
-    """What proves which session was erased."""
+    """The hashes that identify an erased session."""
 
     session: int
     begun: str
@@ -69,7 +69,7 @@ class Tombstone:
 
 @dataclass(frozen=True, slots=True)
 class Withdrawn:
-    """What a withdrawal did.
+    """The result of a withdrawal.
 
     Attributes
     ----------
@@ -165,7 +165,7 @@ def withdraw(
 
 
 def tombstones(study: StudyFolder) -> dict[str, Tombstone]:
-    """Return the withdrawals of a study by participant, in the order in which they were made.
+    """Return the tombstones of a study by participant, in order of withdrawal.
 
     Raises
     ------
@@ -182,7 +182,7 @@ def tombstones(study: StudyFolder) -> dict[str, Tombstone]:
 
 
 def describe_session(session: SessionFolder) -> ErasedSession:
-    """Return what proves which session this is, as far as its files can be read."""
+    """Return the hashes that identify a session, as far as its files can be read."""
     try:
         with open_regular(session.journal) as file:
             first = file.readline()
@@ -203,7 +203,7 @@ def add_tombstone(study: StudyFolder, tombstone: Tombstone) -> None:
 
 
 def proof_of_withdrawal(tombstone: Tombstone) -> tuple[str, str]:
-    """Return the fingerprint of a withdrawal, and what lists of fingerprints call it."""
+    """Return the fingerprint of a withdrawal and its name in lists of fingerprints."""
     return proof_of(json.dumps(asdict(tombstone)).encode()), f"withdrawals.jsonl/sub-{tombstone.participant}"
 
 
@@ -228,7 +228,7 @@ def _parsed(path: Path, number: int, line: bytes) -> Tombstone:
 
 
 def _found(study: StudyFolder, also: Iterable[Path]) -> tuple[list[StudyFolder], list[StudyFolder]]:
-    """Return the study folders below ``also``, without the study's own, and the Psych-DS exports of the study."""
+    """Return copies of the study below ``also`` that contain sessions, and Psych-DS exports of the study."""
     by_path: dict[Path, StudyFolder] = {}
     for folder in also:
         if not folder.is_dir():
@@ -243,14 +243,14 @@ def _found(study: StudyFolder, also: Iterable[Path]) -> tuple[list[StudyFolder],
 
 
 def _name(study: StudyFolder) -> str | None:
-    """Return the name of the study that a dataset is of, None where its description is not of this program."""
+    """Return the name of a dataset's study, or None if its description is not of this program."""
     with suppress(StoreError):
         return described_study(study)
     return None
 
 
 def _tombstone(study: StudyFolder, participant: str, at: str, by: str, reason: str) -> Tombstone:
-    """Return the participant's tombstone; a new one is not written yet."""
+    """Return the participant's tombstone: the existing one, or a new one that is not yet written."""
     if (known := tombstones(study).get(participant)) is not None:
         return known
     sessions = _sessions(study, participant)
@@ -267,7 +267,7 @@ def _sessions(study: StudyFolder, participant: str) -> list[SessionFolder]:
 
 
 def _others(copy: StudyFolder, tombstone: Tombstone) -> list[Path]:
-    """Return the folders of the participant's sessions in a copy that are not those that were erased."""
+    """Return the folders of the participant's sessions in a copy that are not among the erased sessions."""
     begun = {session.begun for session in tombstone.sessions if session.begun}
     return [
         session.path
@@ -277,7 +277,7 @@ def _others(copy: StudyFolder, tombstone: Tombstone) -> list[Path]:
 
 
 def _erase(study: StudyFolder, tombstone: Tombstone) -> bool:
-    """Write the tombstone, then erase folder and rows of a participant; return whether anything was there."""
+    """Write the tombstone, then erase the participant's folder and rows; return whether there was anything to erase."""
     participant = tombstone.participant
     sessions = _sessions(study, participant)
     person = study.data / f"sub-{participant}"
@@ -286,7 +286,7 @@ def _erase(study: StudyFolder, tombstone: Tombstone) -> bool:
     rows, ignores = exclusions(study.path), read_if_there(study.ignore)  # before anything is written
     if sessions and participant not in tombstones(study):
         add_tombstone(study, replace(tombstone, sessions=tuple(map(describe_session, sessions))))
-    ignored = study.withdrawals.name.encode()  # by a Psych-DS validator, also in folders of earlier versions
+    ignored = study.withdrawals.name.encode()  # written by a Psych-DS validator, also in folders of earlier versions
     if ignores is not None and ignored not in ignores.splitlines():
         append_line(study.ignore, ignored + b"\n")
     try:
@@ -310,7 +310,7 @@ def _erase(study: StudyFolder, tombstone: Tombstone) -> bool:
 
 
 def _keep_lines(path: Path, keeps: Callable[[bytes], bool]) -> bool:
-    """Rewrite a list without the lines that it does not keep; return whether there were any."""
+    """Remove the lines for which ``keeps`` is false from a list; return whether there were any."""
     lines = (read_if_there(path) or b"").splitlines(keepends=True)
     kept = [line for line in lines if keeps(line)]
     if kept != lines:
@@ -336,7 +336,7 @@ def _outputs(study: Path) -> tuple[tuple[Path, ...], tuple[Output, ...]]:
 
 
 def _names(study: StudyFolder, participant: str, *folders: Path) -> Iterator[str]:
-    """Yield what still names the participant, except the tombstone, the entry in the allocation and recordings.
+    """Yield the paths that still name the participant, except tombstone, allocation entry and recordings.
 
     Where ``folders`` are given, they alone are searched: in the footage of an export an ID may occur by chance.
     """

@@ -26,13 +26,13 @@ from study_app.workspace import Workspace, setting_of, workspace
 ASIDE: Final = "machine.damaged.json"
 LEAST_X_HEIGHT_DEG: Final = 0.4
 STATEMENT_X_HEIGHT_PX: Final = 16 * 1118 / 2048
-"""Height of an x of Inter in a statement as designed [logical px]: its size times the font's own ratio."""
+"""x-height of Inter in a statement as designed [logical px]: font size times the font's ratio."""
 
 DISTANCE_MM: Final = (200.0, 3000.0)
 WIDTH_MM: Final = (80.0, 5000.0)
 MOST_RECENT: Final = 8
 REMEMBERED_OPTIONS: Final = ("firmware",)
-"""Options of devices that are settings of this computer, by name; others are asked for before each session."""
+"""Names of device options stored as settings of this computer; others are asked for before each session."""
 OFFSET_MS: Final = (0.0, 500.0)
 SPREAD_MS: Final = (0.0, 200.0)
 CAMERA_LENGTH: Final = 400
@@ -47,7 +47,7 @@ class _Strict(BaseModel):
 
 
 class DisplayOffset(_Strict):
-    """How much later than it is painted something lights up on a screen [ms]: ``mean_ms``, give or take ``spread_ms``.
+    """The delay from painting to light on a screen [ms]: ``mean_ms`` ± ``spread_ms``.
 
     ``measured`` is the day, ``screen`` the name of the screen it was measured on: it holds for no other.
     """
@@ -60,7 +60,7 @@ class DisplayOffset(_Strict):
 
 
 class DeviceBench(_Strict):
-    """What a bench measured of a device, on the day ``measured``; of x, y and z.
+    """The bench measurements of a device on the day ``measured``, for x, y and z.
 
     ``mass_kg``, ``damping_nspm`` and ``friction_n`` are the device's own, ``stable_nspm`` the greatest stable damping,
     ``delay_ms`` how late a force acts, ``gain`` newtons on a scale for each newton sent (None without a scale),
@@ -82,12 +82,12 @@ class DeviceBench(_Strict):
 
     @property
     def entry(self) -> dict[str, Any]:
-        """What a receipt records of it."""
+        """The entry of the measurements in a receipt."""
         return self.model_dump(mode="json", exclude={"name", "serial", "report"})
 
 
 class MachineSettings(_Strict):
-    """What this machine is like.
+    """The settings of this computer.
 
     ``screen`` is the participant's by its name, ``screen_number`` tells screens of one name apart and counts from 1;
     ``viewing_distance_mm`` and ``screen_width_mm`` are None until they are measured. ``firmware`` is the file
@@ -125,17 +125,17 @@ class MachineSettings(_Strict):
 
     @property
     def marker_addresses(self) -> tuple[str, ...]:
-        """Where the markers of sessions go."""
+        """The addresses to which markers of sessions are sent."""
         return (*(("lsl",) if self.lsl_markers else ()), *((self.triggers,) if self.triggers else ()))
 
     @property
     def device_options(self) -> dict[str, Path]:
-        """The values of devices' options that are remembered on this computer, by name."""
+        """The values of the device options stored on this computer, by name."""
         values = {name: getattr(self, name) for name in REMEMBERED_OPTIONS}
         return {name: Path(value) for name, value in values.items() if value is not None}
 
     def with_recent(self, protocol: Path) -> MachineSettings:
-        """Return the settings with this file, if it is outside the workspace, as the one that was opened last."""
+        """Return the settings with this file as the most recent one, if it is outside the workspace."""
         if protocol.resolve().parent == workspace().protocols.resolve():
             return self
         name = str(protocol.absolute())
@@ -143,29 +143,29 @@ class MachineSettings(_Strict):
         return self.model_copy(update={"recent": (name, *others)[:MOST_RECENT]})
 
     def with_bench(self, bench: DeviceBench) -> MachineSettings:
-        """Return the settings with this measurement in place of an earlier one of the same device."""
+        """Return the settings with this measurement, replacing an earlier one of the same device."""
         others = (other for other in self.benches if (other.name, other.serial) != (bench.name, bench.serial))
         return self.model_copy(update={"benches": (bench, *others)})
 
     def bench_of(self, described: Mapping[str, Any]) -> DeviceBench | None:
-        """Return the measurement of a device by what it says of itself; None where it was not measured."""
+        """Return the measurement of the device with this name and serial number, or None if it was not measured."""
         own = described.get("name"), described.get("serial") or ""
         return next((bench for bench in self.benches if (bench.name, bench.serial) == own), None)
 
     def screen_among(self, names: Sequence[str]) -> int:
-        """Return which of the screens with these names is the participant's, from 1; the last where it is not there."""
+        """Return the number (from 1) of the participant's screen among ``names``; the last if it is not connected."""
         alike = [number for number, name in enumerate(names, start=1) if name == self.screen]
         if not self.screen or not alike:
             return len(names)
         return self.screen_number if self.screen_number in alike else alike[0]
 
     def offset_on(self, screen: str) -> DisplayOffset | None:
-        """Return the display offset that was measured on a screen; None where none was."""
+        """Return the display offset measured on a screen, or None."""
         offset = self.display_offset
         return offset if offset is not None and offset.screen == screen else None
 
     def text_scale(self, width_px: float, system_mm: float) -> float:
-        """Return how much larger than designed words must be for an x of 0.4° at the viewing distance.
+        """Return the factor that enlarges text so that an x spans 0.4° at the viewing distance.
 
         ``width_px`` is the screen's width in logical pixels, ``system_mm`` the width that the system tells, used until
         it is corrected. 1 where distance or width is not known; never smaller.
@@ -174,7 +174,7 @@ class MachineSettings(_Strict):
         return 1.0 if height_deg is None else max(1.0, LEAST_X_HEIGHT_DEG / height_deg)
 
     def x_height_deg(self, width_px: float, system_mm: float) -> float | None:
-        """Return under which angle an x of a statement is seen as designed; None where it cannot be known."""
+        """Return the visual angle of an x of a statement as designed [°], or None if it is unknown."""
         width_mm = self.screen_width_mm if self.screen_width_mm is not None else system_mm
         if self.viewing_distance_mm is None or width_mm <= 0 or width_px <= 0:
             return None
@@ -182,7 +182,7 @@ class MachineSettings(_Strict):
         return math.degrees(2 * math.atan(height_mm / (2 * self.viewing_distance_mm)))
 
     def describe(self, screen: str, width_px: float, system_mm: float) -> dict[str, Any]:
-        """Return what the receipt says of the participant's screen besides what the system reports of it."""
+        """Return the receipt's fields on the participant's screen that the system does not report."""
         offset = self.offset_on(screen)
         return {
             "viewing_distance_mm": self.viewing_distance_mm,
@@ -198,12 +198,12 @@ DEFAULTS: Final = MachineSettings()
 
 
 def load() -> MachineSettings:
-    """Return the settings as they were kept; the defaults where none were.
+    """Read the settings; without a file, return the defaults.
 
     Raises
     ------
     StoreError
-        There is a file, and it cannot be understood; one line says what is wrong with it.
+        The file is invalid; one line names the problem.
     """
     path = settings_file()
     try:
@@ -225,7 +225,7 @@ def load() -> MachineSettings:
 
 
 def load_or_default() -> tuple[MachineSettings, str]:
-    """Return the settings, and why they are the defaults where a file cannot be understood ("" where it can)."""
+    """Return the settings, with the reason if they are the defaults because the file is invalid (else "")."""
     try:
         return load(), ""
     except StoreError as error:
@@ -233,13 +233,13 @@ def load_or_default() -> tuple[MachineSettings, str]:
 
 
 def device_without_force() -> str:
-    """Return the name of the device of this computer if it gives no force; "" if it does, or none was chosen."""
+    """Return the name of this computer's device if it renders no force; "" if it does or none was chosen."""
     settings = load_or_default()[0]
     return "" if settings is DEFAULTS else WITHOUT_FORCE.get(settings.device.partition(":")[0], "")
 
 
 def save(settings: MachineSettings) -> None:
-    """Keep the settings, whole or not at all; a file that could not be understood is put aside first.
+    """Write the settings atomically; an invalid file is moved aside first.
 
     Raises
     ------
@@ -259,7 +259,7 @@ def save(settings: MachineSettings) -> None:
 
 
 def create_workspace(made: Workspace) -> None:
-    """Create the two folders of a workspace, where they are missing.
+    """Create the two folders of a workspace if they are missing.
 
     Raises
     ------
@@ -274,7 +274,7 @@ def create_workspace(made: Workspace) -> None:
 
 
 def keep_workspace(made: Workspace) -> None:
-    """Make this the workspace of this machine from now on, and create its two folders.
+    """Set the workspace of this computer and create its two folders.
 
     Raises
     ------
@@ -286,7 +286,7 @@ def keep_workspace(made: Workspace) -> None:
 
 
 def remember_protocol(protocol: Path) -> None:
-    """Keep a protocol file among the recent ones.
+    """Add a protocol file to the recent ones.
 
     Raises
     ------
@@ -297,12 +297,12 @@ def remember_protocol(protocol: Path) -> None:
 
 
 def recent_protocols() -> tuple[str, ...]:
-    """Return the recent protocol files that are still there, newest first."""
+    """Return the recent protocol files that still exist, newest first."""
     return tuple(name for name in load_or_default()[0].recent if Path(name).is_file())
 
 
 def _first(error: ValidationError, document: dict[str, Any]) -> str:
-    """Return what is wrong with a file, in a line: first what can be hinted at."""
+    """Return one line on a problem in a settings file, preferring problems with a hint."""
     fault = min(faults_of(error, document, MachineSettings.model_json_schema()), key=lambda fault: not fault.hint)
     hint = f" ({fault.hint})" if fault.hint else ""
     return f"{'.'.join(str(step) for step in fault.path)}: {fault.message}{hint}"

@@ -163,8 +163,9 @@ def _of_branches(curve: FlowCurve) -> Iterator[str]:
     size = math.sqrt(float(np.mean(gap**2)))
     if size > APART * noise and size > LEAST_GAP:
         yield (
-            f"{branches.description} differ by {100 * math.expm1(size):.0f} % of the stress, which noise does not explain: "
-            "thixotropy or hysteresis; the fit lies between them, and the intervals do not cover both: fit one branch"
+            f"{branches.description} differ by {100 * math.expm1(size):.0f} % of the stress, which noise does not "
+            "explain: thixotropy or hysteresis; the fit lies between them, and the intervals do not cover both: fit one "
+            "branch"
         )
 
 

@@ -59,7 +59,7 @@ from study_app.workspace import workspace
 DEVICE = {"name": "answers-only", "measured": False}
 SAY_EVERY_S = 5.0
 BEGINS: Final = (PageShown, FormShown, TrialStarted)
-"""The lines that begin a step."""
+"""The events that begin a step."""
 
 
 def rehearse_answers(
@@ -72,7 +72,7 @@ def rehearse_answers(
     features: ConditionFeatures | None = None,
     progress: Callable[[str], object] | None = None,
 ) -> Path:
-    """Answer for P001, P002 … and return the study folder.
+    """Simulate the answers of P001, P002 … and return the study folder.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def rehearse_answers(
 
 
 def _answer(study: Protocol, who: str, group: str | None, kept: SimulatedStudy, features: ConditionFeatures) -> None:
-    """Answer one session of a study; ``group`` is the participant's pre-existing group."""
+    """Simulate the answers of one session; ``group`` is the participant's pre-existing group."""
     time_passed = SimulatedTime()
     store = kept.begin(who, SessionClock(time_passed.ns, datetime.now().astimezone()), group)
     own = store.protocol
@@ -129,7 +129,7 @@ def _answer(study: Protocol, who: str, group: str | None, kept: SimulatedStudy, 
 
 
 class Kept(typing.Protocol):
-    """Where the events of a session go."""
+    """The interface of the store of a simulated session."""
 
     def append(self, event: Line, *, t_s: float | None = None) -> None: ...  # noqa: D102
     def finish(self, status: str, reason: str = "") -> None: ...  # noqa: D102
@@ -137,17 +137,17 @@ class Kept(typing.Protocol):
 
 @dataclass(slots=True)
 class SimulatedTime:
-    """The time of a session that is not held [s]."""
+    """The simulated time of a session [s]."""
 
     seconds: float = 0.0
 
     def ns(self) -> int:
-        """Return it in ns, as a clock."""
+        """Return the time in ns, as a clock."""
         return round(self.seconds * 1e9)
 
 
 class Answering(SimulatedParticipant):
-    """One session that is answered without being held."""
+    """One session of simulated answers, without a servo."""
 
     def __init__(
         self,
@@ -159,14 +159,14 @@ class Answering(SimulatedParticipant):
     ) -> None:
         self._features_of = features
         self._feels = NO_FEATURES
-        self._sensed_in: dict[int, list[float]] = {}  # by trial, interval by interval
+        self._sensed_in: dict[int, list[float]] = {}  # by trial, in the order of intervals
         self._time = time_passed
         self._store = kept
         super().__init__(study, state.plan.schedule)
         self.state = state
 
     def run(self, until: int | None = None) -> None:
-        """Go from the first page to the last, or to the beginning of the step of that index."""
+        """Run from the first page to the last, or to the beginning of the step with index ``until``."""
         if until == 0:
             return
         self._post(Begin(self._time.seconds))
@@ -178,7 +178,7 @@ class Answering(SimulatedParticipant):
                 case TaskPage(interval=Interval(resting=True)) | FeedbackPage():
                     self._pass(
                         max(0.0, (self.state.until_s or 0.0) - self._time.seconds) + 0.001
-                    )  # time comes in whole ms
+                    )  # time advances in whole ms
                     self._post(TimeUp(self._time.seconds))
                 case TaskPage(adjusts=True) as page:
                     self._set(page)
@@ -187,13 +187,13 @@ class Answering(SimulatedParticipant):
                     self._post(TaskDone(self._time.seconds, "complete", {}))
                 case QuestionnairePage() | DesignPage() as page:
                     self._fill_in(page)
-                case PausePage():  # before the trial that a resumed session goes on with
+                case PausePage():  # before the first trial of a resumed session
                     self._post(ResumeRequested(self._time.seconds, "participant"))
                 case _:
                     raise SessionError(f"the session failed at {self.page}")
 
     def _set(self, page: TaskPage) -> None:
-        """Set the level by what was sensed, exactly as it is, until it is done or the time is over."""
+        """Adjust the level from exactly sensed values until the setting is done or its time is over."""
         observer, began_s = self._adjusting(page.trial), self._time.seconds
         sensed = self._sensed_in[page.trial]
         self._pass(page.task.judged_from_s)
@@ -214,7 +214,7 @@ class Answering(SimulatedParticipant):
         return {number: sensed for number, sensed in self._sensed_in.items() if self._trials[number].block == block.id}
 
     def _sense(self, trial: int, presented: Stimulated) -> None:
-        """Take what a trial presents: a varied number exactly as it was requested, a condition as it was felt."""
+        """Store the percept of a trial: a varied number exactly as requested, a condition from its features."""
         block = self.state.trial.block
         if presented.vary is not None:
             self._sensed_in.setdefault(trial, []).append(as_requested(presented))
@@ -229,7 +229,7 @@ class Answering(SimulatedParticipant):
         return self._time.seconds
 
     def _pass(self, seconds: float) -> None:
-        """Let time pass, in whole milliseconds as a servo's clock has them."""
+        """Advance the time, in whole milliseconds like a servo's clock."""
         self._time.seconds = round(self._time.seconds + seconds, 3)
 
     def _post(self, event: Event) -> None:
@@ -258,7 +258,7 @@ class Answering(SimulatedParticipant):
 def begin_at(results: Path, study: Protocol, source: bytes, start: SessionStart, step: int) -> Path:
     """Begin a simulated session in a new study folder, answer the steps before ``step``; return the session's folder.
 
-    The session is unfinished; resumed exactly, it goes on at ``step``, or at the next one that is not passed over.
+    The session is unfinished; when resumed exactly, it continues at ``step`` or the next step that is due.
 
     Parameters
     ----------
@@ -303,7 +303,7 @@ def begin_at(results: Path, study: Protocol, source: bytes, start: SessionStart,
 
 @dataclass
 class _Lines:
-    """The lines of the steps before one; what begins that one is left to whoever resumes."""
+    """A store that keeps the lines before a given step."""
 
     kept: list[tuple[Line, float]] = field(default_factory=list)
     reason: str = ""
@@ -312,12 +312,12 @@ class _Lines:
     _begun: bool = False
 
     def append(self, event: Line, *, t_s: float | None = None) -> None:
-        """Keep a line unless the step has begun."""
+        """Store a line unless the step has begun."""
         assert self.session is not None  # noqa: S101 - set before the session runs
         self._begun = self._begun or (isinstance(event, BEGINS) and self.session.state.index >= self.until)
         if not self._begun:
             self.kept.append((event, t_s or 0.0))
 
     def finish(self, _status: str, reason: str = "") -> None:
-        """Keep why the session ended before the step."""
+        """Store the reason why the session ended before the step."""
         self.reason = reason

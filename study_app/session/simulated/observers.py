@@ -28,32 +28,32 @@ from study_app.store.delivered import LONGEST_S
 Floats: TypeAlias = NDArray[np.float64]
 Draw: TypeAlias = Callable[[], float]
 RATE_HZ = 200.0
-PACE_MPS = (0.06, 0.22)  # slowest and fastest mean pace of a stroke
-REST_S = (0.3, 0.9)  # a stop after each figure, to feel what the liquid does
+PACE_MPS = (0.06, 0.22)  # slowest and fastest mean speed of a stroke [m/s]
+REST_S = (0.3, 0.9)  # a stop after each figure, in which the liquid's response is felt
 _CORNERS = 128
-_TURN = complex(0.9987954562051724, 0.049067674327418015)  # one corner further round the circle
+_TURN = complex(0.9987954562051724, 0.049067674327418015)  # angle to the next corner of the circle
 Figure: TypeAlias = Callable[[Draw, Floats, Floats], list[Floats]]
 SECONDS_PER_WORD = 0.12
-REACTION_S = (0.2, 0.35)  # from seeing a target lit to moving
+REACTION_S = (0.2, 0.35)  # reaction time from a lit target to the movement [s]
 ANSWER_S = (0.8, 2.6)
 CHANGES_MIND = 0.08
-AIM_ERROR = 0.3  # of a target's radius, at most, along each axis
+AIM_ERROR = 0.3  # largest error of aim along each axis, as a fraction of the target's radius
 FOLLOWED_HZ = 200.0
-CORRECTION_S = 0.35  # the hand was still for so long outside the target before it tries again
+CORRECTION_S = 0.35  # time at rest outside the target before another attempt [s]
 LONGEST_PATH_S: Final = 60.0
-"""The path begins anew after so long, or shortly before the task would end by time."""
+"""Time after which the path repeats, unless the task ends earlier [s]."""
 BEFORE_END_S: Final = 0.1
 MOVE_S: Final = 0.8
 STAY_S: Final = 0.2
-"""From one target to the next, and how long the ball stays there beyond the dwell time."""
+"""Time at a target beyond the dwell time [s]."""
 RETURN_S: Final = 0.25
-"""To the middle after a task: less than the shortest pause between two intervals."""
+"""Time of the return to the middle after a task, shorter than the shortest pause between intervals [s]."""
 _SAMPLE = np.dtype([("time_ns", np.int64), ("position_m", np.float64, 3)])
 
 
 @dataclass(slots=True, kw_only=True)
 class SensedTrial:
-    """What reached hand and eyes in one trial; ``scale`` is scene metres per hand metre.
+    """The forces felt and frames seen in one trial; ``scale`` is scene metres per hand metre.
 
     ``period_s`` is the time between two ticks [s] in studies that delay the force, else None.
     """
@@ -66,7 +66,7 @@ class SensedTrial:
     ages_s: list[float] = field(default_factory=list)
 
     def feel(self, samples: Any) -> None:
-        """Take what the hand felt (recarray of ``layout.SAMPLE``), where there was a liquid."""
+        """Add samples felt by the hand (recarray of ``layout.SAMPLE``), if there was a liquid."""
         wet = samples[samples["scene"] != 0]
         self.forces_n.append(wet["device_force_n"])
         self.velocities_mps.append(wet["velocity_mps"])
@@ -74,16 +74,16 @@ class SensedTrial:
             self.model_n.append(wet["force_n"])
 
     def see(self, painted_ns: int, view: TankView) -> None:
-        """Take a frame that was seen."""
+        """Add a frame that was seen."""
         self.ages_s.append((painted_ns - view.sample_time_ns) * 1e-9)
 
     def clear(self) -> None:
-        """Forget what came so far."""
+        """Discard all samples and frames."""
         for samples in (self.forces_n, self.velocities_mps, self.ages_s):
             samples.clear()
 
     def features(self) -> TrialFeatures:
-        """Return the features that an opinion is made of."""
+        """Return the features from which a rating is computed."""
         force_n = np.concatenate(self.forces_n or [np.zeros((0, 3))])
         velocity_mps = np.concatenate(self.velocities_mps or [np.zeros((0, 3))]) / self.scale
         norm_n = _norm(force_n)
@@ -101,7 +101,7 @@ class SensedTrial:
         )
 
     def _force_delay_s(self, force_n: Any) -> float:
-        """Return how late the force was sent [s]."""
+        """Return the delay with which the force was sent [s]."""
         if self.period_s is None or not self.model_n:
             return 0.0
         rows = lag(force_n, np.concatenate(self.model_n), round(LONGEST_S / self.period_s))
@@ -109,7 +109,7 @@ class SensedTrial:
 
 
 def exploration(draw: Draw, half_m: tuple[float, float, float], duration_s: float) -> tuple[Floats, Floats]:
-    """Return a motion of at least ``duration_s`` that begins and stays within ``half_m`` of the middle."""
+    """Return times (n,) [s] and positions (n, 3) [m] of exploring for at least ``duration_s`` within ±``half_m``."""
     reach_m = 0.7 * np.asarray(half_m)
     pieces = [np.zeros((1, 3))]
     coming: list[Figure] = []
@@ -122,7 +122,7 @@ def exploration(draw: Draw, half_m: tuple[float, float, float], duration_s: floa
 
 
 def _strokes(along: int, aside: int, sides: tuple[int, ...]) -> Figure:
-    """Return a figure that goes to and fro along an axis, at any place of another axis."""
+    """Return a figure that moves to and fro along one axis at random positions on another."""
 
     def figure(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
         ends_m = np.zeros((len(sides), 3))
@@ -136,14 +136,14 @@ def _strokes(along: int, aside: int, sides: tuple[int, ...]) -> Figure:
 
 
 def _zigzag(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
-    """Cross the tank in legs that turn by about 90°."""
+    """Return the path of a crossing of the tank in legs that turn by about 90°."""
     across = np.linspace(-1, 1, 6) * reach_m[0]
     side = reach_m[2] * 0.5
     return _through(draw, start_m, [np.array([x, 0.0, side * (1 - 2 * (i % 2))]) for i, x in enumerate(across)])
 
 
 def _circles(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
-    """Stir: three rounds about the middle, begun and ended at full pace as a hand does that stops at once."""
+    """Return the path of stirring: three circles about the middle, begun and ended at full speed."""
     radius_m = min(reach_m[0], reach_m[2]) * _between(draw, 0.6, 1.0)
     pace_mps = _between(draw, *PACE_MPS)
     first = np.array([radius_m, 0.0, 0.0])
@@ -159,7 +159,7 @@ def _circles(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
 
 
 def _through(draw: Draw, start_m: Floats, places_m: list[Floats]) -> list[Floats]:
-    """Go from place to place, each stroke at a pace of its own."""
+    """Return the path through places, each stroke with its own speed."""
     return [
         _stroke(begin, end, _between(draw, *PACE_MPS))
         for begin, end in zip([start_m, *places_m[:-1]], places_m, strict=True)
@@ -193,12 +193,12 @@ def _between(draw: Draw, low: float, high: float) -> float:
 
 
 def reading_s(page: TextPage) -> float:
-    """Return how long it takes to read a page [s]."""
+    """Return the time that it takes to read a page [s]."""
     return 1.0 + SECONDS_PER_WORD * sum(len(paragraph.split()) for paragraph in (page.title, *page.paragraphs))
 
 
 class Explorer:
-    """Moves about for a while that it likes, then wants to go on."""
+    """Explore for a preferred time, then press the space bar to continue."""
 
     def __init__(self, task: Task, device: HandOrders, draw: Draw, now_s: float) -> None:
         least_s = task.limit_s if task.least_s is None else task.least_s
@@ -212,7 +212,7 @@ class Explorer:
 
 
 class Reacher:
-    """Reaches for the target that is seen lit, and tries again where the ball is seen to have come to rest outside."""
+    """Reach for the lit target, and try again if the ball is seen at rest outside it."""
 
     def __init__(self, task: Reach, device: HandOrders, draw: Draw, _now_s: float) -> None:
         self._task = task
@@ -223,7 +223,7 @@ class Reacher:
         self._outside_since_s: float | None = None
 
     def act(self, now_s: float, view: TankView) -> bool:
-        """Move the hand as what is seen asks for; the space bar is never pressed."""
+        """Move the hand in response to the view; return False, since the space bar is never pressed."""
         lit = view.task.lit
         if lit is None:
             return False
@@ -254,7 +254,7 @@ class Reacher:
 
 
 class Follower:
-    """Moves with the target, whose even swing it anticipates, with the error of an aim."""
+    """Follow the moving target, anticipating its regular swing, with an error of aim."""
 
     def __init__(self, task: Task, device: HandOrders, draw: Draw, _now_s: float) -> None:
         t_s = np.arange(round(task.limit_s * FOLLOWED_HZ) + 1) / FOLLOWED_HZ
@@ -264,31 +264,31 @@ class Follower:
         device.follow(t_s, path_m)
 
     def act(self, _now_s: float, _view: TankView) -> bool:
-        """Return that the space bar is not pressed: time ends the task."""
+        """Return False: the space bar is not pressed, since time ends the task."""
         return False
 
 
 class Hand(Protocol):
-    """Who does a task with a simulated hand."""
+    """A simulated participant's behaviour in a task."""
 
     def act(self, now_s: float, view: TankView, /) -> bool:
-        """Move the hand as what is seen asks for; return whether the space bar is pressed."""
+        """Move the hand in response to the view; return whether the space bar is pressed."""
         ...
 
 
 def hand_for(task: Task, device: HandOrders, draw: Draw, now_s: float) -> Hand:
-    """Return who does a task with a simulated hand, from ``now_s`` on [s]."""
+    """Return the behaviour for a task with a simulated hand, from ``now_s`` on [s]."""
     made: Hand = resolve_name(task.hand)(task, device, draw, now_s)
     return made
 
 
 def _followed(task: Task, times_s: Floats) -> Floats:
-    """Return where the target that moves is at each time (n,) [s]: (n, 3) [m, hand frame]."""
+    """Return the positions (n, 3) [m, hand frame] of the moving target at times (n,) [s]."""
     return np.array([task.target_m(float(time_s)) for time_s in times_s])
 
 
 def rest(task: Task, device: HandOrders, *, returns: bool) -> None:
-    """Let a simulated hand rest after a task: where its next interval begins, if that begins at a place.
+    """Move a simulated hand after a task to the start of the next interval, if that is a fixed position.
 
     Otherwise it ``returns`` to the middle, where an exploration begins, or stays, and jumps there as the next trial
     begins, which asks for forces that no person feels.
@@ -311,7 +311,7 @@ class Choice:
 
 
 def filled_in(page: QuestionnairePage, features: TrialFeatures, person: Rater, draw: Draw) -> list[Choice]:
-    """Return how a page is answered by what was felt."""
+    """Return the choices that answer a page, from the features of the trial."""
     judged = judgements([item.id for item in page.items], features, person, draw)
     answers = {item.id: item.simulated(judged[item.id], draw) for item in page.items}
     visible = shown(page.items, answers)
@@ -321,7 +321,7 @@ def filled_in(page: QuestionnairePage, features: TrialFeatures, person: Rater, d
 def choices(
     items: Iterable[ItemView], answers: Mapping[str, Value], draw: Draw, *, changes_mind: bool = True
 ) -> list[Choice]:
-    """Return how answers are given: one after the other, sometimes first one nearby."""
+    """Return the choices that give ``answers`` in order, sometimes with a neighbouring value first."""
     given: list[Choice] = []
     for item in items:
         value = answers[item.id]
@@ -334,7 +334,7 @@ def choices(
 def newly_shown(
     page: QuestionnairePage | DesignPage, answers: Mapping[str, Value], seen: Collection[str]
 ) -> tuple[str, ...]:
-    """Return which questions of a page appear by the answers so far."""
+    """Return the questions of a page that appear because of the answers so far."""
     return tuple(item for item in shown(page.items, answers) if item not in seen)
 
 
@@ -347,7 +347,7 @@ def _norm(vectors: Any) -> Any:
 
 
 class ProgrammedBall:
-    """A ball on a path of ``duration_s`` [s], which repeats, through a task in a tank of these full sizes [m].
+    """A ball that repeats a path of ``duration_s`` [s] through a task in a tank of these full sizes [m].
 
     With ``hidden_after_lead`` it is not drawn once the task's lead is over; ``seed`` is that of an exploration.
     """
@@ -367,7 +367,7 @@ class ProgrammedBall:
         self._tracker.feed(samples)
 
     def view(self, elapsed_s: float) -> TankView:
-        """Return what the tank shows ``elapsed_s`` after the ball began to move [s]."""
+        """Return the view of the tank ``elapsed_s`` after the ball began to move [s]."""
         now_ns = round(elapsed_s % self.duration_s * 1e9)
         position_m = np.array([np.interp(now_ns, self._times_ns, axis) for axis in self._positions_m.T])
         shown = self._tracker.at(now_ns)
@@ -390,7 +390,7 @@ def task_path(
 
 
 def _reaches(task: Reach, duration_s: float) -> tuple[Floats, Floats]:
-    """Return minimum-jerk movements from target to target (Flash & Hogan 1985), with a stay in each."""
+    """Return minimum-jerk movements from target to target (Flash & Hogan 1985), with a stay at each."""
     each_s = MOVE_S + task.dwell_s + STAY_S
     count = max(1, min(int(duration_s / each_s), task.count or int(duration_s / each_s)))
     ends_m = np.array([(0.0, 0.0, 0.0), *(task.targets_m[at % len(task.targets_m)] for at in range(count))])

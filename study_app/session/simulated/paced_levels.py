@@ -22,7 +22,7 @@ INERTIAL = {effect.name for effect in EFFECTS if effect.damping_nspm is not None
 
 
 def undelivered_levels(protocol: Protocol) -> Iterator[str]:
-    """Yield a sentence for each stimulus of which an end of the levels would be presented again and again."""
+    """Yield a sentence for each stimulus whose lowest or highest level would never be delivered."""
     for block in protocol.blocks.values():
         task, where = protocol.tasks[block.task], f"stimuli.{block.stimulus}.levels"
         if block.stimulus is None or not isinstance(task, Follow):

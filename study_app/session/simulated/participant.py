@@ -21,15 +21,15 @@ from study_app.session.simulated.observers import Choice, Draw, choices, filled_
 from study_app.session.transitions.events import Chosen, Event, ItemShown, Submitted
 
 LOOK_AT_SETTING_S: Final = 0.5
-"""How long the observer judges before the next steps [s]: half a swing of a target at 1 Hz."""
+"""Time that the observer judges a level before the next steps [s]: half a swing of a target at 1 Hz."""
 FAST: Final = 4
-"""Steps at once, until the remembered strength was crossed. [choice]"""
+"""Size of the first steps, until the remembered strength is crossed. [choice]"""
 MOST_LOOKS: Final = 60
-"""Then the observer leaves a setting as it is: what is remembered may lie beyond the levels."""
+"""Number of judgements after which the observer stops: the remembered strength may lie beyond the levels."""
 
 
 class AdjustingObserver:
-    """Remembers the standard with noise, takes what is adjusted with noise, and goes on until the two cross.
+    """An observer that perceives standard and adjusted level with noise and adjusts until the two cross.
 
     The noise of a setting is drawn once, so that settings scatter as the difference of two single impressions does.
     """
@@ -42,7 +42,7 @@ class AdjustingObserver:
         self._looks = 0
 
     def steps(self, sensed: float, standard: float) -> int:
-        """Return the next steps by what is sensed, 0 where the setting is done; ``standard`` is what was sensed of it.
+        """Return the next steps for a sensed level, 0 if the setting is done; ``standard`` is the sensed standard.
 
         Both are those of `Comparison.sensed`.
         """
@@ -66,7 +66,7 @@ class AdjustingObserver:
 
 
 class SimulatedParticipant(ABC):
-    """Answers the pages of a session; how time passes and where events go is the subclass's affair."""
+    """Answer the pages of a session; subclasses define how time passes and where events go."""
 
     def __init__(self, study: Protocol, schedule: Schedule, observer: Observer | None = None) -> None:
         self.answers = 0
@@ -85,33 +85,33 @@ class SimulatedParticipant(ABC):
 
     @abstractmethod
     def _pass(self, seconds: float) -> None:
-        """Let time pass while nothing is done."""
+        """Wait for a simulated time [s]."""
 
     @abstractmethod
     def _post(self, event: Event) -> None:
-        """Give the session an event."""
+        """Post an event to the session."""
 
     @abstractmethod
     def _felt(self, trial: int | None) -> TrialFeatures:
-        """Return what was felt last in a trial; on a page of no trial nothing."""
+        """Return the features of a trial's last presentation; those of no trial for a form."""
 
     @abstractmethod
     def _sensed(self, block: Block) -> Mapping[int, Sequence[float]]:
-        """Return what was sensed in the trials of a block with a design so far, by trial, interval by interval."""
+        """Return the sensed magnitudes of each interval by trial, for a block with a design."""
 
     def _stream(self, name: str) -> Draw:
         return stream(self._seed, f"rehearsal/{self._who}/{name}").random
 
     def _attended(self, trial: int) -> Comparison:
-        """Return what is attended to in a trial of a block with a design."""
+        """Return the comparison that the observer makes in a trial of a block with a design."""
         return Comparison.of(self._study, self._study.blocks[self._trials[trial].block], self.observer)
 
     def _adjusting(self, trial: int) -> AdjustingObserver:
-        """Return who sets the level of a trial."""
+        """Return the observer that adjusts the level of a trial."""
         return AdjustingObserver(self._attended(trial), self._stream(f"{trial}/answers"))
 
     def _remembered(self, trial: int, sensed: float) -> float:
-        """Return what a setting is compared with: the interval before, else the mean of earlier ones, else itself."""
+        """Return the reference of a setting: the interval before, else the mean of earlier settings, else itself."""
         block = self._study.blocks[self._trials[trial].block]
         known = self._sensed(block)
         if design_of(self._study, block).intervals > 1:
@@ -120,7 +120,7 @@ class SimulatedParticipant(ABC):
         return sum(earlier) / len(earlier) if earlier else sensed
 
     def _fill_in(self, page: QuestionnairePage | DesignPage) -> None:
-        """Answer every question by what was felt, and confirm."""
+        """Answer every question of a page and confirm."""
         answers: dict[str, Value] = {}
         seen = self._notice_questions(page, answers, ())
         for choice in self._answers_to(page):
@@ -130,7 +130,7 @@ class SimulatedParticipant(ABC):
             self._post(Chosen(self._seconds(), choice.item, choice.value))
             answers[choice.item] = choice.value
             seen += self._notice_questions(page, answers, seen)
-        if not isinstance(page, ChoicePage):  # there the press that answers goes on
+        if not isinstance(page, ChoicePage):  # on a choice page the answer continues the session
             self._pass(1.0)
         self._post(Submitted(self._seconds()))
         self.answers += len(answers)
@@ -153,7 +153,7 @@ class SimulatedParticipant(ABC):
         before: list[float] = []
         last: str | int | float | None = None
         for number in sorted(known for known in sensed if known <= trial):
-            answered = len(sensed[number]) == design.intervals  # else it was passed over after its last attempt
+            answered = len(sensed[number]) == design.intervals  # else it was given up after its last attempt
             if number == trial or (answered and number not in self._said):
                 source = draw if number == trial else self._stream(f"{number}/answers")
                 course = Course(self._courses[number], last)

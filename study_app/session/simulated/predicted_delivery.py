@@ -29,16 +29,16 @@ from study_app.session.simulated.observers import task_path
 
 MOTIONS: Final = 5
 LONGEST_S: Final = 4.0
-"""So much of a long task is simulated."""
+"""Longest simulated part of a task [s]."""
 REST_S: Final = 1.0
-"""Between two motions, without force, while the hand goes to where the next one begins."""
+"""Time without force between two motions, in which the hand moves to the next start [s]."""
 READ_S: Final = 0.5
 
 
 def predicted_delivery(protocol: Protocol, delay_ticks: int) -> PredictedDelivery:
-    """Return how many main trials a simulated participant would miss on a device with this delay [ticks].
+    """Predict the main trials that a simulated participant would lose on a device with this delay [ticks].
 
-    Of sessions that differ, such as those of groups, it is the one that loses most trials.
+    If sessions differ, for example between groups, the prediction is for the one that loses most trials.
     """
     with late_rig(protocol, delay_ticks) as rig:
         failing = _FailingScenes(protocol, rig)
@@ -50,7 +50,7 @@ def predicted_delivery(protocol: Protocol, delay_ticks: int) -> PredictedDeliver
 
 
 def _in_session(protocol: Protocol, shares: Mapping[str, float]) -> PredictedDelivery:
-    """Return what one kind of session loses; ``shares`` are those of the trials that each main block loses."""
+    """Return the predicted loss of one kind of session; ``shares`` has the lost fraction of each main block."""
     counts: dict[bool, float] = {True: 0.0, False: 0.0}
     trials: dict[bool, int] = {True: 0, False: 0}
     for block in orders_of(protocol).blocks:
@@ -68,7 +68,7 @@ def _in_session(protocol: Protocol, shares: Mapping[str, float]) -> PredictedDel
 
 
 def late_rig(protocol: Protocol, delay_ticks: int) -> Rig:
-    """Return a simulated hand whose device is late by ``delay_ticks``, and its servo on a virtual clock."""
+    """Return a simulated hand with a device delay of ``delay_ticks``, and its servo on a virtual clock."""
     settings = study_settings(protocol, stream(0, "predicted/hand"))
     x_m, y_m, z_m = (size / 2 for size in settings.workspace_m)
     device = ScriptedDevice(settings.random, workspace_m=(x_m, y_m, z_m), force_limit_n=settings.force_limit_n)
@@ -115,14 +115,14 @@ def withheld_shares(
 
 
 class _FailingScenes:
-    """How often a simulated motion of a task in a scene breaks the limit, each simulated once."""
+    """Cached fractions of simulated motions that break the limit, by scene and task."""
 
     def __init__(self, protocol: Protocol, rig: Rig) -> None:
         self._protocol, self._rig = protocol, rig
         self._known: dict[tuple[Scene, str], float] = {}
 
     def share(self, scene: Scene, task: str) -> float:
-        """Return the share of the motions of a task in which more is withheld than the limit permits."""
+        """Return the fraction of a task's motions in which more force is withheld than the limit permits."""
         if (known := self._known.get((scene, task))) is not None:
             return known
         protocol, limit = self._protocol, self._protocol.limits.withheld_percent / 100
@@ -132,7 +132,7 @@ class _FailingScenes:
 
 
 def _lost_share(protocol: Protocol, block: Block, scenes: _FailingScenes) -> float:
-    """Return the probability that a trial of a block is missing, or, without intervals, that it is out of limits."""
+    """Return the probability that a trial of a block is missing or, without intervals, out of limits."""
 
     def failing(scene: Scene) -> float:
         return scenes.share(scene, block.task)
@@ -155,6 +155,6 @@ def _lost_share(protocol: Protocol, block: Block, scenes: _FailingScenes) -> flo
 
 
 def _scenes(protocol: Protocol, block: Block) -> Iterator[Scene]:
-    """Yield the scenes of the strongest and the weakest level of each standard; of delays that of the condition."""
+    """Yield the scenes of the strongest and weakest level of each standard; for delays, that of the condition."""
     scenes = [scene for _, _, scene in ends(protocol, block)]
     yield from scenes or map(protocol.scene_for, protocol.conditions_in(block.id))

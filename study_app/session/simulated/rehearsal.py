@@ -84,21 +84,21 @@ from study_app.store.tables.study_files import check_study
 from study_app.store.withdrawals import tombstones
 from study_app.workspace import workspace
 
-LOOK_S = 0.05  # the session looks at the device so often
-IDLE_S = 0.5  # and while reading and answering
+LOOK_S = 0.05  # interval between polls of the device during a task [s]
+IDLE_S = 0.5  # the same while reading and answering [s]
 FRAME_S = 1 / 60
-PAINT_S = (0.002, 0.006)  # from looking at the clock to the frame being on the screen
+PAINT_S = (0.002, 0.006)  # time from reading the clock to the frame on the screen
 Where: TypeAlias = tuple[str, str]
-"""A block, whose task is done, and a condition."""
+"""A block and a condition."""
 ConditionFeatures: TypeAlias = Mapping[Where, tuple[TrialFeatures, ...]]
-"""What was felt in each trial of a condition in a block."""
+"""The features of each trial by block and condition."""
 REHEARSED_PEOPLE: Final = 4
-"""So many simulated participants feel all conditions."""
+"""The number of simulated participants that rehearse all conditions."""
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """What is asked, and what was felt in each interval of the trial: nothing on a form of its own.
+    """The page of a question, and the features of each interval of its trial: none for a separate form.
 
     A task is the page where its level is set; the last that was felt is what is set, since the last steps.
     """
@@ -115,14 +115,14 @@ Where a level is set, the answer is by how many steps, above 0 towards more; 0 c
 
 
 def _plain(value: Any) -> Any:
-    """Return an answer with Python's own numbers and texts; several, in a list or an array, as a tuple."""
+    """Return an answer as Python numbers and texts; a list or array becomes a tuple."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     return tuple(_plain(item) for item in value) if isinstance(value, list | tuple) else value
 
 
 class HeldSignals:
-    """Holds signals that end the program, such as Ctrl+C, until `obey`, which a session calls between its writes.
+    """Hold signals that end the program, such as Ctrl+C, until `obey`, which a session calls between its writes.
 
     An exception in the midst of a write could leave a line that the journal does not count. A second signal ends the
     program at once. Only the main thread gets signals; elsewhere nothing is held.
@@ -146,7 +146,7 @@ class HeldSignals:
             self.obey()
 
     def obey(self) -> None:
-        """Do what a signal that came would have done."""
+        """Act on a held signal."""
         if self._came is None:
             return
         number, self._came = self._came, None
@@ -165,7 +165,7 @@ class HeldSignals:
 
 
 class DiscardingStore:
-    """A session that is kept nowhere."""
+    """A session store that discards everything."""
 
     recorder = None
     fingerprint = ""
@@ -178,7 +178,7 @@ class DiscardingStore:
         """Keep nothing."""
 
     def check_flushed(self) -> None:
-        """Do nothing: nothing is kept."""
+        """Do nothing."""
 
     def write_tables(self) -> None:
         """Keep nothing."""
@@ -202,7 +202,7 @@ def rehearsal_rig(study: Protocol, person: str, seed: int, device: str) -> Rig:
 
 @dataclass(slots=True)
 class _Setting:
-    """A level that is being set: by whom, what was sensed since the last steps, and when they were made [s]."""
+    """The state of a setting: its observer, the magnitudes sensed since the last steps, and their time [s]."""
 
     observer: AdjustingObserver
     scale: float
@@ -259,19 +259,19 @@ class RehearsedSession(SimulatedParticipant):
         self._notice()
 
     def _notice(self) -> None:
-        """End where a person would wait for the disk."""
+        """Raise an error if the session stalled: a person would wait for the disk, a rehearsal ends."""
         if self._runner.stalled is not None:
             raise StoreError(self._runner.stalled)
 
     def run(self) -> None:
-        """Go from the first page to the last."""
+        """Run from the first page to the last."""
         for _ in self.pages():
             pass
 
     def pages(self) -> Iterator[Page]:
-        """Yield each page when it is shown, and do what it asks for when the next one is wanted."""
+        """Yield each page when it is shown, and respond to it when the next page is requested."""
         self._post(Begin(self._now_s()))
-        if isinstance(self.page, PausePage):  # before the trial that a resumed session goes on with
+        if isinstance(self.page, PausePage):  # before the first trial of a resumed session
             self._post(ResumeRequested(self._now_s(), "participant"))
         told: Page | None = None
         while not self._runner.finished:
@@ -304,14 +304,14 @@ class RehearsedSession(SimulatedParticipant):
             self._poll()
 
     def _advance(self, seconds: float) -> None:
-        """Let the servo take its ticks; who ends the program ends them, and without them no time passes."""
+        """Run the servo for a time [s]; a signal that ends the program stops it."""
         self.signals.obey()
         servo = self.rig.servo
         if servo.advance(max(1, round(seconds * servo.rate_hz))) == 0 and servo.fault is None:
             raise SessionError("the rehearsal was stopped from outside")
 
     def _do(self, page: TaskPage) -> None:
-        """Do a task until its page is left, seeing every frame and feeling every tick."""
+        """Perform a task until its page is left, with every frame seen and every tick felt."""
         interval = page.interval
         named = str(page.trial) if interval is None else f"{page.trial}/{interval.number}"
         arm, draw = self._hand, self._stream(f"{named}/behaviour")
@@ -321,7 +321,7 @@ class RehearsedSession(SimulatedParticipant):
         self._next_frame_ns = self.rig.servo.now_ns()
         hand = hand_for(page.task, arm, draw, self._now_s())
         setting = _Setting(self._adjusting(page.trial), self._study.scene.scale) if page.adjusts else None
-        self.look(senses)  # the first frame, with which the trial begins, is painted at once
+        self.look(senses)  # the first frame, which begins the trial, is painted at once
         while page is self.page:
             self._advance(LOOK_S)
             view = self.look(senses)
@@ -333,14 +333,14 @@ class RehearsedSession(SimulatedParticipant):
                 self._set(page, setting, view, samples)
             if wants_to_go_on and page is self.page:
                 self._post(Continue(self._now_s()))
-        rest(page.task, arm, returns=self._study.format > 1)  # rehearsals of format 1 keep their numbers
+        rest(page.task, arm, returns=self._study.format > 1)  # rehearsals of format 1 keep their results
         earlier = () if interval is None or interval.number == 1 else self._features_of.get(page.trial, ())
         self._features_of[page.trial] = (*earlier, senses.features())
         if self._tell_features is not None:
             self._tell_features(page.trial, self._features_of[page.trial])
 
     def _set(self, page: TaskPage, setting: _Setting, view: TankView, samples: Any) -> None:
-        """Adjust what is felt by what was sensed since the last steps, and confirm where that is done."""
+        """Make the next steps of a setting from the magnitudes sensed since the last ones, or confirm it."""
         setting.senses.feel(samples)
         setting.senses.see(self.rig.servo.now_ns(), view)
         since_s = view.task.elapsed_s - setting.judged_s
@@ -358,7 +358,7 @@ class RehearsedSession(SimulatedParticipant):
             self._post(Submitted(self._now_s()))
 
     def _steps(self, page: TaskPage, setting: _Setting) -> int:
-        """Return the next steps of a level that is set, 0 where it is done."""
+        """Return the next steps of a setting, 0 if it is done."""
         now = setting.senses.features()
         earlier = self._features_of.get(page.trial, ()) if page.interval and page.interval.number > 1 else ()
         given = None if self._answer is None else self._answer(Question(page, (*earlier, now)))
@@ -373,7 +373,7 @@ class RehearsedSession(SimulatedParticipant):
             ) from None
 
     def look(self, senses: SensedTrial) -> TankView | None:
-        """Show the frames that are due since the last look; return what the newest showed, None where none was due."""
+        """Show the frames due since the last call; return the view of the newest one, or None."""
         view = None
         while self._next_frame_ns <= self.rig.servo.now_ns():
             view = self._runner.view(self._next_frame_ns)
@@ -414,7 +414,7 @@ class RehearsedSession(SimulatedParticipant):
 def condition_features(
     protocol: Protocol, *, seed: int, people: int = REHEARSED_PEOPLE, progress: Callable[[str], object] | None = None
 ) -> ConditionFeatures:
-    """Return what ``people`` simulated participants feel in every condition of the blocks.
+    """Rehearse every condition of the blocks with ``people`` simulated participants and return the features.
 
     Raises
     ------
@@ -446,7 +446,7 @@ def condition_features(
 
 
 def _presented(protocol: Protocol, key: LevelKey, schedule: Schedule, trial: Trial) -> tuple[Where, ...]:
-    """Return what a trial presents, interval by interval; nothing where it is passed over with any answers."""
+    """Return block and condition of each interval of a trial, none if it is passed over for any answers."""
     if protocol.blocks[trial.block].design is None:
         return ((trial.block, key.codes[trial.block][trial.code]),)
     due = next_level(protocol, key, schedule, trial, ())
@@ -465,7 +465,7 @@ def rehearse(
     progress: Callable[[str], object] | None = None,
     observer: Observer | None = None,
 ) -> Path:
-    """Run a session each of P001, P002 … and return the study folder.
+    """Run one session each for P001, P002 … and return the study folder.
 
     Parameters
     ----------
@@ -532,10 +532,10 @@ def finish_session(
     results: Path,
     progress: Callable[[str], object] | None = None,
 ) -> None:
-    """Bring a participant's first session to its end, whatever an earlier call, or a killed program, left of it.
+    """Complete a participant's first session: begin it, or resume what an earlier call or killed program left.
 
-    An interrupted session is resumed with its own seed and device. One that is finished is not touched, nor is anything
-    begun for a participant who withdrew.
+    An interrupted session is resumed with its own seed and device. Finished sessions are not changed, and none is begun
+    for a withdrawn participant.
 
     Parameters
     ----------
@@ -569,7 +569,7 @@ def finish_session(
         _run_to_end(participant, opening, progress)
     elif progress_of(journal.read(session.journal)).ended is None:
         _run_to_end(participant, reopen_session(session.path, protocol=protocol), progress)
-    else:  # the program was killed after the session's last line, before its proofs
+    else:  # the program was killed between the session's last line and its proofs
         rebuild(session.path)
         if progress is not None:
             progress(f"{participant}: tables and checksums of the finished session rebuilt")
@@ -608,7 +608,7 @@ def open_session(
     observer: Observer | None = None,
     answer: Answer | None = None,
 ) -> Iterator[tuple[RehearsedSession, SessionStore]]:
-    """Begin a session with a simulated hand; yield it and its store. Left before its end, it stays unfinished.
+    """Begin a session with a simulated hand; yield it and its store. It stays unfinished if left before its end.
 
     Parameters
     ----------
@@ -668,7 +668,7 @@ def open_session(
 
 @contextmanager
 def _tables_of(store: SessionStore) -> Iterator[None]:
-    """Bring the tables of a session that is left before its end up to date."""
+    """Update the tables of a session that is left before its end."""
     try:
         yield
     finally:
@@ -678,7 +678,7 @@ def _tables_of(store: SessionStore) -> Iterator[None]:
 
 
 def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
-    """Go on with a rehearsed session whose program was ended, to its last page; as `reopen_session`."""
+    """Resume an interrupted rehearsed session and run it to its last page; errors as in `reopen_session`."""
     with reopen_session(session_folder, protocol=protocol) as (rehearsal, _):
         rehearsal.run()
 
@@ -687,7 +687,7 @@ def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
 def reopen_session(
     session_folder: Path, *, protocol: str | Path | None = None, answer: Answer | None = None
 ) -> Iterator[tuple[RehearsedSession, SessionStore]]:
-    """Go on with a rehearsed session whose program was ended; yield it and its store.
+    """Resume an interrupted rehearsed session; yield it and its store.
 
     Parameters
     ----------
@@ -737,7 +737,7 @@ def reopen_session(
 def _features_of_whole_session(
     study: Protocol, schedule: Schedule, device: str, codes: dict[str, dict[str, str]], secret: bytes
 ) -> dict[int, tuple[TrialFeatures, ...]]:
-    """Return what is felt in each trial (by number) of a session that is not interrupted."""
+    """Return the features of each trial (by number) of an uninterrupted session."""
     features: dict[int, tuple[TrialFeatures, ...]] = {}
     with rehearsal_rig(study, schedule.participant, schedule.seed, device) as rig:
         RehearsedSession(

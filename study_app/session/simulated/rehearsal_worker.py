@@ -1,4 +1,4 @@
-"""The worker process that rehearses a protocol for a window."""
+"""The worker process in which a window rehearses a protocol."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +21,7 @@ class RehearsalOrder:
 
 
 RehearsalClient: TypeAlias = WorkerClient[RehearsalOrder, float | str | Path]
-"""Its answers are the share of what is compiled, a line for each participant, then the study folder."""
+"""The client; its answers are the fraction of compiled functions, a line per participant, then the study folder."""
 
 
 def carry_out(order: RehearsalOrder, send: Send, _stop: Stop) -> Path:

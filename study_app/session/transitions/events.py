@@ -20,14 +20,14 @@ Status: TypeAlias = Literal["completed", "withdrawn", "aborted", "broken"]
 
 
 class Command:
-    """What is to be done."""
+    """A command of the state machine, executed by the runner."""
 
     __slots__ = ()
 
 
 @dataclass(frozen=True, slots=True)
 class ShowPage(Command):
-    """Put a page before the participant."""
+    """Show a page to the participant."""
 
     page: Page
 
@@ -54,7 +54,7 @@ class StartTrial(Command):
 
 @dataclass(frozen=True, slots=True)
 class Adjust(Command):
-    """Present another value of the varied number within the interval under way, and write the line of its steps.
+    """Change the varied number within the current interval, and write the event of its steps.
 
     The force goes on from what it is; the line has the number by which recordings know the scene from then on.
     """
@@ -66,32 +66,32 @@ class Adjust(Command):
 
 @dataclass(frozen=True, slots=True)
 class LeaveTask(Command):
-    """End the task because the participant wants to go on, if it may end so already."""
+    """End the task at the participant's request, if it may end already."""
 
 
 @dataclass(frozen=True, slots=True)
 class StopTrial(Command):
-    """Follow the task no longer; what was measured until now stays until the next trial starts."""
+    """Stop tracking the task; its measurements are kept until the next trial starts."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rest(Command):
-    """Take the liquid away: the force fades to zero."""
+    """Remove the liquid: the force fades to zero."""
 
 
 @dataclass(frozen=True, slots=True)
 class StopForce(Command):
-    """Zero force with the next tick, and until ``FadeIn``."""
+    """Set the force to zero with the next tick, until ``FadeIn``."""
 
 
 @dataclass(frozen=True, slots=True)
 class FadeIn(Command):
-    """Let the force come back gently."""
+    """Fade the force in."""
 
 
 @dataclass(frozen=True, slots=True)
 class Write(Command):
-    """Put one line into the journal; with ``waits``, as for answers and notes, on the disk before the next command.
+    """Write one line to the journal; with ``waits``, as for answers and notes, wait until it is on the disk.
 
     Other lines are flushed in the background, so that nothing drawn waits for the disk. With ``measured`` the runner
     adds what it measured of the trial that was stopped.
@@ -104,12 +104,12 @@ class Write(Command):
 
 @dataclass(frozen=True, slots=True)
 class CheckFlushed(Command):
-    """Stop here while journal lines that were written without waiting could not be flushed."""
+    """Fail if journal lines written without waiting could not be flushed."""
 
 
 @dataclass(frozen=True, slots=True)
 class WriteTables(Command):
-    """Bring the tables up to date with the journal."""
+    """Update the tables from the journal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,31 +122,31 @@ class Finish(Command):
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """What happened at ``at_s``."""
+    """An event at ``at_s``."""
 
     at_s: float
 
 
 @dataclass(frozen=True, slots=True)
 class Begin(Event):
-    """Everything is open; show the first page."""
+    """All devices and files are open; show the first page."""
 
 
 @dataclass(frozen=True, slots=True)
 class Continue(Event):
-    """The participant goes on from a text page, or ends an exploration after its least time."""
+    """The participant continues from a text page, or ends an exploration after its least time."""
 
 
 @dataclass(frozen=True, slots=True)
 class LanguageChosen(Event):
-    """The participant wants to read in another of the study's languages; possible until a consent is given."""
+    """The participant chose another language of the study; possible until consent is given."""
 
     language: str
 
 
 @dataclass(frozen=True, slots=True)
 class TaskDone(Event):
-    """The task of the running trial is over; ``summary`` is what its row records (see ``store.columns``).
+    """The task of the running trial is over; ``summary`` has the columns of its row (see ``store.columns``).
 
     ``invalid`` names the limits that an interval breaks, so that it was not delivered as requested.
     """
@@ -165,7 +165,7 @@ class ItemShown(Event):
 
 @dataclass(frozen=True, slots=True)
 class Chosen(Event):
-    """The participant answered ``item`` with ``value``, None for "cannot judge"; may come again."""
+    """The participant chose ``value`` for ``item``, None for "cannot judge"; the last choice counts."""
 
     item: str
     value: Value
@@ -173,14 +173,14 @@ class Chosen(Event):
 
 @dataclass(frozen=True, slots=True)
 class Retracted(Event):
-    """The participant took the answer to ``item`` back: an entry was emptied."""
+    """The participant removed the answer to ``item`` by emptying its field."""
 
     item: str
 
 
 @dataclass(frozen=True, slots=True)
 class Stepped(Event):
-    """The participant wants more of what an adjustment sets by some steps, or less where ``steps`` is below 0."""
+    """The participant adjusted the level by ``steps``, negative for less."""
 
     steps: int
 
@@ -192,12 +192,12 @@ class Submitted(Event):
 
 @dataclass(frozen=True, slots=True)
 class TimeUp(Event):
-    """A rest between two intervals, or a feedback, has lasted long enough; only the clock says so."""
+    """The time of a rest between intervals, or of a feedback, is over."""
 
 
 @dataclass(frozen=True, slots=True)
 class PauseRequested(Event):
-    """Esc, the operator's pause, or the program's when it is ended from outside or stood still."""
+    """A pause by Esc, by the operator, or by the program when it was terminated or suspended."""
 
     by: Literal["participant", "operator", "program"]
 
@@ -218,7 +218,7 @@ class ForceStopped(Event):
 
 @dataclass(frozen=True, slots=True)
 class Note(Event):
-    """The operator's note, or a mark (empty text allowed) at a moment."""
+    """The operator's note, or a mark without a text."""
 
     kind: Literal["note", "mark"]
     text: str
@@ -252,14 +252,14 @@ class Broke(Event):
 
 @dataclass(frozen=True, slots=True)
 class Reconnected(Event):
-    """What failed is open again and the servo runs at zero force; the journal keeps ``described``, of the device."""
+    """The failed device or video is open again and the servo runs at zero force; ``described`` is journalled."""
 
     described: dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
 class WriteFailed(Event):
-    """The disk did not take a command, for a reason; it and those after it, of moment ``at_s``, are ``left``."""
+    """Writing failed, for a reason; the failed command and those after it, of time ``at_s``, are ``left``."""
 
     reason: str
     left: tuple[Command, ...]
@@ -267,15 +267,15 @@ class WriteFailed(Event):
 
 @dataclass(frozen=True, slots=True)
 class WriteRetried(Event):
-    """What the disk did not take is tried again."""
+    """The pending writes are retried."""
 
 
 @dataclass(frozen=True, slots=True)
 class WriteCompleted(Event):
-    """The disk took all that was left."""
+    """All pending writes succeeded."""
 
 
 def broken(at_s: float, error: BaseException) -> Broke:
-    """Return that ``error`` broke the session."""
+    """Return the event for an ``error`` that stops the session."""
     what = str(error) if isinstance(error, StudyError) else f"{type(error).__name__}: {error}"
     return Broke(at_s, what, "device" if isinstance(error, DeviceError | ServoFault | VideoError) else "program")

@@ -62,7 +62,7 @@ STOPPABLE = {Phase.READING, Phase.TASK, Phase.RESTING, Phase.ANSWERING, Phase.FE
 
 
 def begin(state: SessionState, event: Begin) -> Result:
-    """Go to the first step, or to where an interrupted session goes on; a trial waits there until somebody is ready."""
+    """Go to the first step, or to that of a resumed session; a trial waits there, paused."""
     start = state.plan.start
     reached, done = reach(replace(state, heard=start.heard), start.step, at_s=event.at_s)
     if start == FIRST or reached.phase is Phase.ENDED or not isinstance(reached.step, Trial):
@@ -72,7 +72,7 @@ def begin(state: SessionState, event: Begin) -> Result:
 
 
 def read_on(state: SessionState, event: Continue) -> Result:
-    """Leave a page that was read, but not before its least time."""
+    """Leave a text page, but not before its least time."""
     if state.stays_until_s is not None and event.at_s < state.stays_until_s:
         return state, ()
     text = state.plan.protocol.pages[state.page_id]
@@ -84,7 +84,7 @@ def read_on(state: SessionState, event: Continue) -> Result:
 
 
 def choose_language(state: SessionState, event: LanguageChosen) -> Result:
-    """Show the page in another language, and all that come."""
+    """Show this page and all later ones in another language."""
     if event.language == state.plan.language:
         return state, ()
     if event.language not in state.languages:
@@ -95,12 +95,12 @@ def choose_language(state: SessionState, event: LanguageChosen) -> Result:
 
 
 def leave_task(state: SessionState, _event: Continue) -> Result:
-    """Let the participant end an exploration that has lasted long enough; its end is a `TaskDone`."""
+    """End an exploration at the participant's request after its least time; a `TaskDone` event follows."""
     return state, () if state.adjusts else (LeaveTask(),)
 
 
 def step(state: SessionState, event: Stepped) -> Result:
-    """Move the level that the participant sets, within its ends; outside of such an interval do nothing."""
+    """Adjust the level within its range; do nothing outside of an adjustable interval."""
     setting, due = state.adjusting, state.due
     if setting is None or due is None:
         return state, ()
@@ -112,14 +112,14 @@ def step(state: SessionState, event: Stepped) -> Result:
 
 
 def confirm_setting(state: SessionState, _event: Submitted) -> Result:
-    """Let the participant end a setting; its end is a `TaskDone`. Where nothing is set there is nothing to confirm."""
+    """End a setting at the participant's request; a `TaskDone` event follows. Elsewhere there is nothing to confirm."""
     return state, (LeaveTask(),) if state.adjusts else ()
 
 
 def end_task(state: SessionState, event: TaskDone) -> Result:
-    """Take the liquid away, keep what was measured, and ask or go on; between two intervals rest.
+    """Remove the liquid, write the measures, and ask or continue; rest between two intervals.
 
-    A trial that was not delivered as requested is not asked about, but presented again.
+    A trial that was not delivered as requested is presented again without a question.
     """
     done: Commands = (StopTrial(), Rest())
     measures = dict(event.summary)
@@ -136,7 +136,7 @@ def end_task(state: SessionState, event: TaskDone) -> Result:
         done = (*done, Write(ended))
         if reasons:
             return present_again(state, done, event.at_s)
-        measures = {}  # they are those of the intervals
+        measures = {}  # measures are those of the intervals
         if state.interval < design.intervals:
             return rest(replace(state, interval=state.interval + 1), done, event.at_s + FADE_OUT_S + design.pause_s)
     done = (*done, Write(journal.TrialEnded(**which(state), outcome=event.outcome, others=measures)))
@@ -149,24 +149,24 @@ def end_task(state: SessionState, event: TaskDone) -> Result:
 
 
 def end_rest(state: SessionState, event: TimeUp) -> Result:
-    """Present the next interval, once the rest before it has lasted long enough."""
+    """Present the next interval after its rest."""
     return (state, ()) if before_end(state, event.at_s) else start_interval(state, (), event.at_s)
 
 
 def end_feedback(state: SessionState, event: TimeUp) -> Result:
-    """Go on, once the feedback was shown long enough."""
+    """Continue after the time of the feedback."""
     return (state, ()) if before_end(state, event.at_s) else enter(state, state.index + 1, at_s=event.at_s)
 
 
 def pause(state: SessionState, event: PauseRequested) -> Result:
-    """Show the pause; a task under way is over as an attempt."""
+    """Show the pause; the current attempt at a task ends."""
     held: Hold | None = "pause" if event.by == "operator" else None
     paused = replace(state, phase=Phase.PAUSED, interrupted=state.phase, held=held)
     return paused, (*break_off(state), Write(journal.Paused(by=event.by)), WriteTables(), show(paused))
 
 
 def pause_again(state: SessionState, event: PauseRequested) -> Result:
-    """Let the operator take over the participant's pause; else do nothing."""
+    """Convert the participant's pause to the operator's; otherwise do nothing."""
     if event.by != "operator" or state.held is not None:
         return state, ()
     paused = replace(state, held="pause")
@@ -174,7 +174,7 @@ def pause_again(state: SessionState, event: PauseRequested) -> Result:
 
 
 def resume(state: SessionState, event: ResumeRequested) -> Result:
-    """Go back to what was interrupted, with the force if it was off; only the operator ends what is held."""
+    """Return to the interrupted phase and fade the force in if it was off; only the operator ends a held pause."""
     if state.held is not None and event.by != "operator":
         what = "the force was stopped" if state.held == "force" else "the operator paused the session"
         raise SessionError(f"{what}: only the operator resumes it, not the {event.by}")
@@ -190,7 +190,7 @@ def resume(state: SessionState, event: ResumeRequested) -> Result:
 
 
 def stop_force(state: SessionState, event: ForceStopped) -> Result:
-    """Switch the force off and pause; only the operator resumes, unless the program itself stopped the force."""
+    """Stop the force and pause; only the operator resumes, unless the program itself stopped the force."""
     stopped = Write(journal.ForceStopped(by=event.by))
     held: Hold | None = state.held if event.by == "program" else "force"
     if state.phase is Phase.PAUSED:
@@ -202,17 +202,17 @@ def stop_force(state: SessionState, event: ForceStopped) -> Result:
 
 
 def stop_force_again(state: SessionState, event: ForceStopped) -> Result:
-    """Switch off a force that is off already, and say who wanted so."""
+    """Record another stop of a force that is already off."""
     return state, (StopForce(), Write(journal.ForceStopped(by=event.by)))
 
 
 def stop_force_after_end(state: SessionState, _event: ForceStopped) -> Result:
-    """Switch the force off; the journal is closed."""
+    """Stop the force after the journal was closed."""
     return state, (StopForce(),)
 
 
 def repeat(state: SessionState, event: RepeatRequested) -> Result:
-    """Present the trial again, keeping the attempt that was."""
+    """Present the trial again; the earlier attempt stays in the data."""
     if not event.reason.strip():
         raise SessionError("repeating a trial needs a reason: enter one")
     repeated = Write(journal.Repeat(trial=state.trial.number, reason=event.reason), waits=True)
@@ -220,13 +220,13 @@ def repeat(state: SessionState, event: RepeatRequested) -> Result:
 
 
 def note(state: SessionState, event: Note) -> Result:
-    """Keep what the operator noted; what was typed is on the disk first."""
+    """Write the operator's note, waiting for the disk if it has a text."""
     written = Write(journal.Note(kind=event.kind, text=event.text), waits=event.kind == "note")
     return state, (written, WriteTables())
 
 
 def end(state: SessionState, event: EndRequested) -> Result:
-    """End early; a session in trouble from which the participant did not withdraw counts as broken."""
+    """End the session early; after a failure without a withdrawal its status is broken."""
     broken = state.phase is Phase.TROUBLE and event.status == "aborted"
     ended = replace(state, phase=Phase.ENDED, interrupted=None)
     finish = Finish("broken" if broken else event.status, event.reason)
@@ -234,9 +234,9 @@ def end(state: SessionState, event: EndRequested) -> Result:
 
 
 def call_operator(state: SessionState, event: Broke) -> Result:
-    """Keep the force off and everything on the disk, and wait for the operator.
+    """Stop the force, write all data, and wait for the operator.
 
-    Where the device failed, ``interrupted`` keeps what the session goes back to once it is connected again. In a study
+    If the device failed, ``interrupted`` is the phase to which the session returns after reconnection. In a study
     with videos the journal does not say whether a device or a video failed: that would tell the trial's condition.
     """
     waits = state.phase in {Phase.OPENING, Phase.PAUSED, Phase.TROUBLE}
@@ -265,7 +265,7 @@ def reconnect(state: SessionState, event: Reconnected) -> Result:
 
 
 def stall(state: SessionState, event: WriteFailed) -> Result:
-    """Stop the force and show a calm page until the disk takes what is left."""
+    """Stop the force and show a waiting page until the pending writes succeed."""
     first = Stall(event.reason, event.left, event.at_s, state.phase)
     again = first if state.stall is None else replace(first, before=state.stall.before, by=state.stall.by)
     stalled = replace(state, phase=Phase.STALLED, stall=again)
@@ -273,12 +273,12 @@ def stall(state: SessionState, event: WriteFailed) -> Result:
 
 
 def retry(state: SessionState, _event: WriteRetried) -> Result:
-    """Carry out what is left, in order and once; whether the disk took it is another event."""
+    """Retry the pending commands in order, each once; success is a separate event."""
     return state, _stall(state).left
 
 
 def recover(state: SessionState, event: WriteCompleted) -> Result:
-    """Go back to what the disk interrupted, paused at zero force until somebody resumes."""
+    """Return to the interrupted phase, paused at zero force."""
     stalled = _stall(state)
     back = replace(state, phase=stalled.before, stall=None)
     if back.phase in STOPPABLE:
@@ -287,14 +287,14 @@ def recover(state: SessionState, event: WriteCompleted) -> Result:
 
 
 def stop_force_of_stalled(state: SessionState, event: ForceStopped) -> Result:
-    """Switch off a force that is off already; afterwards only the operator resumes."""
+    """Record a stop of the force while stalled; afterwards only the operator resumes."""
     if event.by != "program":
         state = replace(state, stall=replace(_stall(state), by=event.by))
     return state, (StopForce(),)
 
 
 def end_unwritten(state: SessionState, _event: EndRequested) -> Result:
-    """End without a line in the journal: the session stays unfinished, and what is left is still tried."""
+    """End without a line in the journal: the session stays unfinished, and pending writes are still tried."""
     if state.over:
         raise SessionError("the session is over: its last lines wait for the disk")
     ended = replace(state, stall=replace(_stall(state), before=Phase.ENDED))

@@ -24,12 +24,12 @@ from study_app.store.journals.journal_events import Answer
 
 PARTICIPANT: Final = "P001"
 SEED: Final = 1
-"""The participant and the seed of a preview, unless others are asked for."""
+"""The default participant and seed of a preview."""
 Kind: TypeAlias = Literal["text", "tank", "questions", "feedback"]
 
 
 def page(state: SessionState) -> pages.Page:
-    """Return what the participant sees in any phase but the one before the first page."""
+    """Return the page of any phase after the first page is shown."""
     match state.phase:
         case Phase.TASK | Phase.RESTING:
             made = replace(_task_page(state, state.trial), task=state.task, interval=_interval(state))
@@ -46,7 +46,7 @@ def page(state: SessionState) -> pages.Page:
         case Phase.TROUBLE | Phase.STALLED:
             return pages.TroublePage(_words(state).trouble_title, _words(state).trouble_body)
         case Phase.COMPLETE:
-            last = state.plan.schedule.steps[-1]  # a study that says goodbye itself does so once
+            last = state.plan.schedule.steps[-1]  # a study with its own farewell shows no second one
             text = state.plan.protocol.pages[last.page_id] if isinstance(last, PageStep) else None
             title = _words(state).end_title if text is None else _text(state, text.title)
             return pages.EndPage(title, _words(state).end_body)
@@ -94,7 +94,7 @@ def _task_page(state: SessionState, trial: Trial) -> pages.TaskPage:
 
 
 def task_page(protocol: Protocol, language: str, trial: Trial, body: Body) -> pages.TaskPage:
-    """Return the tank of a trial in a session's own protocol with a ball, before anything is presented."""
+    """Return the tank page of a trial in a session's own protocol, before anything is presented."""
     block = protocol.blocks[trial.block]
     task, questionnaire = protocol.tasks[block.task], protocol.questionnaire_of(block.id)
     set_by_hand = block.design is not None and design_of(protocol, block).adjusts
@@ -118,7 +118,7 @@ def _drawn_condition(state: SessionState, trial: Trial) -> str:
 
 
 def _presenting(state: SessionState, made: pages.TaskPage) -> pages.TaskPage:
-    """Return a page of a task with what is seen in what the trial, or its interval, presents."""
+    """Return a task page with the visible properties of the trial or interval."""
     named = _drawn_condition(state, state.trial)
     if state.due is not None:
         named = state.due.intervals[state.interval - 1].condition
@@ -128,7 +128,7 @@ def _presenting(state: SessionState, made: pages.TaskPage) -> pages.TaskPage:
 
 
 def _interval(state: SessionState) -> pages.Interval | None:
-    """Return where the trial under way is among its intervals; None without a design."""
+    """Return the interval of the current trial; None without a design."""
     design, said = state.design, _words(state)
     if design is None:
         return None
@@ -174,9 +174,9 @@ def _questionnaire_page(state: SessionState) -> pages.QuestionnairePage:
 def questions_page(
     protocol: Protocol, questionnaire: Questionnaire, questions: Sequence[Question], context: Context, label: str
 ) -> pages.QuestionnairePage:
-    """Return the page of some questions of a questionnaire before any answer, outside a session.
+    """Return a page of questions without answers, outside a session.
 
-    ``questions`` are in the order shown; ``label`` is what the page is called where the questionnaire has no title.
+    ``questions`` are in the order shown; ``label`` is the page's title if the questionnaire has none.
     """
     statements = len(questionnaire.statements) == len(questionnaire.items)
     scale = protocol.scales[questionnaire.scale or ""] if statements else None
@@ -201,7 +201,7 @@ def _progress(state: SessionState, trial: Trial) -> pages.Progress:
 
 
 def _progress_between(state: SessionState) -> pages.Progress | None:
-    """Return the progress shown on a page to read: before the first trial of its part, or after a number of trials.
+    """Return the progress shown on a text page: before the first trial of its part, or after a number of trials.
 
     None outside the parts, except for a break among trials of intervals, which names the last trial.
     """
@@ -222,14 +222,14 @@ def _coming(state: SessionState) -> Trial | None:
 
 
 def _among(protocol: Protocol, trial: Trial, label: str, index: int) -> pages.Progress:
-    """Return where trial ``index`` of a trial's block is; a block with a criterion may end early."""
+    """Return the progress of trial ``index`` in its block; a block with a criterion may end early."""
     at_most = protocol.blocks[trial.block].until is not None
     return pages.Progress(part=trial.part, parts=protocol.parts, label=label, index=index, of=trial.of, at_most=at_most)
 
 
 @dataclass(frozen=True, slots=True)
 class Preview:
-    """One session of a study, with its own protocol: in a study with groups, with the steps of the participant's group.
+    """A previewed session of a study with its own protocol; with groups, it has the steps of the participant's group.
 
     ``codes`` is block → code → condition or track; levels are drawn from ``secret``.
     """
@@ -241,7 +241,7 @@ class Preview:
 
 
 def preview(study: Protocol, seed: int = SEED, participant: str = PARTICIPANT) -> Preview:
-    """Return the first session of the first participant of a folder that begins with this seed.
+    """Return the first session of a study folder that begins with this seed and participant.
 
     All its randomness comes from the seed, the codes too; the number in the participant's id determines the row of a
     square.
@@ -256,7 +256,7 @@ def preview(study: Protocol, seed: int = SEED, participant: str = PARTICIPANT) -
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """One of the pages of a step: its kind, and in a trial with a design which interval (from 1) a tank presents."""
+    """A page of a step: its kind and, for the tank of a trial with a design, the interval (from 1)."""
 
     kind: Kind
     interval: int = 1
@@ -284,9 +284,9 @@ def moments(shown: Preview, index: int) -> tuple[Moment, ...]:
 def previewed_page(
     shown: Preview, index: int, moment: Moment, language: str, answers: Mapping[str, Value] | None = None
 ) -> pages.Page:
-    """Return a page of a step (by its index in the schedule), as a session would show it in one of the languages.
+    """Return a page of a step (by its index in the schedule) as shown in a session, in one of the languages.
 
-    Of ``answers`` that were given before, by item, those that would not be accepted are left out.
+    Earlier ``answers`` (by item) that would not be accepted are left out.
     """
     if moment.kind == "feedback":
         return pages.FeedbackPage(right=True)
@@ -306,7 +306,7 @@ def previewed_page(
 
 
 def tested_condition(shown: Preview, index: int) -> str | None:
-    """Return the condition that a trial presents; None for other steps, and where a number is varied."""
+    """Return the condition of a trial; None for other steps and for trials that vary a number."""
     step = shown.schedule.steps[index]
     if not isinstance(step, Trial):
         return None

@@ -21,7 +21,7 @@ from study_app.store.journals.journal_events import Answer
 
 
 class Phase(Enum):
-    """What the participant is doing."""
+    """The phase of a session: the participant's current activity."""
 
     OPENING = "opening"
     READING = "reading"
@@ -43,7 +43,7 @@ FINAL = frozenset({Phase.COMPLETE, Phase.ENDED})
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What stays the same through a session, but for the language, which a participant may choose at its beginning.
+    """The constant data of a session, except the language, which the participant may choose at its beginning.
 
     ``key`` (block → code → condition or track) and ``secret``, from which levels are drawn, are blinded and never
     printed. ``start`` is where it begins: not at the first step where it was interrupted before.
@@ -57,7 +57,7 @@ class Plan:
     secret: bytes = field(default=b"", repr=False)
 
     def due(self, trial: Trial, heard: Sequence[TrialResult]) -> Presentation | None:
-        """Return what a trial of a block with a design presents; None where it is passed over."""
+        """Return the presentation of a trial of a block with a design; None if it is passed over."""
         return next_level(self.protocol, Key(self.key, self.secret), self.schedule, trial, heard)
 
     def condition(self, trial: Trial) -> str:
@@ -67,7 +67,7 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class Stall:
-    """What the disk did not take: why, and the commands of moment ``at_s`` that are still to be carried out.
+    """A failed write: its reason, and the commands of time ``at_s`` that are still to be executed.
 
     ``before`` is the phase that the session goes back to, ``by`` who stops its force then.
     """
@@ -81,7 +81,7 @@ class Stall:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionState:
-    """The session at one moment.
+    """The state of a session at one time.
 
     ``index`` counts the schedule's steps (−1 before the first, their number after the last), ``attempt`` the
     presentations of the present trial from 1. ``answers`` holds the statements of the present questionnaire that were
@@ -117,7 +117,7 @@ class SessionState:
 
     @property
     def step(self) -> Step | None:
-        """The step under way; None before the first and after the last."""
+        """The current step; None before the first and after the last."""
         steps = self.plan.schedule.steps
         return steps[self.index] if 0 <= self.index < len(steps) else None
 
@@ -128,25 +128,25 @@ class SessionState:
 
     @property
     def lost_device(self) -> bool:
-        """Whether the session stopped because of its device, so that it goes on once that is connected again."""
+        """Whether the session stopped because of its device and can continue after reconnection."""
         return self.phase is Phase.TROUBLE and self.interrupted is not None
 
     @property
     def page_id(self) -> str:
-        """The id of the page that is read (SessionError if none is)."""
+        """The id of the current text page; raises SessionError if there is none."""
         if isinstance(step := self.step, PageStep):
             return step.page_id
         raise SessionError("no page is being read: wait for the next one")
 
     @property
     def stays_until_s(self) -> float | None:
-        """When the page that is read may be left at the earliest [s, session's clock]; None: at once."""
+        """The earliest time at which the text page may be left [s, session's clock]; None: at once."""
         least_s = self.plan.protocol.pages[self.page_id].min_s
         return None if least_s is None else self.since_s + least_s
 
     @property
     def languages(self) -> tuple[str, ...]:
-        """The languages that the participant may choose from now: the study's, until a consent is given."""
+        """The languages that can be chosen now: those of the study until consent is given, then none."""
         offered, pages = self.plan.protocol.study.languages, self.plan.protocol.pages
         before = self.plan.schedule.steps[: self.index]
         early = all(isinstance(step, PageStep) and pages[step.page_id].kind != "consent" for step in before)
@@ -154,14 +154,14 @@ class SessionState:
 
     @property
     def trial(self) -> Trial:
-        """The trial under way (SessionError if none is)."""
+        """The current trial; raises SessionError if there is none."""
         if isinstance(step := self.step, Trial):
             return step
         raise SessionError("no trial is under way: wait for the next one")
 
     @property
     def task(self) -> AnyTask:
-        """The task of the trial under way; while its level is set, one that goes on for as long as that may take."""
+        """The task of the current trial; while its level is set, with the duration of a setting."""
         block = self.plan.protocol.blocks[self.trial.block]
         task = self.plan.protocol.tasks[block.task]
         method = method_of(self.plan.protocol, block) if self.adjusts else None
@@ -169,13 +169,13 @@ class SessionState:
 
     @property
     def adjusts(self) -> bool:
-        """Whether the interval under way, or the one after the rest, is set by the participant."""
+        """Whether the participant sets the level of the current interval, or of the one after the rest."""
         design = self.design
         return design is not None and design.adjusts and self.interval == design.intervals
 
     @property
     def adjusting(self) -> Adjusting | None:
-        """The setting under way, with where it started; None where nothing is set."""
+        """The current setting, with its start; None if nothing is set."""
         if not self.adjusts or self.due is None or self.due.level is None:
             return None
         block = self.plan.protocol.blocks[self.trial.block]
@@ -183,38 +183,38 @@ class SessionState:
 
     @property
     def asks(self) -> bool:
-        """Whether something is asked after the trial under way."""
+        """Whether questions follow the current trial."""
         return self.plan.protocol.questionnaire_of(self.trial.block) is not None
 
     @property
     def design(self) -> Design | None:
-        """How the trial under way is built; None where it is a single task."""
+        """The design of the current trial; None if it is a single task."""
         block = self.plan.protocol.blocks[self.trial.block]
         return None if block.design is None else design_of(self.plan.protocol, block)
 
     @property
     def items(self) -> tuple[str, ...]:
-        """The ids of the questions of the present page, in the order shown; of a trial those after its task."""
+        """The ids of the questions of the current page, or of those after the current task, in the order shown."""
         return self.step.items if isinstance(self.step, FormStep) else self.trial.items
 
     @property
     def questions(self) -> tuple[Question, ...]:
-        """The questions of the present page, in the order shown."""
+        """The questions of the current page, in the order shown."""
         return tuple(map(self.questionnaire.item, self.items))
 
     @property
     def shown(self) -> tuple[str, ...]:
-        """The ids of those questions that the answers so far leave shown."""
+        """The ids of the questions that are visible with the answers so far."""
         return shown(self.questions, {item: answer.value for item, answer in self.answers.items() if answer.given})
 
     @property
     def context(self) -> Context:
-        """What the questions of the present page are asked with."""
+        """The context of the questions of the current page."""
         return self.questionnaire.context(self.plan.protocol.scales, self.plan.language)
 
     @property
     def questionnaire(self) -> Questionnaire:
-        """What is answered after the trial under way, or the form (SessionError if nothing is)."""
+        """The questionnaire after the current trial, or the form; raises SessionError if there is none."""
         if isinstance(self.step, FormStep):
             return self.plan.protocol.questionnaires[self.step.form]
         if (questionnaire := self.plan.protocol.questionnaire_of(self.trial.block)) is None:

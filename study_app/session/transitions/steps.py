@@ -37,23 +37,23 @@ from study_app.store.journals.journal_events import UNDELIVERED, Answer, Respons
 Commands: TypeAlias = tuple[Command, ...]
 Result: TypeAlias = tuple[SessionState, Commands]
 END_SHOWN_S: Final = 0.1
-"""A closed ring is seen for so long before the next page."""
+"""Time that a closed ring is shown before the next page [s]."""
 AGAIN_S: Final = 1.5
-"""A trial that was not delivered as requested comes again after a rest of so long."""
+"""Rest before a trial that was not delivered as requested is presented again [s]."""
 FADE_OUT_S: Final = 0.05
-"""The force has faded to zero after so long; from then on a rest counts."""
+"""Time in which the force fades to zero, after which a rest begins [s]."""
 
 
 def enter(state: SessionState, index: int, done: Commands = (), *, at_s: float) -> Result:
-    """Go to the step at ``index``, or to the next that is not passed over; ``done`` finishes the step before."""
+    """Go to the step at ``index``, or to the next that is not passed over; ``done`` ends the step before."""
     reached, passed = reach(state, index, at_s=at_s)
     return enter_reached(reached, (*done, *passed))
 
 
 def reach(state: SessionState, index: int, *, at_s: float) -> Result:
-    """Return the state at the first step from ``index`` on that is not passed over, with a line on each that is.
+    """Return the state at the first step from ``index`` on that is not passed over, with an event for each passed one.
 
-    The phase is that of the step before, or ENDED where a criterion that ends the session was missed.
+    The phase is unchanged, or ENDED if a criterion that ends the session was missed.
     """
     steps = state.plan.schedule.steps
     start = state.plan.start
@@ -79,7 +79,7 @@ def reach(state: SessionState, index: int, *, at_s: float) -> Result:
 
 
 def enter_reached(state: SessionState, done: Commands) -> Result:
-    """Begin the step that was reached; ``done`` comes first."""
+    """Begin the current step after the commands ``done``."""
     if state.phase is Phase.ENDED:
         return state, (*done, show(state))
     if state.step is None:
@@ -99,7 +99,7 @@ def enter_reached(state: SessionState, done: Commands) -> Result:
 
 
 def start_trial(state: SessionState, done: Commands, at_s: float, *, rest_until_s: float | None = None) -> Result:
-    """Present a trial, where it has intervals the first of them, after a rest if there is one."""
+    """Present a trial, or its first interval, after a rest if there is one."""
     state = replace(state, phase=Phase.TASK, answers={}, interval=1, until_s=None, errors_ms=())
     trial = state.trial
     fields: dict[str, Any] = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
@@ -111,7 +111,7 @@ def start_trial(state: SessionState, done: Commands, at_s: float, *, rest_until_
 
 
 def present_again(state: SessionState, done: Commands, at_s: float) -> Result:
-    """Present a trial again that was not delivered as requested, as often as the study's limits permit; else go on."""
+    """Present an undelivered trial again if the study's limits permit another attempt; otherwise continue."""
     done = (*done, Write(journal.TrialEnded(**which(state), outcome=UNDELIVERED)))
     state = replace(state, invalid=state.invalid + 1)
     if state.invalid >= (state.plan.protocol.limits.attempts or 1):
@@ -121,7 +121,7 @@ def present_again(state: SessionState, done: Commands, at_s: float) -> Result:
 
 
 def start_interval(state: SessionState, done: Commands, at_s: float) -> Result:
-    """Present what the trial presents, or its present interval."""
+    """Present the trial, or its current interval."""
     state = replace(state, phase=Phase.TASK, until_s=None, steps=0, place=0)
     protocol, block = state.plan.protocol, _block(state, state.trial)
     if state.due is None:
@@ -147,18 +147,18 @@ def start_interval(state: SessionState, done: Commands, at_s: float) -> Result:
 
 
 def rest(state: SessionState, done: Commands, until_s: float) -> Result:
-    """Rest at zero force before the present interval."""
+    """Rest at zero force before the current interval."""
     state = replace(state, phase=Phase.RESTING, until_s=until_s)
     return state, (*done, show(state))
 
 
 def before_end(state: SessionState, at_s: float) -> bool:
-    """Return whether a rest or a feedback must last longer."""
+    """Return whether the time of a rest or feedback is not over yet."""
     return state.until_s is not None and at_s < state.until_s
 
 
 def break_off(state: SessionState) -> Commands:
-    """End a trial that is under way, in its task or in a rest, with what was measured of it until now."""
+    """Interrupt the current trial, in its task or a rest, and write its measures so far."""
     if state.phase not in {Phase.TASK, Phase.RESTING}:
         return ()
     ended = Write(journal.TrialEnded(**which(state), outcome="interrupted"), measured=state.due is None)
@@ -169,12 +169,12 @@ def break_off(state: SessionState) -> Commands:
 
 
 def which(state: SessionState) -> dict[str, Any]:
-    """Return the fields that say which attempt of which trial a line is about."""
+    """Return the event fields for trial, attempt and interval."""
     return {"trial": state.trial.number, "attempt": state.attempt}
 
 
 def show(state: SessionState) -> ShowPage:
-    """Return the command that shows the present page."""
+    """Return the command that shows the current page."""
     return ShowPage(page_builder.page(state))
 
 
@@ -185,7 +185,7 @@ def _block(state: SessionState, trial: Trial) -> Block:
 def _passed_over(
     state: SessionState, before: Step | None, step: Step | None, due: Presentation | None
 ) -> journal.PassedOver | None:
-    """Return the line on a step that is passed over: a trial that is not due, a break after one."""
+    """Return the event for a step that is passed over (a trial that is not due, or a break after one), else None."""
     if isinstance(step, Trial):
         block = _block(state, step)
         if block.design is None or due is not None:
@@ -199,7 +199,7 @@ def _passed_over(
 
 
 def _presented(state: SessionState, last: Trial) -> bool:
-    """Return whether any trial was answered, or given up, from the page before trial ``last`` on."""
+    """Return whether a trial was answered or given up between the previous text page and trial ``last``."""
     steps = state.plan.schedule.steps
     answered = {*state.plan.start.presented, *(result.trial for result in state.heard)}
     if state.invalid:
@@ -217,7 +217,7 @@ def _reason(state: SessionState, block: Block) -> str:
 
 
 def _missed_criterion(state: SessionState, before: Step | None, step: Step | None) -> Block | None:
-    """Return the block that has ended without its criterion, where that ends the session."""
+    """Return the block that ended without reaching a criterion that ends the session, or None."""
     if not isinstance(before, Trial):
         return None
     block = _block(state, before)
@@ -231,7 +231,7 @@ def _missed_criterion(state: SessionState, before: Step | None, step: Step | Non
 
 
 def show_item(state: SessionState, event: ItemShown) -> Result:
-    """Keep when a statement was first shown."""
+    """Record when a question was shown."""
     _check_item(state, event.item)
     answer = state.answers.get(event.item, Answer()).shown(event.at_s)
     written = Write(journal.ItemShown(**_page(state), item=event.item))
@@ -239,7 +239,7 @@ def show_item(state: SessionState, event: ItemShown) -> Result:
 
 
 def choose(state: SessionState, event: Chosen) -> Result:
-    """Keep a choice; the last one counts. Answers to questions that it hides are removed."""
+    """Record a choice; the last one counts. Answers to questions that it hides are removed."""
     _check_shown(state, event.item)
     if (problem := state.questionnaire.item(event.item).problem(event.value, state.context)) is not None:
         raise SessionError(problem)
@@ -249,13 +249,13 @@ def choose(state: SessionState, event: Chosen) -> Result:
 
 
 def retract(state: SessionState, event: Retracted) -> Result:
-    """Remove an answer, and those to questions that are hidden without it."""
+    """Remove an answer, and the answers to questions that are hidden without it."""
     _check_shown(state, event.item)
     return _without_hidden(*_removed(state, event.item))
 
 
 def submit(state: SessionState, event: Submitted) -> Result:
-    """Keep the responses and go on, if every required statement has its answer."""
+    """Write the responses and continue, if every required question is answered."""
     shown = state.shown
     answers = {item: state.answers.get(item, Answer()) for item in state.items}
     numbered = [(number, item) for number, item in enumerate(state.items, start=1) if item in shown]
@@ -279,14 +279,14 @@ def submit(state: SessionState, event: Submitted) -> Result:
 
 
 def keep_setting(state: SessionState, done: Commands, at_s: float) -> Result:
-    """Keep the steps of a setting as the answer, and go on; ``done`` ends its interval."""
+    """Write the steps of a setting as the answer, and continue; ``done`` ends its interval."""
     state, chosen = choose(state, Chosen(at_s, state.items[0], state.steps))
     state, kept = submit(state, Submitted(at_s))
     return state, (*done, *chosen, *kept)
 
 
 def _keep_result(state: SessionState, written: Write, at_s: float) -> Result:
-    """Keep the answer for the levels to come, and say whether it was correct, where that is due."""
+    """Store the answer for later levels, and show feedback if it is due."""
     trial, due, design = state.trial, state.due, state.design
     assert due is not None and design is not None  # noqa: S101, PT018 - the caller has looked
     protocol, answer = state.plan.protocol, str(state.answers[design.name].value)
@@ -304,7 +304,7 @@ def _with_answer(state: SessionState, item: str, answer: Answer) -> SessionState
 
 
 def _page(state: SessionState) -> dict[str, Any]:
-    """Return the field that says which page a line is about: a trial's, or a form."""
+    """Return the event fields for the page: those of a trial, or the form."""
     return {"form": state.step.form} if isinstance(state.step, FormStep) else {"trial": state.trial.number}
 
 

@@ -60,7 +60,7 @@ class Allocation:
 
     @property
     def is_preexisting(self) -> bool:
-        """Whether the group is pre-existing, and so recorded openly."""
+        """Whether the group is pre-existing, and therefore recorded in plain text."""
         return not self.sealed
 
 
@@ -97,7 +97,7 @@ def allocate(
     row_of: str | None = None,
     waits: bool = True,
 ) -> Allocation | None:
-    """Return the allocation of a participant; claim an entry for a new one. None in a study without groups.
+    """Return the allocation of a participant, claiming an entry if there is none yet; None in a study without groups.
 
     ``group`` is a new participant's pre-existing group, ``row_of`` the participant who is replaced; both were checked
     (`check_choice`).
@@ -130,7 +130,7 @@ def allocate(
             )
             try:
                 write_through(path, json.dumps(_content(claim)).encode() + b"\n", waits=waits)
-            except FileExistsError:  # another program was first
+            except FileExistsError:  # another program claimed this entry first
                 if replaced is not None:
                     raise StoreError(f"{path} was changed: restore it from a copy") from None
                 continue
@@ -142,7 +142,7 @@ def allocate(
 
 
 def allocated(study: StudyFolder, key: Key, participant: str) -> Allocation | None:
-    """Return the allocation of a participant, None where there is none yet."""
+    """Return the allocation of a participant, or None if there is none yet."""
     if (claim := _claim_of(claims(study), participant)) is not None:
         if not is_unchanged(claim, key):
             raise StoreError(f"{claim.path} was changed: restore it from a copy")
@@ -164,7 +164,7 @@ def check_session(
     group: str | None = None,
     row_of: str | None = None,
 ) -> None:
-    """Reject a session that the participant cannot have, as far as known; nothing is claimed.
+    """Reject a session that the participant cannot have; nothing is claimed.
 
     Raises
     ------
@@ -184,7 +184,7 @@ def check_session(
 def check_choice(
     protocol: Protocol, held: Sequence[Claim], participant: str, *, group: str | None, row_of: str | None
 ) -> None:
-    """Reject, as StudyError, a group or a replaced participant that contradicts the protocol or the ``held`` claims."""
+    """Raise StudyError if the group or replaced participant contradicts the protocol or the ``held`` claims."""
     name, own = protocol.study.name, _claim_of(held, participant)
     if group is not None and not protocol.asks_group:
         why = "assigns participants to its groups at random" if protocol.groups else "has no groups"
@@ -233,7 +233,7 @@ def _check_replaced(
 def simulated_groups(
     study: StudyFolder, protocol: Protocol, participants: Iterable[str], group: str | None
 ) -> dict[str, str | None]:
-    """Return the group that each new simulated participant is given: ``group``, or pre-existing ones dealt evenly.
+    """Return the group of each new simulated participant: ``group``, or pre-existing groups in equal numbers.
 
     StudyError rejects a ``group`` that the study cannot take (`check_choice`).
     """
@@ -252,7 +252,7 @@ def simulated_groups(
 
 
 def session_protocol(study: StudyFolder, protocol: Protocol, participant: str, session: int) -> Protocol:
-    """Return the protocol of a participant's session, whose group is known; nothing is claimed.
+    """Return the protocol of a session of a participant whose group is known; nothing is claimed.
 
     Raises
     ------
@@ -277,12 +277,12 @@ def claims(study: StudyFolder) -> list[Claim]:
 
 
 def counts_places(held: Iterable[Claim]) -> bool:
-    """Return whether places in groups assign rows of squares: in folders without claims of an earlier version."""
+    """Return whether places in groups assign rows of squares: not in folders with claims of an earlier version."""
     return all(claim.place_in_group for claim in held if claim.participant)
 
 
 def is_unchanged(claim: Claim, key: Key) -> bool:
-    """Return whether an entry's file holds the group that the key gives, or a pre-existing one."""
+    """Return whether an entry's file has the group that the key gives, or a pre-existing group."""
     if claim.group is not None or not key.groups:
         return claim.group is not None and not key.groups
     opened = open_text(_whose(claim.entry, claim.participant), claim.sealed, key.nonce, frozenset({"group"}))
@@ -290,7 +290,7 @@ def is_unchanged(claim: Claim, key: Key) -> bool:
 
 
 def entries_begun(study: StudyFolder) -> dict[str, Begun]:
-    """Return what the first lines of the journals say of the entry of each participant with a session."""
+    """Return the entry of each participant with a session, from the first lines of the journals."""
     by_participant: dict[str, Begun] = {}
     for session in study.sessions():
         try:
@@ -321,7 +321,7 @@ def _content(claim: Claim) -> dict[str, Any]:
 
 
 def _claim(study: StudyFolder, path: Path) -> Claim:
-    """Return the content of an entry's file; nothing if it is damaged."""
+    """Read the claim in an entry's file; it is empty if the file is damaged."""
     try:
         held = parse_json(read_own(path, study.path))
         claim = Claim(

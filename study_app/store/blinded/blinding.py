@@ -57,7 +57,7 @@ _SEALED_IN: Final[Mapping[type[events.Event], frozenset[str]]] = {
     events.Recorded: frozenset({"samples_recorded", "frames_recorded", "opened_sha256", "opened_frames_sha256"}),
     events.TrialEnded: SEALED | {"reached_s"},
 }
-"""The fields that each event's lines hold sealed."""
+"""The sealed fields of each event."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +91,7 @@ class Key:
 
 
 def sealed_hash(folder: Path) -> str | None:
-    """Return the SHA-256 of a study's sealed key, as in its receipts; None where there is none, or none readable."""
+    """Return the SHA-256 of a study's sealed key, as in its receipts; None if the key is missing or unreadable."""
     try:
         return hashlib.sha256(read_own(StudyFolder(folder).key, folder)).hexdigest()
     except StoreError:
@@ -101,7 +101,7 @@ def sealed_hash(folder: Path) -> str | None:
 def open_or_draw_key(
     folder: Path, protocol: Protocol, random: Callable[[], float] | None = None, files: Mapping[str, str] = NO_FILES
 ) -> Key:
-    """Return the study's key; draw and seal it if there is none.
+    """Return the study's key; draw and seal a new one if there is none.
 
     If two programs start at the same time, one draws the key and the other reads it.
     """
@@ -122,7 +122,7 @@ def open_or_draw_key(
 
 
 def check_conditions(folder: Path, protocol: Protocol) -> None:
-    """Refuse a protocol with other conditions than those that the study's key was sealed for; nothing is written.
+    """Raise an error if the study's key was sealed for other conditions than those of ``protocol``; write nothing.
 
     Raises
     ------
@@ -144,12 +144,12 @@ def _refuse_other_conditions(study: StudyFolder, key: Key, protocol: Protocol) -
 
 
 def same_conditions(folder: Path, protocol: Protocol) -> bool:
-    """Return whether ``protocol`` has the liquids, conditions, stimuli and blocks that the key was sealed for."""
+    """Return whether the key was sealed for the liquids, conditions, stimuli and blocks of ``protocol``."""
     return verified_key(StudyFolder(folder)).tables_hash == _tables_hash(protocol)
 
 
 def reveal(folder: Path, by: str, reason: str) -> Codes:
-    """Record who opens the key and why, then return block → code → condition id.
+    """Record who opens the key and why, and return the mapping block → code → condition id.
 
     Raises
     ------
@@ -175,7 +175,7 @@ def reveal(folder: Path, by: str, reason: str) -> Codes:
 
 
 def revealed_key(folder: Path) -> Key | None:
-    """Return the key with the conditions' tables if it was revealed, else None.
+    """Return the key with the tables of conditions if it was revealed, else None.
 
     Raises
     ------
@@ -187,12 +187,12 @@ def revealed_key(folder: Path) -> Key | None:
 
 
 def reveals(folder: Path) -> tuple[dict[str, str], ...]:
-    """Return the recorded reveals, first to last: ``at``, ``by``, ``reason``, ``key_hash``."""
+    """Return the recorded reveals in order, each with ``at``, ``by``, ``reason`` and ``key_hash``."""
     return tuple(record for _, _, record in _reveal_lines(folder) if record is not None)
 
 
 def unreadable_reveals(folder: Path) -> tuple[tuple[int, bool], ...]:
-    """Return the numbers of lines that are not reveals, and whether a power cut may have truncated them."""
+    """Return the number of each line that is not a reveal, with whether a power cut may have truncated it."""
     lines = [(number, line, record) for number, line, record in _reveal_lines(folder) if record is None]
     begins = b'{"at": "'
     return tuple((number, line[:8] == begins[: len(line)] and not line.endswith(b"}")) for number, line, _ in lines)
@@ -239,7 +239,7 @@ def _seal(protocol: Protocol, drawn: str, random: Callable[[], float], files: Ma
 
 
 def _tables(protocol: Protocol) -> dict[str, Any]:
-    """Return the tables that a receipt lacks; ``blocks`` has of each block with a design what it presents."""
+    """Return the tables that a receipt omits; ``blocks`` has the presented values of each block with a design."""
     tables = protocol.model_dump(mode="json", include={"conditions", "liquids", "stimuli", "designs", "methods"})
     if protocol.design_questions:
         named = {name: protocol.blocks[name] for name in protocol.design_questions}
@@ -270,7 +270,7 @@ def _tables_hash(protocol: Protocol) -> str:
 
 
 def verified_key(study: StudyFolder) -> Key:
-    """Read the key and compare its hash with what every session published."""
+    """Read the key and compare its hash with the hash that every session published."""
     key = read_key(study.path)
     for session in study.sessions():
         if _published_hash(session) not in {None, key.hash}:
@@ -328,7 +328,7 @@ def read_key(folder: Path) -> Key:
 
 
 def _check_content(content: dict[str, Any]) -> None:
-    """Refuse a key whose codes or conditions are of other types (ValueError, KeyError, TypeError, AttributeError)."""
+    """Raise ValueError, KeyError, TypeError or AttributeError for a key with codes or conditions of a wrong type."""
     conditions = content["tables"]["conditions"].values()
     if (
         content["drawn"] not in ("system", "seed")
@@ -347,7 +347,7 @@ def _is_texts(value: object) -> bool:
 
 def _refuse_if_lost(study: StudyFolder) -> None:
     under = [session for session in study.sessions() if is_there(session.receipt)]
-    if under and not is_there(study.key):  # checked again: another program may just have drawn it
+    if under and not is_there(study.key):  # checked again: another program may have drawn the key in the meantime
         raise StoreError(
             f"{study.key} is missing, though {len(under)} sessions ran under it: restore it from a copy; without it no "
             "code can be translated"
@@ -355,12 +355,12 @@ def _refuse_if_lost(study: StudyFolder) -> None:
 
 
 def whole_protocol(published: Mapping[str, Any], key: Key) -> Protocol:
-    """Return the protocol of a receipt completed from the key.
+    """Return the complete protocol: that of a receipt, with the parts sealed in the key.
 
     Raises
     ------
     KeyError, TypeError, AttributeError, ValueError
-        They give no protocol that this version knows.
+        Receipt and key do not give a protocol that this version knows.
     """
     blocks = {name: dict(block) for name, block in published["blocks"].items()}
     questionnaires = dict(published["questionnaires"])
@@ -382,7 +382,7 @@ def whole_protocol(published: Mapping[str, Any], key: Key) -> Protocol:
 
 
 def sealed(start: events.SessionStarted, event: events.Event, key: Key) -> events.Event:
-    """Return an event as the journal of a session that began with ``start`` holds it."""
+    """Return an event with its blinded fields sealed, as written in the journal of the session ``start``."""
     if start.own_codes and isinstance(event, events.TrialStarted):
         own = own_code(list(key.codes[event.block]), key.nonce, start.participant, event.block, event.code)
         text = seal([*_whose(start, event), "code"], {"code": event.code}, key.nonce)
@@ -400,12 +400,12 @@ def sealed(start: events.SessionStarted, event: events.Event, key: Key) -> event
 
 
 def opened(lines: Iterable[events.Event], key: Key | None) -> list[events.Event]:
-    """Return a journal's lines with their sealed values; unchanged without a ``key``.
+    """Return a journal's lines with their sealed fields opened; unchanged without a ``key``.
 
     Raises
     ------
     StoreError
-        What is sealed was changed, is of another trial, or was sealed with another key.
+        A sealed field was changed, belongs to another trial, or was sealed with another key.
     """
     lines = list(lines)
     if key is None or not lines:
@@ -422,7 +422,7 @@ def own_group(start: events.SessionStarted, key: Key) -> str | None:
 
 
 def own_place(start: events.SessionStarted, key: Key) -> int | None:
-    """Return the number that assigns a session its rows of squares; None: the number in the participant's id.
+    """Return the number that assigns a session its rows of squares, or None to use the number in the participant's id.
 
     It is the participant's place in the group. Without groups, and where a study with groups began under a version that
     did not count places, it is the number in the id of the participant who is replaced.
@@ -433,7 +433,7 @@ def own_place(start: events.SessionStarted, key: Key) -> int | None:
 
 
 def opened_key(folder: StudyFolder) -> Key | None:
-    """Return the study's key if it was opened, None while it is sealed.
+    """Return the study's key if it was opened, or None while it is sealed.
 
     Raises
     ------
@@ -470,7 +470,7 @@ def _whose(start: events.SessionStarted, line: Any) -> list[object]:
 
 
 def sealed_model(protocol: Protocol, participant: str, session: int, key: Key) -> str:
-    """Return effects and chosen laws of each liquid, sealed for one session."""
+    """Return the effects and chosen laws of each liquid as a sealed text for one session."""
     return seal(_session_owner(participant, session), {"liquids": _resolved(protocol)}, key.nonce)
 
 
@@ -482,7 +482,7 @@ def as_recorded(protocol: Protocol, receipt: Mapping[str, Any], key: Key) -> Pro
     Raises
     ------
     StoreError
-        What is sealed in the receipt was changed, or is of another session.
+        A sealed field of the receipt was changed, or belongs to another session.
     """
     recorded: dict[str, Any] = {}
     if (text := receipt.get("resolved")) is not None:
@@ -505,12 +505,12 @@ def as_recorded(protocol: Protocol, receipt: Mapping[str, Any], key: Key) -> Pro
 
 @contextlib.contextmanager
 def reading_what_ran(receipt: Path) -> Iterator[None]:
-    """Turn what goes wrong while a receipt and the key are made a protocol into a `StoreError`."""
+    """Convert errors raised while a protocol is made from receipt and key into `StoreError`."""
     try:
         yield
     except KeyError as lacking:
         raise StoreError(f"{receipt} lacks {lacking}: restore it from a copy") from lacking
-    except (AttributeError, TypeError, ValueError):  # said without the reason, which would tell conditions
+    except (AttributeError, TypeError, ValueError):  # the reason is omitted, since it could reveal conditions
         raise StoreError(
             f"{receipt} and the study's key give no protocol that this version can run: restore them from a copy"
         ) from None

@@ -21,13 +21,13 @@ from study_app.store.journals import journal_events as events
 
 MARK: Final = b"This file is sealed until the study is unblinded: liquid-study unblind RESULTS\n"
 SAMPLE_BYTES: Final = 64
-"""Of a sealed recording per sample: more than the samples of any device take."""
+"""Bytes per sample of a sealed recording: more than the samples of any device need."""
 FRAMES_BYTES_PER_S: Final = 6_000
-"""Of the sealed frames of a recording: more than 240 frames per second take."""
+"""Bytes per second for the sealed frames of a recording: enough for more than 240 frames per second."""
 _FACTS_BYTES: Final = 16_384  # of a recording without rows
 _TAG_BYTES = 16
 TASK_BYTES: Final = 4096
-"""Of the sealed end of a task: enough for its measures and the times of 300 targets."""
+"""Bytes of the sealed end of a task: enough for its measures and the times of 300 targets."""
 _PIECE_BYTES = 65_536  # encrypted at once
 _LENGTH_BYTES = 8
 
@@ -44,7 +44,7 @@ def seal(whose: Sequence[object], values: Mapping[str, Any], secret: bytes, bloc
 
 
 def open_text(whose: Sequence[object], text: str, secret: bytes, names: frozenset[str]) -> dict[str, Any] | None:
-    """Return the values of these names from `seal`; None if the text was changed, or has another owner or secret."""
+    """Return the sealed values with these names, or None if the text was changed or has another owner or secret."""
     try:
         content = bytes.fromhex(text)
     except ValueError:
@@ -55,12 +55,12 @@ def open_text(whose: Sequence[object], text: str, secret: bytes, names: frozense
 
 
 def sealed_bytes(seconds: float, bytes_per_s: float) -> int:
-    """Return the size of what a recording of so many seconds is sealed into: the same for up to twice the time."""
+    """Return the size in bytes of a sealed recording of so many seconds; it is constant for up to twice the time."""
     return _FACTS_BYTES + round(bytes_per_s * 2.0 ** math.ceil(math.log2(max(seconds, 1.0))))
 
 
 def seal_file(content: bytes, size: int, secret: bytes) -> bytearray:
-    """Return the content of a file, sealed into ``size`` bytes, doubled where they are too few."""
+    """Return the content of a file sealed into ``size`` bytes, doubled until it fits."""
     while size < _LENGTH_BYTES + len(content):
         size *= 2
     sealed, start = bytearray(len(MARK) + _TAG_BYTES + size), len(MARK) + _TAG_BYTES
@@ -84,7 +84,7 @@ def open_file(sealed: bytes, secret: bytes) -> bytes | None:
 
 
 def _measured(said: bytes, names: frozenset[str]) -> dict[str, Any]:
-    """Return the columns in a text with a valid tag, without any that a holder of the key has forged."""
+    """Return the columns of a text with a valid tag, without values that a holder of the key could have forged."""
     try:
         measured = parse_json(said)
     except ValueError:
@@ -95,12 +95,12 @@ def _measured(said: bytes, names: frozenset[str]) -> dict[str, Any]:
 
 def _tag(whose: bytes, said: bytes | memoryview, secret: bytes) -> bytes:
     tag = hmac.new(secret, whose, "sha256")
-    tag.update(said)  # other threads run meanwhile
+    tag.update(said)  # releases the lock, so that other threads run
     return tag.digest()[:_TAG_BYTES]
 
 
 def _combine_pieces(text: memoryview, tag: bytes, secret: bytes) -> None:
-    """Encrypt a text in its place, or decrypt it, so that other threads run meanwhile."""
+    """Encrypt or decrypt a text in place, in pieces, so that other threads can run."""
     for at in range(0, len(text), _PIECE_BYTES):
         text[at : at + _PIECE_BYTES] = _combined(text[at : at + _PIECE_BYTES], tag + at.to_bytes(8), secret)
 

@@ -46,7 +46,7 @@ OTHER_LINE_ENDINGS = (
 )
 """Of the journal and the receipt; since 2 the lines have ``previous``."""
 RETRY_S = 1.0
-"""The background thread repeats a failed flush after this time."""
+"""Time after which the background thread repeats a failed flush [s]."""
 
 
 class SessionClock:
@@ -108,18 +108,18 @@ def count_events(path: Path, *kinds: str) -> tuple[int, ...]:
 
 
 def read(path: Path) -> list[Event]:
-    """Return the complete lines of the journal, in order, without an incomplete one at the end (`scan` reports it).
+    """Return the complete lines of the journal in order; an incomplete last line is left out (`scan` reports it).
 
     Raises
     ------
     StoreError
-        It cannot be read, or is damaged elsewhere than at its end.
+        It cannot be read, or is damaged before its last line.
     """
     return whole(path).lines
 
 
 def whole(path: Path) -> Contents:
-    """Read the journal to its last complete line; at most an incomplete line follows it."""
+    """Read the journal; raise StoreError for any damage other than an incomplete last line."""
     contents = scan(path)
     if contents.damage is not None:
         raise StoreError(contents.damage)
@@ -127,7 +127,7 @@ def whole(path: Path) -> Contents:
 
 
 def scan(path: Path) -> Contents:
-    """Read the journal to its last complete line, check each with its event and the lines before; report the rest."""
+    """Read the journal's complete lines, check each against its event and the lines before, and report any damage."""
     content = read_own(path, study_root(path))
     *pieces, tail = content.split(b"\n")
     lines: list[Event] = []
@@ -165,7 +165,7 @@ def scan(path: Path) -> Contents:
 
 
 def _break(line: Mapping[str, Any], before: str, *, chained: bool) -> str | None:
-    """Return how a line contradicts the lines before it, whose SHA-256 is ``before``, or None.
+    """Return how a line contradicts the lines before it, whose SHA-256 is ``before``; None if it does not.
 
     ``chained`` tells whether the line before has ``previous``: then this one must have it. The first line of a journal
     has it since format 2; a journal of format 1 gets it where it was resumed by a later version.
@@ -173,7 +173,7 @@ def _break(line: Mapping[str, Any], before: str, *, chained: bool) -> str | None
     first, hash_before = line["n"] == 1, line.get("previous")
     if first and line.get("format", 1) > FORMAT:
         return f"has format {line['format']}, this version reads {FORMAT}: use a newer version of liquid-study"
-    if first and "format" not in line and "measures_sealed" in line:  # a later version than those of format 1
+    if first and "format" not in line and "measures_sealed" in line:  # not of a version with format 1
         return "lacks format: it was changed; restore it from a copy"
     if hash_before is None:
         needed = chained or (first and line.get("format", 1) > 1)
@@ -195,7 +195,7 @@ def line_of(event: Event, number: int, clock: SessionClock, t_s: float | None, *
 
 
 def line_bytes(line: Mapping[str, Any]) -> bytes:
-    """Return a line as in the file, with its newline."""
+    """Return a line as written to the file, with its newline."""
     text = json.dumps(line, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.encode("utf-8", "backslashreplace") + b"\n"
 
@@ -246,7 +246,7 @@ class Journal:
 
     @classmethod
     def reopen(cls, path: Path, contents: Contents, clock: SessionClock) -> Journal:
-        """Open the file to go on after the last whole line of ``contents``, which `scan` has just read.
+        """Open the file to append after the last complete line of ``contents``, which `scan` has just read.
 
         An incomplete line at the end is removed by rewriting the complete lines in one step, and stored next to the
         journal.
@@ -324,7 +324,7 @@ class Journal:
 
     @property
     def closed(self) -> bool:
-        """Whether it accepts no more lines."""
+        """Whether the journal is closed: it accepts no more lines."""
         return self.file.closed
 
     def close(self) -> None:
@@ -358,8 +358,8 @@ class Journal:
         self.close()
 
     def _refuse_if_replaced(self) -> None:
-        """Refuse to write into a file that no longer has the journal's name, or that another program wrote."""
-        torn = self._torn  # then the file may be longer
+        """Raise an error if the journal's path now names another file, or another program has written to the file."""
+        torn = self._torn  # after a torn write the file may be longer
         try:
             status = self.path.stat()
             is_same_file = os.path.samestat(status, os.fstat(self.file.fileno()))
@@ -373,7 +373,7 @@ class Journal:
             raise StoreError(f"{self.path} was written by another program while the session ran: end this session")
 
     def _write(self, content: bytes) -> bool:
-        """Write a line after the last whole one; return whether it must be waited for because something failed."""
+        """Write a line after the last complete one; return whether an earlier failure requires waiting for the disk."""
         with self._changed:
             failed = self._torn
             try:
@@ -444,7 +444,7 @@ class Journal:
                 self._failed = error
 
     def _take_back(self) -> None:
-        """Remove the remains of an interrupted write, and write again the lines that may not be on the disk."""
+        """Remove a partly written line, and write again the lines that may not be on the disk."""
         self.file.truncate(self._size)
         self.file.seek(self._size - len(self._unflushed))
         write_whole(self.file, bytes(self._unflushed))

@@ -18,7 +18,7 @@ from study_app.errors import StoreError
 from study_app.store.columns import DELIVERED, TRIALS, VIDEO
 from study_app.store.folders import PARTICIPANT_ID, RECORDING_NAME, STUDY_NAME
 
-SHOWN = 200  # characters of a bad value shown in messages
+SHOWN = 200  # greatest number of characters of a bad value shown in messages
 
 CAUSE_WITHHELD = "the session was stopped"
 """Text of `Broke` for a failed device or video in a study with videos: the cause would reveal the condition."""
@@ -29,7 +29,7 @@ COMPLETED, INCOMPLETE = "completed", "incomplete"
 REACHED_END = (COMPLETED, INCOMPLETE)
 """The status of sessions that reached their last page: with enough trials, or with more missing than permitted."""
 
-_MOST_SECONDS = 1e9  # of a session's clock
+_MOST_SECONDS = 1e9  # greatest time on a session's clock [s]
 _MOST = 10**30  # greatest integer that the program writes
 _MAY_BE_NULL = (
     "level", "standard", "part", "value", "answer", "onset_s", "first_s", "last_s", "gap_s", "device",
@@ -165,11 +165,11 @@ class Answer:
         return self.first_s is not None
 
     def shown(self, at_s: float) -> "Answer":
-        """Return it after its question was shown, perhaps again."""
+        """Return the answer after its question was shown, perhaps again."""
         return self if self.onset_s is not None else dataclasses.replace(self, onset_s=at_s)
 
     def chosen(self, at_s: float, value: Any) -> "Answer":
-        """Return it after a choice; the last one counts."""
+        """Return the answer after a choice; the last choice counts."""
         if not self.given:
             return dataclasses.replace(self, first_s=at_s, last_s=at_s, value=value)
         if self.value == value:
@@ -177,7 +177,7 @@ class Answer:
         return dataclasses.replace(self, last_s=at_s, value=value, changes=self.changes + 1)
 
     def removed(self) -> "Answer":
-        """Return it after it was taken back."""
+        """Return the answer after it was removed."""
         return Answer(onset_s=self.onset_s)
 
 
@@ -190,7 +190,7 @@ class Response(Answer):
     kind: Text | None = None
 
     def fields(self) -> dict[str, Any]:
-        """Return it as written in a line."""
+        """Return the response as written in a line."""
         return {name: getattr(self, name) for name in _RESPONSE if name != "kind" or self.kind is not None}
 
 
@@ -616,11 +616,11 @@ def _known_kinds() -> Iterator[tuple[str, tuple[Kind, bool]]]:
 
 
 _KINDS = dict(_known_kinds())
-"""The kind of a field of that name, in any event that this version knows, and whether it may be null."""
+"""The kind of each field of the events that this version knows, and whether it may be null."""
 
 
 def problem(line: Mapping[str, Any]) -> str | None:
-    """Return the error in a line of a journal, or None.
+    """Return a sentence on the first error in a line of a journal, or None.
 
     A line must have all fields of its event, and every field in the dictionary must be of its kind, also in events of
     another version.
@@ -640,7 +640,7 @@ def problem(line: Mapping[str, Any]) -> str | None:
 
 
 def journal_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a line of a journal, which has no `problem`."""
+    """Return the JSON Schema of a journal line in which `problem` finds no error."""
     of_fields = {name: _schema_of(name) for name in _KINDS if name not in {"answer", "value"}}
     answer = {
         "type": "object",
@@ -677,7 +677,7 @@ def _schema_of(name: str) -> dict[str, Any]:
 
 
 def read_event(line: Mapping[str, Any]) -> Event:
-    """Return the event of a line that has no `problem`."""
+    """Return the event of a journal line in which `problem` finds no error."""
     kind, others = EVENTS.get(line["event"], UnknownEvent), dict(line)
     if kind is not UnknownEvent:
         del others["event"]
@@ -701,12 +701,12 @@ def plain(value: Any) -> Any:
 
 
 def _kind_name(held: Mapping[str, Any], name: str) -> str:
-    """Return whose entry says what a name holds: without a kind of question an answer is a whole number."""
+    """Return the name of the entry that describes a field: without a kind of question an answer is an integer."""
     return "answer" if name == "value" and "kind" in held else name
 
 
 def shortened(value: object) -> str:
-    """Return ``value`` as messages show it."""
+    """Return ``value`` as text for messages, shortened."""
     shown = repr(value)
     return shown if len(shown) <= SHOWN else f"{shown[:SHOWN]}…"
 

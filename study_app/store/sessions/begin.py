@@ -96,7 +96,7 @@ class SessionStart:
 def begin(
     results: Path, protocol: Protocol, source: bytes, start: SessionStart, *, clock: SessionClock | None = None
 ) -> SessionStore:
-    """Claim a session in the study folder ``results`` and write all files required before the first trial.
+    """Claim a session in the study folder ``results`` and write all files needed before the first trial.
 
     The folder is created exclusively: of two programs that want one id, one gets it. A folder claimed by a program that
     ended before it wrote a line is taken over. On any failure the claimed folder is removed.
@@ -135,7 +135,7 @@ def begin(
     try:
         allocation = allocate(study_folder, key, start.participant, group=start.group, row_of=start.row_of)
         group = None if allocation is None else allocation.group
-        own_protocol(protocol, group, start.session)  # refuses a session that the group does not have
+        own_protocol(protocol, group, start.session)  # raises an error if the group does not have this session
         started, first_receipt = first_records(
             protocol, source, start, key_hash=key.hash, measures_sealed=sealed, clock=clock, allocation=allocation
         )
@@ -156,7 +156,7 @@ def first_records(
     clock: SessionClock,
     allocation: Allocation | None = None,
 ) -> tuple[SessionStarted, dict[str, Any]]:
-    """Return a session's first line, and its receipt as it is before the first trial."""
+    """Return a session's first line and its receipt before the first trial."""
     row_of, group = start.row_of, None
     if allocation is not None:
         row_of = allocation.replaces if allocation.place_in_group else row_of
@@ -205,7 +205,7 @@ def first_records(
 
 
 def note_allocation(store: SessionStore) -> None:
-    """Journal the sealed group of the session's participant, unless a session of the participant has done so."""
+    """Write the sealed group of the participant to the journal, unless an earlier session of the participant did."""
     study, folder, start = store.place.study_folder, store.place.folder, start_of(store.lines)
     if start.entry is None or start.group is not None:
         return
@@ -219,7 +219,7 @@ def note_allocation(store: SessionStore) -> None:
 
 
 def make_recorder(place: Place, start: SessionStarted, clock: SessionClock, key: Key) -> Recorder | None:
-    """Return the recorder of a session as its first line says, or None where it keeps no recordings."""
+    """Return the recorder that a session's first line requires, or None for a session without recordings."""
     if not start.recordings:
         return None
     fields = {
@@ -238,7 +238,7 @@ def surroundings(
     outlets: Mapping[str, Any] | None = None,
     video: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Return the receipt's part about what the session runs with, from its beginning or since it was resumed."""
+    """Return the receipt's section on device, screens and versions of a session that begins or is resumed."""
     optional = {"motors_masked": motors_masked, "outlets": outlets, "video": video}
     used = receipt.plug_ins_of(protocol, str(device.get("name")), outlets or ())
     return {
@@ -254,7 +254,7 @@ def surroundings(
 
 @dataclass(frozen=True, slots=True)
 class UsedIds:
-    """The sessions of a study's folder as they were when it was read: ids and numbers are checked without the disk.
+    """The sessions of a study's folder at one time, so that ids and numbers are checked without reading the disk.
 
     ``held`` are participant and number of the sessions that were begun, or are claimed by a program that runs; ``ids``
     the ids of all folders; ``withdrawn`` are those of participants whose data were erased.
@@ -266,24 +266,24 @@ class UsedIds:
     withdrawn: tuple[str, ...] = ()
 
     def numbers(self, participant: str) -> tuple[int, ...]:
-        """Return the numbers of a participant's sessions."""
+        """Return the session numbers of a participant."""
         return tuple(sorted(number for holder, number in self.held if holder == participant))
 
     def suggested(self) -> str:
-        """Return the next free id: P001, P002 ...; those of sessions that were never begun are free again."""
+        """Return the next free id: P001, P002 ...; ids of sessions that were never begun are free."""
         used = (*(participant for participant, _ in self.held), *self.withdrawn)
         matches = (_NUMBERED.fullmatch(participant.upper()) for participant in used)
         return f"P{max((int(match[1]) for match in matches if match), default=0) + 1:03d}"
 
     def check_unused(self, participant: str, number: int) -> None:
-        """Reject a session that exists, or a new id that other programs change or that differs only in capitals.
+        """Reject an existing session, or a new id that other programs would change or that differs only in case.
 
         A session that was claimed by an ended program, and never begun, can be begun.
 
         Raises
         ------
         StoreError
-            Names the three ways to go on.
+            Names the three possible remedies.
         """
         if not 1 <= number <= MAX_SESSION:
             raise StoreError(f"session number {number} cannot be used: it must be from 1 to {MAX_SESSION}")
@@ -308,7 +308,7 @@ class UsedIds:
             raise self.refusal(participant, number)
 
     def refusal(self, participant: str, number: int) -> StoreError:
-        """Return the refusal of a used id, with the three ways to go on."""
+        """Return the error for a used id, with the three possible remedies."""
         free = max(self.numbers(participant), default=number)
         return StoreError(
             f"participant {participant} already has session {number} in {self.path}: use a new session number "
@@ -317,7 +317,7 @@ class UsedIds:
 
 
 def used_ids(folder: StudyFolder) -> UsedIds:
-    """Return which ids and session numbers of a study are used; nothing is touched."""
+    """Read the used ids and session numbers of a study."""
     sessions = folder.sessions()
     held = frozenset((session.participant, session.number) for session in sessions if not abandoned(session.path))
     return UsedIds(
@@ -346,7 +346,7 @@ def check_participant(participant: str, *, pilot: bool = False) -> None:
 
 
 def refuse_never_begun(session: SessionFolder) -> None:
-    """Refuse to resume a session that was claimed and never begun.
+    """Raise an error for a session that was claimed but never begun: it cannot be resumed.
 
     Raises
     ------
@@ -361,7 +361,7 @@ def refuse_never_begun(session: SessionFolder) -> None:
 
 
 def _claim(place: Place) -> Opening:
-    """Create the session's folder, which must not have been begun, locked for this program from the start."""
+    """Create the session's folder, locked by this program from the start; the session must not have been begun."""
     path = place.folder.path
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -378,7 +378,7 @@ def _claim(place: Place) -> Opening:
 
 
 def _unclaim(place: Place, opening: Opening) -> None:
-    """Remove the claimed folder in one step, and the participant's folder if that is empty then."""
+    """Remove the claimed folder in one step, and then the participant's folder if it is empty."""
     path = place.folder.path
     away = temporary_path(path)
     with contextlib.suppress(OSError):

@@ -36,7 +36,7 @@ from study_app.store.tables.study_files import write_participants
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """The place of a session's files: the study's folder, the session's in it, and the study's name."""
+    """The location of a session's files: study folder, session folder and the study's name."""
 
     study_folder: StudyFolder
     folder: SessionFolder
@@ -79,7 +79,7 @@ class SessionStore:
         self._over = False
         self._ended_s: float | None = None
         self.outlets: Outlets | None = None
-        self._marked: Marker | None = None  # of the line that could not be written
+        self._marked: Marker | None = None  # time of the line that could not be written
         self._outlets_lost: set[str] = set()  # that are journalled
         self._reached_s: list[float] = []  # in the running task of a sealed session
 
@@ -90,11 +90,11 @@ class SessionStore:
 
     @property
     def lines(self) -> tuple[events.Event, ...]:
-        """The journal so far."""
+        """The lines of the journal so far."""
         return tuple(self._lines)
 
     def as_recorded(self, protocol: Protocol) -> Protocol:
-        """Return the protocol with estimator, effects and laws as they were resolved when the session began.
+        """Return the protocol with the estimator, effects and laws resolved when the session began.
 
         Raises
         ------
@@ -104,7 +104,7 @@ class SessionStore:
         return as_recorded(protocol, self._receipt, self.key)
 
     def attach(self, outlets: Outlets) -> None:
-        """Send markers of the session's events from now on, first of its beginning or resumption."""
+        """Start sending markers of the session's events, beginning with its start or resumption."""
         self.outlets = outlets
         self._mark(
             next(
@@ -137,14 +137,14 @@ class SessionStore:
         self._marked = None
 
     def _hold_target(self, event: events.TargetReached) -> None:
-        """Send the marker of a reached target; its time is written, sealed, at the end of the task."""
+        """Send the marker of a reached target and hold its time, which is written sealed at the end of the task."""
         self._mark(event)
         self._marked = None
         if event.t_task_s is not None:
             self._reached_s.append(round(event.t_task_s, 6))
 
     def _with_targets(self, event: events.Event) -> events.Event:
-        """Return the end of a task with the times of the targets that were held back."""
+        """Return the end of a task with the held times of the reached targets."""
         if isinstance(event, events.TrialStarted | events.IntervalStarted):
             self._reached_s = []
         if isinstance(event, events.EndOfTask) and self._reached_s:
@@ -152,7 +152,7 @@ class SessionStore:
         return event
 
     def _mark(self, event: events.Event) -> None:
-        """Send the marker of an event, before waiting for the disk; only once, even if its line is written again."""
+        """Send the marker of an event before waiting for the disk, once even if its line is written again."""
         if self.outlets is None:
             return
         marker = marker_of(event.event, event.t_s, self.clock.origin_ns, event.fields())
@@ -171,7 +171,7 @@ class SessionStore:
         self.journal.check_flushed()
 
     def write_tables(self) -> None:
-        """Bring the session's tables up to date with its journal.
+        """Update the session's tables from its journal.
 
         While the session runs only changed tables are written, without a flush, since the participant waits for the
         next page; at its end all are rewritten and flushed. A table that cannot be written now (open in another
@@ -207,7 +207,7 @@ class SessionStore:
             self._keep_recordings()
             self._ended_s = (
                 self.clock.seconds() if self._ended_s is None else self._ended_s
-            )  # the same when tried again
+            )  # the same at a second attempt
             missing = self.missing_trials
             if status == events.COMPLETED and missing.exceed:
                 status, reason = events.INCOMPLETE, str(missing)
@@ -229,7 +229,7 @@ class SessionStore:
 
     @property
     def missing_trials(self) -> MissingTrials:
-        """The main trials of the session so far that were not delivered."""
+        """The main trials so far that were not delivered."""
         return progress_of(self._lines).missing_trials
 
     def _exclude_if_incomplete(self) -> None:
@@ -249,7 +249,7 @@ class SessionStore:
         if self.recorder is not None:
             self.recorder.close(LEAVING_S)
         if not self.journal.closed:
-            with contextlib.suppress(StoreError):  # `reopen` finds the files without a line in the journal
+            with contextlib.suppress(StoreError):  # `reopen` finds recordings without a line in the journal
                 self._keep_recordings()
                 if self._outlets_lost:
                     self._write_receipt()
@@ -264,14 +264,14 @@ class SessionStore:
         self._write_receipt()
 
     def _write_receipt(self) -> None:
-        """Write the receipt, with the failures of outlets: the last count of lost samples, not the journal's first."""
+        """Write the receipt with the failures of outlets and their final counts of lost samples."""
         if self.outlets is not None and (lost := self.outlets.lost):
             since = (self._receipt, *self._receipt.get("resumed", ()))[-1]
             since["outlets_lost"] = dict(lost)
         receipt.write(self.folder.receipt, self._receipt)
 
     def _write_proofs(self) -> None:
-        """Write the receipt, and then its proofs: without it these would be of the receipt before."""
+        """Write the receipt and then the proofs, which would otherwise be those of the previous receipt."""
         self._write_receipt()
         value = fingerprint(write_checksums(self.folder), self._lines)
         if not self.fingerprint:
@@ -279,7 +279,7 @@ class SessionStore:
         self.fingerprint = value
 
     def _keep_recordings(self) -> None:
-        """Journal the results of recordings, their files or why there are none; and failures of outlets."""
+        """Write the results of recordings (files, or the reason for a loss) and failures of outlets to the journal."""
         if self.recorder is not None:
             self._kept += self.recorder.kept()
         while self._kept:
@@ -305,9 +305,9 @@ class SessionStore:
 
 
 def table_files(place: Place, lines: Sequence[events.Event], key: Key | None) -> tuple[tuple[Path, bytes], ...]:
-    """Return the session's tables as files: paths and contents, from the journal's lines alone.
+    """Return path and content of each table of the session, made from the journal's lines alone.
 
-    ``key`` is the study's once it was opened; without it the sealed columns are left out.
+    ``key`` is the study's opened key; without it the sealed columns are left out.
     """
     lines = opened(lines, key)
     rows = session_tables.SessionRows(lines)

@@ -49,7 +49,7 @@ from study_app.store.tables.study_files import write_description, write_particip
 RESTORE = "restore the journal from a copy"
 SHOWN_DIFFERENCES = 6
 MOST_GAP_S = 366 * 86400.0
-"""Greatest plausible gap: beyond it the wall clock was or is wrong."""
+"""Longest plausible gap [s]: beyond it the wall clock was or is wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +179,7 @@ def sealed_source(session_folder: Path, source: bytes) -> bytes:
     study_folder, _ = locate(session_folder)
     try:
         files = read_key(study_folder.path).files
-    except StoreError:  # `reopen` reports it
+    except StoreError:  # `reopen` reports the error
         return source
     return bundled(unbundled(source)[0], files.get, hashes_in(source)) if files else source
 
@@ -220,7 +220,7 @@ def rebuild(session_folder: Path) -> Rebuilt:
 
 
 def refuse_if_cut(place: Place, lines: Sequence[events.Event]) -> None:
-    """Reject a journal with less information than the session's other files, which would be replaced."""
+    """Raise an error if the journal has less information than the session's other files, which would be replaced."""
     for name in events.unknown_events(lines):
         raise StoreError(
             f"{place.folder.journal} has events {name!r}, which this version does not know: use the version that wrote "
@@ -231,7 +231,7 @@ def refuse_if_cut(place: Place, lines: Sequence[events.Event]) -> None:
 
 
 def beyond(place: Place, lines: Sequence[events.Event]) -> Iterator[tuple[Path, str]]:
-    """Yield each of receipt, checksums and tables that contains more than the journal, with a description.
+    """Yield path and description of each file (receipt, checksums, tables) that contains more than the journal.
 
     A session that has ended has a complete journal. After a power cut the trials table may have one more trial, since
     the line of a trial's start is not flushed at once; answers are.
@@ -255,7 +255,7 @@ def beyond(place: Place, lines: Sequence[events.Event]) -> Iterator[tuple[Path, 
 
 
 def _ended_or_recorded(place: Place, lines: Sequence[events.Event]) -> Iterator[tuple[Path, str]]:
-    """Yield the study's fingerprints and the recordings that contain more than a journal without an end."""
+    """Yield path and description of fingerprints and recordings that contain more than a journal without an end."""
     folder, study = place.folder, place.study_folder
     if isinstance(lines[-1], events.SessionEnded):
         return
@@ -268,7 +268,7 @@ def _ended_or_recorded(place: Place, lines: Sequence[events.Event]) -> Iterator[
 
 
 def _rows(path: Path, root: Path) -> int:
-    """Return the number of rows of a table; 0 if it is not a table, which is made again without a loss."""
+    """Return the number of rows of a table; 0 if it is not a table, since nothing is lost by making it again."""
     try:
         text = read_own(path, root).decode("utf-8", "replace")
         names, *rows = list(csv.reader(io.StringIO(text, newline=""))) or [[]]
@@ -289,7 +289,7 @@ class _Left:
 
 
 def _left(study_folder: StudyFolder, folder: SessionFolder, protocol: Protocol, source: bytes) -> _Left:
-    """Read the data of an interrupted session; reject one that cannot be resumed with this protocol."""
+    """Read the data of an interrupted session; raise an error if it cannot be resumed with this protocol."""
     contents = journal.whole(folder.journal)
     start = _unfinished(folder, contents.lines)
     place = Place(study_folder, folder, start.study)
@@ -313,7 +313,7 @@ def _unfinished(folder: SessionFolder, lines: list[events.Event]) -> events.Sess
 
 
 def refuse_finished(folder: SessionFolder, done: Progress) -> None:
-    """Refuse (StoreError) to resume a session that has its end."""
+    """Raise StoreError if a session has ended, so that it is not resumed."""
     if done.ended is not None:
         raise StoreError(
             f"{folder.path} is finished ({done.ended}) and cannot be resumed; use a new session number for another "
@@ -324,7 +324,7 @@ def refuse_finished(folder: SessionFolder, done: Progress) -> None:
 def _same_protocol(
     place: Place, first: Mapping[str, Any], start: events.SessionStarted, protocol: Protocol, source: bytes
 ) -> None:
-    """Reject a protocol whose file is not the one the session began with, with the differences."""
+    """Raise an error that lists the differences if the protocol's file is not the one that the session began with."""
     if protocol_hash(source) == start.protocol_hash:
         return
     changes = list(differences(first["protocol"], json.loads(json.dumps(receipt.without_conditions(protocol)))))
@@ -343,7 +343,7 @@ def _same_protocol(
 def _go_on(
     lines: list[events.Event], now_ns: Callable[[], int], now: datetime | None
 ) -> tuple[float | None, SessionClock]:
-    """Return the gap since the last line, if known [s], and the clock that continues after it."""
+    """Return the gap since the last line [s], None if unknown, and the clock that continues after it."""
     now = now if now is not None else datetime.now().astimezone()
     gap_s = (now - datetime.fromisoformat(lines[-1].at)).total_seconds()
     known = 0 <= gap_s <= MOST_GAP_S
@@ -353,7 +353,7 @@ def _go_on(
 
 
 def _recordings_found(folder: SessionFolder, lines: list[events.Event], key: Key) -> Iterator[events.Event]:
-    """Yield the lines about recordings that the ended program did not write: complete or lost."""
+    """Yield events for recordings, complete or lost, that the ended program did not write to the journal."""
     from study_app.store import recordings  # noqa: PLC0415 - loads the Parquet library, where there are recordings
 
     known = {line.which for line in lines if isinstance(line, events.Recorded | events.RecordingLost)}
@@ -366,14 +366,14 @@ def _recordings_found(folder: SessionFolder, lines: list[events.Event], key: Key
             kept, shown = (recordings.read_written(path, key.nonce) for path in (samples, frames))
             yield recorded(which, kept, shown, dropped)
         except StoreError:
-            if not is_there(samples):  # frames are put in their place first, and are no recording alone
+            if not is_there(samples):  # frames are written first and are not a recording by themselves
                 with contextlib.suppress(OSError):
                     frames.unlink(missing_ok=True)
             yield lost(which, "the program ended before it was complete")
 
 
 def _renew_receipt(folder: SessionFolder, lines: list[events.Event]) -> list[Path]:
-    """Set the receipt's end from the journal; a missing receipt cannot be recreated."""
+    """Copy the session's end from the journal to the receipt; a missing receipt cannot be recreated."""
     last = lines[-1]
     if not isinstance(last, events.SessionEnded) or not is_there(folder.receipt):
         return []
@@ -386,10 +386,7 @@ def _renew_receipt(folder: SessionFolder, lines: list[events.Event]) -> list[Pat
 
 
 def _renew_proof(place: Place, lines: list[events.Event], rewritten: list[Path]) -> list[Path]:
-    """Renew the checksums, and list the fingerprint where it is missing; return what was written.
-
-    Sessions of format 1 have none.
-    """
+    """Renew the checksums and list a missing fingerprint; return the written paths. Format 1 has neither."""
     study, folder = place.study_folder, place.folder
     listed_places = {session for _, session in listed(study.fingerprints)}
     has_none = lines[-1].previous is not None and place_of(study, folder) not in listed_places

@@ -34,7 +34,7 @@ from study_app.store.tables.study_files import check_study, write_description, w
 
 
 class SimulatedStudy:
-    """A study folder that takes sessions of simulated answers; the table of participants follows with the block's end.
+    """A study folder for sessions of simulated answers; the participants table is updated when the ``with`` block ends.
 
     Until then the study's folder itself is open in this program.
 
@@ -99,10 +99,7 @@ class SimulatedStudy:
         self.receipt = plain(first_receipt)
 
     def begin(self, participant: str, clock: SessionClock, group: str | None = None) -> SimulatedSession:
-        """Return the session of a participant of a pre-existing group, if the study has these.
-
-        It is not on the disk before it is finished.
-        """
+        """Return a new session, in a pre-existing ``group`` if the study has these; it is written at its end."""
         return SimulatedSession(self, participant, clock, group)
 
     def keep(self, session: SimulatedSession) -> None:
@@ -129,7 +126,7 @@ class SimulatedStudy:
         note_fingerprint(self.folder, place.folder, fingerprint(sums, lines), waits=False)
 
     def __enter__(self) -> Self:
-        """Write the study's description, which identifies its folder from the first session on."""
+        """Write the study's description, which identifies its folder."""
         self._opening = open_alone(self.folder.path)
         write_description(
             self.folder, self.protocol.study, self.protocol.format, intervals=bool(self.protocol.design_questions)
@@ -139,7 +136,7 @@ class SimulatedStudy:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Bring the table of participants up to date with the sessions that were finished."""
+        """Update the participants table with the finished sessions."""
         try:
             write_participants(self.folder, self.protocol.study.name)
         finally:
@@ -148,7 +145,7 @@ class SimulatedStudy:
 
 
 class SimulatedSession:
-    """One session while it is simulated: takes what ``open_session.SessionStore`` takes, and keeps it until its end.
+    """A simulated session with the interface of ``open_session.SessionStore``, kept in memory until its end.
 
     ``protocol`` is that of the session: in a study with groups, with the steps of the participant's group.
     """
@@ -175,7 +172,7 @@ class SimulatedSession:
             self.append(Allocated(entry=allocation.entry, sealed=allocation.sealed))
 
     def append(self, event: Event, *, t_s: float | None = None) -> None:
-        """Keep a line of the journal; ``t_s`` is when it happened, by default now."""
+        """Store a line of the journal in memory; ``t_s`` is its time [s], by default now."""
         if self.lines:
             event = sealed(start_of(self.lines), event, self._study.key)
         line = line_of(event, len(self.lines) + 1, self.clock, t_s, previous=self._hash.hexdigest())
@@ -185,7 +182,7 @@ class SimulatedSession:
         self._hash.update(content)
 
     def write_tables(self) -> None:
-        """Do nothing: tables are written with the rest."""
+        """Do nothing: tables are written at the end."""
 
     def finish(self, status: str, reason: str = "") -> None:
         """Write the whole session.
@@ -193,7 +190,7 @@ class SimulatedSession:
         Raises
         ------
         StoreError
-            It cannot be written, or is there already.
+            It cannot be written, or exists already.
         """
         self.append(SessionEnded(status=status, reason=reason))
         self._study.keep(self)

@@ -42,7 +42,7 @@ LEFT_BEHIND: Final = shutil.ignore_patterns(".open-*.json", ".*.tmp")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Source:
-    """The data of a folder that is, or is to be, a site of a merged study.
+    """A results folder that is, or will be, a site of a merged study.
 
     ``protocol_hash`` is empty and ``pilot`` None where all participants withdrew; ``begun`` are the sessions' folders
     by the SHA-256 of their journals' first lines. ``state`` is what changes when a file does, from before the reading.
@@ -59,7 +59,7 @@ class _Source:
 
 
 def merge(given: Mapping[str, Path], to: Path) -> Merged:
-    """Copy the results folders of sites into the merged study ``to``, which is made, or gets further sites.
+    """Copy the results folders of sites into the merged study ``to``, which is created or extended.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def _check_places(given: Mapping[str, Path], to: Path, merged: Merged | None) ->
 
 
 def _source(name: str, path: Path) -> _Source:
-    """Read the data that must agree between sites."""
+    """Read the properties of a results folder that must agree between sites."""
     study = StudyFolder(path)
     described = described_study(study)
     if described is None:
@@ -170,7 +170,7 @@ def _source(name: str, path: Path) -> _Source:
 
 
 def _check_alike(sources: tuple[_Source, ...], protocol_hash: str) -> None:
-    """Reject sites of other protocols, and rehearsals or pilots mixed with participants."""
+    """Raise an error for sites of different protocols, or rehearsals or pilots mixed with participants."""
     first = next((source for source in sources if source.protocol_hash), sources[0])
     for other in sources:
         if other.study != first.study or other.protocol_hash not in ("", protocol_hash):
@@ -191,7 +191,7 @@ def _kind(source: _Source) -> str:
 
 
 def _check_sessions(sources: tuple[_Source, ...]) -> None:
-    """Reject a session that is in two sites: it would count twice."""
+    """Raise an error for a session that is in two sites: it would count twice."""
     seen: dict[str, Path] = {}
     for source in sources:
         for begun, path in source.begun.items():
@@ -208,7 +208,7 @@ def _create(merged: Merged, sources: tuple[_Source, ...]) -> None:
     half = temporary_path(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        for path in temporaries(target.parent, target.name):  # of merges that were killed
+        for path in temporaries(target.parent, target.name):  # left by interrupted merges
             if path.is_dir() and not is_open(path):
                 shutil.rmtree(path, ignore_errors=True)
         opening = create_opened(half)
@@ -231,14 +231,14 @@ def _create(merged: Merged, sources: tuple[_Source, ...]) -> None:
 
 
 def _add(merged: Merged, sources: tuple[_Source, ...]) -> None:
-    """Copy further sites into the folder; they count from the moment on at which they are listed."""
+    """Copy further sites into the folder; they count once they are listed."""
     place = merged.path / FOLDER
     sweep(place)
     copies: list[Path] = []
     try:
         for source in sources:
             copy = merged.folder(source.name)
-            if is_there(copy):  # of a merge that was killed: it is not listed
+            if is_there(copy):  # left by an interrupted merge: it is not listed
                 shutil.rmtree(copy)
             half = temporary_path(copy)
             copies.append(half)
@@ -264,7 +264,7 @@ def _copy(source: _Source, to: Path) -> None:
 
 
 def _state(path: Path) -> list[tuple[Path, int, int]]:
-    """Return a state that changes when a file in a folder does."""
+    """Return path, size and modification time of every file in a folder, to detect changes."""
     states = [(entry, entry.lstat()) for entry in paths_in(path)]
     return [(entry, held.st_size, held.st_mtime_ns) for entry, held in states if not entry.is_dir()]
 
@@ -279,6 +279,6 @@ def _copy_file(source: str, to: str, *, follow_symlinks: bool = True) -> str:
 
 
 def unlisted(merged: Merged) -> tuple[Path, ...]:
-    """Return what lies next to the sites and is none: left by a merge that was killed, or put there by somebody."""
+    """Return the entries next to the sites that are not listed, left by an interrupted merge or added by hand."""
     place = merged.path / FOLDER
     return tuple(sorted(path for path in place.iterdir() if path.name not in merged.names)) if place.is_dir() else ()

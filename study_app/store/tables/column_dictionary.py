@@ -48,16 +48,16 @@ SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
     ("Samples", "recordings/trial-….parquet", "one row per tick of the servo", SAMPLES),
     ("Frames", "recordings/trial-…_frames.parquet", "one row per frame shown", FRAMES),
 )
-"""Title, file, what a row of it is, and its columns."""
+"""Title, file, meaning of a row, and columns of each table."""
 
 
 def dictionary_markdown() -> str:
-    """Return every file's columns, and the journal's events, as Markdown: a heading and a table for each."""
+    """Return the columns of every file and the journal's events as Markdown, each with a heading and a table."""
     return "\n".join((*(table_markdown(*section) for section in SECTIONS), _journal()))
 
 
 def table_markdown(title: str, file: str, row: str, columns: Sequence[Column]) -> str:
-    """Return a heading, what a row is, and a table of the columns."""
+    """Return a heading, the meaning of a row and a table of the columns as Markdown."""
     rows = [
         f"| `{column.name}` | {column.permitted}{f' [{column.unit}]' if column.unit else ''} | "
         f"{column.variable['description']}{' **Sealed until unblinding.**' if column.sealed else ''} |"

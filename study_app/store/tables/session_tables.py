@@ -49,7 +49,7 @@ class SessionRows:
             self.take(line)
 
     def table(self, name: str) -> list[Row]:
-        """Return the rows of the table of a name."""
+        """Return the rows of the table with this name."""
         return {"responses": self.responses, "trials": self.trials, "intervals": self.intervals}[name]
 
     def take(self, line: events.Event) -> None:
@@ -105,7 +105,7 @@ class SessionRows:
                 _note(self.trials[-1], f"repeated: {line.reason}")
 
     def _row_of(self, line: events.OfAttempt) -> Row:
-        """Return the row that a line is about: of an interval, or of a trial."""
+        """Return the row of the interval or trial to which a line belongs."""
         trial, attempt, interval = line.which
         known = self._places.get((trial, attempt))
         place = known if interval is None else self._intervals.get((trial, attempt, interval))
@@ -130,7 +130,7 @@ class SessionRows:
         self.intervals.append(_interval_row(trial, self._started[which], line, earlier))
 
     def _measured(self, line: events.TrialEnded) -> Row:
-        """Return the measures of a trial that ended; with a design, from all its intervals."""
+        """Return the measures of a completed trial, combined from all its intervals if it has a design."""
         which = line.trial, line.attempt
         if not self._started[which].has_intervals:
             return {name: line.others.get(name) for name in self._measured_names}
@@ -139,14 +139,14 @@ class SessionRows:
         return {name: _combined(name, [row[name] for row in rows if row.get(name) is not None]) for name in names}
 
     def _interrupt(self) -> None:
-        """Mark a trial without an end as interrupted."""
+        """Set the outcome of a trial without an end to interrupted."""
         for rows in (self.trials, self.intervals):
             if rows and rows[-1]["outcome"] is None:
                 rows[-1]["outcome"] = "interrupted"
 
 
 def table_columns(lines: Sequence[events.Event], *, opened: bool) -> dict[str, tuple[Column, ...]]:
-    """Return the columns of a session's tables by name: without the sealed ones where they are sealed, not ``opened``.
+    """Return the columns of a session's tables by name, without sealed columns unless ``opened``.
 
     Only a study with designs has a table of intervals.
     """
@@ -181,7 +181,7 @@ def participant(lines: Sequence[events.Event]) -> Row:
 
 
 def latest(rows: Iterable[Row]) -> list[Row]:
-    """Return the rows of each trial's last attempt, in order."""
+    """Return the rows of the last attempt at each trial, in order."""
     rows = list(rows)
     last: dict[int, int] = {}
     for row in rows:
@@ -190,7 +190,7 @@ def latest(rows: Iterable[Row]) -> list[Row]:
 
 
 def _interval_row(trial: Row, started: events.TrialStarted, line: events.IntervalStarted, before: Row | None) -> Row:
-    """Return the row of an interval that begins."""
+    """Return a new row for an interval that begins."""
     row: Row = {name: trial.get(name) for name in header(INTERVALS)} | dict.fromkeys(_OF_THE_END)
     number = line.interval
     ended_s = None if before is None else before["ended_s"]
@@ -223,12 +223,12 @@ def _session(start: events.SessionStarted) -> Row:
 
 
 def _group(start: events.SessionStarted) -> Row:
-    """Return the group of the session's participant, where it was opened; nothing in format 1."""
+    """Return the cell of the participant's group if it was opened; no cell in format 1."""
     return {"group": start.group} if (start.protocol_format or 1) > 1 else {}
 
 
 def _response(session: Row, about: Row, answer: events.Response, answered_at: str) -> Row:
-    """Return the row of an answer; only in format 2 it says its kind, and the answer as text and as number."""
+    """Return the row of an answer; format 2 adds its kind, and the answer as text and as number."""
     value = answer.value
     plain = answer.kind is None or value is None
     row = {

@@ -35,8 +35,8 @@ from study_app.store.merged import MANIFEST, folders_of, refuse_merged
 from study_app.store.tables import session_tables
 
 _READ: Final[dict[Path, tuple[object, list[csv_files.Row]]]] = {}
-"""Rows by the session's folder, with time and size of the journal. Reading a journal takes 5 ms, 200 take a second."""
-# What a study folder holds besides tables; patterns as in .gitignore.
+"""Cached rows by session folder, with time and size of the journal. Reading a journal takes 5 ms, 200 take a second."""
+# Files of a study folder other than tables; patterns as in .gitignore.
 IGNORED = b"""\
 .psychds-ignore
 .*.tmp
@@ -55,13 +55,13 @@ rebuilt.txt
 
 
 def participants(folder: StudyFolder) -> list[csv_files.Row]:
-    """Return one row per session that has begun its journal, by participant and number."""
+    """Return one row per session with a journal, by participant and number."""
     key = opened_or_none(folder)
     return [row for session in folder.sessions() for row in _row_of(session, key)]
 
 
 def _row_of(session: SessionFolder, key: Key | None) -> list[csv_files.Row]:
-    """Return the row of one session as `row_of`; a journal that this program has read is not read again."""
+    """Return the row of one session as `row_of`, from the cache if the journal has not changed."""
     try:
         status = session.journal.lstat()
     except OSError:
@@ -76,34 +76,34 @@ def _row_of(session: SessionFolder, key: Key | None) -> list[csv_files.Row]:
 
 
 def opened_or_none(folder: StudyFolder) -> Key | None:
-    """Return the study's key where it was opened and can be read: a lost one hides no session."""
+    """Return the study's key if it was opened and can be read, else None: a lost key must not hide sessions."""
     with contextlib.suppress(StoreError):
         return opened_key(folder)
     return None
 
 
 def row_of(session: SessionFolder, key: Key | None) -> list[csv_files.Row]:
-    """Return the row of one session; none if it has not begun. ``key`` is the study's once it was opened."""
+    """Return a list with the row of one session, empty if it has not begun. ``key`` is the study's opened key."""
     try:
         contents = journal.scan(session.journal) if is_there(session.journal) else journal.Contents([], 0)
         if not contents.lines and never_begun(session.path):
             return []
-    except StoreError:  # one session that cannot be read must not stop the others
+    except StoreError:  # an unreadable session must not prevent reading the others
         return [_damaged(session, {})]
     return [row_from(session, contents, key) if contents.lines else _damaged(session, {})]
 
 
 def row_from(session: SessionFolder, contents: journal.Contents, key: Key | None) -> csv_files.Row:
-    """Return the row of a session whose journal has these lines."""
+    """Return the row of a session from its journal's contents, as a list."""
     try:
         row = session_tables.participant(opened(contents.lines, key))
-    except StoreError:  # one session that cannot be read must not stop the others
+    except StoreError:  # an unreadable session must not prevent reading the others
         return _damaged(session, contents.lines[0].line())
     return row if contents.damage is None else row | {"status": "damaged"}
 
 
 def _damaged(session: SessionFolder, start: Mapping[str, Any]) -> csv_files.Row:
-    """Return the row of a session without one from its journal: from its folder, first line and receipt."""
+    """Return the row of a session whose journal gives none, from its folder, first line and receipt."""
     if not start:
         with contextlib.suppress(StoreError):
             held = receipt.read(session.receipt)
@@ -116,10 +116,10 @@ def _damaged(session: SessionFolder, start: Mapping[str, Any]) -> csv_files.Row:
 
 
 def write_participants(folder: StudyFolder, study: str) -> None:
-    """Bring the table up to date with all journals.
+    """Update the table from all journals.
 
-    Several programs may do so at once on a shared folder: each looks again after it wrote, so that whoever wrote last
-    has seen what the others journalled before they wrote, and the table ends up complete.
+    Several programs may do so at once on a shared folder: each reads the journals again after writing, so that the last
+    writer has seen the lines of the others and the table is complete.
     """
     path = folder.participants(study)
     content = table_bytes(folder, participants(folder))
@@ -134,7 +134,7 @@ def write_participants(folder: StudyFolder, study: str) -> None:
 
 
 def table_bytes(folder: StudyFolder, rows: Sequence[csv_files.Row]) -> bytes:
-    """Return the table with these rows, with the columns of `columns_of`."""
+    """Return the table with these rows and the columns of `columns_of`."""
     return csv_files.csv_bytes(
         columns_of(folder, rows), [{"group": None, TRIALS_MISSING.name: None} | row for row in rows]
     )
@@ -154,7 +154,7 @@ def columns_of(folder: StudyFolder, rows: Iterable[csv_files.Row]) -> tuple[Colu
 
 
 def description_bytes(study: StudyHead, *, sealed: bool, protocol_format: int = 1, intervals: bool = False) -> bytes:
-    """Return the file for ``study``; the same bytes for the same study on every machine.
+    """Return the description of ``study``, with the same bytes on every machine.
 
     ``sealed`` says that no table has the sealed columns, except the group if it is pre-existing; ``protocol_format`` is
     the format of the study's file, ``intervals`` whether it has blocks with a design.
@@ -180,7 +180,7 @@ def description_bytes(study: StudyHead, *, sealed: bool, protocol_format: int = 
 
 
 def describes_alike(content: bytes, expected: bytes) -> bool:
-    """Return whether a description says the same of the study, and of the same columns but for `LATER`.
+    """Return whether two descriptions agree on the study and on all columns except `LATER`.
 
     Earlier versions of the program lack columns, describe others in other words, and add a pattern of the cells, which
     is no property of schema.org's PropertyValue; units and ranges are the same in all.
@@ -206,7 +206,7 @@ def describes_alike(content: bytes, expected: bytes) -> bool:
 def write_description(
     folder: StudyFolder, study: StudyHead, protocol_format: int = 1, *, intervals: bool = False
 ) -> None:
-    """Write the description where it is missing or of an older version of the study.
+    """Write the description if it is missing or describes an older version of the study.
 
     Until the key is opened it lacks the sealed columns, unless an earlier version of the program described them: then
     tables have them.
@@ -226,7 +226,7 @@ def has_intervals(protocol: Mapping[str, Any]) -> bool:
 
 
 def names_sealed(content: bytes) -> bool:
-    """Return whether a description names a sealed column; the group is none if it is pre-existing."""
+    """Return whether a description names a sealed column; a pre-existing group is not sealed."""
     with contextlib.suppress(AttributeError, KeyError, TypeError, ValueError):
         names = {variable["name"] for variable in parse_json(content)["variableMeasured"]}
         return not names.isdisjoint(SEALED - {GROUP.name})
@@ -234,7 +234,7 @@ def names_sealed(content: bytes) -> bool:
 
 
 def described_study(folder: StudyFolder) -> str | None:
-    """Return the name of the study whose folder this is, or None where it is none yet."""
+    """Return the name of the study in this folder, or None if it has no study yet."""
     if not is_there(folder.description):
         return None
     try:
@@ -246,7 +246,7 @@ def described_study(folder: StudyFolder) -> str | None:
 
 
 def check_study(folder: StudyFolder, study: str) -> None:
-    """Refuse a folder of another study, of merged sites, of studies in folders of their own, or within one of these.
+    """Raise an error for a folder of another study, of merged sites or of several studies, or inside one of these.
 
     Raises
     ------
@@ -270,7 +270,7 @@ def check_study(folder: StudyFolder, study: str) -> None:
 
 
 def participants_of(folder: Path) -> list[Row]:
-    """Return one row per session of a study; in a merged one by site, with the site in the participants' IDs.
+    """Return one row per session of a study, for merged studies by site with the site in the participants' IDs.
 
     Raises
     ------
@@ -290,7 +290,7 @@ def study_folders(results: Path) -> Iterator[Path]:
     Raises
     ------
     OSError
-        The folder is not there, or cannot be read.
+        The folder does not exist or cannot be read.
     """
     for folder in sorted(results.iterdir()):
         if (folder / "data").is_dir() or (not folder.name.startswith(".") and (folder / MANIFEST).is_file()):

@@ -23,25 +23,25 @@ from study_app.store.journals.journal_events import Event, Stepped, TrialStarted
 
 Tables: TypeAlias = Mapping[str, Any]
 
-_STATEMENTS = frozenset({"item", "items"})  # in journal, receipt and tables
+_STATEMENTS = frozenset({"item", "items"})  # names of free texts in journal, receipt and tables
 _CLOCKS = frozenset({"t_s", "onset_s", "first_choice_s", "last_change_s", "trial_started_s"})
-_PASSED_OVER = _STATEMENTS | _CLOCKS  # a moment may be any number: 1.717 s is no wake of 1717 ticks
+_PASSED_OVER = _STATEMENTS | _CLOCKS  # times can have any value: 1.717 s does not reveal a wake of 1717 ticks
 _SETTINGS = frozenset(
     {"id", "effects", "kind", "axes"}
-)  # words of the force model that tell no condition by themselves
-_TELLING_DIGITS = 5  # digits that do not stand somewhere by chance
+)  # words of the force model that do not reveal a condition by themselves
+_TELLING_DIGITS = 5  # number of digits that are unlikely to occur by chance
 
 
 @dataclass(frozen=True, slots=True)
 class Leak:
-    """A word that tells a condition, and the file and line it stands in; the word is not for showing."""
+    """A word that reveals a condition, with its file and line; the word must not be shown."""
 
     place: str
     word: str = field(repr=False)
 
 
 class Telltales:
-    """Words that tell conditions; made by `telltales` and `certain_telltales`."""
+    """Words that reveal conditions; made by `telltales` and `certain_telltales`."""
 
     def __init__(self, words: Iterable[str]) -> None:
         self.words = frozenset(words)
@@ -50,12 +50,12 @@ class Telltales:
         self._pattern = re.compile(rf"(?<!\w)(?<!\d\.)(?:{listed})(?!\w|\.\d)" if listed else r"(?!)")
 
     def in_text(self, text: str) -> list[str]:
-        """Return the words that stand by themselves in ``text``: a window's title, a line of a log, a cell."""
+        """Return the revealing words that occur as whole words in ``text``: a window's title, a log line, a cell."""
         return self._pattern.findall(text)
 
 
 def telltales(protocol: Protocol, recorded: Iterable[float] = ()) -> Telltales:
-    """Return all that reveals a condition or level of ``protocol``: ids, and numbers in every unit they are used in.
+    """Return the words that reveal a condition or level of ``protocol``: ids, and numbers in every unit in use.
 
     ``recorded`` are `recorded_numbers`.
     """
@@ -64,7 +64,7 @@ def telltales(protocol: Protocol, recorded: Iterable[float] = ()) -> Telltales:
 
 
 def presented_numbers(protocol: Protocol) -> frozenset[float]:
-    """Return every level, standard and comparison that trials of a protocol can present, 0 aside."""
+    """Return every level, standard and comparison that trials of a protocol can present, except 0."""
     numbers: set[float] = set()
     for block in protocol.blocks.values():
         if block.design is None or block.stimulus is None:
@@ -81,7 +81,7 @@ def presented_numbers(protocol: Protocol) -> frozenset[float]:
 
 
 def recorded_numbers(protocol: Protocol, opened: Iterable[Event]) -> frozenset[float]:
-    """Return every level and comparison that the opened lines of a journal presented: methods may choose any level.
+    """Return every level and comparison that the opened lines of a journal present: methods may choose any level.
 
     Those that a participant set, step by step, are among them.
     """
@@ -99,7 +99,7 @@ def recorded_numbers(protocol: Protocol, opened: Iterable[Event]) -> frozenset[f
 
 
 def certain_telltales(tables: Tables, published: Any, levels: Iterable[float] = ()) -> Telltales:
-    """Return the words that reveal a condition and occur nowhere by chance: no short number, no ``published`` word.
+    """Return the words that reveal a condition and do not occur by chance: no short numbers, no ``published`` words.
 
     ``tables`` are the sealed key's, ``published`` is the receipt's protocol, ``levels`` are `presented_numbers`.
     """
@@ -110,7 +110,7 @@ def certain_telltales(tables: Tables, published: Any, levels: Iterable[float] = 
 
 
 def find_leaks(folder: Path, telling: Telltales) -> list[Leak]:
-    """Return where in ``folder`` one of ``telling`` stands: in a name or in a text, statements and recordings aside."""
+    """Return the ``telling`` words in names and texts of ``folder``, except statements and recordings."""
     leaks: list[Leak] = []
     key = StudyFolder(folder).key
     for path in paths_in(folder):
@@ -124,7 +124,7 @@ def find_leaks(folder: Path, telling: Telltales) -> list[Leak]:
 def _in_file(path: Path, name: str, telling: Telltales) -> Iterator[Leak]:
     try:
         content = path.read_bytes().decode("utf-8", "replace")
-    except FileNotFoundError:  # a running program has just taken it away
+    except FileNotFoundError:  # a running program has just removed it
         return
     except OSError as error:
         raise cannot_read(path, error) from error
@@ -136,7 +136,7 @@ def _in_file(path: Path, name: str, telling: Telltales) -> Iterator[Leak]:
 
 
 def _fragments(suffix: str, content: str) -> Iterator[tuple[str, str]]:
-    """Yield place and text of what a file holds besides statements."""
+    """Yield the texts in a file other than statements, with their places."""
     if suffix == ".csv":
         yield from _cells(content)
     elif suffix == ".json":
@@ -156,7 +156,7 @@ def _cells(content: str) -> Iterator[tuple[str, str]]:
 
 
 def _parsed(text: str, place: str) -> Iterator[tuple[str, str]]:
-    """Yield what a JSON text holds, or the text itself where it is none."""
+    """Yield the texts in a JSON document with their places; any other text is yielded itself."""
     try:
         value = parse_json(text)
     except ValueError:
@@ -166,7 +166,7 @@ def _parsed(text: str, place: str) -> Iterator[tuple[str, str]]:
 
 
 def _texts(value: Any, place: str, passed_over: frozenset[str]) -> Iterator[tuple[str, str]]:
-    """Yield every name and value in a JSON value as text."""
+    """Yield every name and value in a JSON value as text, with its place."""
     if isinstance(value, dict):
         for name, inner in value.items():
             yield place, name
@@ -206,7 +206,7 @@ def _all_spelled(values: Iterable[float]) -> set[str]:
 
 
 def _spelled(value: float) -> Iterator[str]:
-    """Yield a number as it may be written: as it is, and of milliseconds also as s, µs and ns."""
+    """Yield the notations of a number: as it is and, since it may be in milliseconds, in s, µs and ns."""
     for scaled in (value, value / 1000, value * 1000, value * 1_000_000):
         yield repr(scaled)
         if float(scaled).is_integer():
@@ -215,5 +215,5 @@ def _spelled(value: float) -> Iterator[str]:
 
 
 def _digits(word: str) -> int:
-    """Return how many digits of a number are not mere zeros at its ends."""
+    """Return the number of significant digits of a number."""
     return len(re.sub(r"[^0-9]", "", word.partition("e")[0]).strip("0"))

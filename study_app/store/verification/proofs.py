@@ -30,14 +30,14 @@ STORE: Final = ("liquid-study", "signing key of the lab")
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """What was kept elsewhere: its lines, and in words who signed them and when they were stamped."""
+    """A stored proof: its lines, with a text about who signed them and when they were time-stamped."""
 
     lines: Proofs
     told: tuple[str, ...] = ()
 
 
 def records(study: StudyFolder) -> Proofs:
-    """Return fingerprint and place of each record of a study."""
+    """Return fingerprint and name of each record (withdrawal, reveal, exclusion) of a study."""
     rows = (*exclusions(study.path), *reversals(study.path))
     name = study.exclusions.name
     excluded = [(proof_of(json.dumps(asdict(row)).encode()), f"{name}/sub-{row.participant}") for row in rows]
@@ -46,7 +46,7 @@ def records(study: StudyFolder) -> Proofs:
 
 
 def lines_of(study: StudyFolder) -> str:
-    """Return the lines that prove a study as it is now."""
+    """Return the lines that prove the current state of a study."""
     lines = [checked_line(*proof) for proof in (*listed(study.fingerprints), *records(study))]
     if not lines:
         raise StoreError(f"{study.path} has no session that ended: there is nothing to prove yet")
@@ -54,14 +54,14 @@ def lines_of(study: StudyFolder) -> str:
 
 
 def signed(lines: str) -> str:
-    """Return a signature of lines, as a line, with the key of the lab; a first one is drawn and kept by the system."""
+    """Return the signature of ``lines`` as a line, made with the lab's key, which is created if missing."""
     key = _key(draws=True)
     public = base64.b64encode(key.public_key().public_bytes_raw()).decode()
     return f"signature {public} {base64.b64encode(key.sign(lines.encode())).decode()}\n"
 
 
 def read_proof(path: Path) -> Proof:
-    """Return what a file that was kept elsewhere proves, after its signature and its time stamp were verified.
+    """Read a stored proof and verify its signature and time stamp.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def read_proof(path: Path) -> Proof:
 
 
 def leave(study: StudyFolder, say: Callable[[str], object]) -> None:
-    """Write the study's proof into the folder that the settings name, signed and stamped, while the program goes on."""
+    """Write the study's proof, signed and stamped, into the folder of the settings in the background."""
     settings = workstation.load_or_default()[0]
     if settings.proofs is None:
         return
@@ -102,13 +102,13 @@ def leave(study: StudyFolder, say: Callable[[str], object]) -> None:
         except StoreError as error:
             say(f"the proof of the study is not in {to}: {error}")
 
-    thread = threading.Thread(target=write, name="proof", daemon=True)  # a folder may never answer
+    thread = threading.Thread(target=write, name="proof", daemon=True)  # a network folder may never respond
     thread.start()
     atexit.register(thread.join, 2 * WAITS_S)
 
 
 def proof_text(study: StudyFolder, *, server: str = "", sign: bool | None = None) -> str:
-    """Return a study's proof, signed (None: if the lab has a key), and stamped by a server (URL) where one is given."""
+    """Return a study's proof, signed (None: if the lab has a key) and stamped if a ``server`` (URL) is given."""
     lines, below = lines_of(study), ""
     if sign or (sign is None and _key(draws=False) is not None):
         below += signed(lines)
@@ -118,7 +118,7 @@ def proof_text(study: StudyFolder, *, server: str = "", sign: bool | None = None
 
 
 def _key(*, draws: bool) -> Any:
-    """Return the private key of the lab from the system's key store; None, or a new one, where there is none."""
+    """Return the lab's private key from the system's key store; if missing, None or, with ``draws``, a new one."""
     if not draws and None in (find_spec("keyring"), find_spec("cryptography")):
         return None
     store, ed25519 = optional_library("keyring"), optional_library("cryptography.hazmat.primitives.asymmetric.ed25519")

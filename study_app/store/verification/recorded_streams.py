@@ -25,13 +25,13 @@ from study_app.store.merged import read_merged
 from study_app.store.verification.verify_session import Finding, Findings
 
 RESET_S: Final = 1.0
-"""A change of an offset between two measurements from which on a clock was set, not drifting."""
+"""Smallest change of an offset between two measurements that means a clock was set rather than drifting [s]."""
 LATE: Final = 1.5
-"""Intervals between successive ticks from so many periods on are late."""
+"""Number of periods from which the interval between successive ticks is late."""
 
 
 def check_recording(file: Path, folder: Path, findings: Findings) -> list[str]:
-    """Compare the recording ``file`` with the study in ``folder``; add to ``findings``, and return the measurements.
+    """Compare the recording ``file`` with the study in ``folder``; add to ``findings`` and return the measurements.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def check_recording(file: Path, folder: Path, findings: Findings) -> list[str]:
 
 
 _TARGET: Final = '{"event":"target_reached",'
-"""How the marker of a reached target begins, which has no line in the journal while measures are sealed."""
+"""Beginning of a reached target's marker, which has no line in the journal while measures are sealed."""
 
 
 def _read(file: Path) -> list[Any]:
@@ -92,15 +92,15 @@ def _read(file: Path) -> list[Any]:
 def _markers(
     file: Path, stream: Mapping[str, Any], expected: Mapping[SessionFolder, Sequence[str]], findings: Findings
 ) -> Iterator[str]:
-    """Compare a stream of markers with the journals: none may lack, and none be added, between the first and last."""
+    """Compare markers with the journals: between the first and the last, none may be missing or added."""
     texts = _texts(stream)
-    if not texts:  # of a program that was killed before its session, for example
+    if not texts:  # for example of a program that was killed before its session
         yield "markers: none recorded"
         return
     known = Counter(text for texts in expected.values() for text in texts)
     unknown = sum(text not in known and not text.startswith(_TARGET) for text in texts)
     for session, all_sent in expected.items():
-        sent = [text for text in all_sent if known[text] == 1]  # sessions begin with the same text
+        sent = [text for text in all_sent if known[text] == 1]  # all sessions begin with the same text
         wanted = set(sent)
         at = {text: place for place, text in enumerate(texts) if text in wanted}
         known_numbers = [number for number, text in enumerate(sent) if text in at]
@@ -130,7 +130,7 @@ def _texts(stream: Mapping[str, Any]) -> list[str]:
 
 
 def _error_ms(session: SessionFolder, stream: Mapping[str, Any], at: Mapping[str, int]) -> float:
-    """Return how far the markers' stamps are from the journal's times, less their median from each start or resume."""
+    """Return the largest deviation of markers' stamps from the journal's times, less each start's median [ms]."""
     parts: list[list[float]] = [[]]
     for line in journal.read(session.journal):
         marker = marker_of(line.event, line.t_s, 0, line.fields())
@@ -153,7 +153,7 @@ def _samples(file: Path, stream: Mapping[str, Any], findings: Findings) -> Itera
         return
     ticks = np.asarray(stream["time_series"])[:, labels.index("tick")].astype(np.int64)
     steps, intervals_s = np.diff(ticks) % TICKS, np.diff(stamps_s)
-    gaps = (steps > 1) & (steps < TICKS // 2)  # a greater one is a new start of the servo
+    gaps = (steps > 1) & (steps < TICKS // 2)  # a larger gap is a restart of the servo
     lost = int((steps[gaps] - 1).sum())
     if lost:
         first_s = stamps_s[int(np.argmax(gaps))] - stamps_s[0]
@@ -165,7 +165,7 @@ def _samples(file: Path, stream: Mapping[str, Any], findings: Findings) -> Itera
 
 
 def clock_drift(stream: Mapping[str, Any]) -> str:
-    """Return the drift of a stream's clock against the recorder's, by its measured offsets between two resets."""
+    """Return a text about the drift of a stream's clock against the recorder's, from offsets between two resets."""
     times_s, values_s = (np.asarray(stream.get(name, ()), float) for name in ("clock_times", "clock_values"))
     if len(times_s) < 2:
         return f"{counted(len(times_s), 'offset')} measured: too few for its drift"
@@ -181,7 +181,7 @@ def clock_drift(stream: Mapping[str, Any]) -> str:
 
 
 def _line(t_s: NDArray[np.float64], v_s: NDArray[np.float64]) -> tuple[float, float]:
-    """Return slope and greatest residual of a line through offsets; the slope is NaN with fewer than three."""
+    """Return slope and largest residual of a line through offsets; the slope is NaN for fewer than three."""
     if len(t_s) < 3 or np.ptp(t_s) == 0:
         return math.nan, math.nan
     slope, start_s = np.polyfit(t_s - t_s[0], v_s, 1)

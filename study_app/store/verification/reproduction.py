@@ -29,14 +29,14 @@ from study_app.store.progress import trial_results
 
 @dataclass(slots=True)
 class Reproduced:
-    """What was compared."""
+    """The result of reproducing a session's orders and levels."""
 
     differences: list[str] = field(default_factory=list)
     followed: list[str] = field(default_factory=list)
 
 
 def reproduced(session_folder: Path) -> Reproduced:
-    """Return how a session compares with what its receipt, the study's key and its answers give.
+    """Compare a session with the orders and levels computed from its receipt, the study's key and its answers.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def reproduced(session_folder: Path) -> Reproduced:
     if lines and events.start_of(lines).intervals:
         compared = _Compared(protocol, Key(key.codes, key.nonce), schedule)
         _levels(compared, lines, key, reproduction)
-        versions = ran["versions"]  # where receipts of 0.2.1 may have the rules, as a text
+        versions = ran["versions"]  # here receipts of 0.2.1 may have the rules as a text
         if compared.differences and str(ran.get("level_rules", versions.get("level rules"))) != str(LEVEL_RULES):
             reproduction.followed.append(
                 f"liquid-study {versions.get('liquid-study')} ran the session and chose levels by other rules: run "
@@ -75,7 +75,7 @@ def reproduced(session_folder: Path) -> Reproduced:
 
 
 def _levels(compared: "_Compared", lines: list[events.Event], key: blinding.Key, reproduction: Reproduced) -> None:
-    """Compare what each trial of intervals presented with what was due."""
+    """Compare the levels presented in trials of intervals with the computed ones."""
     try:
         lines = opened(lines, key)
         for index, line in enumerate(lines):
@@ -93,7 +93,7 @@ def _levels(compared: "_Compared", lines: list[events.Event], key: blinding.Key,
 
 
 class _Compared:
-    """Trials of intervals, compared one after the other; ``trials`` says by block and number whether they follow."""
+    """Compares trials of intervals in order; ``trials`` has by block and number whether they agree."""
 
     def __init__(self, protocol: Protocol, key: Key, schedule: Schedule) -> None:
         self.differences: list[str] = []
@@ -104,7 +104,7 @@ class _Compared:
         self._planned = {trial.number: trial for trial in self._schedule.trials}
 
     def take(self, line: events.Event, before: Sequence[events.Event]) -> None:
-        """Compare one line with what follows from those before it."""
+        """Compare one line with the level that follows from the lines before it."""
         if isinstance(line, events.IntervalEnded | events.Responses):
             self._take_setting(line, before)
         if not isinstance(line, events.TrialStarted | events.PassedOver) or line.trial not in self._planned:
@@ -133,9 +133,9 @@ class _Compared:
         self._note(block, trial.number, follows)
 
     def _take_setting(self, line: events.IntervalEnded | events.Responses, before: Sequence[events.Event]) -> None:
-        """Compare the level that a participant set with the steps from where it started, and the answer with their sum.
+        """Compare a level set by the participant with its start plus its steps, and the answer with their sum.
 
-        A line that is not about a setting is left alone.
+        Lines that do not belong to a setting are ignored.
         """
         set_to = line.others.get("setting")
         if isinstance(line, events.IntervalEnded) and set_to is None:
@@ -167,7 +167,7 @@ class _Compared:
 
 
 def recorded_trials(lines: Iterable[events.Event]) -> tuple[RecordedTrial | int, ...]:
-    """Return what the lines of a journal say was presented: every attempt, in the order of time.
+    """Return every attempt at a trial in the lines of a journal, in order of time.
 
     A trial that was passed over is its number alone. KeyError says that a line answers a trial that never started.
     """

@@ -47,7 +47,7 @@ COMPARE = "compare it with fingerprints stored elsewhere: liquid-study verify --
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing found, and where: a path in the study folder; ``shares`` says that it concerns sharing alone."""
+    """A problem and its path in the study folder; ``shares`` says that it matters for sharing only."""
 
     place: str
     message: str
@@ -59,9 +59,9 @@ class Finding:
 
 @dataclass(slots=True)
 class Findings:
-    """What was found in a study's ``folder``, with so many sessions; ``plug_ins`` are those that receipts name.
+    """The problems in a study's ``folder``, with its number of sessions and the ``plug_ins`` named in receipts.
 
-    ``errors`` are files that cannot be trusted as they are, ``warnings`` something to know.
+    ``errors`` are about files that cannot be trusted, ``warnings`` about other facts to know.
     """
 
     folder: Path
@@ -73,29 +73,29 @@ class Findings:
 
     @property
     def sound(self) -> bool:
-        """Whether there is no error."""
+        """Whether there are no errors."""
         return not self.errors
 
     def take(self, others: Findings) -> None:
-        """Add what others found."""
+        """Add the findings of ``others``."""
         self.errors += others.errors
         self.warnings += others.warnings
 
     def error(self, path: Path, message: str) -> None:
-        """Add what makes ``path`` untrustworthy."""
+        """Add an error: ``path`` cannot be trusted."""
         self.errors += (Finding(self._name(path), message),)
 
     def failure(self, path: Path, error: StoreError) -> None:
-        """Add an error that stopped us reading ``path``, which is named once."""
+        """Add an error raised while ``path`` was read; the path is named once."""
         self.error(path, str(error).removeprefix(str(path)).lstrip(" ,:/"))
 
     def warning(self, path: Path, message: str, *, shares: bool = False) -> None:
-        """Add what should be known of ``path``."""
+        """Add a warning about ``path``."""
         self.warnings += (Finding(self._name(path), message, shares),)
 
     @contextlib.contextmanager
     def reading(self, path: Path) -> Iterator[None]:
-        """Turn an error of reading within this block into a finding about ``path``, and continue after the block."""
+        """Convert an error raised in this ``with`` block into a finding about ``path``; continue after the block."""
         try:
             yield
         except StoreError as error:
@@ -108,7 +108,7 @@ class Findings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckedSession:
-    """What the study's own files are compared with, of one session.
+    """The data of one session with which the study's own files are compared.
 
     ``row`` is its row of the participants table: None where it has not begun, or its journal cannot be read
     (``readable`` is False). ``running`` says that a program has it open, ``chained`` that its journal's lines tell what
@@ -125,7 +125,7 @@ class CheckedSession:
 
 
 def check_session(place: Place, key: Key | None, findings: Findings, *, recordings: bool = True) -> CheckedSession:
-    """Check one session; again where there is an error and a program has opened it meanwhile.
+    """Check one session; repeat the check if there are errors and a program has opened it in the meantime.
 
     Without ``recordings`` these are not read, which takes a while.
     """
@@ -194,7 +194,7 @@ def _check(place: Place, key: Key | None, findings: Findings, *, running: bool, 
 
 
 def _journal(folder: SessionFolder, findings: Findings, *, running: bool) -> Contents:
-    """Return what the journal holds: no line where it says nothing of the session."""
+    """Check the journal and return its contents, without lines if they cannot be those of the session."""
     nothing = Contents([], 0)
     if not is_there(folder.journal):
         if never_begun(folder.path):
@@ -245,7 +245,7 @@ def _journal(folder: SessionFolder, findings: Findings, *, running: bool) -> Con
 def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, findings: Findings) -> None:
     path = folder.receipt
     if not lines and not is_there(path):
-        return  # claimed and never begun
+        return  # claimed but never begun
     try:
         held = receipt.read(path)
     except StoreError as error:
@@ -295,7 +295,7 @@ def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, 
 
 
 def _differing(held: Mapping[str, Any], lines: Sequence[events.Event]) -> list[str]:
-    """Return the fields of a receipt that the journal contradicts, beside those that are copied from its first line."""
+    """Return the fields of a receipt that the journal contradicts, without those copied from its first line."""
     start = events.start_of(lines)
     resumed = {line.at: line.receipt_hash for line in lines if isinstance(line, events.SessionResumed)}
     expected: dict[str, Any] = {"started_at": start.at}
@@ -318,10 +318,10 @@ def _differing(held: Mapping[str, Any], lines: Sequence[events.Event]) -> list[s
 
 
 def _is_protocol(held: Mapping[str, Any], start: events.SessionStarted, key: Key) -> bool:
-    """Return whether the protocol of a receipt is one, completed from the key, and as this version writes it."""
+    """Return whether a receipt's protocol, completed from the key, is valid and as this version writes it."""
     try:
         whole = receipt.without_conditions(whole_protocol(held["protocol"], key))
-    except PlugInError:  # it is not here to tell; `verify` names it
+    except PlugInError:  # the plug-in is missing; `verify` reports it
         return True
     except (KeyError, TypeError, AttributeError, ValueError):
         return False
@@ -329,7 +329,7 @@ def _is_protocol(held: Mapping[str, Any], start: events.SessionStarted, key: Key
 
 
 def _removed(lines: Sequence[events.Event]) -> Iterator[str]:
-    """Yield a sentence on each trial or form whose answers were never confirmed, though the session went on."""
+    """Yield a sentence on each trial or form whose answers were never confirmed although the session continued."""
     chosen: dict[int, int] = {}
     form: events.FormShown | None = None
     for line in lines:
@@ -352,14 +352,14 @@ def _removed(lines: Sequence[events.Event]) -> Iterator[str]:
 
 
 def wrong_responses(lines: Sequence[events.Event]) -> Iterator[str]:
-    """Yield a sentence on each answer in ``responses`` that is not the one given by the choices before it."""
+    """Yield a sentence on each answer in ``responses`` that differs from the choices before it."""
     now = Progress()
     for line in lines:
         if isinstance(line, events.Responses | events.FormAnswered):
             chosen = dict(now.answers)
             where = f"form {line.form}" if isinstance(line, events.FormAnswered) else f"trial {line.trial}"
             line_name = f"line {line.n} ({line.event})"
-            hides = any(row.kind is not None for row in line.items)  # format 2: it may have been shown for a while
+            hides = any(row.kind is not None for row in line.items)  # format 2: a question may have been hidden again
             for row in line.items:
                 if not _same_answer(row, chosen.pop(row.item, events.Answer())):
                     wrong = "another answer than was chosen before: it was changed"
@@ -371,7 +371,7 @@ def wrong_responses(lines: Sequence[events.Event]) -> Iterator[str]:
 
 
 def _same_answer(listed_answer: events.Answer, given: events.Answer) -> bool:
-    """Return whether a confirmed answer is what was chosen; moments of a line are rounded to 1 µs."""
+    """Return whether a confirmed answer equals the chosen one; times in lines are rounded to 1 µs."""
     moments = ((getattr(listed_answer, name), getattr(given, name)) for name in ("onset_s", "first_s", "last_s"))
     return (listed_answer.value, listed_answer.changes) == (given.value, given.changes) and all(
         listed == ours or (None not in (listed, ours) and abs(listed - ours) <= _ROUNDED_S) for listed, ours in moments
@@ -379,9 +379,9 @@ def _same_answer(listed_answer: events.Answer, given: events.Answer) -> bool:
 
 
 def _tables(place: Place, lines: list[events.Event], findings: Findings, *, ended: bool) -> None:
-    """Compare the tables with what the journal gives; one that tells more than the journal is named as such."""
+    """Compare the tables with those made from the journal; report tables that contain more than the journal."""
     telling: set[Path] = set()
-    with contextlib.suppress(StoreError):  # said of receipt or journal already
+    with contextlib.suppress(StoreError):  # already reported for receipt or journal
         for path, what in beyond(place, lines):
             findings.error(path, f"{what}: {RESTORE}")
             telling.add(path)
@@ -399,7 +399,7 @@ def _tables(place: Place, lines: list[events.Event], findings: Findings, *, ende
 def check_table(
     path: Path, expected: bytes, columns: tuple[Column, ...], findings: Findings, *, may_differ: Callable[[int], bool]
 ) -> None:
-    """Compare a table with what the journals give, and its cells with the dictionary.
+    """Compare a table with the one made from the journals, and its cells with the column dictionary.
 
     ``may_differ`` says of a line's number whether it is of a session that has not ended, whose tables follow its
     journal with the next page or when it is rebuilt: a difference there is only a warning.
@@ -416,13 +416,13 @@ def check_table(
     if differing:
         report = findings.warning if follows else findings.error
         report(path, f"differs from the journal, from line {differing[0]} on; rebuild renews it")
-    if not (differing and follows):  # else a row may be half written: earlier versions wrote in place
+    if not (differing and follows):  # a row may be partly written: earlier versions wrote in place
         for problem in csv_files.problems(content, columns):
             findings.error(path, problem)
 
 
 def _hash(folder: SessionFolder, name: str) -> str:
-    """Return the checksum of a file as it is now; none where it cannot be read."""
+    """Return the current SHA-256 of a session's file, "" if it cannot be read."""
     try:
         return hashed(folder, name)
     except StoreError:
@@ -430,7 +430,7 @@ def _hash(folder: SessionFolder, name: str) -> str:
 
 
 def _listed_system_files(folder: SessionFolder) -> Iterator[str]:
-    """Yield the system's files that were there when the session ended, so that its list has them."""
+    """Yield the system files that existed when the session ended, so that its list includes them."""
     if names := system_files(folder):
         with contextlib.suppress(StoreError):
             listed = read_checksums(folder)
@@ -481,7 +481,7 @@ def _recordings(
     *,
     ended: bool,
 ) -> None:
-    """Check that every recording the journal tells of is there, whole and of this trial, and no other."""
+    """Check that exactly the recordings named in the journal exist, complete and of the right trials."""
     listed: set[str] = set()
     known = {line.which for line in lines if isinstance(line, events.Recorded | events.RecordingLost)}
     for line in lines:
@@ -502,7 +502,7 @@ def _recordings(
                 continue
             if hashes[name] not in digests:
                 findings.error(folder.path / name, f"has changed since it was recorded ({which})")
-            if rows is not None:  # else what is sealed cannot be read, as was said
+            if rows is not None:  # without a key sealed files cannot be read, as already reported
                 _facts(folder, line, kind, name, rows, key, findings)
     if events.start_of(lines).recordings:
         for planned in recordable(lines)[: None if ended else -1]:
@@ -538,7 +538,7 @@ def _facts(
 
 @dataclass(frozen=True, slots=True)
 class Discrepancy:
-    """A file that is not what was recorded, and what to do about it."""
+    """A file that differs from what was recorded, with the remedy."""
 
     path: Path
     what: str
@@ -549,7 +549,7 @@ class Discrepancy:
 
 
 def doubts(place: Place) -> tuple[Discrepancy, ...]:
-    """Return what cannot be trusted of a session's journal, receipt, tables and checksums.
+    """Return the discrepancies of a session's journal, receipt, tables and checksums.
 
     Once the session has ended they are compared with their checksums: files that keep these are as they were when the
     tables were made from the journal. Where one does not, the session is checked as by `check_session`, and the first
@@ -577,7 +577,7 @@ def doubts(place: Place) -> tuple[Discrepancy, ...]:
 
 
 def _as_ended(place: Place) -> bool:
-    """Return whether journal, receipt and tables are what the checksums of the session's end are of."""
+    """Return whether journal, receipt and tables match the checksums of the session's end."""
     folder = place.folder
     tables = [folder.table(place.study, name) for name in ("responses", "trials", "intervals")]
     tables = [path for path in tables if path != tables[-1] or is_there(path)]  # few studies have intervals

@@ -77,7 +77,7 @@ def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
     elif fingerprints is None:
         _between(merged, findings)
         sessions = []
-        for site in filter(Path.is_dir, map(merged.folder, merged.names)):  # `_between` says which are missing
+        for site in filter(Path.is_dir, map(merged.folder, merged.names)):  # `_between` reports the missing ones
             with findings.reading(site):
                 sessions += _verify_study(site, None, findings)
     else:
@@ -122,7 +122,7 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findi
 
 
 def _plug_ins(study: StudyFolder, findings: Findings) -> None:
-    """Name the plug-ins that the sessions used, and those that are not here."""
+    """Collect the plug-ins that the sessions used, and report those that are not installed."""
     used = receipt.recorded_plug_ins(session.receipt for session in study.sessions())
     findings.plug_ins |= used
     for package, names in used.items():
@@ -135,7 +135,7 @@ def _plug_ins(study: StudyFolder, findings: Findings) -> None:
 
 
 def _contents(study: StudyFolder, findings: Findings) -> None:
-    """Name versions under which different files were run."""
+    """Report versions under which different contents of the study's file were run."""
     runs = filter(None, (run_of(session.receipt) for session in study.sessions()))
     hashes: dict[str, set[str]] = {}
     for run in runs:
@@ -149,7 +149,7 @@ def _contents(study: StudyFolder, findings: Findings) -> None:
 
 
 def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[str], findings: Findings) -> None:
-    """Check that every participant with a session has one entry, that of the journals, and that none was changed.
+    """Check that every participant with a session has one unchanged entry, the one in the journals.
 
     Those of the participants who have ``withdrawn`` stay used.
     """
@@ -192,7 +192,7 @@ def _same_entry(claim: Claim, replaced: Claim | None) -> bool:
 
 
 def _withdrawn(study: StudyFolder, findings: Findings) -> dict[str, Tombstone]:
-    """Return the withdrawals, and report those that are not finished."""
+    """Return the withdrawals, and report unfinished ones."""
     try:
         withdrawn = tombstones(study)
     except StoreError as error:
@@ -209,7 +209,7 @@ def _withdrawn(study: StudyFolder, findings: Findings) -> dict[str, Tombstone]:
 
 
 def _participants(study: StudyFolder, name: str, sessions: Sessions, findings: Findings) -> None:
-    """Check the table of all sessions, where each session's journal could be read.
+    """Check the participants table if the journals of all sessions could be read.
 
     Lines of sessions that have not ended may be behind their journals. The table is not judged where a program writes
     it when it ends: it has the study open, or has had a session open since the check began.
@@ -232,7 +232,7 @@ def _participants(study: StudyFolder, name: str, sessions: Sessions, findings: F
 
 
 def _fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, findings: Findings) -> None:
-    """Compare the sessions with the study's own list, as it was before they were checked.
+    """Compare the sessions with the study's own list, read before they were checked.
 
     A program lists a session once its files are final, just before it lets go of it: a listed one is judged even where
     it is open.
@@ -241,7 +241,7 @@ def _fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, finding
     for number in unreadable(path):
         findings.error(path, f"line {number} is not a fingerprint: restore it from a copy")
     _compare(study, sessions, early, path.name, findings)
-    if is_open(study.path):  # by a program that lists a session just after it is there
+    if is_open(study.path):  # written by a program that lists a session just after creating it
         return
     known = {place for _, place in listed(path)}
     for session in sessions:
@@ -262,12 +262,12 @@ def _copy(
     proof: Proof,
     findings: Findings,
 ) -> None:
-    """Compare sessions and records with what was kept elsewhere; a withdrawal must be in it, too."""
+    """Compare sessions, records and withdrawals with a proof stored elsewhere."""
     for told in proof.told:
         findings.warning(study.path, f"{path} {told}")
     erased: set[tuple[str, str]] = set()
     recorded: Proofs = ()
-    with contextlib.suppress(StoreError):  # said already
+    with contextlib.suppress(StoreError):  # already reported
         recorded = records(study)
     kept = _as_named(proof.lines, [*withdrawn, *(session.place.folder.participant for session in sessions)], recorded)
     for participant, tombstone in withdrawn.items():
@@ -296,7 +296,7 @@ def _copy(
 
 
 def _as_named(lines: Proofs, participants: Iterable[str], recorded: Proofs) -> Proofs:
-    """Return lines that may have been typed in capitals with the participants as they are written in the study."""
+    """Normalise the case of participant IDs in ``lines`` to the study's spelling."""
     known = {*participants, *(place.rpartition("sub-")[2] for _, place in recorded)}
     names = {name.lower(): name for name in known} | {name: name for name in known}
     return tuple(
@@ -321,7 +321,7 @@ def _compare(
 
 
 def _description(study: StudyFolder, findings: Findings) -> None:
-    """Compare the description with what this version writes for the study as one of the receipts has it."""
+    """Compare the description with the one that this version writes for the study in one of the receipts."""
     held = read_own(study.description, study.path)
     sealed = not (blinding.reveals(study.path) or names_sealed(held))
     heads: set[bytes] = set()
@@ -382,23 +382,23 @@ def _reveals(study: StudyFolder, key: Key | None, findings: Findings) -> None:
 
 
 def _blinding(study: StudyFolder, key: Key | None, findings: Findings) -> None:
-    """Say where a condition is revealed before the key was, but not which."""
+    """Report where a condition is revealed although the key is sealed, without naming it."""
     published = next(_published(study), None)
     if key is None or blinding.reveals(study.path) or published is None:
         return
     levels: frozenset[float] = frozenset()
-    with contextlib.suppress(KeyError, TypeError, AttributeError, ValueError):  # a receipt without what it must hold
+    with contextlib.suppress(KeyError, TypeError, AttributeError, ValueError):  # a receipt that lacks required fields
         protocol = whole_protocol(published, key)
         levels = presented_numbers(protocol)
         for session in study.sessions() if has_intervals(published) else ():  # others present no levels
-            with contextlib.suppress(StoreError):  # said of the journal already
+            with contextlib.suppress(StoreError):  # already reported for the journal
                 levels |= recorded_numbers(protocol, opened(journal.read(session.journal), key))
     for leak in find_leaks(study.path, certain_telltales(key.tables, published, levels)):
         findings.warning(study.path, f"{leak.place} reveals a condition, although the key is sealed")
 
 
 def _between(merged: Merged, findings: Findings) -> None:
-    """Check what the list of sites says of them, and that no session is in two."""
+    """Compare the sites with the list of sites, and check that no session is in two sites."""
     seen: dict[str, Path] = {}
     for site in merged.sites:
         folder = merged.folder(site.name)
@@ -427,7 +427,7 @@ def _between(merged: Merged, findings: Findings) -> None:
 
 
 def _compare_site(merged: Merged, site: Site, findings: Findings) -> None:
-    """Compare a site's folder with what the list of sites says of it; sessions are only erased there."""
+    """Compare a site's folder with its entry in the list of sites; only withdrawn sessions may be missing."""
     study = StudyFolder(merged.folder(site.name))
     if (name := described_study(study)) not in (None, merged.study):
         findings.error(study.path, f"is of study {name}, but {merged.manifest.name} lists sites of {merged.study}")
