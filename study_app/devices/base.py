@@ -25,7 +25,7 @@ class Device(Driver, Protocol):
         """Release the device; a second call does nothing."""
 
     def describe(self) -> dict[str, Any]:
-        """Return its record for a receipt: names and numbers, no folders of this machine."""
+        """Return the description for receipts: names and numbers, without paths of this computer."""
 
     def __enter__(self) -> Self:
         self.open()

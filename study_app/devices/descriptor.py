@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 Kind: TypeAlias = Literal["felt", "seen", "simulated"]
-"""With force; visual only, without force; not used by participants."""
+""""felt": with force; "seen": visual only; "simulated": not used by participants."""
 
 Icon: TypeAlias = Literal["device", "mouse", "fast_forward"]
 

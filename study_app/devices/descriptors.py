@@ -45,7 +45,7 @@ def _felt_and_emulated(
     options: tuple[DeviceOption, ...] = (),
     emulated_options: tuple[DeviceOption, ...] = (),
 ) -> tuple[DeviceDescriptor, DeviceDescriptor]:
-    """Return the descriptors of a device with force and of its emulation; ``can`` says what the latter is."""
+    """Return the descriptors of a device with force and of its emulation, whose capabilities ``can`` describes."""
     package, twin = "study_app.devices.", f"{name}-emulated"
     failures = package + failures
     return (

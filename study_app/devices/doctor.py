@@ -35,7 +35,7 @@ class Finding:
 
     @property
     def words(self) -> str:
-        """The symptom if it was found, else the tested state."""
+        """The symptom if the failure is present, else the tested state."""
         return self.symptom if self.state == "found" else self.tested
 
 
@@ -127,7 +127,7 @@ class DeviceFailureNotFound(DeviceFailure, DeviceNotFound):
 
 @dataclass(frozen=True, slots=True)
 class FailureTable:
-    """The modes of failure of ``device``, in the order in which they are tested; ``not_found``: it is not there."""
+    """The failure modes of ``device`` in test order; ``not_found`` are those of a missing device."""
 
     device: str
     modes: tuple[FailureMode, ...]
@@ -142,7 +142,7 @@ class FailureTable:
         return set(ids[: ids.index(mode)])
 
     def sentence(self, mode: str, seen: str = "") -> str:
-        """Return symptom, what was ``seen``, cause and cure of a mode in a line."""
+        """Return symptom, observation (``seen``), cause and cure of a mode in one line."""
         known = self.mode(mode)
         detail = f" ({seen})" if seen else ""
         return f"{known.symptom}{detail}: {known.cause}; {known.cure}"
@@ -152,7 +152,7 @@ class FailureTable:
         return kind(mode, f"{self.device} cannot be used: {self.sentence(mode, seen)}")
 
     def findings(self, observed: Container[str] = (), passed: Container[str] = ()) -> tuple[Finding, ...]:
-        """Return every mode in its order, ``found``, ``passed`` (tested and not found), or not checked."""
+        """Return a finding for every mode in order: "found" if ``observed``, "ok" if ``passed``, else "not checked"."""
 
         def finding(number: int, mode: FailureMode) -> Finding:
             state: State = "found" if mode.id in observed else "ok" if mode.id in passed else "not checked"
@@ -174,8 +174,8 @@ class FailureTable:
 def read_failures(file: Path, platform: str = sys.platform, **phrases: object) -> FailureTable:
     """Return the table in a TOML file.
 
-    ``[[mode]]`` has the fields of a `FailureMode`, and the systems that it is ``only`` of. A text that differs is a
-    table by system, with ``other``; braces name ``phrases``, or those in the file's ``[words]``.
+    ``[[mode]]`` has the fields of a `FailureMode`, and ``only``, the systems on which it occurs. A text that differs
+    between systems is a table by system, with ``other``; names in braces are ``phrases`` or entries of ``[words]``.
     """
 
     def here(text: str | dict[str, str]) -> str:

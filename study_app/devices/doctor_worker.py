@@ -19,7 +19,7 @@ from study_app.workers.server import Send, Stop
 
 @dataclass(frozen=True, slots=True)
 class Examination:
-    """Which device to examine: ``name`` as ``--device`` takes it, its options, and ``faults`` of an emulated one."""
+    """The device to examine: its ``name`` as for ``--device``, its options, and the ``faults`` of an emulated one."""
 
     name: str
     options: Mapping[str, str | Path]
@@ -27,7 +27,7 @@ class Examination:
 
 
 ExaminationClient: TypeAlias = WorkerClient[Examination, str | Report]
-"""Its answers are lines to show, then the report."""
+"""The client of the worker; its answers are lines to show, then the report."""
 
 
 def start_examination(

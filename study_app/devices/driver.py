@@ -30,7 +30,7 @@ from study_app.haptics.runtime.servo import Servo
 from study_app.user_folder import settings_file
 
 RUNS, RELEASED, FINISHED = range(3)
-"""Values of ``ended``: open; closed by the program, or not open; closed, and ended by a call that outlasted it."""
+"""Values of ``ended``: open; closed by the program or not open; closed and ended by a call that ran longer."""
 FIRST_CAUSE: Final = 3
 """First value of a driver's own causes for ending the exchange."""
 LEAVE_S: Final = 0.5  # a read or a write takes a few milliseconds at most
@@ -42,7 +42,7 @@ _CHUNK_S = 0.25
 
 COMMON: Final[list[tuple[Any, ...]]] = [
     ("now_ns", np.int64),  # time of the tick; stays first: an emulator reads it here
-    ("ended", np.int64),  # RUNS, or why calls are rejected
+    ("ended", np.int64),  # RUNS, or the reason why calls are rejected
     ("inside", np.int64),  # 1 while a read or write runs, which may use the connection
     ("unguarded", np.int64),  # 1: the guard has died: no force may be sent
     ("sent_n", np.float64, (3,)),  # the force that acts since the last command [N, hand frame]
@@ -66,7 +66,7 @@ def enter(device: Any) -> bool:
 
 @kernel
 def outlasted(device: Any) -> bool:
-    """Return whether the device was closed during this call, which then must end the force before it returns."""
+    """Return whether the device was closed during this call, which must then end the force before it returns."""
     if device.ended != RELEASED:
         return False
     device.ended = FINISHED
@@ -81,7 +81,7 @@ def leave(device: Any) -> None:
 
 
 def release(exchange: Any) -> bool:
-    """Reject further calls and wait for a running one; return whether none is left."""
+    """Reject further calls and wait for a running call; return whether none is running any more."""
     if exchange.ended == RUNS:
         exchange.ended = RELEASED
     patience = time.monotonic() + LEAVE_S
@@ -94,11 +94,11 @@ class Connection(Protocol):
     """Access to an open device: a library, a socket, a bridge, or an emulated one."""
 
     def close(self) -> object:
-        """Close it; its force was ended before."""
+        """Close the connection; the force has already been ended."""
 
 
 AtClose: TypeAlias = Literal["stand_down", "release", "leave"]
-"""After closing the guard is dismissed, ends the force, or does so once the device is connected again."""
+"""After closing, the guard is dismissed, ends the force, or ends it once the device is reconnected."""
 
 
 class FramedDevice(Device):
@@ -116,7 +116,7 @@ class FramedDevice(Device):
     """First mode of failure that appears only while the device runs."""
     counted: ClassVar[Sequence[str]] = ("ticks", "fresh")
     ends_force: str | None = None
-    """``guard.Guard``'s function that ends the force if the program dies; None: the device does so itself."""
+    """The function with which ``guard.Guard`` ends the force if the program dies; None: the device does so itself."""
 
     def __init__(
         self, memory: Any, workspace_m: tuple[float, float, float], force_limit_n: float, functions: tuple[Any, Any]
@@ -142,11 +142,11 @@ class FramedDevice(Device):
         raise NotImplementedError
 
     def _prepare(self, connection: Any) -> Mapping[str, Any]:
-        """Check the device and fill its memory, with the force at zero; return what the receipt records."""
+        """Check the device and fill its memory, with the force at zero; return the fields for the receipt."""
         raise NotImplementedError
 
     def _finish(self, connection: Any) -> AtClose:
-        """End the force by the last commands, if that was not done yet."""
+        """End the force by final commands, unless that was done already."""
         raise NotImplementedError
 
     def open(self) -> None:
@@ -155,7 +155,7 @@ class FramedDevice(Device):
         Raises
         ------
         DeviceError
-            It is not there or cannot be used; then nothing is left open.
+            It is not connected or cannot be used; nothing is left open.
         """
         if self.connection is not None:
             if self.exchange.ended == RUNS:
@@ -195,7 +195,7 @@ class FramedDevice(Device):
                     getattr(guard, then)()
 
     def _start_guard(self, *arguments: str, needed: bool = True) -> None:
-        """Start the guard if needed, whose function takes these arguments, and end one that was left behind."""
+        """Start the guard, if ``needed``, with its function's arguments, and end a guard that was left behind."""
         if needed and self.ends_force is not None:
             self.guard = Guard(self.name, self.ends_force, *arguments, died=self._lose_guard)
             self.guard.start()
@@ -209,7 +209,7 @@ class FramedDevice(Device):
 
     @property
     def dynamics(self) -> Dynamics:
-        """What the device reports of delay, encoder count and mass, or its bench measured."""
+        """Delay, encoder count and mass as reported by the device or measured by its bench."""
         return self._dynamics
 
     @property
@@ -218,7 +218,7 @@ class FramedDevice(Device):
 
     @property
     def failure_mode(self) -> str | None:
-        """The id of what ended the exchange in ``failures``; None while nothing did."""
+        """The id in ``failures`` of the failure that ended the exchange; None while it runs."""
         state = self.exchange
         if state.unguarded:
             return "unguarded"
@@ -227,12 +227,12 @@ class FramedDevice(Device):
 
     @property
     def failure(self) -> str | None:
-        """Symptom, cause and cure of what ended the exchange in a sentence; None while nothing did."""
+        """Symptom, cause and cure of the failure that ended the exchange, in a sentence; None while it runs."""
         mode = self.failure_mode
         return None if mode is None else self.failures.sentence(mode, self._detail(mode))
 
     def _detail(self, mode: str) -> str:
-        """Return what the device itself states about a failure."""
+        """Return the device's own message about a failure."""
         return ""
 
     def check(self) -> None:
@@ -250,20 +250,20 @@ class FramedDevice(Device):
         }
 
     def observed(self) -> tuple[str, ...]:
-        """Return what the doctor prints about the open device."""
+        """Return the doctor's lines about the open device."""
         return ()
 
     def appeared(self, samples: Any) -> set[str]:
-        """Return the modes of failure that a run at rest shows in its samples."""
+        """Return the failure modes that the samples of a run at rest show."""
         return set() if self.failure_mode is None else {self.failure_mode}
 
     def take_fault(self, fault: str) -> None:
-        """Have a fault, if it is emulated."""
+        """Simulate a fault, if the device is emulated."""
         raise DeviceError(f"'{self.name}' cannot be given faults: only {self.name}-emulated can")
 
 
 def framed_device(name: str, request: OpenRequest) -> FramedDevice | None:
-    """Return a device by its name, closed; None: its driver is no `FramedDevice`."""
+    """Return the closed device with this name; None if its driver is not a `FramedDevice`."""
     driver = descriptor_of(name).driver
     device: FramedDevice | None = resolve_name(driver).of(request) if driver else None
     return device
@@ -272,9 +272,9 @@ def framed_device(name: str, request: OpenRequest) -> FramedDevice | None:
 def dynamics_of(
     delay_s: float | None, count_m: float | None, mass_kg: float | None, *, name: str, serial: str | None
 ) -> Dynamics:
-    """Return a device's dynamics: as it reports them, else as its latest bench on this computer measured them.
+    """Return a device's dynamics as reported, else as measured by its latest bench on this computer.
 
-    ``name`` and ``serial`` name its bench; settings that cannot be read hold none.
+    ``name`` and ``serial`` identify its bench; unreadable settings count as no bench.
     """
     with suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
         for bench in json.loads(settings_file().read_bytes())["benches"]:
@@ -295,7 +295,7 @@ def examine(
     progress: Callable[[str], object],
     seconds: float = SECONDS,
 ) -> Report:
-    """Open a device by the driver of sessions, run it at rest, and return which of its modes of failure appeared.
+    """Open a device with the driver of sessions, run it at rest, and return a report on its failure modes.
 
     Parameters
     ----------
@@ -332,9 +332,9 @@ def examine(
 
 
 def run_at_rest(device: Device, seconds: float) -> tuple[Any, str | None]:
-    """Run an open device without force; a simulated hand moves, and its time is virtual.
+    """Run an open device without force; a simulated hand moves in virtual time.
 
-    Return the samples (n,), and why the servo stopped itself; None: it did not.
+    Return the samples (n,) and the reason why the servo stopped itself, or None.
     """
     hand = hand_of(device)
     kept: list[Any] = []

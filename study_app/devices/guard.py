@@ -23,7 +23,7 @@ from study_app.haptics.runtime.clocks.grants import allow_suspension, refuse_sus
 WORD: Final = b"done\n"
 READY: Final = b"ready\n"
 PATIENCE_S: Final = 10.0
-"""Time in which the guard tries to open the device: the system needs a moment to release it from a dead program."""
+"""Time in which the guard tries to open the device [s]: the system needs a moment to release it from a dead program."""
 
 _RETRY_S = 0.02
 _LEAVE_S = 5.0
@@ -53,12 +53,12 @@ class Guard:
         self.listener: threading.Thread | None = None
 
     def start(self) -> None:
-        """Start it, and wait until it watches.
+        """Start the guard and wait until it watches.
 
         Raises
         ------
         DeviceError
-            It does not start: then no force may be sent.
+            It does not start: no force may be sent.
         """
         if self.child is not None:
             return
@@ -99,11 +99,11 @@ class Guard:
         self._end(WORD)
 
     def release(self) -> None:
-        """Let it end the force after the device is closed; wait for the end."""
+        """Make the guard end the force after the device is closed; wait for its end."""
         self._end(b"")
 
     def leave(self) -> None:
-        """Let the guard end the force once the device is connected again, within a limited time; return at once.
+        """Make the guard end the force once the device is reconnected, within a limited time; return at once.
 
         For a lost link: the device may still exert force, and may reconnect before any program opens it.
         """
@@ -129,7 +129,7 @@ class Guard:
         allow_suspension(self)
         if child is None or child.stdin is None:
             return
-        with suppress(OSError):  # it may have gone
+        with suppress(OSError):  # it may have ended
             child.stdin.write(word)
             child.stdin.flush()
         child.stdin.close()

@@ -24,7 +24,7 @@ from study_app.haptics.model.ranges import Vector
 STAY, POINT, HOLD, REACH, FOLLOW = range(5)
 
 WAVES = 3  # tremor: waves per axis
-LONGEST_STEP_S = 0.05  # longest time computed after a pause of the loop
+LONGEST_STEP_S = 0.05  # longest simulated time after a pause of the loop [s]
 
 ORDER = np.dtype(
     [
@@ -46,13 +46,13 @@ HAND = np.dtype(
         ("taken", np.int64),  # serial of the order in force
         ("order", ORDER),
         ("began_ns", np.int64),
-        ("began_m", np.float64, (3,)),  # where the hand was when the order began
+        ("began_m", np.float64, (3,)),  # position of the hand when the order began
         ("row", np.int64),  # of FOLLOW: the row before now
         ("moving", np.int64),  # 1 while an order is not yet fulfilled
         ("lag_s", np.float64),  # of POINT: time constant of each of two low-passes that smooth the pointer
         ("smooth_m", np.float64, (3,)),  # of POINT: after the first low-pass
         ("aim_m", np.float64, (3,)),  # the hand's target
-        ("place_m", np.float64, (3,)),  # where it is: aim and tremor
+        ("place_m", np.float64, (3,)),  # its position: aim and tremor
         ("was_m", np.float64, (3,)),  # its previous place
         ("tremor_m", np.float64),  # amplitude of each wave
         ("tremor_hz", np.float64, (3, WAVES)),
@@ -64,8 +64,8 @@ HAND = np.dtype(
 _row_at = record_at(MOTION_ROW)
 _ROW_BYTES = MOTION_ROW.itemsize
 
-REACH_START_S = 0.3  # a reach takes this time and
-REACH_PACE_MPS = 0.25  # its distance at this pace: 60 mm in 0.54 s with a peak of 0.21 m/s
+REACH_START_S = 0.3  # a reach takes this time [s], and
+REACH_PACE_MPS = 0.25  # this time per distance [s/m]: 60 mm in 0.54 s with a peak of 0.21 m/s
 
 
 @kernel
@@ -80,7 +80,7 @@ def post(hand: Any, order: Any) -> None:
 
 @kernel
 def move_hand(hand: Any, now_ns: int, elapsed_s: float) -> None:
-    """Bring ``hand.place_m`` to ``now_ns``, ``elapsed_s`` after the last time."""
+    """Update ``hand.place_m`` to ``now_ns``, ``elapsed_s`` after the last call."""
     _take_order(hand, now_ns)
     since_s = (now_ns - hand.began_ns) * 1e-9
     if hand.order.kind == POINT:
@@ -102,7 +102,7 @@ def move_hand(hand: Any, now_ns: int, elapsed_s: float) -> None:
 
 @kernel
 def move_held_handle(simulated: Any, now_ns: int, elapsed_s: float) -> None:
-    """Bring ``simulated.hand`` and the ``simulated.handle`` in it to ``now_ns``, ``elapsed_s`` after the last time."""
+    """Update ``simulated.hand`` and its ``simulated.handle`` to ``now_ns``, ``elapsed_s`` after the last call."""
     elapsed_s = min(max(elapsed_s, 0.0), LONGEST_STEP_S)
     move_hand(simulated.hand, now_ns, elapsed_s)
     move(simulated.handle, simulated.hand.was_m, simulated.hand.place_m, elapsed_s)
@@ -116,7 +116,7 @@ def _take_order(hand: Any, now_ns: int) -> None:
     fence()
     hand.order = hand.posted
     fence()
-    if hand.serial != serial:  # overwritten meanwhile: the next tick reads the newer one
+    if hand.serial != serial:  # it was overwritten during the read: the next tick reads the newer one
         hand.order.kind = STAY
         return
     hand.taken = serial
@@ -310,6 +310,6 @@ class HandOrders:
 
 
 def hand_of(device: object) -> HandOrders | None:
-    """Return the interface to the simulated hand of ``device``: itself, or its ``hand``; None: a person holds it."""
+    """Return the simulated hand of ``device``: the device itself or its ``hand``; None if a person holds it."""
     hand = device if isinstance(device, HandOrders) else getattr(device, "hand", None)
     return hand if isinstance(hand, HandOrders) else None

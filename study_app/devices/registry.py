@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from study_app.devices.base import Device
 
 REMOVED: Final = {"falcon-socket": "falcon-emulated, or falcon"}
-"""Devices of earlier versions, and what to use in their place."""
+"""Devices of earlier versions, with their replacements."""
 
 
 DEVICES: Final = Registry("device", {device.name: device for device in OWN}, DeviceDescriptor, "name")
@@ -31,12 +31,12 @@ def all_devices() -> tuple[DeviceDescriptor, ...]:
 
 
 def list_devices() -> tuple[str, ...]:
-    """Return the names that ``open_device`` takes as they are, the default first."""
+    """Return the device names for ``open_device``, the default first."""
     return tuple(device.name for device in all_devices() if not device.argument_required)
 
 
 def descriptor_of(name: str) -> DeviceDescriptor:
-    """Return the descriptor of a device, by its name with or without what follows the colon.
+    """Return the descriptor of a device by its name, with or without an argument after a colon.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def title_of(name: str) -> str:
 
 
 def open_device(name: str, **request: Any) -> Device:
-    """Return the device ``name``, open; ``request`` are the fields of an `OpenRequest` but its argument.
+    """Open the device ``name``; ``request`` has the fields of an `OpenRequest` except its argument.
 
     ``name`` is one of `list_devices`, or with what follows the colon, such as ``falcon:SERIAL``.
 
@@ -71,13 +71,13 @@ def open_device(name: str, **request: Any) -> Device:
     DeviceNotFound
         No device has this name, or none is connected.
     DeviceError
-        It is there, and cannot be used; or it does not take an option.
+        It is connected but cannot be used, or it does not have an option.
     """
     device = descriptor_of(name)
     asked = OpenRequest(**request)
     check_options(name, asked.options)
     opened = device.open(replace(asked, argument=name.partition(":")[2]))
-    if not hasattr(opened, "failure"):  # of another package, made for an earlier version
+    if not hasattr(opened, "failure"):  # a plug-in made for an earlier version
         opened.close()
         raise DeviceError(
             f"device '{name}' has no 'failure': let {type(opened).__name__} inherit study_app.devices.base.Device"
@@ -105,7 +105,7 @@ def doctor_of(name: str) -> Doctor:
 
 
 def check_options(name: str, options: Iterable[str]) -> None:
-    """Reject options that a device does not have.
+    """Raise an error for options that a device does not have.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ class Rig:
         return self.device.describe() | self.servo.describe()
 
     def reconnect(self) -> dict[str, Any]:
-        """Open a device that failed again, home it, and start the servo at zero force; return what describes it now.
+        """Reopen a failed device, home it, and start the servo at zero force; return its new description.
 
         The force stays off until the servo's `fade_in`. Takes as long as opening did.
 

@@ -29,8 +29,8 @@ SIMULATED = np.dtype(
         ("last_ns", np.int64),  # time of the last read
         ("started", np.int64),  # 1 after the first read
         ("buttons", np.int64),
-        ("unplugged", np.int64),  # 1: does not respond
-        ("measures_velocity", np.int64),  # 1: reports the handle's velocity with every sample
+        ("unplugged", np.int64),  # 1: the device does not respond
+        ("measures_velocity", np.int64),  # 1: the device reports the handle's velocity with every sample
     ],
     align=True,
 )
@@ -166,7 +166,7 @@ COULOMB_N = 0.1
 STIFFNESS_NPM = 500.0
 DAMPING_NSPM = 30.0
 QUANTUM_M = 38e-6  # one count of a Falcon at the knee
-TREMOR_M = 5e-5  # three waves of this amplitude an axis: 0.06 mm in the mean square root, 0.15 mm at most
+TREMOR_M = 5e-5  # three waves of this amplitude per axis: 0.06 mm RMS, at most 0.15 mm
 
 
 def new_scripted_handle(quantum_m: float) -> Any:
@@ -182,7 +182,7 @@ def new_scripted_handle(quantum_m: float) -> Any:
 
 
 class ScriptedDevice(SimulatedDevice):
-    """A handle in the hand of a simulated participant; the same ``random`` moves it to the same bit anywhere.
+    """A handle in the hand of a simulated participant; the same ``random`` gives the same motion, bit for bit.
 
     Parameters
     ----------

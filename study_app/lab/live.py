@@ -81,7 +81,7 @@ _LONGEST_GAP_NS: Final = 200_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
-    """Place of the hand [m, hand frame], the force on it [N], the wake at the body [m/s, scene], and the servo's state.
+    """Position of the hand [m, hand frame], force on it [N], wake at the body [m/s, scene], and state of the servo.
 
     ``fault`` is why the servo stopped itself, in a sentence; empty while it runs.
     """

@@ -239,7 +239,7 @@ def changed(scene: Scene, name: str, value: Value) -> Scene:
         whole[AXES.index(axis[0])] = value
         return override_all(scene, {f"{place}.{field}": tuple(whole)})
     chosen = place in NAMED and NAMED[place].choose is not None
-    by_hand = _named(scene) if chosen else {}  # the gate would choose another
+    by_hand = _named(scene) if chosen else {}  # the gate would choose another law
     if field in _KINDS and (place == "region" or place in NAMED):
         if value == read(scene, name):
             return scene
@@ -259,7 +259,7 @@ def _checked(it: Parameter, value: Value) -> Value:
         return value
     if isinstance(value, str) or value is None or not math.isfinite(value):
         raise StudyError(f"{it.label} must be a number, not {value!r}")
-    slack = 1e-9 * (abs(it.least) + abs(it.most))  # of a number in other units
+    slack = 1e-9 * (abs(it.least) + abs(it.most))  # rounding of a number in other units
     if not it.least - slack <= value <= it.most + slack:
         raise StudyError(f"{it.label} must be {it.shown(it.least)} to {it.shown(it.most)}, not {it.shown(value)}")
     value = min(max(float(value), it.least), it.most)

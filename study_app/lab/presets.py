@@ -17,7 +17,7 @@ from study_app.workspace import workspace
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Choice:
-    """A liquid for a side: its file or shipped name, its id there, and its displayed name."""
+    """A liquid to choose: its file or shipped name, its id there, and its displayed name."""
 
     source: str
     liquid: str
@@ -30,12 +30,12 @@ class Choice:
         Raises
         ------
         ProtocolError
-            The file no longer contains it.
+            The file no longer contains the liquid.
         """
         return load_scene(self.source, self.liquid)
 
     def setting(self) -> Setting:
-        """Return its initial setting on a side of the workbench.
+        """Return the initial setting of the liquid on a side of the workbench.
 
         If its file has the default "ewma", the lab uses "kalman", also in presets saved there.
         """

@@ -24,7 +24,7 @@ SHORTEST_APPROACH_S: Final = 0.5
 _REST_S: Final = 2.0
 _LEGS: Final = 5
 _RATE_HZ: Final = 1000.0
-_HALF_TURN: Final = 0.7071  # of a leg, to either side of the path
+_HALF_TURN: Final = 0.7071  # angle of a leg to either side of the path
 
 
 def programme(name: str, scene: Scene, half_m: Vector) -> Motion:

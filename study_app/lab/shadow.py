@@ -147,7 +147,7 @@ class Shadow:
             half.restart()
 
     def expect(self, serial: int, side: Side, a: Scene, b: Scene, *, goes_on: bool = False) -> None:
-        """Note what the servo will present as scene ``serial``; ``goes_on`` if it only adjusts."""
+        """Register the setting that the servo will present as scene ``serial``; ``goes_on`` if it only adjusts."""
         self._expected[serial] = _Presented(side, {"A": a, "B": b}, goes_on)
 
     def set_other(self, side: Side, scene: Scene) -> None:
@@ -180,14 +180,14 @@ class Shadow:
         if serial == self._serial:
             return
         self._serial = serial
-        missed = [it for number, it in self._expected.items() if number <= serial]  # some may have no sample at all
+        missed = [it for number, it in self._expected.items() if number <= serial]  # some scenes may have no sample
         presented = self._expected.get(serial)
-        if presented is None:  # rest: a servo that ends, or presents nothing
+        if presented is None:  # rest: the servo ends, or presents nothing
             return
         self._expected = {number: it for number, it in self._expected.items() if number > serial}
         shown, hidden = self._sides[presented.side], self._sides[other(presented.side)]
         if self._side != presented.side:
-            shown.safety, hidden.safety = (hidden.safety, hidden.safety.copy())  # the servo's own follows
+            shown.safety, hidden.safety = (hidden.safety, hidden.safety.copy())  # the servo's own setting follows
         goes_on = all(it.goes_on for it in missed)
         (shown.go_on if goes_on else shown.begin)(presented.scenes[presented.side])
         if hidden.scene != presented.scenes[other(presented.side)]:

@@ -19,7 +19,7 @@ SECOND_NS: Final = 1_000_000_000
 USUAL_RATE_HZ: Final = 30.0
 RATES_HZ: Final = (1.0, 240.0)
 OF_FILE: Final = {"format_whitelist": "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpeg,mpegts,ogg"}
-"""FFmpeg's names of containers that hold the video themselves: others, such as ffconcat, name another file."""
+"""FFmpeg's names of containers that contain the video: others, such as ffconcat, refer to another file."""
 
 
 class Pixels(NamedTuple):
@@ -59,7 +59,7 @@ def open_video(source: str, *, kind: str | None = None, timeout: Any = None, **o
 
 
 def reason(error: Exception) -> str:
-    """Return why a video cannot be read, as the system or FFmpeg reports it."""
+    """Return the reason why a video cannot be read, as reported by the system or FFmpeg."""
     if type(error).__name__ == "ExitError":  # FFmpeg: "Immediate exit requested", after its time limit
         return "no data came in time"
     if isinstance(error, UnicodeError):  # PyAV reads a name in it

@@ -9,7 +9,7 @@ from study_app.errors import VideoError
 from study_app.video.decoding import EXTRA
 
 CODECS = ("libx264", "mpeg4")
-"""Of FFmpeg, the first one that it was built with."""
+"""Codecs in order of preference; the first one in this build of FFmpeg is used."""
 
 
 class VideoWriter:

@@ -62,7 +62,7 @@ class VideoSource(Protocol):
 
 
 class VideoStatistics:
-    """Counts the frames of a video as they are painted; without a frame there are no statistics."""
+    """Statistics of the painted frames of a video; without a frame there are none."""
 
     def __init__(self) -> None:
         self._number: int | None = None

@@ -44,7 +44,7 @@ USUAL: Final = {"linux": "v4l2:/dev/video0", "darwin": "avfoundation:0"}.get(sys
 KINDS: Final = ("v4l2", "avfoundation", "dshow")
 OPENS_S, STALLS_S, ENDS_S = 8.0, 1.0, 5.0
 MOST_AGE_S: Final = 10.0
-"""Time stamps that differ more from both system clocks are from another clock. [choice]"""
+"""Greatest difference of a time stamp from a system clock [s]: a larger one means another clock. [choice]"""
 SPARE_NS: Final = SECOND_NS // 2
 HOST: Final = re.compile(r"([\w.-]+|\[[\da-fA-F:.]+\])(:\d{1,5})?")
 NOT_SHOWN: Final = "(address not shown)"
@@ -109,10 +109,10 @@ class Camera:
         self._fitted = (width, height)
 
     def rewind(self) -> None:
-        """Do nothing: it is live."""
+        """Do nothing: a camera is live."""
 
     def begin(self, at_ns: int) -> None:
-        """Do nothing: it is live."""
+        """Do nothing: a camera is live."""
 
     def frame_at(self, moment_ns: int) -> VideoFrame | None:
         """Return the newest frame that was ready at a time [ns, servo's clock]; None if none was.
@@ -185,17 +185,17 @@ def without_login(source: str) -> str:
     """Return the name of a device, or scheme and host of an URL, whose other parts may contain name and password."""
     if source.partition(":")[0] in KINDS:
         return source
-    with suppress(ValueError):  # of an URL that is not valid
+    with suppress(ValueError):  # the URL is invalid
         parts = urlsplit(source)
         host = parts.netloc.rpartition("@")[2]
-        no_later = source.count("@") == parts.netloc.count("@")  # else a / in a password may have cut off the host
+        no_later = source.count("@") == parts.netloc.count("@")  # otherwise a / in a password may have cut off the host
         if parts.scheme and no_later and HOST.fullmatch(host):
             return f"{parts.scheme}://{host}"
     return NOT_SHOWN
 
 
 class _Numbers:
-    """Counts the frames of a camera, including lost ones."""
+    """Number the frames of a camera, including lost ones."""
 
     def __init__(self, period_ns: int) -> None:
         self.period_ns = period_ns
@@ -217,7 +217,7 @@ class _Numbers:
 
 
 def _age_ns(stamp_s: float | None) -> int | None:
-    """Return the present age of a frame with this time stamp [ns], by the system clock that the stamps are from."""
+    """Return the age of a frame with this time stamp [ns], by the system clock of the stamps."""
     for clock in (time.monotonic, time.time):
         if stamp_s is not None and -0.001 <= (age_s := clock() - stamp_s) < MOST_AGE_S:
             return max(0, round(age_s * SECOND_NS))
@@ -471,12 +471,12 @@ class Videos:
 
 
 def missing_here(protocol: Protocol, folder: Path, camera: str, now_ns: Callable[[], int]) -> str:
-    """Return why this machine cannot show the study's videos, "" if it can.
+    """Return the reason why this computer cannot show the study's videos, or "".
 
     Raises
     ------
     VideoError
-        Why footage cannot be shown on any machine, in one line.
+        Footage cannot be shown on any computer; one line gives the reason.
     """
     views = {condition.view for condition in protocol.conditions.values() if condition.shows_video}
     if views and not installed():

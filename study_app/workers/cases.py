@@ -38,7 +38,7 @@ T = TypeVar("T")
 _PACKAGE: Final = Path(study_app.__file__).resolve().parent
 _ENDINGS: Final = (".py", ".csv", ".toml")
 _LOGGERS: Final = ("distributed", "distributed.client", "tornado.application")
-"""They print tracebacks when a scheduler is lost, which is raised as one line."""
+"""Loggers that print tracebacks when a scheduler is lost; the loss is raised as a one-line error."""
 
 
 class ProcessExecutor(ProcessPoolExecutor):
@@ -113,7 +113,7 @@ class ClusterExecutor(Executor):
             self._client = Client(address, timeout=CONNECT_S, set_as_default=False)
         except OSError as error:
             raise _no_scheduler(address, str(error)) from error
-        except Exception as error:  # whatever Dask makes of the bytes of another program
+        except Exception as error:  # Dask may raise anything if the server is not a Dask scheduler
             raise _no_scheduler(address, "another program answers there") from error
         self._executor = self._client.get_executor(pure=False)
         self.has_workers = bool(self._client.nthreads())
@@ -182,7 +182,7 @@ def _compute(expected: Mapping[str, str], fn: Callable[..., T], args: tuple[Any,
 
 
 def _run(fn: Callable[..., T], args: tuple[Any, ...], kwargs: dict[str, Any]) -> T:
-    """Compute a case; where a plug-in fails, say which: the modules of a trace are known in this process alone."""
+    """Compute a case; name the plug-in in its errors, since its modules are known only in this process."""
     try:
         return fn(*args, **kwargs)
     except Exception as error:
@@ -232,7 +232,7 @@ def _check_that_something_answers(address: str) -> None:
 
 
 def _receive_greeting(connection: socket.socket) -> None:
-    """Receive what a scheduler sends first: a length as eight bytes, and so many more."""
+    """Receive a scheduler's greeting: a length as eight bytes, and as many bytes."""
     until_s = time.monotonic() + CONNECT_S
     came, wanted = b"", 8
     while len(came) < wanted:

@@ -9,7 +9,7 @@ from typing import Final, Generic, TypeVar
 from study_app.workers.server import CONTEXT, Crashed, Refused, serve
 
 PATIENCE_S: Final = 3.0
-"""Time after which a process that was asked to end is killed."""
+"""Time after which a process that was asked to end is killed [s]."""
 
 Order = TypeVar("Order")
 Answer = TypeVar("Answer")
@@ -53,7 +53,7 @@ class WorkerClient(Generic[Order, Answer]):
 
     @property
     def works(self) -> bool:
-        """Whether the process takes orders."""
+        """Whether the process accepts orders."""
         return not self._closed and self.process.is_alive()
 
     @property

@@ -26,9 +26,9 @@ from study_app.errors import MissingExtra, StudyError, naming_the_extra
 Send: TypeAlias = Callable[[Any], object]
 """Sends an answer before the last one."""
 Stop: TypeAlias = Callable[[], bool]
-"""Whether to stop early: by request, because another order waits, or because the client has ended."""
+"""Returns whether to stop early: by request, because another order waits, or because the client has ended."""
 Task: TypeAlias = Callable[[Any, Send, Stop], object]
-"""Carries out an order; what it returns is its last answer. A `StudyError` is answered by `Refused`."""
+"""Executes an order and returns its last answer. A `StudyError` is answered by `Refused`."""
 _STOP: Final = None
 _END: Final = object()
 
@@ -109,12 +109,12 @@ def serve(orders: Connection, answers: Connection, task: str, *, background: boo
     waiting: SimpleQueue[Any] = SimpleQueue()
     # Orders are read at once: a full pipe would make the client's window wait.
     threading.Thread(target=_read, args=(orders, waiting), name="orders", daemon=True).start()
-    with suppress(ModuleNotFoundError):  # then the first order reports it
+    with suppress(ModuleNotFoundError):  # the first order reports the error
         resolve_name(task)
     with suppress(BrokenPipeError, ConnectionResetError):
         while (received := waiting.get()) is not _END:
             if received is _STOP:
-                continue  # its order has ended
+                continue  # the order has already ended
             number, order = received
             try:
                 with naming_the_extra():

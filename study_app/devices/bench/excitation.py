@@ -140,7 +140,7 @@ class BenchDriver:
         return self._inner.failure
 
     def excite(self, what: Excitation) -> None:
-        """Apply this from the next reading on; a spring begins at the handle's place, and keeps its integral."""
+        """Apply this excitation from the next reading on; a spring begins at the handle and keeps its integral."""
         state = self.state
         state.armed = 0
         held = state.stiffness_npm > 0.0 and what.stiffness_npm > 0.0 and state.ended == RUNNING
@@ -311,7 +311,7 @@ class Stand:
 
     @property
     def ended(self) -> str | None:
-        """Why the excitation ended by itself, in words; None while it acts."""
+        """The reason why the excitation ended by itself; None while it acts."""
         return ENDED.get(int(self._driver.state.ended))
 
     @property
@@ -327,7 +327,7 @@ class Stand:
     def run(
         self, seconds: float, *, answered: Callable[[], str | None] | None = None, may_end: bool = False
     ) -> tuple[Any, str | None]:
-        """Wait; return the samples of that time and the operator's answer during it, if any.
+        """Wait for a time; return its samples and the operator's answer during it, if any.
 
         Parameters
         ----------

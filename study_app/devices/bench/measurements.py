@@ -30,7 +30,7 @@ _REACH: Final = 5  # widths of the Gaussian on either side
 
 
 class Spread(NamedTuple):
-    """What half and 99 % of the values do not exceed, and the greatest of them; NaN without any."""
+    """Median, 99th percentile and maximum of values; NaN without values."""
 
     median: float
     most: float

@@ -40,14 +40,14 @@ FROM_HZ: Final = 1.5
 TO_HZ: Final = 25.0
 REACH_M: Final = 0.045
 SLIP_M: Final = 0.03
-"""Greatest motion of a handle that pushes on a scale: beyond it, it has slipped off."""
+"""Greatest motion of a handle that pushes on a scale [m]: beyond it, it has slipped off."""
 MOST_NSPM: Final = 150.0
 SHAKE_N: Final = 0.35
 """Effective force of the damper above 20 Hz that counts as oscillation. [choice]"""
 DRAW_N: Final = 0.6
 DRAW_HZ: Final = 0.7
 LEAST_EXPLAINED: Final = 0.95
-"""Of the variance of the force; simulated handles give 0.998 to 0.9996."""
+"""Smallest explained fraction of the force's variance; simulated handles give 0.998 to 0.9996."""
 LEVELS_N: Final = (0.0, 1.0, 2.0, 3.0, 1.0)
 _PATIENCE_S: Final = 600.0
 FORMAT: Final = 1

@@ -103,7 +103,7 @@ def _check(code: int) -> None:
 
 
 class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
-    """A bus with only these Falcons; its time is that of the first one."""
+    """A USB bus with the given Falcons; its time is that of the first one."""
 
     def __init__(self, *emulators: Emulator) -> None:
         self.emulators = emulators
@@ -122,7 +122,7 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
             emulator.pause(seconds)
 
     def follow_clock(self, address: int) -> None:
-        """Let the int64 [ns] at this address be the time of all; 0: their own."""
+        """Use the int64 [ns] at this address as the time of all Falcons; 0: their own time."""
         for emulator in self.emulators:
             emulator.follow_clock(address)
 
@@ -158,7 +158,7 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
         )
 
     def get_parent(self, dev: Emulator) -> None:
-        """Return no hub: it is connected directly."""
+        """Return None: the device is connected without a hub."""
 
     def open_device(self, dev: Emulator) -> _Handle:
         if dev.faults.is_on("unplugged"):
@@ -170,7 +170,7 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
         return _Handle(dev)
 
     def close_device(self, dev_handle: _Handle) -> None:
-        """Close it, and give up what was claimed; nothing else changes."""
+        """Close the handle and release its claims; nothing else changes."""
         dev_handle.open = False
         if self._claims.get(id(dev_handle.emulator)) is dev_handle:
             del self._claims[id(dev_handle.emulator)]
@@ -240,7 +240,7 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
         return len(descriptor)
 
     def reset_device(self, dev_handle: _Handle) -> None:
-        """Reset the bridge's port; the device behind it goes on."""
+        """Reset the bridge's port; the device behind it continues."""
         _check(self._reach(dev_handle).control(constants.REQUEST_RESET, constants.RESET_ALL))
 
     def clear_halt(self, dev_handle: _Handle, ep: int) -> None:
@@ -248,7 +248,7 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
         self._reach(dev_handle)
 
     def _reach(self, handle: _Handle) -> Emulator:
-        """Return the Falcon behind an open handle, its cable in."""
+        """Return the Falcon of an open handle; raise an error if its cable is unplugged."""
         if not handle.open or handle.emulator.faults.is_on("unplugged"):
             _check(constants.ERROR_NO_DEVICE)
         return handle.emulator
@@ -306,7 +306,7 @@ class EmulatedFalcon(FalconDevice):
         self._patience_s = FAULTY_PATIENCE_S
 
     def open(self) -> None:
-        """Open it, and wait until the hand has moved the grip to the middle after homing."""
+        """Open the device and wait until the hand has moved the grip to the middle after homing."""
         super().open()
         still = 0
         while still < _STILL_TICKS:

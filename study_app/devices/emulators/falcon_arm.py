@@ -42,7 +42,7 @@ Novint advertised more than 8.9 N (2 lbf). Full torque units give 9.8 to 10.2 N 
 saturates, each motor or their supply, and at how much, is not published: uncertain by 1 N across, by more along z.
 """
 LEAST_LEVER_M = 0.012
-"""Where the rod gives way by less for a turn of its arm [m/rad] the arm is nearly stretched: there it has its stop. All
+"""Smallest change of the rod's length per arm rotation [m/rad]: below it the arm is nearly stretched, at its stop. All
 that a Falcon is used for is twice as far from that."""
 
 _STEP_M = 2e-5  # of the differences: truncated at 1e-7 of a derivative, rounded at 1e-11

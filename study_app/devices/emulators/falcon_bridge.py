@@ -149,7 +149,7 @@ def answer(bridge: Any, value: int, since_ns: int, divisor: int) -> None:
 
 @kernel
 def hand_over_ns(bridge: Any) -> int:
-    """Return when the chip hands its next packet to a host that asks from now on [ns]."""
+    """Return the time at which the chip sends its next packet to a host that requests it from now on [ns]."""
     due = bridge.sent_ns + bridge.latency_ns
     first, held = bridge.back_first, bridge.back_last - bridge.back_first
     if held >= constants.CHUNK:
@@ -178,7 +178,7 @@ def hand_over(bridge: Any, data: int, noise: int) -> int:
 
 @kernel
 def arrived(bridge: Any) -> int:
-    """Return whether the chip has a byte for the host."""
+    """Return the number of bytes that the chip has for the host."""
     if bridge.back_first == bridge.back_last:
         return 0
     return 1 if bridge.back_ns[bridge.back_first % BACK_RING] <= bridge.now_ns else 0
@@ -203,7 +203,7 @@ def overflow(bridge: Any) -> None:
 
 @kernel
 def control(bridge: Any, request: int, value: int) -> None:
-    """Carry out a request of the host; ignore those without an effect on bytes."""
+    """Execute a control request of the host; ignore requests without an effect on bytes."""
     if request == constants.REQUEST_RESET:
         if value in (constants.RESET_ALL, constants.PURGE_RX):
             _purge_back(bridge)

@@ -138,7 +138,7 @@ def poll(e: Any, data: int, length: int, moved: Any) -> int:
 
 @kernel
 def next_event_ns(e: Any) -> int:
-    """Return when a poll may transfer more than now: the chip hands over, or the device hears a byte [ns]."""
+    """Return the time of the next packet from the chip or byte to the device, when a poll may transfer more [ns]."""
     bridge = e.bridge
     due_ns = falcon_bridge.hand_over_ns(bridge)
     if bridge.out_first < bridge.out_last:
@@ -180,7 +180,7 @@ def _advance(e: Any, to_ns: int) -> None:
 
 @kernel
 def run_program(e: Any) -> None:
-    """Begin with encoders at 0, no torque and no arm homed."""
+    """Start the program with encoders at 0, no torque and no arm homed."""
     e.loader.state = falcon_processor.RUNNING
     _limp(e)
     for arm in range(3):
@@ -344,7 +344,7 @@ class Emulator(HandOrders):
 
     @property
     def next_event_ns(self) -> int:
-        """When a transfer in that is not over may go on [ns]."""
+        """The time at which an incomplete IN transfer may continue [ns]."""
         return int(next_event_ns(self.state))
 
     def transfer(self, endpoint: int, memory: Any, length: int, timeout_ms: int) -> tuple[int, int]:
@@ -369,13 +369,13 @@ class Emulator(HandOrders):
         spare.power(False)
 
     def claimed(self) -> None:
-        """Note that a program has claimed the bridge: the hand is ready to home the grip."""
+        """Record that a program has claimed the bridge: the hand is ready to home the grip."""
         self.state.run.stroke_due = 1
 
     # Time.
 
     def follow_clock(self, address: int) -> None:
-        """Let the int64 [ns] at this address be the time from the next transfer on; 0: its own again."""
+        """Use the int64 [ns] at this address as the time from the next transfer on; 0: the emulator's own time."""
         self.state.bridge.clock = address
         self.state.bridge.joined = 0
 
@@ -391,7 +391,7 @@ class Emulator(HandOrders):
         return entry_of(let_pass, self.state, 0)
 
     def look(self) -> None:
-        """Advance it to the present time of its clock: process bytes that have arrived, move for a limited time."""
+        """Advance to the current time of its clock: process bytes that have arrived, move for a limited time."""
         look(self.state)
 
     # State and faults.
@@ -401,7 +401,7 @@ class Emulator(HandOrders):
         supply(self.state, 1 if on else 0)
 
     def take(self, fault: str) -> None:
-        """Take a fault as a command line gives it: ``drop=0.01``, ``frozen`` or ``power-off``."""
+        """Set a fault in the notation of the command line: ``drop=0.01``, ``frozen`` or ``power-off``."""
         if falcon_processor.spelt(fault.strip()) == falcon_processor.POWER_OFF:
             self.power(False)
         else:

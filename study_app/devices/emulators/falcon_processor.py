@@ -45,7 +45,7 @@ SWITCHES: Final = (
 )
 
 POWER_OFF: Final = "power-off"
-"""On a command line: its mains adapter is disconnected, which the emulator handles."""
+"""The fault of a disconnected mains adapter, which the emulator handles."""
 
 FAULTS = np.dtype(
     [
@@ -76,7 +76,7 @@ def draw(faults: Any) -> float:
 
 @kernel
 def strikes(faults: Any, kind: int) -> bool:
-    """Return whether this fault happens now."""
+    """Draw whether this fault occurs now."""
     if faults.due[kind] > 0:
         faults.due[kind] -= 1
     elif not (faults.chance[kind] > 0.0 and draw(faults) < faults.chance[kind]):
@@ -90,7 +90,7 @@ class Faults:
 
     Attributes
     ----------
-    CHANCES, SWITCHES : the names there are
+    CHANCES, SWITCHES : the names of the faults
     """
 
     def __init__(self, state: Any, random: Random) -> None:
@@ -104,7 +104,7 @@ class Faults:
         self._state.chance[_place(name)] = chance
 
     def once(self, name: str, times: int = 1) -> None:
-        """Let it happen at the next ``times`` opportunities."""
+        """Make the fault occur at the next ``times`` opportunities."""
         self._state.due[_place(name)] = times
 
     def happened(self, name: str) -> int:
@@ -115,7 +115,7 @@ class Faults:
         if name == "unplugged" and on:
             self._state.was_unplugged = 1
         if name == "kernel_driver_stays" and on:
-            self._state.kernel_driver = 1  # which has to be there, to stay
+            self._state.kernel_driver = 1  # the origin must exist before it is lost
 
     def off(self, name: str) -> None:
         self.on(name, False)
@@ -131,11 +131,11 @@ class Faults:
             self._state.stall_ns = round(stall_s * 1e9)
 
     def ignore_pings(self, count: int) -> None:
-        """Leave the next ``pings`` of the boot loader without an answer."""
+        """Leave the next ``count`` pings of the boot loader unanswered."""
         self._state.ignored_pings = count
 
     def take(self, word: str) -> None:
-        """Take a fault as a command line gives it: ``drop=0.01`` or ``frozen``."""
+        """Set a fault in the notation of the command line: ``drop=0.01`` or ``frozen``."""
         name, equals, value = word.partition("=")
         name = name.strip().replace("-", "_")
         if name in SWITCHES and not equals:
@@ -150,7 +150,7 @@ class Faults:
 
 
 def spelt(name: str) -> str:
-    """Return a fault's name as a command line gives it and messages say it."""
+    """Return a fault's name in the notation of command line and messages."""
     return name.replace("_", "-")
 
 
@@ -172,10 +172,10 @@ WAITING, RESET, PINGED, LOADING, STUCK, RUNNING = range(6)
 LOADER = np.dtype(
     [
         ("state", np.int64),
-        ("matched", np.int64),  # bytes of a ping that came in a row
+        ("matched", np.int64),  # bytes of a ping received in a row
         ("loaded", np.int64),  # bytes of the stream so far
-        ("low", np.int64),  # the first byte of the word that is coming
-        ("words", np.int64),  # of the block that is coming, its destination counted; 0: its count comes next
+        ("low", np.int64),  # first byte of an incomplete word
+        ("words", np.int64),  # words left of the current block, including its destination; 0: its count comes next
         ("blocks", np.int64),
     ],
     align=True,
@@ -202,7 +202,7 @@ def reset(loader: Any) -> None:
 
 @kernel
 def load(loader: Any, bridge: Any, faults: Any, value: int, divisor: int, at_ns: int) -> None:
-    """Receive a byte that came at ``at_ns``, over the line at this speed."""
+    """Receive a byte of the boot stream that arrives at ``at_ns`` over the line at this speed."""
     if loader.state == RESET:
         if divisor == constants.BAUD_9600:
             _hear_ping(loader, bridge, faults, value, at_ns)
@@ -273,9 +273,9 @@ STROKE_NOW, STROKE_ASKED = 1, 2
 RUN = np.dtype(
     [
         ("heard", np.uint8, (constants.PACKET,)),
-        ("held", np.int64),  # bytes of a packet that is coming
+        ("held", np.int64),  # bytes of an incomplete packet
         ("packets", np.int64),  # well-formed ones so far
-        ("refused", np.int64),  # bytes that belong to none
+        ("refused", np.int64),  # bytes outside of packets
         ("torque", np.int64, (3,)),  # as last sent [units]
         ("acting", np.float64, (3,)),  # as exerted by the motors
         ("highest", np.int64),  # the greatest torque ever sent
@@ -287,7 +287,7 @@ RUN = np.dtype(
         ("origin", np.int64, (3,)),  # true count where each encoder shows 0
         ("shown", np.int64, (3,)),  # counts as last sent
         ("before_rad", np.float64, (3,)),  # angles at the packet before
-        ("stalled_ns", np.int64),  # receives nothing until
+        ("stalled_ns", np.int64),  # time until which nothing is received
         ("stroke", np.int64),  # of homing, by an emulated hand with no other orders: STROKES[stroke - 1]
         ("stroke_due", np.int64),  # STROKE_NOW, STROKE_ASKED: when lights or arms ask for it, or 0: not
     ],
@@ -306,7 +306,7 @@ _NIBBLES: Final = 4
 
 @kernel
 def receive_byte(e: Any, value: int, divisor: int, at_ns: int) -> None:
-    """Receive a byte of a packet that came at ``at_ns``, over the line at this speed."""
+    """Receive a byte of a packet that arrives at ``at_ns`` over the line at this speed."""
     run = e.run
     if divisor != constants.BAUD_1500000 or at_ns < run.stalled_ns:
         run.held = 0

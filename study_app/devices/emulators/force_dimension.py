@@ -72,7 +72,7 @@ class EmulatedFunctions:
         return int(_functions()[name].address)
 
     def take(self, fault: str, after: int = 0) -> None:
-        """Have a fault after so many readings.
+        """Simulate a fault after so many readings.
 
         Raises
         ------
@@ -89,7 +89,7 @@ class EmulatedFunctions:
 
 
 class EmulatedForceDimension(ForceDimensionDevice):
-    """A Force Dimension device of numbers; ``hand`` takes the orders of whoever simulates a participant.
+    """An emulated Force Dimension device; ``hand`` takes the orders of a simulated participant.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ class EmulatedForceDimension(ForceDimensionDevice):
 
 @cache
 def _functions() -> dict[str, Any]:
-    """Compile the emulated functions, by the names of the maker's."""
+    """Compile the emulated functions; return them by the maker's names."""
     compiled = {
         "get_position": c_function(VECTOR, _get_position),
         "get_velocity": c_function(VECTOR, _get_velocity),
@@ -138,7 +138,7 @@ def _functions() -> dict[str, Any]:
 
 
 def _get_position(x_at: int, y_at: int, z_at: int, device: int) -> int:
-    """Give the position in the maker's axes: x toward the participant, y to the right, z up."""
+    """Write the position in the maker's axes: x toward the participant, y to the right, z up."""
     state = _emulated_at(device)
     faulty = False
     if state.fault != NO_FAULT:

@@ -18,7 +18,7 @@ FAULT_AFTER = 1000  # commands
 
 
 class EmulatedLink:
-    """The byte stream to an emulated service: nothing waits, since each command is carried out at once."""
+    """The byte stream to an emulated service, which executes each command at once."""
 
     def __init__(self, service: Service) -> None:
         self._service = service

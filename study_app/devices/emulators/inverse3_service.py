@@ -52,7 +52,7 @@ STATUS: Final = {"calibrated": True, "in_use": False, "power_supply": True, "rea
 LEGACY_STATE: Final[dict[str, Any]] = {
     "inverse3": {DEVICE_ID: {"config": {"device_info": {"id": DEVICE_ID}}, "state": {}, "status": {}}}
 }
-"""Format 3.0: an object by device id ("Haply Inverse Service" 3.0.x, Devices)."""
+"""Messages of format 3.0: an object by device id ("Haply Inverse Service" 3.0.x, Devices)."""
 OF_OPENING: Final = (
     "not-websocket",
     "version-3.0",
@@ -137,7 +137,7 @@ def state_message(
 
 
 def template(message: dict[str, Any]) -> tuple[bytes, list[int]]:
-    """Return a message as text with room for its numbers, and where each of `SLOTS` begins; -1 where it is not."""
+    """Return a message as text with space for its numbers, and the offset of each of `SLOTS`; -1 if missing."""
     text = json.dumps(message)
     for slot in SLOTS:
         text = text.replace(f'"{slot}"', "#" + slot.ljust(SLOT_WIDTH - 1))
@@ -148,7 +148,7 @@ def template(message: dict[str, Any]) -> tuple[bytes, list[int]]:
 
 
 def faulty_bytes(fault: str, message: dict[str, Any]) -> bytes:
-    """Return what is sent for a fault of `OF_STREAM` in place of a state, whose numbers are the words of ``SLOTS``."""
+    """Return the bytes sent for a fault of `OF_STREAM` in place of a state."""
     device = message["inverse3"][0]
     if fault == "no-position":
         del device["state"]["cursor_position"]
@@ -224,11 +224,11 @@ class Service(HandOrders):
 
     @property
     def handle(self) -> int:
-        """What its ``send`` and ``recv`` take."""
+        """The handle for its ``send`` and ``recv``."""
         return int(self.memory.ctypes.data)
 
     def compile(self) -> None:
-        """Compile all that answers a client, or load it from the cache: a client waits for seconds only."""
+        """Compile all functions that answer a client, or load them from the cache: a client waits only for seconds."""
         self.connected()
         self._answer_message(
             {"inverse3": [{"device_id": DEVICE_ID, "commands": {"set_cursor_force": {"vector": _ZERO}}}]}
@@ -238,7 +238,7 @@ class Service(HandOrders):
         self.disconnected()
 
     def follow_clock(self, address: int) -> None:
-        """Let the int64 [ns] at this address be the time; 0: a millisecond a command."""
+        """Use the int64 [ns] at this address as the time; 0: one millisecond per command."""
         self.state.clock = address
 
     def press(self, buttons: int) -> None:
@@ -247,7 +247,7 @@ class Service(HandOrders):
         self._refresh()
 
     def take(self, fault: str, after: int = 0) -> None:
-        """Have a fault: at once where it concerns opening, else so many commands from now.
+        """Simulate a fault: at once if it concerns opening, else after so many commands.
 
         Raises
         ------
@@ -295,7 +295,7 @@ class Service(HandOrders):
         self._refresh()
 
     def take_bytes(self, data: bytes) -> None:
-        """Take what the client sends while its session is opened, or at any time."""
+        """Receive bytes from the client."""
         state = self.state
         if not self._upgraded:
             self._asked += data
@@ -308,17 +308,17 @@ class Service(HandOrders):
         self.work()
 
     def give_bytes(self) -> bytes:
-        """Return all that the client may see by now."""
+        """Return all bytes that are due for the client."""
         state = self.state
         if state.clock == 0 and state.visible == state.read and state.queue_first < state.queue_next:
-            state.now_ns = max(state.now_ns, state.queue_ns[state.queue_first % state.queue_ns.size])  # who asks waits
+            state.now_ns = max(state.now_ns, state.queue_ns[state.queue_first % state.queue_ns.size])  # reading waits
         inverse3_stream.let_pass(state)
         places = np.arange(state.read, state.visible) % state.outbox.size
         state.read = state.visible
         return bytes(state.outbox[places].tobytes())
 
     def disconnected(self) -> None:
-        """See the end of the stream: the session is over, and its device idle."""
+        """Handle the end of the stream: the session is over and the device idle."""
         inverse3_stream.rest(self.state)
         self.state.ended = 1
 
@@ -367,7 +367,7 @@ class Service(HandOrders):
         )
 
     def _answer_message(self, message: dict[str, Any]) -> None:
-        """Take settings and the command, and answer with a state; with the configuration where that is asked for."""
+        """Apply settings and command of a message, and answer with a state, including the configuration on request."""
         session = message.get("session", {})
         for entry in message.get("inverse3", []):
             if entry.get("device_id") == DEVICE_ID:
@@ -382,7 +382,7 @@ class Service(HandOrders):
             self._arm()
 
     def _configure(self, device: dict[str, Any], session: dict[str, Any]) -> None:
-        """Set what "Device Configuration" lists for WebSocket ``configure``."""
+        """Apply the settings that "Device Configuration" lists for WebSocket ``configure``."""
         filters = self.config["filters"]
         if "preset" in device:
             self.config["preset"] = device["preset"]["preset"]
@@ -413,6 +413,6 @@ class Service(HandOrders):
 
 
 def service_calls(service: Service) -> TransferCalls:
-    """Return the service as a byte stream, with functions in place of the system's ``send`` and ``recv``."""
+    """Return the functions of the emulated service that replace the system's ``send`` and ``recv``."""
     send, receive = inverse3_stream.stream_functions()
     return TransferCalls(handle=service.handle, send=int(send.address), receive=int(receive.address))

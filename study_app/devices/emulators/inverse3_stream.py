@@ -18,7 +18,7 @@ from study_app.haptics.kernels.plant import HANDLE, measure, push, release_handl
 
 SOCKET_CALL = types.intp(types.intp, types.intp, types.uintp, types.int32)
 IDLE_NS: Final = 100_000_000
-"""A device without commands for so long is idle: that it returns to idle is documented, after which time is not."""
+"""Time without commands after which a device is idle [ns]: the return is documented, its time is not."""
 INBOX: Final = 1 << 14
 OUTBOX: Final = 1 << 17
 TEXT: Final = 1 << 12
@@ -31,22 +31,22 @@ _DECIMALS = 100_000_000
 
 SERVICE = np.dtype(
     [
-        ("clock", np.intp),  # address of the time [ns]; 0: a millisecond a command
+        ("clock", np.intp),  # address of the time [ns]; 0: one millisecond per command
         ("now_ns", np.int64),
         ("last_ns", np.int64),  # of the last command
         ("started", np.int64),
         ("hand", HAND),
         ("handle", HANDLE),
-        ("counted_m", np.float64, (3,)),  # what its encoders say
+        ("counted_m", np.float64, (3,)),  # position according to its encoders
         ("buttons", np.int64),
         ("inbox", np.uint8, (INBOX,)),
         ("in_size", np.int64),
         ("outbox", np.uint8, (OUTBOX,)),  # a ring
-        ("written", np.int64),  # bytes ever written to it
-        ("visible", np.int64),  # as far as its time has come
+        ("written", np.int64),  # bytes written to it in total
+        ("visible", np.int64),  # bytes that are due
         ("read", np.int64),
-        ("queue_end", np.int64, (_QUEUE,)),  # frames that wait for their time: where each ends
-        ("queue_ns", np.int64, (_QUEUE,)),  # and when
+        ("queue_end", np.int64, (_QUEUE,)),  # pending frames: the end of each
+        ("queue_ns", np.int64, (_QUEUE,)),  # and its time
         ("queue_first", np.int64),
         ("queue_next", np.int64),
         ("text", np.uint8, (TEXT,)),  # a state, with room for its numbers
@@ -54,14 +54,14 @@ SERVICE = np.dtype(
         ("slots", np.int64, (_SLOTS,)),
         ("id", np.uint8, (16,)),  # the device's, in quotes
         ("id_size", np.int64),
-        ("complex_at", np.int64),  # where the message for Python begins in the inbox
+        ("complex_at", np.int64),  # start of the message for Python in the inbox
         ("complex_size", np.int64),  # and its length; 0: none
-        ("complex_end", np.int64),  # where its frame ends
+        ("complex_end", np.int64),  # end of its frame
         ("ended", np.int64),  # 1: the stream is over
         ("refused", np.int64),  # 1: the client broke RFC 6455
-        # what was commanded
+        # commands
         ("commands", np.int64),
-        ("pushes", np.int64),  # of them, how many commanded a force that is not zero
+        ("pushes", np.int64),  # commands with a force other than zero
         ("force_n", np.float64, (3,)),  # the last, hand frame
         ("most_n", np.float64),  # the largest
         ("close_frames", np.int64),
@@ -71,8 +71,8 @@ SERVICE = np.dtype(
         ("faulty_size", np.int64),
         ("silent", np.int64),  # 1: nothing
         ("ends", np.int64),  # 1: and the stream is over
-        ("lag_ns", np.int64),  # states come so much later, fault or not
-        ("portion", np.int64),  # a receive gives at most so many bytes; 0: all
+        ("lag_ns", np.int64),  # delay of states, with or without a fault [ns]
+        ("portion", np.int64),  # greatest number of bytes per receive; 0: all
     ],
     align=True,
 )
@@ -88,7 +88,7 @@ _FORCE, _VECTOR, _SESSION, _CONFIGURE, _X, _Y, _Z = (
 
 @cache
 def stream_functions() -> tuple[Any, Any]:
-    """Compile what stands for ``send`` and ``recv``."""
+    """Compile the functions that replace ``send`` and ``recv``."""
     return c_function(SOCKET_CALL, _send), c_function(SOCKET_CALL, _receive)
 
 
@@ -127,7 +127,7 @@ def _look_at_clock(service: Any) -> None:
 
 @kernel
 def let_pass(service: Any) -> None:
-    """Let the client see the frames whose time has come."""
+    """Release the frames that are due to the client."""
     while service.queue_first < service.queue_next:
         row = service.queue_first % _QUEUE
         if service.queue_ns[row] > service.now_ns:
@@ -153,7 +153,7 @@ def put_frame(service: Any, opcode: int, payload: Any, size: int, lag_ns: int) -
 
 @kernel
 def put_bytes(service: Any, data: Any, size: int) -> None:
-    """Queue bytes as they are."""
+    """Queue raw bytes."""
     for k in range(size):
         _put(service, data[k])
     _enqueue(service, 0)
@@ -175,7 +175,7 @@ def _enqueue(service: Any, lag_ns: int) -> None:
 
 @kernel
 def take_frames(service: Any) -> None:
-    """Carry out what came whole, up to a message for Python."""
+    """Process complete frames up to a message for Python."""
     while service.complex_size == 0 and service.in_size >= 2 and not service.ended:
         first: Any = np.int64(service.inbox[0])
         second: Any = np.int64(service.inbox[1])
@@ -217,7 +217,7 @@ def drop(service: Any, end: int) -> None:
 
 @kernel
 def _answer(service: Any, begin: int, end: int) -> bool:
-    """Carry out a command and answer it; return False where the message is more than that."""
+    """Execute a command and answer it; return False if the message contains more."""
     if _find(service.inbox, begin, end, _SESSION) >= 0 or _find(service.inbox, begin, end, _CONFIGURE) >= 0:
         return False
     go_on(service)
@@ -236,7 +236,7 @@ def _answer(service: Any, begin: int, end: int) -> bool:
 
 @kernel
 def go_on(service: Any) -> None:
-    """Let the handle move until now; without commands for long it was idle."""
+    """Move the handle up to the current time; it is idle after a long time without commands."""
     _look_at_clock(service)
     if service.clock == 0:
         service.now_ns += _OWN_STEP_NS
@@ -261,7 +261,7 @@ def act(service: Any, x_n: float, y_n: float, z_n: float) -> None:
 
 @kernel
 def rest(service: Any) -> None:
-    """Take the force off: the device is idle."""
+    """Remove the force: the device is idle."""
     release_handle(service.handle)
     for axis in range(3):
         service.force_n[axis] = 0.0
@@ -269,7 +269,7 @@ def rest(service: Any) -> None:
 
 @kernel
 def reply(service: Any) -> None:
-    """Send the state, or what a fault sends in its place."""
+    """Send the state, or the bytes of a fault in its place."""
     if service.fault_at > 0 and service.commands >= service.fault_at:
         if service.silent == 0:
             put_bytes(service, service.faulty, service.faulty_size)
@@ -283,7 +283,7 @@ def reply(service: Any) -> None:
 
 @kernel
 def fill(service: Any, text: Any, slots: Any) -> None:
-    """Write position, velocity and force into a state's text, where it has them (axes of the service)."""
+    """Write position, velocity and force (axes of the service) into the slots of a state's text."""
     handle = service.handle
     measure(handle, service.counted_m)
     for name in range(3):
@@ -319,7 +319,7 @@ def _write(text: Any, at: int, value: float) -> None:
 
 @kernel
 def _find(data: Any, begin: int, end: int, word: Any) -> int:
-    """Return where a word ends in the data; -1 where it is not, or ``begin`` is negative."""
+    """Return the end of a word in the data; -1 if it is missing or ``begin`` is negative."""
     if begin < 0:
         return -1
     for at in range(begin, end - word.size + 1):
@@ -335,7 +335,7 @@ def _find(data: Any, begin: int, end: int, word: Any) -> int:
 
 @kernel
 def _number(data: Any, at: int, end: int) -> float:
-    """Return the number after the colon at ``at``; 0 where there is none."""
+    """Return the number after the colon at ``at``; 0 if there is none."""
     if at < 0:
         return 0.0
     while at < end and (data[at] == 58 or data[at] == 32):

@@ -37,7 +37,7 @@ KNOWN: Final = {
     ("ae838730af34b582", "27ea64a4"): "novint_T0.bin",
     ("e0ae3598670fa1c8", "7ff4e816"): "novint_T2.bin",
 }
-"""First 16 and last 8 digits of SHA-256 -> under which name it is known."""
+"""Names of known firmware by the first 16 and last 8 digits of its SHA-256."""
 
 _HEX_DUMP: Final = re.compile(rb"[0-9A-Fa-f\s:|.,x]{32,}")
 
@@ -52,9 +52,9 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Firmware:
-    """What a file holds: its size in bytes, its hash, where it begins to run, and its blocks.
+    """The content of a firmware file: size [bytes], hash, entry point and blocks.
 
-    ``name`` is that of a file which is known to work, None for others.
+    ``name`` is that of a file known to work, None for others.
     """
 
     size: int
@@ -65,7 +65,7 @@ class Firmware:
 
 
 def check(data: bytes) -> Firmware:
-    """Return what ``data`` holds."""
+    """Check and parse the firmware in ``data``."""
     _refuse_other_files(data)
     _refuse_wrong_header(data)
     high, low = struct.unpack_from("<HH", data, _HEADER_BYTES - 4)
@@ -140,8 +140,8 @@ _BETWEEN_ATTEMPTS_S: Final = 0.2
 class BootFailure(DeviceFailure):
     """The firmware could not be loaded.
 
-    ``step`` is where the last attempt ended: "ping", "autobaud", "echo" or "start"; ``attempt`` its number; ``reason``
-    the observation there.
+    ``step`` is the step at which the last attempt failed ("ping", "autobaud", "echo" or "start"), ``attempt`` its
+    number, ``reason`` the observation.
     """
 
     def __init__(self, step: str, attempt: int, reason: str) -> None:
@@ -160,7 +160,7 @@ class _Ended(Exception):
 
 
 class _Line:
-    """The bytes that come over a bridge, without its status, and the packets in them.
+    """The bytes received over a bridge, without its status bytes, and the packets in them.
 
     It reads one USB packet at a time: a longer read does not end with a full packet, such as the echo of a chunk, but
     waits for the bridge's timer.
@@ -172,14 +172,14 @@ class _Line:
         self._parser, self._status = records(PARSER, 1), records(STATUS, 1)
 
     def until(self, complete: Callable[[bytes], bool], timeout_s: float, came: bytes = b"") -> bytes:
-        """Return ``came`` and the bytes after it, until they are complete or the time is out."""
+        """Return ``came`` and the bytes received after it, until they are complete or the time-out."""
         ends_s = self._transport.now_s() + timeout_s
         while not complete(came) and (left_s := ends_s - self._transport.now_s()) > 0.0:
             came += self._memory[: self._read(left_s)].tobytes()
         return came
 
     def answers(self, timeout_s: float) -> bool:
-        """Send a quiet packet; return whether a packet came back in time."""
+        """Send a quiet packet; return whether a reply arrives in time."""
         try:
             self._transport.write(constants.quiet_packet(constants.FLAG_HOMING), timeout_s)
         except UsbFailure as failure:
@@ -207,12 +207,12 @@ def configure(transport: Transport) -> None:
 
 
 def set_event_character(transport: Transport, on: bool) -> None:
-    """Let the bridge send its data as soon as it has a packet's last byte, or only when its timer expires."""
+    """Set whether the bridge sends its data at a packet's last byte, or only when its timer expires."""
     transport.control(constants.REQUEST_EVENT_CHARACTER, constants.STOP | (constants.EVENT_ENABLED if on else 0))
 
 
 def is_running(transport: Transport) -> bool:
-    """Return whether the Falcon has its firmware: whether it answers a quiet packet. The bridge must be configured."""
+    """Return whether the Falcon runs its firmware, that is, answers a quiet packet. The bridge must be configured."""
     for _ in range(PROBES):
         if _Line(transport).answers(PROBE_S):
             return True
@@ -221,14 +221,14 @@ def is_running(transport: Transport) -> bool:
 
 
 def measure_round_trip(transport: Transport) -> float:
-    """Return the median time from a packet to its reply [s]; one that stays without counts as 50 ms."""
+    """Return the median time from a packet to its reply [s]; a missing reply counts as 50 ms."""
     return median(_round_trip_s(transport) for _ in range(ROUND_TRIPS))
 
 
 def choose_event_character(transport: Transport) -> tuple[float, dict[str, Any]]:
     """Use the bridge's event character if the round trip is shorter with it.
 
-    Return the shorter round trip [s], and what the receipt says of it.
+    Return the shorter round trip [s] and the fields for the receipt.
     """
     taken_s = {}
     for on in (False, True):
@@ -245,7 +245,7 @@ def _round_trip_s(transport: Transport) -> float:
     began_s = transport.now_s()
     if _Line(transport).answers(PROBE_S):
         return transport.now_s() - began_s
-    _purge(transport)  # its reply must not count as the next one's
+    _purge(transport)  # a late reply must not count as that of the next packet
     return PROBE_S
 
 
@@ -287,7 +287,7 @@ def _attempt(transport: Transport, firmware: bytes) -> None:
 
 
 def _ping(transport: Transport) -> None:
-    """Reset the processor by an edge of DTR, and call until its loader answers."""
+    """Reset the processor by an edge of DTR, and ping until its loader answers."""
     _purge(transport)
     set_event_character(transport, on=False)
     transport.control(constants.REQUEST_LATENCY, constants.LATENCY_BOOT_MS)
@@ -306,7 +306,7 @@ def _ping(transport: Transport) -> None:
 
 
 def _time(transport: Transport) -> None:
-    """Let the loader find the speed of the upload by the bits of an 'A'."""
+    """Send an 'A', from whose bits the loader determines the speed of the upload."""
     transport.control(constants.REQUEST_MODEM, constants.DTR_LOW)
     transport.control(constants.REQUEST_BAUD, constants.BAUD_142857)
     _purge(transport)

@@ -35,8 +35,8 @@ BRIDGE = np.dtype(
         ("write", np.intp),
         ("waiting", np.intp),
         ("set_timeouts", np.intp),
-        ("timeout_ms", np.int64),  # as set last; 0: not yet
-        ("count", np.uint32),  # where the library writes how many
+        ("timeout_ms", np.int64),  # time-out last set; 0: none
+        ("count", np.uint32),  # number of bytes transferred, written by the library
     ],
     align=True,
 )
@@ -92,7 +92,7 @@ def _transfer(handle: int, endpoint: int, data: int, length: int, transferred: i
 
 @kernel
 def _receive(handle: int, data: int, length: int, transferred: int) -> Any:
-    """Receive what there is, or wait for a first byte and take what came with it; status bytes go in front."""
+    """Receive the available bytes, or wait for the first byte; put status bytes in front."""
     bridge = _bridge_at(handle)
     room = min(length - constants.STATUS_BYTES, _DATA_BYTES)
     received: Any = 0
@@ -109,7 +109,7 @@ def _receive(handle: int, data: int, length: int, transferred: int) -> Any:
                 return _code(status)
             received += np.int64(bridge.count)
         if received != 1:
-            break  # only a byte that was waited for may have brought more with it
+            break  # more bytes may have arrived with the byte that was waited for
     if received == 0:
         return constants.ERROR_TIMEOUT
     for i in range(constants.STATUS_BYTES):

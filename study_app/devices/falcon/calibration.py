@@ -36,8 +36,8 @@ UNCALIBRATED_UNITS_PER_NM: Final = 6616.0
 LEAST_POSES: Final = 5
 MOST_RESIDUAL_N: Final = 0.5
 """Greatest residual of consistent weights."""
-_GAINS: Final = (1000.0, 100_000.0)  # no Falcon's is outside
-_OFFSETS_RAD: Final = math.radians(15)  # nor its arms' offset
+_GAINS: Final = (1000.0, 100_000.0)  # range of every Falcon's gain
+_OFFSETS_RAD: Final = math.radians(15)  # and of its arms' offset
 _STEPS: Final = 20
 
 
@@ -66,7 +66,7 @@ class Calibration:
 def fit(
     geometry: mechanics.Geometry, poses: Any, forces_n: Any, units: Any, *, measured: date | None = None
 ) -> Calibration:
-    """Return the gain, offset and weight of the grip that explain best what the motors held, by least squares.
+    """Fit gain, arm offset and weight of the grip to the measured motor units by least squares.
 
     The grip stands still when motors, its own weight and what pulls at it balance:
     ``-J(theta + offset)^T units / gain + (0, -own weight, 0) + force = 0``.
@@ -130,7 +130,7 @@ def left_over(calibration: Calibration, poses: Any, forces_n: Any, units: Any) -
 
 
 def _solve(geometry: mechanics.Geometry, offset_rad: float, counts: Any, pulled_n: Any, held: Any) -> tuple[Any, Any]:
-    """Return the best (1 / gain, own weight) for an offset, and what is left of the forces, flat [N]."""
+    """Return the best (1 / gain, own weight) for an offset, and the residual forces, flat [N]."""
     mechanism = mechanics.new_mechanism(geometry, 1.0, offset_rad)
     theta, place_m, rates = np.zeros(3), np.zeros(3), np.zeros((3, 3))
     pushed = np.zeros((len(counts), 3))
@@ -176,7 +176,7 @@ def save(serial: str, calibration: Calibration) -> Path:
 
 
 def load(serial: str) -> Calibration | None:
-    """Return the calibration of the Falcon with this serial number; None where it has none."""
+    """Return the calibration of the Falcon with this serial number, or None."""
     file = calibration_file(serial)
     try:
         calibration = Calibration(**json.loads(file.read_text(encoding="utf-8")))
@@ -259,11 +259,11 @@ class Grip:
 
     @property
     def place_m(self) -> Any:
-        """Its place (3,) [m, hand frame]."""
+        """The grip's position (3,) [m, hand frame]."""
         return self._place_m.copy()
 
     def tick(self) -> None:
-        """Read its place and push it toward its target; without a new position for 20 ticks, send no force."""
+        """Read the position and push toward the target; without a new position for 20 ticks, send no force."""
         if self._virtual:
             self._now_ns += round(1e9 * _TICK_S)
             elapsed_s = _TICK_S
@@ -298,13 +298,13 @@ class Grip:
         return force_n * min(1.0, self._device.force_limit_n / size) if size else force_n
 
     def wait(self, answered: Callable[[], str | None]) -> str:
-        """Hold it in place until there is an answer; return the answer."""
+        """Hold the grip in place until the operator answers; return the answer."""
         while (answer := answered()) is None:
             self.tick()
         return answer
 
     def come(self, place_m: Any) -> None:
-        """Move it slowly to a place, and wait until it rests there, possibly displaced by its load."""
+        """Move the grip slowly to a position and wait until it rests there, possibly displaced by its load."""
         way = np.asarray(place_m) - self._target_m
         ticks = max(int(np.linalg.norm(way) / (_PACE_MPS * _TICK_S)), 1)
         began = self._target_m.copy()

@@ -12,9 +12,9 @@ PRODUCT: Final = "FALCON HAPTIC"
 ENDPOINT_IN: Final = 0x81
 ENDPOINT_OUT: Final = 0x02
 USB_PACKET: Final = 64
-"""Most bytes of a USB packet; reads ask for whole multiples of it."""
+"""Largest size of a USB packet [bytes]; reads request whole multiples of it."""
 STATUS_BYTES: Final = 2
-"""Modem status at the begin of every IN packet of up to ``USB_PACKET`` bytes."""
+"""Number of modem status bytes at the start of every IN packet of up to ``USB_PACKET`` bytes."""
 
 # Control requests of the bridge: bmRequestType 0x40, wIndex 0.
 REQUEST_TYPE: Final = 0x40
@@ -60,5 +60,5 @@ def quiet_packet(flags: int = 0) -> bytes:
 
 
 def milliseconds(seconds: float) -> int:
-    """Return a time-out for C: never 0, which would mean for ever."""
+    """Return a time-out in milliseconds for C functions: at least 1, since 0 means unlimited."""
     return max(1, round(seconds * 1000.0))

@@ -170,7 +170,7 @@ class FalconDevice(FramedDevice):
         return max(requests - replies - 1, 0) / max(requests, 1)
 
     def _check_reach(self, mechanism: Any) -> None:
-        """Refuse a workspace that the arms do not reach."""
+        """Raise an error for a workspace that the arms do not reach."""
         theta = np.zeros(3)
         for corner in np.array(np.meshgrid(*((-half, half) for half in self.workspace_m))).reshape(3, -1).T:
             reached = (
@@ -188,7 +188,7 @@ class FalconDevice(FramedDevice):
                 )
 
     def _run_firmware(self, transport: Transport) -> str:
-        """Load the firmware if it does not run; return which one runs."""
+        """Load the firmware if it is not running; return the name of the running one."""
         boot.configure(transport)
         if boot.is_running(transport):
             return "already running"

@@ -37,7 +37,7 @@ LONGEST_TICK_S: Final = 4e-3
 
 @kernel
 def push(falcon: Any) -> None:
-    """Turn ``force_n``, as much of it as passes the gate, into ``units`` for the motors.
+    """Convert ``force_n``, limited by the gate, into motor ``units``.
 
     ``held_n`` is then the force of the motors until the next command, where the grip is now, and ``sent_n`` the force
     after it [N].
@@ -50,7 +50,7 @@ def push(falcon: Any) -> None:
 
 @kernel
 def may_wait(falcon: Any) -> bool:
-    """Return whether the motors may keep their force for a tick: it is close to the wanted one, and not 0."""
+    """Return whether the motors may keep their force for a tick: it is close to the requested force, which is not 0."""
     near: bool = square_distance(falcon.sent_n, falcon.held_n) <= MOST_WAITING_N * MOST_WAITING_N
     return near and (square(falcon.sent_n) > 0.0 or square(falcon.held_n) == 0.0)
 
@@ -171,7 +171,7 @@ FALCON = np.dtype(
         ("seen_buttons", np.int64),  # as in the last one
         # replies owed
         ("asked", np.int64),  # packets sent since the last read
-        ("owed", np.int64),  # replies that did not come so far
+        ("owed", np.int64),  # missing replies so far
         ("delay", np.int64),  # reads after which a packet's reply comes, as measured
         ("measured", np.int64),  # result of a measurement to be confirmed by another one
         ("testing", np.int64),  # packets omitted so far to measure it; 0: no measurement

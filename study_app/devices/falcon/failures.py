@@ -31,11 +31,11 @@ KINDS: Final = {
     constants.ERROR_NOT_SUPPORTED: "not-supported",
 }
 FURTHER_KINDS: Final = ("kernel-driver", "no-libusb", "no-ftd2xx", "two-drivers")
-"""What keeps it from being opened before libusb has a code for it."""
+"""Failures of opening without a libusb error code."""
 
 
 def failures_on(platform: str) -> FailureTable:
-    """Return the modes of failure on a system, which is named as by ``sys.platform``."""
+    """Return the failure modes on a system, named as in ``sys.platform``."""
     phrases = {
         "rule": UDEV_RULE,
         "rules_file": RULES_FILE,
@@ -49,10 +49,10 @@ FAILURES: Final = failures_on(sys.platform)
 
 
 class UsbFailure(DeviceFailure):
-    """A transfer, or the way to it, failed.
+    """A transfer, or its preparation, failed.
 
-    ``kind`` is one of ``KINDS`` or ``FURTHER_KINDS``, ``where`` what was being done, ``code`` libusb's error, None
-    where no transfer was tried.
+    ``kind`` is one of ``KINDS`` or ``FURTHER_KINDS``, ``where`` the operation, ``code`` libusb's error, None before any
+    transfer.
     """
 
     def __init__(self, kind: str, where: str, code: int | None = None) -> None:
@@ -71,15 +71,15 @@ class UsbFailure(DeviceFailure):
 
 
 class FalconNotFound(UsbFailure, DeviceNotFound):
-    """There is none."""
+    """No Falcon is connected."""
 
 
 class FalconLost(UsbFailure, DeviceLost):
-    """It was there."""
+    """The connection to the Falcon was lost."""
 
 
 def usb_failure(code: int, where: str) -> UsbFailure:
-    """Return the error to raise for libusb's ``code``, which came while doing ``where``."""
+    """Return the error to raise for libusb's ``code`` in the operation ``where``."""
     kind = KINDS.get(code, "io")
     classes: dict[str, type[UsbFailure]] = {"no-device": FalconLost, "not-found": FalconNotFound}
     return classes.get(kind, UsbFailure)(kind, where, code)

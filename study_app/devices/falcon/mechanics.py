@@ -104,10 +104,10 @@ OUT_STROKE_M: Final = 0.170
 """The grip counts as pulled out beyond this z in the Falcon's frame: no force before that."""
 
 SAFE_BOX_M: Final = ((-0.045, 0.045), (-0.045, 0.045), (0.085, 0.165))
-"""Where the mechanism moves freely, in the Falcon's frame: lowest and highest x, y, z."""
+"""Limits of x, y and z in the Falcon's frame within which the mechanism moves freely [m]."""
 
 WORKSPACE_M: Final = (0.05, 0.03, 0.03)
-"""Half extents of what it reaches about the hand's origin in every published geometry, corners included."""
+"""Half extents about the hand's origin that every published geometry reaches, corners included [m]."""
 
 
 def geometry_named(name: str) -> Geometry:
@@ -116,7 +116,7 @@ def geometry_named(name: str) -> Geometry:
     Raises
     ------
     DeviceError
-        Nobody published one of this name.
+        There is no geometry with this name.
     """
     if name not in GEOMETRIES:
         known = ", ".join(GEOMETRIES)
@@ -142,18 +142,18 @@ MECHANISM = np.dtype(
 
 REACHED: Final = 0
 OUTSIDE: Final = 1
-"""No such pose: out of reach, or in the mirror image that the mechanism cannot reach."""
+"""The pose is out of reach, or a mirror image that the mechanism cannot take."""
 
 START_M: Final = (0.0, 0.0, 0.12)
 """Start position from which `forward` finds every pose of the workspace."""
 
 _STEPS = 30
 _LEAST_ROD_M = 1e-6  # what is seen of a rod that lies across its arm
-_ENOUGH_M = 1e-12  # a step so small ends Newton's method: its error is then of the order of rounding
+_ENOUGH_M = 1e-12  # step at which Newton's method ends: the error is then of the order of rounding
 
 
 def new_mechanism(geometry: Geometry, units_per_nm: float, arm_offset_rad: float = 0.0) -> Any:
-    """Return the record of a Falcon: published measures, and what calibration found of this one."""
+    """Return the record of a Falcon: published dimensions, and gain and offset of its calibration."""
     mechanism = records(MECHANISM, 1)[0]
     mechanism.arm_m, mechanism.rod_m, mechanism.ends_m = geometry.arm_m, geometry.rod_m, geometry.ends_m
     mechanism.base_m = geometry.base_m - geometry.platform_m
@@ -175,7 +175,7 @@ def angles(mechanism: Any, counts: Any, theta: Any) -> None:
 
 @kernel
 def inverse(mechanism: Any, position_m: Any, theta: Any) -> int:
-    """Write into ``theta`` (3,) [rad] the angles for ``position_m`` (3,) [m]; return ``REACHED`` or ``OUTSIDE``."""
+    """Write the angles for ``position_m`` (3,) [m] into ``theta`` (3,) [rad]; return ``REACHED`` or ``OUTSIDE``."""
     a = mechanism.arm_m
     w = position_m[2]
     for i in range(3):
@@ -256,7 +256,7 @@ def count_at(mechanism: Any, z_m: float) -> float:
 
 
 def rounding_n(mechanism: Any) -> float:
-    """Return the most by which whole motor units change a force in the reach of the grip [N]: half a unit per motor."""
+    """Return the greatest force error by rounding to motor units within reach [N]: half a unit per motor."""
     theta, rates, sums = np.zeros(3), np.zeros((3, 3)), []
     for corner_m in itertools.product(*SAFE_BOX_M):
         if inverse(mechanism, np.array(corner_m), theta) == REACHED:
@@ -267,9 +267,9 @@ def rounding_n(mechanism: Any) -> float:
 
 @kernel
 def torques(rates: Any, force_n: Any, torque_nm: Any) -> None:
-    """Write into ``torque_nm`` (3,) [N m] the arm torques that push with ``force_n`` (3,) [N]: ``J^T tau = F``.
+    """Write the arm torques for ``force_n`` (3,) [N] into ``torque_nm`` (3,) [N m]: ``J^T tau = F``.
 
-    None at a singular pose, which the mechanism's stops keep it from.
+    They are 0 at a singular pose, which the mechanism's stops prevent.
     """
     r0, r1, r2 = rates[0], rates[1], rates[2]
     x, y, z = force_n[0], force_n[1], force_n[2]

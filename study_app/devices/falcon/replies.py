@@ -37,7 +37,7 @@ PARSER = np.dtype(
         ("tail", np.uint8, (constants.PACKET,)),  # the start of an incomplete packet
         ("held", np.int64),  # its number of bytes
         ("packets", np.int64),  # whole valid packets so far
-        ("skipped", np.int64),  # bytes so far that belonged to none
+        ("skipped", np.int64),  # bytes outside of packets so far
     ],
     align=True,
 )
@@ -47,7 +47,7 @@ STATUS = np.dtype(
         ("encoders", np.int64, (3,)),  # counts of arms 1 to 3
         ("buttons", np.int64),  # bits 0 to 3 of the grip
         ("homed", np.int64),  # bits 0 to 2: arms 1 to 3
-        ("count", np.int64),  # how many packets were written here so far
+        ("count", np.int64),  # number of packets written here so far
     ],
     align=True,
 )
@@ -62,7 +62,7 @@ def put_number(out: Any, at: int, value: int) -> None:
 
 @kernel
 def number(data: Any, at: int) -> Any:
-    """Return what stands in the four bytes of ``data`` from ``at`` on, -32768 to 32767."""
+    """Return the number (-32768 to 32767) in the four bytes of ``data`` from ``at`` on."""
     value: Any = 0
     for nibble in range(NIBBLES):
         value += ((np.int64(data[at + nibble]) - constants.ZERO) & 0xF) << (4 * nibble)
@@ -101,7 +101,7 @@ def strip(data: Any, length: int, out: Any) -> int:
 def feed(parser: Any, data: Any, length: int, status: Any) -> Any:
     """Process ``length`` more bytes of the stream; return the number of valid packets that ended in them.
 
-    The newest of them goes into ``status``, which stays as it was where there is none.
+    The newest is written to ``status``, which is unchanged if there is none.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def _take(parser: Any, byte: Any) -> None:
 
 @kernel
 def _fits(at: int, byte: int) -> bool:
-    """Whether ``byte`` may stand ``at`` that place of a packet."""
+    """Return whether ``byte`` can occur at position ``at`` of a packet."""
     if at == 0:
         return byte == constants.START
     if at < FLAGS_AT:
@@ -226,7 +226,7 @@ def _measure_delay(falcon: Any, packets: int) -> None:
         _write_off(falcon)
     if delay >= falcon.delay or delay == falcon.measured:
         _adopt_delay(falcon, delay)
-    else:  # a reply lost may look like that: once more
+    else:  # a lost reply may look the same: measure again
         falcon.measured = delay
         falcon.unsure = 1
         falcon.retest = MOST_DELAY
@@ -257,7 +257,7 @@ def _write_off(falcon: Any) -> None:
 
 @kernel
 def take_status(falcon: Any) -> bool:
-    """Take buttons and homed arms from the newest packet; return whether its encoders count from their index."""
+    """Copy buttons and homed arms from the newest packet; return whether its encoders count from their index."""
     status = falcon.status
     if status.homed != ALL_HOMED:
         falcon.unhomed += 1

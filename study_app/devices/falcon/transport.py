@@ -52,13 +52,10 @@ class Transport(Protocol):
     def write(self, data: bytes, timeout_s: float) -> None: ...
 
     def read(self, size: int, timeout_s: float) -> bytes:
-        """Return what one read of at most ``size`` bytes, a multiple of 64, gives, status bytes and all.
-
-        Nothing at all (``b""``) when the time is out.
-        """
+        """Read at most ``size`` bytes, a multiple of 64, including status bytes; return ``b""`` at the time-out."""
 
     def calls(self) -> BulkCalls:
-        """Return the bridge as compiled code sees it; good until `close` or `reopen`."""
+        """Return handle and function address for compiled code, valid until `close` or `reopen`."""
 
     def now_s(self) -> float:
         return time.monotonic()
@@ -67,10 +64,10 @@ class Transport(Protocol):
         time.sleep(seconds)
 
     def reopen(self) -> None:
-        """Close it and open it again, as new."""
+        """Close the bridge and open it again."""
 
     def close(self) -> None:
-        """Let go of it; a second call does nothing."""
+        """Release the bridge; a second call does nothing."""
 
 
 def open_transport(name: str = "") -> Transport:
@@ -104,7 +101,7 @@ def quiet(transport: Transport) -> int:
 
 
 def end_torque(name: str) -> None:
-    """Open the bridge called ``name`` and send packets of zero torque: what a guard does."""
+    """Open the bridge ``name`` and send packets of zero torque; called by the guard."""
     transport = open_transport(name)
     try:
         if not quiet(transport):
@@ -154,7 +151,7 @@ class PyUsbTransport(Transport):
             devices = find_falcons(self._backend)
         if self.serial is None:
             devices = devices[self._index :]
-        else:  # one that does not tell its number may be the one, and say why when it is opened
+        else:  # a device without a readable number may be the right one; opening it reports the error
             devices = [device for device in devices if serial_of(device) in {self.serial, None}]
             devices.sort(key=lambda device: serial_of(device) is None)
         if not devices:
@@ -184,7 +181,7 @@ class PyUsbTransport(Transport):
             raise usb_failure(constants.ERROR_TIMEOUT, "sending")
 
     def read(self, size: int, timeout_s: float) -> bytes:
-        """Return what one read gives; nothing when the time is out."""
+        """Return the bytes of one read, b"" at the time-out."""
         if size <= 0 or size % constants.USB_PACKET:
             raise ValueError(f"a read asks for a multiple of {constants.USB_PACKET} bytes, not {size}")
         try:
@@ -212,7 +209,7 @@ class PyUsbTransport(Transport):
     def close(self) -> None:
         device, self._device = self._device, None
         if device is not None:
-            with suppress(usb.core.USBError, NotImplementedError):  # it may be gone
+            with suppress(usb.core.USBError, NotImplementedError):  # it may be unplugged
                 usb.util.dispose_resources(device)
 
     def _open_device(self) -> Any:
@@ -222,7 +219,7 @@ class PyUsbTransport(Transport):
 
 
 def find_falcons(backend: Any) -> list[Any]:
-    """Return pyusb's device of each Falcon that ``backend`` sees, opened or not."""
+    """Return pyusb's device of each Falcon on ``backend``, opened or not."""
     devices = usb.core.find(
         find_all=True, backend=backend, idVendor=constants.VENDOR_ID, idProduct=constants.PRODUCT_ID
     )
@@ -230,7 +227,7 @@ def find_falcons(backend: Any) -> list[Any]:
 
 
 def serial_of(device: Any) -> str | None:
-    """Return the serial number of pyusb's ``device``; None where it has none, or does not let itself be asked."""
+    """Return the serial number of pyusb's ``device``; None if it has none or cannot be read."""
     with suppress(usb.core.USBError, ValueError, NotImplementedError):
         return device.serial_number or None
     return None
@@ -245,13 +242,13 @@ def libusb_calls(library: Any, handle: Any) -> BulkCalls:
 
 
 def _claim(device: Any) -> None:
-    """Open and claim pyusb's ``device``, without a reset: a Falcon that runs shall run on."""
+    """Open and claim pyusb's ``device`` without a reset, so that a running Falcon continues."""
     try:
         device.get_active_configuration()
     except usb.core.USBError as error:
         if error.backend_error_code is not None or error.errno is not None:
             raise
-        device.set_configuration()  # pyusb's own word that there is none yet
+        device.set_configuration()  # pyusb's error for a device without a configuration
     try:
         held = device.is_kernel_driver_active(_INTERFACE)
     except NotImplementedError:
@@ -266,7 +263,7 @@ def _claim(device: Any) -> None:
 
 @contextmanager
 def _failures(where: str) -> Iterator[None]:
-    """Turn pyusb's errors into ours."""
+    """Convert pyusb's errors into `UsbFailure`."""
     try:
         yield
     except (usb.core.USBError, NotImplementedError) as error:
@@ -274,7 +271,7 @@ def _failures(where: str) -> Iterator[None]:
 
 
 def _code(error: Exception) -> int:
-    """Return libusb's code of an error of pyusb, which says "not supported" with a class of its own."""
+    """Return libusb's code of an error of pyusb, which has a separate class for "not supported"."""
     if isinstance(error, NotImplementedError):
         return constants.ERROR_NOT_SUPPORTED
     code = getattr(error, "backend_error_code", None)
@@ -289,8 +286,8 @@ _DATA_BYTES = constants.USB_PACKET - constants.STATUS_BYTES
 _D2XX_CODES: Final = {
     1: constants.ERROR_NO_DEVICE,  # FT_INVALID_HANDLE
     2: constants.ERROR_NOT_FOUND,  # FT_DEVICE_NOT_FOUND
-    3: constants.ERROR_BUSY,  # FT_DEVICE_NOT_OPENED: somebody else has opened it
-    4: constants.ERROR_NO_DEVICE,  # FT_IO_ERROR: what an unplugged bridge gives
+    3: constants.ERROR_BUSY,  # FT_DEVICE_NOT_OPENED: another program has opened it
+    4: constants.ERROR_NO_DEVICE,  # FT_IO_ERROR: the bridge was unplugged
 }
 _PURGE_RX, _PURGE_TX = 1, 2
 _EIGHT_BITS = 8
@@ -370,12 +367,12 @@ class FtdiTransport(Transport):
             raise usb_failure(constants.ERROR_TIMEOUT, "sending")
 
     def read(self, size: int, timeout_s: float) -> bytes:
-        """Return what there is, as one packet of the bridge; wait for a first byte; nothing when the time is out."""
+        """Wait for a first byte and return the available bytes as one packet of the bridge; b"" at the time-out."""
         if size <= 0 or size % constants.USB_PACKET:
             raise ValueError(f"a read asks for a multiple of {constants.USB_PACKET} bytes, not {size}")
         self._set_timeout(milliseconds(timeout_s))
         data = self._receive(min(max(self._waiting(), 1), _DATA_BYTES))
-        if len(data) == 1:  # perhaps it was waited for, and more came with it
+        if len(data) == 1:  # more bytes may have arrived while waiting
             data += self._receive(min(self._waiting(), _DATA_BYTES - 1))
         return bytes(constants.STATUS_BYTES) + data if data else b""
 
@@ -383,7 +380,7 @@ class FtdiTransport(Transport):
         from study_app.devices.falcon.bulk import BulkCalls, bridge_record, transfer  # noqa: PLC0415 - likewise
 
         self._memory = bridge_record(self._library, self._opened())
-        self._timeout_ms = 0  # the C function sets its own
+        self._timeout_ms = 0  # the C function sets its own time-out
         return BulkCalls(handle=int(self._memory.ctypes.data), transfer=int(transfer().address))
 
     def close(self) -> None:
@@ -392,7 +389,7 @@ class FtdiTransport(Transport):
             self._library.FT_Close(handle)
 
     def _listed(self) -> list[tuple[str, str]]:
-        """Return serial number and description of each bridge that the driver has."""
+        """Return serial number and description of each bridge that the driver lists."""
         count = ctypes.c_uint32()
         self._check(self._library.FT_CreateDeviceInfoList(ctypes.byref(count)), "looking for it")
         return [self._detail(index) for index in range(count.value)]
@@ -437,7 +434,7 @@ class FtdiTransport(Transport):
 
 
 def load_d2xx() -> Any:
-    """Return FTDI's library; raise `UsbFailure` of kind "no-ftd2xx" where there is none."""
+    """Return FTDI's library; raise `UsbFailure` of kind "no-ftd2xx" if it is not installed."""
     loader = getattr(ctypes, "WinDLL", ctypes.CDLL)
     for name in LIBRARIES:
         try:
@@ -448,7 +445,7 @@ def load_d2xx() -> Any:
 
 
 def probe(usb: Any = None, platform: str = sys.platform) -> Backend:
-    """Return what libusb, or another backend of pyusb, finds on a platform."""
+    """Return the state of libusb, or another backend of pyusb, on a platform."""
     can = "force up to 8 N; needs firmware after it was turned on, and homing"
     by = f"libusb {_version()}"
     usb = usb if usb is not None else libusb_package.get_libusb1_backend()

@@ -16,7 +16,7 @@ FORCE_LIMIT_N: Final = 8.0
 
 
 class Functions(Protocol):
-    """An open device of the maker's library, or an emulated one; ``id`` is passed to its functions."""
+    """The interface of an open device of the maker's library, or an emulated one; ``id`` is passed to its functions."""
 
     id: int
 
@@ -86,7 +86,7 @@ class ForceDimensionDevice(FramedDevice):
         return {"guard": self.guard is not None} | facts
 
     def _finish(self, connection: Functions) -> AtClose:
-        """Send zero force, and take the current off the motors."""
+        """Send zero force and switch off the motors' current."""
         if self.exchange.ended == RELEASED:
             finish(self.exchange, self.context)
         return "leave" if self.exchange.pushes else "stand_down"

@@ -39,10 +39,10 @@ STOP = types.int32(types.intp)
 
 TIMEGUARD, MOTOR_SATURATED = 1, 2  # dhdc.h 160, 161
 STATUS_TICKS: Final = 32
-"""The status is read once in so many ticks."""
+"""Number of ticks between reads of the status."""
 _NORM_SLACK = 1.001
 
-ERROR, BAD_NUMBER, FORCE_OFF, UNGUARDED = range(FIRST_CAUSE, FIRST_CAUSE + 4)  # why the exchange ended
+ERROR, BAD_NUMBER, FORCE_OFF, UNGUARDED = range(FIRST_CAUSE, FIRST_CAUSE + 4)  # reasons for the end of the exchange
 
 FORCE_DIMENSION = np.dtype(
     [
@@ -60,9 +60,9 @@ FORCE_DIMENSION = np.dtype(
         ("wrist", np.int64),  # 1 where it measures orientation
         ("gripper", np.int64),  # 1 where it has a gripper
         ("active", np.int64),  # 1 where wrist or gripper have motors, whose torque and force are kept at 0
-        ("off_cause", np.int64),  # what the device stated where its force is off
+        ("off_cause", np.int64),  # the device's reason for a switched-off force
         ("pushes", np.int64),  # 1 where neither zero force nor ``dhdStop`` was accepted at the end
-        # what the library fills in
+        # memory filled by the library
         ("position_m", np.float64, (3,)),
         ("velocity_mps", np.float64, (3,)),
         ("rotation", np.float64, (3, 3)),
@@ -143,7 +143,7 @@ def _write(context: int, command: int) -> int:
 
 @kernel
 def finish(device: Any, _context: int) -> None:
-    """Send zero force, and take the current off the motors."""
+    """Send zero force and switch off the motors' current."""
     zeroed = _push(device, 0.0, 0.0, 0.0) >= 0
     stopped = np.int32(_call_stop(device.stop, device.id)) >= 0
     device.pushes = 0 if zeroed or stopped else 1
@@ -199,13 +199,13 @@ def _take_sample(device: Any, context: int, now_ns: int, out: Any) -> int:
 
 @kernel
 def _from_maker(vector: Any, out: Any) -> None:
-    """Give a vector of the maker's axes (toward the participant, right, up) in the hand frame (right, up, toward)."""
+    """Convert a vector from the maker's axes (toward the participant, right, up) to the hand frame."""
     out[0], out[1], out[2] = vector[1], vector[2], vector[0]
 
 
 @kernel
 def _put_quaternion(rotation: Any, out: Any) -> bool:
-    """Give a rotation matrix of the maker's axes as a unit quaternion w, x, y, z of the hand frame; False: it is none.
+    """Convert a rotation matrix of the maker's axes to a unit quaternion w, x, y, z of the hand frame; False: invalid.
 
     Shepperd's method: the largest of w^2, x^2, y^2, z^2 is found first (S. W. Shepperd, J. Guidance and Control 1,
     1978, 223). Turning the axes by a permutation permutes the vector part alike.

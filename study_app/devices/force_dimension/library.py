@@ -29,7 +29,7 @@ CAUSES: Final = {
     5: "USB disconnected",
     6: "dead-man switch",
 }
-"""Of status FORCE_OFF_CAUSE: dhdc.h 3.17.5, lines 199 to 206."""
+"""Texts of the status FORCE_OFF_CAUSE: dhdc.h 3.17.5, lines 199 to 206."""
 
 
 _OUT: Final = POINTER(c_double)
@@ -78,7 +78,7 @@ MOST_JOINTS: Final = 8  # DHD_MAX_DOF, dhdc.h 128
 SYNC: Final = 0  # DHD_COM_MODE_SYNC, dhdc.h 194
 ROUND_TRIPS: Final = 50
 COUNTS: Final = 10
-"""Over so many counts of each encoder the handle's motion is computed."""
+"""Number of counts of each encoder over which the handle's motion is computed."""
 COUNT_M: Final = (1e-7, 1e-3)
 MASS_KG: Final = (0.01, 5.0)
 """Least and greatest plausible values; others count as unknown."""
@@ -140,7 +140,7 @@ class Library:
         return self
 
     def prepare(self, force_limit_n: float) -> dict[str, Any]:
-        """Check an open device, keep its safety functions on, and enable its force; return what the receipt records.
+        """Check an open device, keep its safety functions on, and enable its force; return the fields for the receipt.
 
         Raises
         ------
@@ -182,7 +182,7 @@ class Library:
         return any(answer >= 0 for answer in answers)
 
     def _keep_safe(self) -> dict[str, Any]:
-        """Keep the safety functions on and return them; a watchdog, if there is one, is set to its longest: 32 ms."""
+        """Keep the safety functions on and return their state; a watchdog is set to its longest time, 32 ms."""
         call, device, threshold, watchdog = self._functions, self.id, c_uint(), c_ubyte()
         call.dhdEnableExpertMode()
         try:
@@ -231,7 +231,7 @@ class Library:
         """Return the longest motion within an encoder count [m] and the least mass [kg] in the workspace's middle.
 
         The maker's kinematics and inertia matrix compute both for the model and its calibration: no document states
-        them. None where the library cannot, or where its answers contradict one another.
+        them. None if the library lacks the function or its answers are contradictory.
         """
         import numpy as np  # noqa: PLC0415 - the guard, which loads this module, needs no arrays
 
@@ -263,7 +263,7 @@ class Library:
         return _within(longest_m, COUNT_M), _within(least_kg, MASS_KG)
 
     def _enable_force(self) -> None:
-        """Enable the force at zero, and wait until the device says that it is."""
+        """Enable the force at zero and wait until the device confirms it."""
         call, device = self._functions, self.id
         if call.dhdEnableForce(1, device) < 0:
             raise FAILURES.failure("force-off", self._last_error())
@@ -288,13 +288,13 @@ class Library:
 
 
 def end_force(path: str, serial: str) -> None:
-    """Open the device with this serial number ("": the first one), and end its force: what a guard does."""
+    """Open the device with this serial number ("": the first one) and end its force; called by the guard."""
     if not Library(path or None).open(serial).close():
         raise FAILURES.failure("error")
 
 
 def probe() -> Backend:
-    """Return whether the library is installed, and how many devices it finds; opens none."""
+    """Return the state of the library and the number of connected devices, without opening one."""
     try:
         library = Library()
     except DeviceFailure as failed:

@@ -71,7 +71,7 @@ class Inverse3Device(FramedDevice):
         return service.SocketLink(self._host, self._port)
 
     def _prepare(self, connection: service.Link) -> dict[str, Any]:
-        """Choose the device and neutralise the service's settings; the force is zero meanwhile."""
+        """Choose the device and neutralise the service's settings, at zero force."""
         messages = Messages(connection)
         messages.upgrade(f"{self._host}:{self._port}")
         session = open_session(messages, connection, self._wanted_id)
@@ -95,7 +95,7 @@ class Inverse3Device(FramedDevice):
 
     @property
     def age_s(self) -> float:
-        """How long before the tick that used it the last position was asked for [s]."""
+        """The age of the last position in the tick that used it: time since its request [s]."""
         return 1e-9 * float(self.exchange.age_ns)
 
     def observed(self) -> tuple[str, ...]:
@@ -111,7 +111,7 @@ class Inverse3Device(FramedDevice):
 
 
 def address(where: str) -> tuple[str, int, str]:
-    """Return host, port and device id of what follows the device's name: "", "ID", "HOST:PORT" or "HOST:PORT:ID"."""
+    """Return host, port and device id of a device argument: "", "ID", "HOST:PORT" or "HOST:PORT:ID"."""
     parts = where.split(":")
     if len(parts) == 1:
         return service.HOST, service.PORT, parts[0]

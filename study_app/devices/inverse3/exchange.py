@@ -27,9 +27,9 @@ TRANSFER = types.intp(types.intp, types.intp, types.uintp, types.int32)
 
 LONGEST_GAP_NS: Final = 20_000_000
 MOST_UNANSWERED: Final = 4
-"""While so many commands wait for their replies, only weaker forces are sent: others would queue up."""
+"""Number of unanswered commands from which only weaker forces are sent: others would queue up."""
 MOST_WEAKER: Final = 60
-"""While so many wait, none but zero is: the servo's fade takes 45 ticks."""
+"""Number of unanswered commands from which only zero force is sent: the servo's fade takes 45 ticks."""
 INBOX: Final = 1 << 16
 _OUTBOX = 512
 _TEXT = 384
@@ -47,31 +47,31 @@ INVERSE3 = np.dtype(
         ("handle", np.intp),  # of the connection, and
         ("send", np.intp),  # addresses of its functions (``TRANSFER``)
         ("receive", np.intp),
-        # what comes
+        # received data
         ("inbox", np.uint8, (INBOX,)),
         ("filled", np.int64),
         ("header", np.int64, (2,)),
         ("scan", wire.SCAN),
-        # what goes
+        # data to send
         ("prefix", np.uint8, (_TEXT,)),  # the command up to its first number
         ("prefix_size", np.int64),
         ("text", np.uint8, (_TEXT,)),
         ("outbox", np.uint8, (_OUTBOX,)),
         ("out_size", np.int64),  # of the frame in it
-        ("out_sent", np.int64),  # how much of that went
+        ("out_sent", np.int64),  # bytes of it already sent
         ("key", np.uint64, (1,)),  # of the masking keys' generator
         # replies owed
         ("sent", np.int64),  # commands
         ("answered", np.int64),  # replies
         ("sent_ns", np.int64, (_LOG,)),
         ("sent_tick", np.int64, (_LOG,)),
-        ("age_ns", np.int64),  # since the command whose reply was used last was sent
+        ("age_ns", np.int64),  # time since the command whose reply was used last
         ("buttons", np.int64),
         # counters
         ("missing", np.int64),  # ticks without a reply
         ("late", np.int64),  # ticks whose reply was too old
-        ("skipped", np.int64),  # forces that were not sent because replies stayed out
-        ("unasked", np.int64),  # messages that answered no command
+        ("skipped", np.int64),  # forces that were not sent because replies were missing
+        ("unasked", np.int64),  # messages that do not answer a command
     ],
     align=True,
 )
@@ -131,7 +131,7 @@ def _write(context: int, command: int) -> int:
 
 @kernel
 def _take_replies(device: Any, context: int, now_ns: int, out: Any) -> int:
-    """Receive what came; put the newest position into the reading ``out``."""
+    """Receive replies; write the newest position into the reading ``out``."""
     device.now_ns = now_ns
     device.ticks += 1
     answered = device.answered
@@ -149,7 +149,7 @@ def _take_replies(device: Any, context: int, now_ns: int, out: Any) -> int:
         if ended != RUNS:
             return _end(device, context, ended)
         if device.filled == 0 and device.answered >= device.sent:
-            break  # nothing more is owed
+            break  # no more replies are owed
     if device.answered == answered:
         device.missing += 1
         return c_functions.READ_NOTHING_NEW
@@ -172,7 +172,7 @@ def _take_replies(device: Any, context: int, now_ns: int, out: Any) -> int:
 
 @kernel
 def _put_vector(value: Any, place: int, out: Any) -> None:
-    """Give a vector in the hand frame; the service's basis XYZ has x right, y forward, z up.
+    """Write a vector in the hand frame; the service's basis XYZ has x right, y forward, z up.
 
     Documented in docs.haply.co 3.1.x, "Haply Inverse Service", Coordinate System Convention.
     """
@@ -183,7 +183,7 @@ def _put_vector(value: Any, place: int, out: Any) -> None:
 
 @kernel
 def _take_frames(device: Any, context: int) -> int:
-    """Take every whole frame out of the inbox; return `RUNS` or why the stream ends."""
+    """Process every complete frame in the inbox; return `RUNS` or the reason why the stream ends."""
     begin = 0
     while True:
         size = wire.parse_header(device.inbox, begin, device.filled, device.header)
@@ -246,7 +246,7 @@ def _denied(scanned: Any, place: int) -> bool:
 
 @kernel
 def _send_force(device: Any, context: int, force_n: Any) -> int:
-    """Send a force [N, hand frame]; where it cannot go, the last one stays in force and in ``sent_n``."""
+    """Send a force [N, hand frame]; if that fails, the last one stays in effect and in ``sent_n``."""
     _command(device, context, force_n[0], force_n[1], force_n[2])
     return 0
 
@@ -285,7 +285,7 @@ def _command(device: Any, context: int, x_n: float, y_n: float, z_n: float) -> N
 
 @kernel
 def _flush(device: Any, context: int) -> bool:
-    """Send what is left of the frame in the outbox; return whether none is."""
+    """Send the rest of the frame in the outbox; return whether it is complete."""
     while device.out_sent < device.out_size:
         went = np.int32(
             _call(
@@ -304,7 +304,7 @@ def _flush(device: Any, context: int) -> bool:
 
 @kernel
 def _send_control(device: Any, context: int, opcode: int, length: int) -> None:
-    """Send a control frame whose payload is in ``text``, if the frame before went out whole."""
+    """Send a control frame whose payload is in ``text``, if the previous frame was sent completely."""
     if _flush(device, context):
         device.out_size = wire.build_frame(device.outbox, opcode, device.text, length, wire.next_key(device.key))
         device.out_sent = 0
@@ -313,7 +313,7 @@ def _send_control(device: Any, context: int, opcode: int, length: int) -> None:
 
 @kernel
 def _answer_ping(device: Any, context: int, at: int, length: int) -> None:
-    """Send what a ping holds back (RFC 6455 §5.5.3)."""
+    """Answer a ping with its payload (RFC 6455 §5.5.3)."""
     for k in range(length):
         device.text[k] = device.inbox[at + k]
     _send_control(device, context, wire.PONG, length)
@@ -324,7 +324,7 @@ def _end(device: Any, context: int, why: int) -> int:
     """End the stream: send zero force and a close frame, then nothing."""
     if why != CLOSED:
         finish(device, context)
-    clear(device.sent_n)  # silence ends a force that could not be taken back
+    clear(device.sent_n)  # silence ends a force that could not be reset
     device.ended = why
     return c_functions.READ_LOST
 

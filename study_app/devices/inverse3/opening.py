@@ -23,15 +23,15 @@ PRESET: Final = "arm_front_centered"
 """Origin in the middle of the workspace ("Mount & Workspace Transforms", presets)."""
 BASIS: Final = "XYZ"
 FORCE_GATE_GAIN: Final = 0.0
-"""Attenuates the force where the service detects an oscillation; its default is 0.3. That 0 turns it off is not
-documented: on the bench list."""
+"""Attenuation of the force when the service detects an oscillation; the default is 0.3. That 0 disables it is not
+documented: to be tested on the bench."""
 
 SESSION_SCOPED: Final[Mapping[str, Any]] = {
     "preset": PRESET,
     "basis": {"permutation": BASIS},
     "filters": {"force_gate": {"gain": FORCE_GATE_GAIN}, "damping": {"scalar": 0.0}},
 }
-"""As a snapshot of the configuration shows what `first_message` sets."""
+"""The settings of `first_message` as shown in a snapshot of the configuration."""
 
 DEVICE_GLOBAL: Final[Mapping[str, Any]] = {
     "gravity_compensation": {"enabled": True, "scaling_factor": 1.0},
@@ -60,7 +60,7 @@ def first_message(device_id: str) -> dict[str, Any]:
 
 
 def full_state_request(device_id: str) -> dict[str, Any]:
-    """Return a message whose answer has the configuration, too ("Simulation Channel", configuration vs state)."""
+    """Return a message whose answer includes the configuration ("Simulation Channel", configuration vs state)."""
     return {"session": {"force_render_full_state": {}}, **_command(device_id)}
 
 
@@ -81,7 +81,7 @@ def recorded(config: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def differing(config: Mapping[str, Any], required: Mapping[str, Any]) -> list[str]:
-    """Return which settings are not as required, in words; numbers that are equal as floats are equal."""
+    """Return a text for each setting that is not as required; numbers are compared as floats."""
     return list(_differing("", config, required))
 
 
@@ -102,7 +102,7 @@ _MAGIC: Final = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"  # RFC 6455 §1.3
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """An open session: the device's id, what the receipt says of it, and the round trip [s]."""
+    """An open session: the device's id, its fields for the receipt, and the round trip [s]."""
 
     device_id: str
     described: dict[str, Any]
@@ -114,7 +114,7 @@ class Messages:
 
     @staticmethod
     def compile() -> None:
-        """Compile what messages need, or load it from the cache: before the time for opening begins."""
+        """Compile the functions of messages, or load them from the cache, before the time for opening begins."""
         text = np.frombuffer(b"{}", np.uint8)
         build_frame(np.zeros(16, np.uint8), TEXT, text, text.size, 0)
         parse_header(text, 0, text.size, np.zeros(2, np.int64))
@@ -125,7 +125,7 @@ class Messages:
         self._header = np.zeros(2, np.int64)
 
     def upgrade(self, host: str) -> None:
-        """Make a WebSocket of the link (RFC 6455 §4.1)."""
+        """Upgrade the link to a WebSocket (RFC 6455 §4.1)."""
         key = base64.b64encode(secrets.token_bytes(16))
         self._link.send(
             b"GET / HTTP/1.1\r\nHost: %b\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
@@ -184,14 +184,14 @@ class Messages:
 
     @property
     def left(self) -> bytes:
-        """What came after the last message."""
+        """The bytes received after the last message."""
         return self._came
 
 
 def _object(text: bytes) -> dict[str, Any]:
     try:
         message = json.loads(text)
-        json.dumps(message, ensure_ascii=False, allow_nan=False).encode()  # as a receipt holds it
+        json.dumps(message, ensure_ascii=False, allow_nan=False).encode()  # as written to a receipt
     except (ValueError, RecursionError) as error:
         raise FAILURES.failure("not-json", shortened(str(error))) from None
     if not isinstance(message, dict):
@@ -230,7 +230,7 @@ def open_session(messages: Messages, link: Link, wanted_id: str = "") -> Session
 
 
 def find_device(message: Mapping[str, Any], wanted_id: str = "", *, inventory: bool = True) -> dict[str, Any]:
-    """Return what a message says of the device with this id, or of the first one."""
+    """Return the entry in a message of the device with this id, or of the first one."""
     listed = message.get("inverse3", [])
     if not isinstance(listed, list):
         raise FAILURES.failure("version", "format 3.0")
@@ -252,7 +252,7 @@ def find_device(message: Mapping[str, Any], wanted_id: str = "", *, inventory: b
 
 
 def check_status(status: Mapping[str, Any], *, at_opening: bool) -> None:
-    """Refuse a device that has no power, is not calibrated, or is used by another program."""
+    """Raise an error for a device that has no power, is not calibrated, or is used by another program."""
     for key, mode in (("power_supply", "not-ready"), ("ready", "not-ready"), ("calibrated", "uncalibrated")):
         if status.get(key) is False:
             raise FAILURES.failure(mode, f"status.{key} is false")

@@ -22,18 +22,18 @@ FAILURES: Final = read_failures(Path(__file__).with_name("failures.toml"))
 
 HOST: Final = "127.0.0.1"
 PORT: Final = 10001
-"""Of the simulation channel: docs.haply.co 3.5.x, "WebSocket Protocol" and "Settings Reference"."""
+"""Port of the simulation channel: docs.haply.co 3.5.x, "WebSocket Protocol" and "Settings Reference"."""
 OPENS_S: Final = 2.0
-"""Time for all that opens a session, from the connection to the last reply. [choice]"""
+"""Time limit for opening a session, from the connection to the last reply [s]. [choice]"""
 ANSWER_S: Final = 0.5
-"""Time for an answer over HTTP, from the connection to its last byte. [choice]"""
+"""Time limit for an answer over HTTP, from the connection to its last byte [s]. [choice]"""
 CLOSE_S: Final = 0.2
 LONGEST: Final = 1 << 16
-"""Most bytes of a message, of an answer, and of what is not read yet."""
+"""Greatest length of a message, of an answer, and of unread data [bytes]."""
 
 
 class TransferCalls(NamedTuple):
-    """A byte stream as compiled code sees it: the handle to pass, and the addresses of its functions (``TRANSFER``)."""
+    """A byte stream for compiled code: the handle to pass, and the addresses of its functions (``TRANSFER``)."""
 
     handle: int
     send: int
@@ -44,13 +44,13 @@ class Link(Protocol):
     """A byte stream."""
 
     def calls(self) -> TransferCalls:
-        """Return it as compiled code sees it; from then on nothing waits."""
+        """Return handle and function addresses for compiled code; from then on no call waits."""
 
     def send(self, data: bytes) -> None:
-        """Send all of it; raise a ``DeviceFailure`` where it does not go in time."""
+        """Send all data; raise a ``DeviceFailure`` at the time-out."""
 
     def receive(self, most: int = LONGEST) -> bytes:
-        """Return what came, nothing at its end; raise a ``DeviceFailure`` where nothing comes in time."""
+        """Return received data, b"" at the end of the stream; raise a ``DeviceFailure`` at the time-out."""
 
     def now_s(self) -> float: ...
 
@@ -59,14 +59,14 @@ class Link(Protocol):
 
 
 class SocketLink(io.RawIOBase):
-    """A TCP connection to ``host:port``, without Nagle's algorithm: for ``within_s``, and then by `calls` alone."""
+    """A TCP connection to ``host:port`` without Nagle's algorithm; after ``within_s`` only `calls` may be used."""
 
     def __init__(self, host: str = HOST, port: int = PORT, within_s: float = OPENS_S) -> None:
         self._within_s, self._until_s = within_s, time.monotonic() + within_s
         try:
             self._socket = socket.create_connection((host, port), within_s)
         except OSError as error:
-            super().close()  # without a connection there is nothing to close when this object goes
+            super().close()  # without a connection there is nothing to close
             raise FAILURES.failure("no-service", f"{host}:{port}: {error.strerror or error}") from error
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
@@ -77,7 +77,7 @@ class SocketLink(io.RawIOBase):
 
     @contextmanager
     def _in_time(self) -> Iterator[None]:
-        """Give a call the time that is left, and name its failure."""
+        """Limit a call to the remaining time, and convert its errors."""
         left_s = self._until_s - time.monotonic()
         late = FAILURES.failure("no-reply", f"not all within {self._within_s:g} s")
         if left_s <= 0.0:
@@ -99,7 +99,7 @@ class SocketLink(io.RawIOBase):
             return self._socket.recv(most)
 
     def makefile(self, _mode: str) -> io.BufferedReader:
-        """Return what comes as a file, as a socket does for the parser of HTTP."""
+        """Return received data as a file, as the HTTP parser requires of a socket."""
         return io.BufferedReader(self)
 
     def readable(self) -> bool:
@@ -130,14 +130,14 @@ def _addresses() -> tuple[int, int]:
 
 
 PORTS: Final = (10001, 10000)
-"""Of HTTP: docs.haply.co 3.5.x, "Device Configuration" uses the first, "Settings Reference" names the second."""
+"""Ports of HTTP: docs.haply.co 3.5.x, "Device Configuration" uses the first, "Settings Reference" names the second."""
 ID: Final = re.compile(r"[!#-\[\]-~]{1,64}")
-"""An id goes into each command as it is: printable ASCII but spaces, quotes and backslashes."""
+"""Permitted ids, which are inserted unescaped: printable ASCII without spaces, quotes and backslashes."""
 CAN: Final = "force as commanded by the Inverse Service 3.5 or later (Haply Hub); not proved on hardware"
 
 
 def probe(host: str = "127.0.0.1", ports: tuple[int, ...] = PORTS) -> Backend:
-    """Return what the service at ``host`` lists (docs.haply.co 3.4.x, "HTTP", Devices: GET /devices)."""
+    """Return the state of the service at ``host`` with its devices (docs.haply.co 3.4.x, "HTTP", GET /devices)."""
     answer = ask(host, "/devices", ports)
     by = "Inverse Service"
     if not isinstance(answer, dict):
@@ -150,12 +150,12 @@ def probe(host: str = "127.0.0.1", ports: tuple[int, ...] = PORTS) -> Backend:
 
 
 def shortened(value: Any) -> str:
-    """Return what a service sent, for a message: in one line, and not long."""
+    """Return data of a service for a message, shortened to one line."""
     return reprlib.repr(value)[:80]
 
 
 def force_scale(host: str, ports: tuple[int, ...] = PORTS) -> Any:
-    """Return the service's answer about the setting devices/force_scale, the multiplier of all forces; None without.
+    """Return the service's answer about the setting devices/force_scale, the multiplier of all forces, or None.
 
     Documented: "Filters" 3.5.x (the key), "Settings Reference" 3.5.x (GET /settings/KEY).
     """
@@ -163,13 +163,13 @@ def force_scale(host: str, ports: tuple[int, ...] = PORTS) -> Any:
 
 
 def check_force_scale(answer: Any) -> float:
-    """Return the multiplier of all forces in an answer, which is 1.
+    """Return the multiplier of all forces in an answer; raise an error unless it is 1.
 
     The shape of the answer is not documented: a bare number, or an object with the number as ``value`` or under the
     key, are understood.
     """
     scale = answer.get("value", answer.get("devices/force_scale")) if isinstance(answer, dict) else answer
-    if type(scale) not in {int, float}:  # a bool is none
+    if type(scale) not in {int, float}:  # a bool is not a number
         where = f"within {ANSWER_S:g} s" if answer is None else f"in {shortened(answer)}"
         raise FAILURES.failure("unknown-scale", f"no number {where}")
     if scale != 1:
@@ -178,7 +178,7 @@ def check_force_scale(answer: Any) -> float:
 
 
 def ask(host: str, path: str, ports: tuple[int, ...] = PORTS) -> Any:
-    """Return what the service answers to a GET as JSON; None where nothing at these ports does in `ANSWER_S`.
+    """Return the service's JSON answer to a GET request; None if no port answers within `ANSWER_S`.
 
     The connection uses no proxy of the system: the service is in the local network.
     """

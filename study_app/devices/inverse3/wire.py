@@ -102,7 +102,7 @@ _SCALE = 10**_DECIMALS
 
 @kernel
 def put_text(out: Any, at: int, text: Any) -> int:
-    """Copy ``text`` to ``out`` from ``at`` on; return where it ends."""
+    """Copy ``text`` to ``out`` from ``at`` on; return the end."""
     for k in range(text.size):
         out[at + k] = text[k]
     return at + int(text.size)
@@ -110,7 +110,7 @@ def put_text(out: Any, at: int, text: Any) -> int:
 
 @kernel
 def put_fixed(out: Any, at: int, value: float) -> int:
-    """Write a number below 10^9 with six decimals, as JSON takes it, from ``at`` on; return where it ends."""
+    """Write a number below 10^9 as JSON with six decimals from ``at`` on; return the end."""
     whole = int(abs(value) * _SCALE + 0.5)
     if value < 0.0 and whole > 0:
         out[at] = np.uint8(45)
@@ -153,7 +153,7 @@ _PLACES: Final = (
 )
 POSITION, VELOCITY, READY, CALIBRATED, POWER, BUTTON, BUTTONS = 0, 3, 6, 7, 8, 9, 10
 PLACES: Final = len(_PLACES)
-_OF_DEVICE = 9  # places of the inverse3; those after them are of grips
+_OF_DEVICE = 9  # positions of the inverse3; later ones are of grips
 _NEEDED = 0b111
 
 SCAN = np.dtype(
@@ -161,20 +161,20 @@ SCAN = np.dtype(
         ("own_id", np.uint64),  # hash of the device's id
         ("kinds", np.int64, (DEEPEST,)),
         ("paths", np.uint64, (DEEPEST,)),
-        ("candidate", np.float64, (PLACES,)),  # of the device that is being read
-        ("seen", np.int64),  # bits of the places that the candidate has
+        ("candidate", np.float64, (PLACES,)),  # of the device being read
+        ("seen", np.int64),  # bits of the values read for the candidate
         ("value", np.float64, (PLACES,)),  # of the device
-        ("known", np.int64),  # bits of the places that were found
+        ("known", np.int64),  # bits of the values read for the device
         ("is_own", np.int64),  # 1: the id of the candidate is the device's
         ("found", np.int64),  # 1: the message lists the device
-        ("infinite", np.int64),  # 1: a number of the device is beyond what a float64 holds
+        ("infinite", np.int64),  # 1: a number of the device exceeds the range of float64
     ],
     align=True,
 )
 
 
 def text_hash(text: bytes) -> int:
-    """Return the 64-bit FNV-1a hash of a string as it stands between the quotes."""
+    """Return the 64-bit FNV-1a hash of the bytes of a string between its quotes."""
     value = _FNV_BASIS
     for byte in text:
         value = ((value ^ byte) * _FNV_PRIME) % 2**64
@@ -198,7 +198,7 @@ _TENS = np.array([float(f"1e{power}") for power in range(309)] + [np.inf])
 
 @kernel
 def scan(data: Any, begin: int, end: int, state: Any) -> int:
-    """Read the message from ``begin`` to ``end``; return `UNDERSTOOD` or why it says nothing of the device.
+    """Read the message from ``begin`` to ``end``; return `UNDERSTOOD` or the reason why it gives no position.
 
     ``state`` is a record of `SCAN`; its ``own_id`` says which device is meant.
     """
@@ -267,7 +267,7 @@ def _verdict(state: Any) -> int:
 
 @kernel
 def _keep(state: Any) -> None:
-    """Take over what was read of a device, if it is the one."""
+    """Accept the values read for a device if its id matches."""
     if state.is_own == 0:
         return
     state.found = 1
@@ -281,7 +281,7 @@ def _keep(state: Any) -> None:
 
 @kernel
 def _skip(data: Any, at: int, end: int) -> int:
-    """Return where the white space from ``at`` on ends; a negative ``at`` as it is."""
+    """Return the end of the white space from ``at`` on; a negative ``at`` is returned unchanged."""
     while 0 <= at < end and data[at] <= 32:
         byte = data[at]
         if byte != 32 and byte != 10 and byte != 13 and byte != 9:  # noqa: PLR1714 - compiled
@@ -292,7 +292,7 @@ def _skip(data: Any, at: int, end: int) -> int:
 
 @kernel
 def _string_end(data: Any, at: int, end: int) -> int:
-    """Return where the closing quote of the string at ``at`` is; -1 where there is none."""
+    """Return the position of the closing quote of the string at ``at``; -1 if there is none."""
     if at >= end or data[at] != 34:
         return -1
     at += 1
@@ -309,7 +309,7 @@ def _string_end(data: Any, at: int, end: int) -> int:
 
 @kernel
 def _is_escape(data: Any, at: int, end: int) -> bool:
-    """Return whether what follows a backslash is an escape (RFC 8259 §7): a letter of these, or u and four digits."""
+    """Return whether the bytes after a backslash are an escape (RFC 8259 §7): a letter, or u and four digits."""
     if data[at] != 117:
         return data[at] in (34, 92, 47, 98, 102, 110, 114, 116)
     if at + 4 >= end:
@@ -331,7 +331,7 @@ def _hash(data: Any, begin: int, end: int) -> Any:
 
 @kernel
 def _scalar(data: Any, at: int, end: int, path: Any, state: Any) -> int:
-    """Read a string, number or literal, and keep it where its place is known; return where it ends, -1: nowhere."""
+    """Read a string, number or literal, and store it if its path is known; return the end, -1 if it is invalid."""
     byte = data[at]
     if byte == 34:
         close = _string_end(data, at, end)
@@ -365,7 +365,7 @@ def _literal(data: Any, at: int, end: int, word: Any, value: float, path: Any, s
 
 @kernel
 def _number(data: Any, at: int, end: int, path: Any, state: Any) -> int:
-    """Read a number: right to 1 part in 10^15, which is far below what a device resolves."""
+    """Read a number with a relative error up to 1e-15, far below a device's resolution."""
     negative = data[at] == 45
     if negative:
         at += 1

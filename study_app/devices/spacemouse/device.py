@@ -30,12 +30,12 @@ from study_app.devices.spacemouse.hid import (
 
 _REPORT_BYTES = 64
 _WAIT_MS = 10
-_SILENT_S = 0.5  # it repeats a held displacement every 8 or 16 ms: silent for longer, it is not held
+_SILENT_S = 0.5  # a held displacement is repeated every 8 or 16 ms: after a longer silence the cap was released
 _LONGEST_STEP_S = 0.05
 
 
 class SpaceMouseDevice(PointedDevice):
-    """The SpaceMouse that is connected; it can be pulled out and opened again.
+    """The connected SpaceMouse; it can be unplugged and opened again.
 
     Parameters
     ----------
@@ -61,14 +61,14 @@ class SpaceMouseDevice(PointedDevice):
         self._ending = threading.Event()
 
     def open(self) -> None:
-        """Find it, open it, and read it from now on.
+        """Find the SpaceMouse, open it, and start reading.
 
         Raises
         ------
         DeviceNotFound
             None is connected.
         DeviceError
-            There is one, and it cannot be opened or reports no motion.
+            It cannot be opened or reports no motion.
         """
         if self.thread is not None and self.thread.is_alive():
             return
@@ -85,7 +85,7 @@ class SpaceMouseDevice(PointedDevice):
         self.thread.start()
 
     def close(self) -> None:
-        """Take the force off the handle and let go of the device; a second call does nothing."""
+        """Remove the force from the handle and close the device; a second call does nothing."""
         super().close()
         thread, self.thread = self.thread, None
         if thread is not None:
@@ -105,7 +105,7 @@ class SpaceMouseDevice(PointedDevice):
         return super().describe() | own
 
     def _read_on(self) -> None:
-        """Read until the mouse is closed or lost; the servo learns of a loss at its next tick."""
+        """Read until the mouse is closed or lost; the servo detects a loss at its next tick."""
         assert self._model is not None  # noqa: S101 - it is open
         moving = Displacement(right=0, toward=0, down=0)
         place_m = self.aim_m
@@ -133,5 +133,5 @@ class SpaceMouseDevice(PointedDevice):
 
     def _light(self, *, on: bool) -> None:
         if self._model is not None and self._model.light:
-            with suppress(OSError, ValueError):  # one without a light, or gone
+            with suppress(OSError, ValueError):  # it has no light, or was unplugged
                 self._open_hid.write(bytes([LED, int(on)]))

@@ -24,7 +24,7 @@ from study_app.haptics.model.ranges import Vector
 DISPLACEMENT, BUTTONS, LED = 1, 3, 4
 FULL_DEFLECTION: Final = 350
 DEAD_DEFLECTION: Final = 20
-"""A released cap does not come to rest at exactly 0."""
+"""Deflection up to which the cap counts as released, since it does not rest at exactly 0."""
 FULL_SPEED_MPS: Final = 0.25
 USAGE: Final = (1, 8)
 """Page and usage of the collection that reports motion: generic desktop, multi-axis controller."""
@@ -35,7 +35,7 @@ _KNOWN_BUTTONS: Final = 0b11
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Model:
-    """One of 3Dconnexion's; ``escape`` is the bit of its Esc button, None where it has none."""
+    """A model of 3Dconnexion; ``escape`` is the bit of its Esc button, or None."""
 
     name: str
     vendor: int
@@ -63,7 +63,7 @@ MODELS: Final = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Displacement:
-    """Of the cap, about -350 to 350 each: right, toward the user, down."""
+    """The displacement of the cap to the right, toward the user and down, about -350 to 350 each."""
 
     right: int
     toward: int
@@ -72,13 +72,13 @@ class Displacement:
 
 @dataclass(frozen=True, slots=True)
 class Buttons:
-    """Bit 0 is the device's first button."""
+    """The pressed buttons; bit 0 is the device's first button."""
 
     held: int
 
 
 def parse(report: bytes) -> Displacement | Buttons | None:
-    """Return what ``report`` says; None where that is nothing to us, or it is cut short."""
+    """Return the displacement or buttons in ``report``; None for other or truncated reports."""
     if not report:
         return None
     kind, rest = report[0], report[1:]
@@ -91,9 +91,9 @@ def parse(report: bytes) -> Displacement | Buttons | None:
 
 
 def program_buttons(held: int, model: Model) -> int:
-    """Return the program's buttons for the device's: the first goes on; Esc, or the first two at once, stop the force.
+    """Return the program's buttons: the first one continues; Esc, or the first two together, stops the force.
 
-    So every model can stop it, and no button of a large one does anything unexpected.
+    So every model can stop the force, and no other button of a large model has an effect.
     """
     buttons = held & _KNOWN_BUTTONS
     escape = model.escape is not None and bool(held >> model.escape & 1)
@@ -103,12 +103,12 @@ def program_buttons(held: int, model: Model) -> int:
 
 
 def velocity_mps(displacement: Displacement) -> Vector:
-    """Return the velocity of the hand (x right, y up, z toward the user) that a displacement asks for [m/s]."""
+    """Return the hand's velocity (x right, y up, z toward the user) for a displacement [m/s]."""
     return _speed(displacement.right), -_speed(displacement.down), _speed(displacement.toward)
 
 
 def _speed(deflection: int) -> float:
-    """Nothing within the dead zone, from there on in proportion, and no more than full."""
+    """Return the speed for a deflection [m/s]: 0 in the dead zone, then proportional up to the maximum."""
     beyond = min(abs(deflection), FULL_DEFLECTION) - DEAD_DEFLECTION
     share = max(beyond, 0) / (FULL_DEFLECTION - DEAD_DEFLECTION)
     return FULL_SPEED_MPS * (share if deflection > 0 else -share)
@@ -132,7 +132,7 @@ _NO_MOTION_INTERFACE: Final = (
 
 
 def load_hid() -> Any:
-    """Return hidapi's module: on Linux the one that leaves the kernel's driver in place."""
+    """Return hidapi's module; on Linux the variant that leaves the kernel's driver attached."""
     names = ("hidraw", "hid") if sys.platform.startswith("linux") else ("hid",)
     reason = ""
     for name in names:
@@ -144,7 +144,7 @@ def load_hid() -> Any:
 
 
 def find_space_mice(hid: Any) -> list[tuple[Model, dict[str, Any]]]:
-    """Return model and hidapi's description of every interface of every SpaceMouse that is connected."""
+    """Return model and hidapi's description of every interface of every connected SpaceMouse."""
     known = {(model.vendor, model.product): model for model in MODELS}
     listed = [
         (known.get((interface["vendor_id"], interface["product_id"])), interface) for interface in hid.enumerate()
@@ -153,7 +153,7 @@ def find_space_mice(hid: Any) -> list[tuple[Model, dict[str, Any]]]:
 
 
 def choose(interfaces: list[tuple[Model, dict[str, Any]]]) -> tuple[Model, bytes]:
-    """Return the first interface that reports motion; one that does not tell what it reports may be one."""
+    """Return the first interface that reports motion; an interface without usage information counts as such."""
     if not interfaces:
         raise DeviceNotFound(
             "no SpaceMouse is connected: connect it, or turn it on; known models are "
@@ -168,7 +168,7 @@ def choose(interfaces: list[tuple[Model, dict[str, Any]]]) -> tuple[Model, bytes
 
 
 def opened(hid: Any, model: Model, path: bytes) -> Any:
-    """Return hidapi's device of this path, open; raise ``DeviceError`` with what to do on this system."""
+    """Open hidapi's device at this path; raise ``DeviceError`` with the remedy on this system."""
     device = hid.device()
     try:
         device.open_path(path)
@@ -179,7 +179,7 @@ def opened(hid: Any, model: Model, path: bytes) -> Any:
 
 
 def probe(hid: Any = None) -> list[Backend]:
-    """Return what hidapi finds.
+    """Return the state of hidapi and the connected SpaceMice.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ def external(symbol: str, signature: Any) -> Any:
 
 
 def call_at(signature: Any) -> Any:
-    """Return a function for compiled code: (address, *arguments) -> what the C function at the address returns."""
+    """Return a function for compiled code: (address, *arguments) -> the result of the C function at the address."""
 
     def call(_typing_context: Any, _address: Any, *_arguments: Any) -> Any:
         def generate(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
@@ -111,7 +111,7 @@ def record_at(dtype: np.dtype[Any]) -> Any:
 
 
 def stack_memory(word_count: int) -> Any:
-    """Return a function for compiled code: -> the address (intp) of ``words`` 8-byte words on its own stack."""
+    """Return a function for compiled code: -> the address (intp) of ``word_count`` 8-byte words on its own stack."""
     block = ir.ArrayType(ir.IntType(64), word_count)
 
     def allocate(_typing_context: Any) -> Any:
@@ -155,5 +155,5 @@ reading_at, command_at = record_at(READING), record_at(COMMAND)
 
 
 def device_functions(read: Callable[..., int], write: Callable[..., int]) -> tuple[Any, Any]:
-    """Compile the functions of a device (``READ``, ``WRITE``); call it once for all devices of a kind."""
+    """Compile the functions of a device (``READ``, ``WRITE``); call this once for all devices of a kind."""
     return c_function(READ, read), c_function(WRITE, write)

@@ -172,7 +172,7 @@ CACHE: Path | None = _use_own_cache()
 
 
 class PackageCacheLocator(UserProvidedCacheLocator):
-    """Finds compiled functions of this package by the sources' digest and their path in the package.
+    """Locate compiled functions of this package by the sources' digest and their path in the package.
 
     numba would look under the absolute path of their file, and in a frozen program under the bytes of its executable.
     """
@@ -262,7 +262,7 @@ class _Cache(FunctionCache):
 
 
 class _Kernel(CPUDispatcher):
-    """A compiled function. What a call from Python needs is compiled only if Python calls it."""
+    """A compiled function; its interface for Python is compiled only if Python calls it."""
 
     _cache: Any  # where nothing can be kept, numba's own without ``of_step``
     _compiler: Any
@@ -278,7 +278,7 @@ class _Kernel(CPUDispatcher):
         self._compiler.pipeline_class = _StepCompiler if of_step else Compiler
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """Compile it for a compiled function that calls it."""
+        """Compile the function for a compiled caller."""
         with global_compiler_lock:
             before = self._of_step
             self._choose(True)
@@ -288,7 +288,7 @@ class _Kernel(CPUDispatcher):
                 self._choose(before)
 
     def compile(self, sig: Any) -> Any:
-        """Compile it. What was compiled for compiled callers alone is compiled again for Python."""
+        """Compile the function for Python, again if it was compiled only for compiled callers."""
         with global_compiler_lock:
             arguments = tuple(normalize_signature(sig)[0])  # type: ignore[no-untyped-call]
             if not self._of_step and arguments in self.overloads and not _is_callable(self.overloads[arguments]):
@@ -296,7 +296,7 @@ class _Kernel(CPUDispatcher):
             return super().compile(sig)
 
     def add_overload(self, cres: Any) -> None:
-        """Let calls from Python find it if they may."""
+        """Make a specialisation available to Python if it can be called from there."""
         if _is_callable(cres):
             super().add_overload(cres)
         else:
@@ -368,7 +368,7 @@ class _Counter(event.Listener):
 
 @contextmanager
 def following_compilation(progress: Callable[[float], object]) -> Iterator[_Counter]:
-    """Give ``progress`` the share done (0 to 1) after each function that is compiled within the block."""
+    """Report the fraction done (0 to 1) to ``progress`` after each function compiled within the block."""
     counter = _Counter(progress)
     with event.install_listener("numba:compile", counter):
         yield counter

@@ -31,9 +31,9 @@ JERK_OF_SURPRISE_M2PS5: Final = 300.0
 SURPRISE: Final = 4.0
 """Mean of Σ innovation² / its variance above which the jerk is raised: a reach that begins within 50 ms at rest."""
 TIMING_S: Final = 20e-6
-"""Standard deviation of a sample's time."""
+"""Standard deviation of a sample's time [s]."""
 CORNER_RADPS: Final = 2.0 * math.pi * 6.0
-"""Of both high-pass filters."""
+"""Corner frequency of both high-pass filters [rad/s]."""
 USUAL_PER_KG: Final = 1.5
 LEARNING_PKG2S: Final = 10.0
 """Growth rate of the variance of θ [1/(kg² s)]."""
@@ -48,7 +48,7 @@ this."""
 REPEATED: Final = 9.0
 """Innovation² / its variance above which an unchanged position counts as a repeated sample."""
 TROUBLE_S: Final = 20e-3
-"""Over what time."""
+"""Time over which that mean is taken [s]."""
 QUIET_S: Final = 1.0
 CARRIED_S: Final = 10e-3
 NOTHING: Final = 1e-30
@@ -66,7 +66,7 @@ def reset_estimator(parameters: Record, state: Record) -> None:
 
 @part
 def estimate_velocity(parameters: Record, state: Record, interval_s: float) -> None:
-    """Bring ``state.estimate_mps`` and ``state.velocity_mps`` to the newest position, Δt after the one before."""
+    """Update ``state.estimate_mps`` and ``state.velocity_mps`` to the newest position, Δt after the one before."""
     if parameters.estimator == estimators.EWMA:
         _ewma(parameters, state, state.estimate_mps, interval_s)
     elif parameters.estimator == estimators.KALMAN:
@@ -152,7 +152,7 @@ def take_force(state: Record, safety: Record) -> None:
 
 @part
 def filter_velocity(parameters: Record, state: Record, interval_s: float) -> None:
-    """Bring ``state.estimate_mps`` to the newest position; EWMA's estimate is already in ``smoothed_mps``."""
+    """Update ``state.estimate_mps`` to the newest position; EWMA's estimate is already in ``smoothed_mps``."""
     filtered = state.kalman
     _filter_force(filtered, interval_s)
     ratio = _correct(parameters, state, filtered, interval_s)

@@ -34,7 +34,7 @@ FASTER_SAMPLES = 1000
 CONTROL = np.dtype(
     [
         # written by the host
-        ("run", np.int64),  # 1 while the loop may go on
+        ("run", np.int64),  # 1 while the loop may run
         ("stop", np.int64),  # 1 for no force; the loop also sets it when the device's stop button is down
         ("request", np.int64),  # counts the scenes handed over; the newest is in slot request % 2
         ("numbers", np.int64),  # counts the updates of the active scene with the constants of the spare slot
@@ -43,10 +43,10 @@ CONTROL = np.dtype(
         # written by the loop
         ("taken", np.int64),  # the request that is active
         ("numbers_taken", np.int64),  # likewise
-        ("deadline_ns", np.int64),  # when the next tick is due
+        ("deadline_ns", np.int64),  # time at which the next tick is due
         ("ticks", np.int64),  # ticks completed
         ("overruns", np.int64),  # deadlines passed over because a tick did not fit
-        ("began_ns", np.int64),  # when the last tick began
+        ("began_ns", np.int64),  # start time of the last tick
         ("hung", np.int64),  # 1 if the last tick took 50 ms or more
         ("worst_gap_ns", np.int64),  # the longest time between two ticks since the active scene was requested
         ("status", np.int64),  # STATUS_* of the last tick; any other than STATUS_OK ends the loop
@@ -232,7 +232,7 @@ def _take_scene(host: Any, slots: Any, safety: Any, sample: Any) -> None:
     """Switch to a newly requested scene, and copy newly requested constants into the active one."""
     request, numbers = host.request, host.numbers
     if request != host.taken:
-        host.worst_gap_ns = 0  # before the host sees the new ``taken``
+        host.worst_gap_ns = 0  # before the host reads the new ``taken``
         c_functions.fence()
         host.taken = request
         begin_scene(safety)

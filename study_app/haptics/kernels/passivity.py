@@ -257,7 +257,7 @@ def update_observer(model: Any, safety: layout.Record, interval_s: float) -> Non
 
 @part
 def _watch_motion(parameters: layout.Record, passivity: layout.Record, interval_s: float) -> None:
-    """Measure for how long the hand moved fast of late, for how long it is quiet, and since when no sample was missing.
+    """Measure how long the hand recently moved fast, how long it has been quiet, and the time since the last gap.
 
     Its velocity counts without what is slow: a filter of 10 Hz separates shaking from stirring. It is fast if the
     handle has more kinetic energy than the force can have given to it without a debt; a handle that was let go is so
@@ -334,7 +334,7 @@ def reduce_gain(parameters: layout.Record, passivity: layout.Record, sample: lay
 
 @part
 def _judge_debt(parameters: layout.Record, passivity: layout.Record, left_j: float) -> float:
-    """Say why a debt began, and forgive one that a push caused once the hand is quiet; return the energy left [J]."""
+    """Classify the cause of a debt; forgive one caused by a push once the hand is quiet. Return the energy left [J]."""
     if left_j < 0.0 and passivity.debt in (layout.DEBT_NONE, layout.DEBT_FORGIVEN):
         pushed = passivity.fast_s > LEAST_PUSH_S and passivity.gap_s > PUSHED_S
         passivity.debt = layout.DEBT_PUSHED if pushed else layout.DEBT_OWN

@@ -95,7 +95,7 @@ def _plausible(
     """Return whether the position is plausible for a hand, and within reach of the last accepted one."""
     hand_m = sample.position_m
     for axis in range(3):
-        if not abs(hand_m[axis]) <= FARTHEST_HAND_M:  # NaN neither
+        if not abs(hand_m[axis]) <= FARTHEST_HAND_M:  # also rejects NaN
             return False
     if parameters.estimator == DEVICE and not _has_velocity(sample):
         return False
@@ -177,7 +177,7 @@ def can_have_moved(from_m: Any, to_m: Any, interval_s: float) -> bool:
 def _has_velocity(sample: layout.Record) -> bool:
     """Return whether the device measured a velocity that is plausible for a hand."""
     for axis in range(3):
-        if not abs(sample.device_velocity_mps[axis]) <= FASTEST_HAND_MPS:  # NaN neither
+        if not abs(sample.device_velocity_mps[axis]) <= FASTEST_HAND_MPS:  # also rejects NaN
             return False
     return bool(sample.measured & layout.MEASURED_VELOCITY)
 

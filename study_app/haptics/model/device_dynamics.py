@@ -35,7 +35,7 @@ class Dynamics(NamedTuple):
 
     @property
     def unknown(self) -> tuple[str, ...]:
-        """The names of the values that are not known: of the delay, and those assumed."""
+        """The names of the unknown values: the delay if it was not measured, and the assumed values."""
         return (*(("delay_s",) if self.delay_s is None else ()), *self.assumed)
 
     def describe(self) -> dict[str, Any]:

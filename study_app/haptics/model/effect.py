@@ -88,7 +88,7 @@ def _nothing_to_fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[s
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effect:
-    """What the program needs to know about one effect.
+    """The properties of an effect that the program uses outside of its kernel.
 
     Parameters
     ----------

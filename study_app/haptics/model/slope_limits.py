@@ -21,7 +21,7 @@ from study_app.haptics.model.gate import met_mps, resolve
 from study_app.haptics.model.scene import Ewma, Given, Kalman, Scene, Velocity, Withdrawn
 
 SLOWEST_HZ: Final = 500.0
-"""Slower servos are for trials only: participants would feel the limits rather than the liquids."""
+"""Lowest rate for participants [Hz]: with slower servos they would feel the limits rather than the liquids."""
 INERTIA_SHARE: Final = 0.3
 """Share of the drag limit for added mass and history if they need not be exact."""
 MEASURED_KG: Final = 0.1
@@ -32,7 +32,7 @@ in honey if the delay was one tick longer than assumed; from 1.8 on none of 801 
 SLEW_N: Final = 1.5
 """Greatest change of the force within a millisecond on a handle of `MEASURED_KG` or more."""
 KALMAN_SLEW: Final = 0.8
-"""Its share with "kalman": at 1, a released handle oscillated in tar if the delay was one tick longer than assumed."""
+"""Factor on `SLEW_N` with "kalman": at 1, a released handle oscillated in tar if the delay was one tick longer."""
 SLEW_S: Final = 1e-3
 NOMINAL_S: Final = 1e-3
 _THESIS: Final = Ewma()
@@ -168,7 +168,7 @@ def table() -> tuple[Entry, ...]:
 
 
 def refuses(rate_hz: float) -> str | None:
-    """Return why a servo of this rate must not run a participant, in a sentence; None if it may."""
+    """Return the reason why a servo of this rate must not run a participant, in a sentence, or None."""
     if rate_hz >= SLOWEST_HZ:
         return None
     return (

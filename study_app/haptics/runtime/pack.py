@@ -40,7 +40,7 @@ EffectRows.__doc__ = "The arrays of a model that effects own, by name."
 Counts: TypeAlias = Mapping[str, int]
 """A number of rows for each of these arrays."""
 RESOLUTION = 1e-6
-"""Of the factor of smoothing rates."""
+"""Resolution of the factor of smoothing rates."""
 _COMPRESSIONS = {"none": layout.COMPRESSION_NONE, "sqrt": layout.COMPRESSION_SQRT, "square": layout.COMPRESSION_SQUARE}
 
 
@@ -53,7 +53,7 @@ def rows_needed(scene: Scene) -> Counts:
 
 
 def no_rows() -> Counts:
-    """Return none."""
+    """Return a count of 0 for every array."""
     return dict.fromkeys(_ARRAYS, 0)
 
 

@@ -38,7 +38,7 @@ from study_app.haptics.runtime.pack import pack, pack_into
 from study_app.haptics.runtime.telemetry import Telemetry
 
 _FOREVER = -1
-_PATIENCE_S = 2.0  # until the loop ends when asked; it takes one tick
+_PATIENCE_S = 2.0  # time limit for the loop to end on request [s]; it takes one tick
 _STUCK_NS = 75_000_000  # lateness that counts as hanging: checked every frame, it is detected within 100 ms
 _SUSPENDED_NS = 100_000_000  # less is the error of reading two clocks in sequence
 _THAW_S = 0.25  # time for the loop to continue after the whole process stood still

@@ -45,7 +45,7 @@ class Estimates:
     warnings: tuple[str, ...]
 
     def row(self, it: Parameter) -> tuple[str, str]:
-        """Return a parameter's value and interval in words, to five digits; whole numbers as they are."""
+        """Return a parameter's value and interval as texts, with five digits; whole numbers in full."""
         value, (lower, upper) = self.values[it.name], self.intervals[it.name]
         anything = lower <= max(it.least, 1e-12) * (1 + 1e-9) and upper >= it.most
         return (f"{value}" if it.whole else f"{value:.5g}"), "anything" if anything else f"{lower:.5g} … {upper:.5g}"
@@ -124,7 +124,7 @@ def _ends(it: Parameter, u: float, half: float) -> tuple[float, float]:
 
 
 def _alike(correlation: Floats, limit: float) -> list[tuple[int, int]]:
-    """Return every two parameters that cannot be distinguished."""
+    """Return the index pairs of parameters that cannot be distinguished."""
     count = len(correlation)
     return [(j, k) for k in range(count) for j in range(k) if abs(correlation[j, k]) > limit]
 
@@ -162,7 +162,7 @@ def _of_the_parameters(
 
 
 def _edge(problem: Problem, k: int, z: Floats) -> str:
-    """Return why the range ends there, if the model alone does not determine it."""
+    """Return the reason for the end of a range that is not determined by the model alone, or ""."""
     it = problem.parameters[k]
     if it.field in NO_LESS_THAN and z[k] - problem.least[k] < problem.most[k] - z[k]:
         return f" (no less than {NO_LESS_THAN[it.field]})"

@@ -25,7 +25,7 @@ from study_app.lab.identify.search import ForceProblem, Problem
 
 FOLLOWING: Final = 0.1
 CHANCE: Final = 5.0
-"""Residuals count as correlated above this correlation, and above this many standard deviations of noise."""
+"""Number of standard deviations of noise above which residuals count as correlated."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -102,7 +102,7 @@ def _rms(vectors_n: Floats) -> float:
 CURVE_TABLE: Final = "non_newtonian"
 LEAST_OF_A_BRANCH: Final = 6
 APART: Final = 5.0
-"""Branches differ if the gap between them is so many times its noise. [choice] See `test_noise_makes_no_branches`."""
+"""Smallest ratio of the gap between branches to its noise. [choice] See `test_noise_makes_no_branches`."""
 LEAST_GAP: Final = 0.01
 
 
@@ -164,8 +164,8 @@ def _of_branches(curve: FlowCurve) -> Iterator[str]:
     if size > APART * noise and size > LEAST_GAP:
         yield (
             f"{branches.description} differ by {100 * math.expm1(size):.0f} % of the stress, which noise does not "
-            "explain: thixotropy or hysteresis; the fit lies between them, and the intervals do not cover both: fit one "
-            "branch"
+            "explain: thixotropy or hysteresis; the fit lies between them, and the intervals do not cover both: fit "
+            "one branch"
         )
 
 

@@ -15,7 +15,7 @@ from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.scene import Liquid, Scene
 
 THRESHOLDS: Final = tuple(name for effect in EFFECTS for name in effect.thresholds)
-"""Thresholds: the force does not change with them, or jumps."""
+"""Thresholds, which cannot be fitted: the force does not change with them, or jumps."""
 NO_LESS_THAN: Final = {"scaling": "length", "thickened_viscosity_pa_s": "zero_shear_viscosity_pa_s"}
 """Fields that must not be less than another of the same table."""
 

@@ -28,7 +28,7 @@ _STARTS: Final = 6
 _AROUND: Final = (0.5, 0.7, 1.4, 2.0)
 _ROUNDS: Final = 4
 _BETTER: Final = 1e-4
-_TRIAL: Final = 4  # steps from each start, before the best continue
+_TRIAL: Final = 4  # steps from each start before the best one continues
 _MOST: Final = 100
 _STEP: Final = 1e-4
 _LENGTH_STEP: Final = 1e-2
@@ -36,12 +36,12 @@ _ROUNDING: Final = 1e-12  # of exp(log(N)), so that S = N stays so
 
 
 class Coordinate(NamedTuple):
-    """How a parameter is searched: by a monotonic function u of its value; ``step`` for its derivative."""
+    """The search variable u of a parameter, a monotonic function of its value; ``step`` is for its derivative."""
 
     to_u: Callable[[float], float]
     to_value: Callable[[float], float]
     step: float
-    relative: bool  # whether the step is a share of u
+    relative: bool  # whether the step is a fraction of u
 
 
 _LINEAR: Final = Coordinate(lambda value: value, lambda u: u, _STEP, relative=True)
@@ -53,7 +53,7 @@ _RATE: Final = Coordinate(lambda value: -1e3 * math.log(value), lambda u: math.e
 
 
 def coordinate(parameter: Parameter) -> Coordinate:
-    """Return how a parameter is searched."""
+    """Return the search variable of a parameter."""
     if parameter.whole:
         return _COUNT
     if parameter.field == "decay":
@@ -140,7 +140,7 @@ class Problem:
         return np.column_stack(columns)
 
     def slopes_of_u(self, z: Floats) -> Floats:
-        """Return the derivative by u instead, (m, p)."""
+        """Return the derivative of the misfit by u, (m, p)."""
         slopes = self.slopes(z)
         for k, lesser in self.lesser.items():
             slopes[:, lesser] -= slopes[:, k]

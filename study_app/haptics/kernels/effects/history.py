@@ -75,7 +75,7 @@ def basset_force(
 
 @part
 def _storing_square(parameters: Record, local: Record, tracks: Record) -> float:
-    """Return v² [m²/s²] of the energy that it stores, with v smoothed as for the added mass."""
+    """Return v² [m²/s²] of the energy that the history stores, with v smoothed as for the added mass."""
     if parameters.estimator != KALMAN:
         return float(square(local.motion_mps))
     square_m2ps2 = 0.0

@@ -171,7 +171,7 @@ def _move_reference(wake: Record, tracks: Record, elements: Any) -> None:
 
 @kernel
 def renew(wake: Record, tracks: Record, elements: Any, segments: Any) -> None:
-    """Bring the scale back to 1 and all sums to those of the elements held: O(N), at most once in N evictions."""
+    """Reset the scale to 1 and recompute all sums from the stored elements: O(N), at most once in N evictions."""
     number = tracks.first_segment
     left = segments[wake.row + number % wake.length].count
     scale, first, last = tracks.scale, tracks.first_segment, tracks.last_segment
@@ -206,7 +206,7 @@ def _count_speed(tracks: Record, segment: Record, speed_mps: float, sign: float)
 
 @part
 def _add_interior(tracks: Record, segment: Record, sign: float) -> None:
-    """Add what a segment contributes to the interior, or with ``sign`` −1 subtract exactly that."""
+    """Add a segment's contribution to the interior, or subtract exactly that with ``sign`` −1."""
     speed_mps = segment.speed_mps + segment.speed_carry_mps
     for axis in range(3):
         term = sign * (segment.direction[axis] * speed_mps)

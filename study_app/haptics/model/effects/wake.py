@@ -24,7 +24,7 @@ BIT = 1 << 1
 
 
 class Tail(Protocol):
-    """What `Wake` and `local_wake.LocalWake` share."""
+    """The common parameters of `Wake` and `local_wake.LocalWake`."""
 
     @property
     def length(self) -> int: ...
@@ -82,7 +82,7 @@ class Wake(Frozen):
 
 
 def within_scaling(wake: W) -> W:
-    """Return a wake."""
+    """Return the wake; raise ValueError if it could move faster than the body (N > S)."""
     if wake.length > wake.scaling:
         raise ValueError(
             f"length {wake.length} exceeds scaling {wake.scaling:g}: the wake would outrun the body; "

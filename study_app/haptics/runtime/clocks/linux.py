@@ -24,7 +24,7 @@ SERVICE: Final = "org.freedesktop.RealtimeKit1"
 OBJECT: Final = "/org/freedesktop/RealtimeKit1"
 BUS: Final = "org.freedesktop.DBus"
 PATIENCE_S: Final = 2.0  # the service may have to be started first
-PRIORITY: Final = 20  # highest level granted if it reports none
+PRIORITY: Final = 20  # highest level granted if the service reports none
 
 _CALL, _RETURN, _ERROR = 1, 2, 3
 _PATH, _INTERFACE, _MEMBER, _DESTINATION, _SIGNATURE = 1, 2, 3, 6, 8

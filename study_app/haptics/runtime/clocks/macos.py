@@ -93,6 +93,6 @@ def raise_priority(*, real_time: bool = True) -> Grant:
 
 
 def lock_memory(blocks: Blocks) -> bool:
-    """Keep ``blocks`` from being swapped out; tell whether they are."""
+    """Lock ``blocks`` in memory; return whether they are locked."""
     library = ctypes.CDLL(None)
     return all(library.mlock(ctypes.c_void_p(address), ctypes.c_size_t(size)) == 0 for address, size in blocks)

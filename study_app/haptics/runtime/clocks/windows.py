@@ -125,7 +125,7 @@ def ask(avrt: Any, kernel32: Any) -> Grant:
 
 
 def lock_memory(blocks: Blocks) -> bool:
-    """Keep ``blocks`` from being swapped out; tell whether they are."""
+    """Lock ``blocks`` in memory; return whether they are locked."""
     if sys.platform == "win32":
         kernel32 = ctypes.WinDLL("kernel32")
         kernel32.VirtualLock.argtypes = [ctypes.c_void_p, ctypes.c_size_t]
