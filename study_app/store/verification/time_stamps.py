@@ -1,4 +1,4 @@
-"""Time stamps (RFC 3161) of the lines of a proof: asked of a server, and verified against its root certificate."""
+"""Time stamps (RFC 3161) of the lines of a proof: requested from a server and verified with its root certificate."""
 
 import base64
 import queue
@@ -16,12 +16,12 @@ from study_app.store.atomic import read_regular
 EXTRA: Final = "needs the optional extra proofs: pip install 'liquid-study[proofs]'"
 WAITS_S: Final = 10.0
 LONGEST: Final = 1_000_000
-"""Bytes of an answer of a server of time stamps."""
+"""Greatest length of a time-stamp server's answer [bytes]."""
 _EXAMPLE: Final = "https://freetsa.org/tsr"
 
 
 def optional_library(name: str) -> Any:
-    """Import a library of the extra ``proofs``; StoreError says how to install it."""
+    """Import a library of the extra ``proofs``; raise StoreError with the way to install it."""
     try:
         return import_module(name)
     except ImportError as error:
@@ -29,7 +29,7 @@ def optional_library(name: str) -> Any:
 
 
 def stamped(lines: str, server: str) -> str:
-    """Return a time stamp of lines, as a line, from a server (URL).
+    """Request a time stamp of ``lines`` from ``server`` (URL) and return it as a line.
 
     The answer must grant a token over exactly these lines, with the nonce of the request, and come from the configured
     root certificate, if there is one.
@@ -46,7 +46,7 @@ def stamped(lines: str, server: str) -> str:
     answers = queue.SimpleQueue[bytes | Exception]()
     threading.Thread(target=_ask, args=(server, request.as_bytes(), answers), daemon=True).start()
     try:
-        answer = answers.get(timeout=WAITS_S)  # the time-out of a connection is for each packet alone
+        answer = answers.get(timeout=WAITS_S)  # the time-out of a connection applies to each packet
         if not isinstance(answer, Exception):
             check_granted(answer, request)
             if workstation.load_or_default()[0].stamp_root is not None:
@@ -81,7 +81,7 @@ def check_granted(answer: bytes, request: Any) -> None:
 
 
 def _ask(server: str, question: bytes, answers: queue.SimpleQueue[bytes | Exception]) -> None:
-    """Put the answer of a server, up to the greatest length of a stamp, or the error of asking; follow no redirect."""
+    """Put the server's answer, truncated after `LONGEST`, or the error of the request; follow no redirect."""
     import urllib.request as network  # noqa: PLC0415 - loads the network's modules: only where a stamp is asked for
 
     opener = network.OpenerDirector()
@@ -101,7 +101,7 @@ def _ask(server: str, question: bytes, answers: queue.SimpleQueue[bytes | Except
 
 
 def checked_stamp(path: Path, lines: str, token: str) -> str:
-    """Return when the lines of a file were stamped, in words; StoreError if the stamp is not of these lines."""
+    """Return a text with the time of a file's stamp; raise StoreError if the stamp does not match its lines."""
     client = optional_library("rfc3161_client")
     if workstation.load_or_default()[0].stamp_root is None:
         raise StoreError(f"{path} is stamped: name the server's root certificate, liquid-study proof --root FILE")
@@ -113,7 +113,7 @@ def checked_stamp(path: Path, lines: str, token: str) -> str:
 
 
 def _verify_stamp(token: bytes, lines: str) -> Any:
-    """Return a decoded stamp after its signature by the configured root, and its lines, were verified."""
+    """Verify a stamp's lines and its signature by the configured root; return the decoded stamp."""
     client, x509 = optional_library("rfc3161_client"), optional_library("cryptography.x509")
     answer = client.decode_timestamp_response(token)
     root = read_regular(Path(str(workstation.load_or_default()[0].stamp_root)))
