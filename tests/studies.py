@@ -15,7 +15,7 @@ from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import ConditionFeatures
 from study_app.store.journals.journal import SessionClock
-from study_app.store.sessions.begin import SessionStart, begin
+from study_app.store.sessions.begin import SessionStart, begin_session
 from study_app.store.sessions.open_session import SessionStore
 
 
@@ -44,8 +44,8 @@ def begun(
     values: dict[str, Any] = {"seed": 1, "operator": "", "language": "en", "device": {"name": "mouse"}, "screens": {}}
     start = SessionStart(participant, **(values | {"simulated": False} | given))
     if isinstance(study, Protocol):
-        return begin(folder, study, source, start, clock=clock)
-    return begin(folder, load(study), source_bytes(study), start, clock=clock)
+        return begin_session(folder, study, source, start, clock=clock)
+    return begin_session(folder, load(study), source_bytes(study), start, clock=clock)
 
 
 @contextmanager

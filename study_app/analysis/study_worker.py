@@ -30,9 +30,9 @@ from study_app.errors import StoreError
 from study_app.store import receipt
 from study_app.store.atomic import cannot_read
 from study_app.store.exclusions import exclude, include
-from study_app.store.merged import all_exclusions, folders_of, own_place, sessions_in
+from study_app.store.merged import all_exclusions, folders_of, locate_participant, sessions_in
 from study_app.store.tables.study_files import participants_of, study_folders
-from study_app.store.unblinding import all_opened, reveals_of, unblind_folder
+from study_app.store.unblinding import has_opened_keys, reveals_of, unblind_folder
 from study_app.workers.server import Stopped
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def carry_out(order: Order, send: Send, stop: Callable[[], bool]) -> Done:
         case ReadStudy():
             _read(order.folder, send, stop)
         case LeaveOut():
-            place = own_place(order.folder, order.participant)
+            place = locate_participant(order.folder, order.participant)
             change = include if isinstance(order, TakeBack) else exclude
             change(*place, order.session, trial=order.trial, by=order.by, reason=order.reason)
         case OpenKey():
@@ -92,7 +92,7 @@ def _studies(results: Path) -> Iterator[StudyAt]:
 def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
     """Tell of the sessions, then of the study, then draw; once the key is open, evaluate and draw the rest."""
     send(Progress("reading sessions", 0.0))
-    opened = reveals_of(folder) if all_opened(folder) else ()
+    opened = reveals_of(folder) if has_opened_keys(folder) else ()
     send(SessionsFound(folder, tuple(participants_of(folder)), all_exclusions(folder), opened[-1] if opened else None))
     _go_on(stop)
     send(Progress("reading answers", 0.1))

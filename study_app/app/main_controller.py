@@ -109,7 +109,7 @@ class WorkstationController(QObject):
     def _keep(self, settings: MachineSettings) -> None:
         self.settings = settings
         try:
-            workstation.save(settings)
+            workstation.save_settings(settings)
         except StoreError as error:
             self.troubled.emit("This machine's settings could not be saved", f"{error}.")
         self._show()

@@ -39,9 +39,9 @@ def commands(context: click.Context) -> None:
     demo); RESULTS is a study folder, or its name in the workspace; SESSION is a ses-NN folder, or a name that the
     command sessions lists.
     """
-    from study_app.store.program_log import keep_log
+    from study_app.store.program_log import start_log
 
-    keep_log()
+    start_log()
     if context.invoked_subcommand is None:
         from study_app import app
 

@@ -128,7 +128,7 @@ def unblind(results: Path, by: str, reason: str) -> None:
 
     In a merged study the key of each site is opened; for one site name its folder, such as pooled/sites/A.
     """
-    from study_app.store.exclusions import named
+    from study_app.store.exclusions import describe_exclusion
     from study_app.store.unblinding import unblind_folder
 
     for prefix, found in unblind_folder(results, by=by, reason=reason).items():
@@ -138,7 +138,7 @@ def unblind(results: Path, by: str, reason: str) -> None:
                 shown = f"standard {standard}" if standard else "all levels"
                 click.echo(f"{block}  {prefix}{code}  {shown if of_track else condition}")
         for row in found.excluded:
-            click.echo(f"excluded  {named(row)}: {row.reason}")
+            click.echo(f"excluded  {describe_exclusion(row)}: {row.reason}")
         for sentence in found.left:
             click.echo(f"warning: {sentence}", err=True)
 
@@ -152,19 +152,19 @@ def unblind(results: Path, by: str, reason: str) -> None:
 @REASON
 def exclude(results: Path, participant: str, session: int, trial: int | None, by: str, reason: str) -> None:
     """Exclude a session or a trial from the analysis, with a reason; nothing is deleted."""
+    from study_app.store.exclusions import describe_exclusion
     from study_app.store.exclusions import exclude as exclude_from
-    from study_app.store.exclusions import named
-    from study_app.store.merged import own_place
+    from study_app.store.merged import locate_participant
 
-    new = exclude_from(*own_place(results, participant), session, trial=trial, by=by, reason=reason)
-    click.echo(named(replace(new, participant=participant)))
+    new = exclude_from(*locate_participant(results, participant), session, trial=trial, by=by, reason=reason)
+    click.echo(describe_exclusion(replace(new, participant=participant)))
     _warn_if_opened(results)
 
 
 def _warn_if_opened(results: Path) -> None:
-    from study_app.store.unblinding import all_opened
+    from study_app.store.unblinding import has_opened_keys
 
-    if all_opened(results):
+    if has_opened_keys(results):
         click.echo("warning: the key is open; the report states that this was decided afterwards", err=True)
 
 
@@ -177,12 +177,12 @@ def _warn_if_opened(results: Path) -> None:
 @REASON
 def include(results: Path, participant: str, session: int, trial: int | None, by: str, reason: str) -> None:
     """Reverse an exclusion: the session or trial counts again; name, time and reason are recorded."""
+    from study_app.store.exclusions import describe_exclusion
     from study_app.store.exclusions import include as include_in
-    from study_app.store.exclusions import named
-    from study_app.store.merged import own_place
+    from study_app.store.merged import locate_participant
 
-    taken = include_in(*own_place(results, participant), session, trial=trial, by=by, reason=reason)
-    click.echo(f"counts again: {named(replace(taken, participant=participant))}")
+    taken = include_in(*locate_participant(results, participant), session, trial=trial, by=by, reason=reason)
+    click.echo(f"counts again: {describe_exclusion(replace(taken, participant=participant))}")
     _warn_if_opened(results)
 
 
@@ -201,11 +201,11 @@ def include(results: Path, participant: str, session: int, trial: int | None, by
 def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[Path, ...]) -> None:
     """Erase the data of a participant; date, operator, reason and checksums remain."""
     from study_app.store.checksums import checked_line
-    from study_app.store.merged import own_place
+    from study_app.store.merged import locate_participant
     from study_app.store.withdrawals import proof_of_withdrawal
     from study_app.store.withdrawals import withdraw as withdraw_from
 
-    done = withdraw_from(*own_place(results, participant), by=by, reason=reason, also=also)
+    done = withdraw_from(*locate_participant(results, participant), by=by, reason=reason, also=also)
     for folder in done.folders:
         click.echo(f"erased     participant {participant} from {folder}")
     for path in done.outputs:
@@ -241,7 +241,7 @@ def merge(sites: dict[str, Path], to: Path) -> None:
     Each site has a name, which precedes its IDs (A-P001), and keeps its sealed key. The merged folder is RESULTS for
     report, export, plot, verify, unblind, exclude and withdraw.
     """
-    from study_app.store.sites.merge import merge as merge_sites
+    from study_app.store.sites.merge import merge_sites
 
     with progress() as show:
         show("copying")
@@ -256,7 +256,7 @@ def merge(sites: dict[str, Path], to: Path) -> None:
 @takes_session
 def rebuild(session: Path) -> None:
     """Rebuild a session's tables from its journal."""
-    from study_app.store.sessions.recovery import rebuild as rebuild_session
+    from study_app.store.sessions.recovery import rebuild_session
 
     made = rebuild_session(session)
     for path in made.rewritten:
@@ -273,9 +273,9 @@ def rebuild(session: Path) -> None:
 @takes_session
 def reproduce(session: Path) -> None:
     """Recompute a session's orders and levels and compare them with the recorded ones."""
-    from study_app.store.verification.reproduction import reproduced
+    from study_app.store.verification.reproduction import reproduce_session
 
-    found = reproduced(session)
+    found = reproduce_session(session)
     for line in (*found.differences, *found.followed):
         click.echo(line)
     same = "reproduced: trials and statements have the order of the receipt"
@@ -300,7 +300,7 @@ def reproduce(session: Path) -> None:
 def verify(results: Path, fingerprints: Path | None, xdf: Path | None) -> None:
     """Check everything in a study's folder: columns, checksums, receipts, journals, key, recordings."""
     from study_app.store.verification.recorded_streams import check_recording
-    from study_app.store.verification.verify_study import verify as verify_folder
+    from study_app.store.verification.verify_study import verify_study as verify_folder
 
     with progress() as show:
         show("checking every file")
@@ -315,8 +315,8 @@ def verify(results: Path, fingerprints: Path | None, xdf: Path | None) -> None:
     for line in measured:
         click.echo(line)
     running = f", {found.running} running" if found.running else ""
-    click.echo(f"{counted(found.sessions, 'session')}{running}: {'sound' if found.sound else 'not sound'}")
-    end_if(not found.sound)
+    click.echo(f"{counted(found.sessions, 'session')}{running}: {'sound' if found.is_sound else 'not sound'}")
+    end_if(not found.is_sound)
 
 
 @click.command()
@@ -352,7 +352,7 @@ def proof(
     changes = {"proofs": always and str(always.absolute()), "stamp_root": root and str(root.absolute())}
     changes |= {"stamps": server} if always is not None else {}
     if given := {name: value for name, value in changes.items() if value is not None}:
-        workstation.save(workstation.MachineSettings(**(workstation.load().model_dump() | given)))
+        workstation.save_settings(workstation.MachineSettings(**(workstation.load_settings().model_dump() | given)))
     if to is None:
         click.echo(text, nl=False)
     else:

@@ -205,7 +205,7 @@ def _keep_bench(found: Found, folder: Path, *, simulated: bool) -> None:
         end_if(True)
     report = str((folder / "bench.md").resolve())
     bench = workstation.DeviceBench.model_validate({**kept(found, day), "report": report})
-    workstation.save(workstation.load_or_default()[0].with_bench(bench))
+    workstation.save_settings(workstation.load_or_default()[0].with_bench(bench))
     click.echo("Saved in this machine's settings: receipts of later sessions record it, and Devices shows it.")
 
 
@@ -316,7 +316,7 @@ def outlets(markers: str | None, samples: str | None, triggers: str | None) -> N
     from study_app.outlets.session_outlets import is_port, port_examples
     from study_app.store import workstation
 
-    settings = workstation.load()
+    settings = workstation.load_settings()
     changes: dict[str, Any] = {} if markers is None else {"lsl_markers": markers == "on"}
     if samples is not None:
         changes["lsl_samples"] = samples
@@ -327,7 +327,7 @@ def outlets(markers: str | None, samples: str | None, triggers: str | None) -> N
             raise OutletError(f"--triggers '{triggers}' is not the address of a port: use one like {examples}, or off")
     if changes:
         settings = type(settings).model_validate(settings.model_dump() | changes)
-        workstation.save(settings)
+        workstation.save_settings(settings)
     click.echo(f"markers over LSL: {'on' if settings.lsl_markers else OFF}")
     click.echo(f"samples over LSL: {settings.lsl_samples}")
     click.echo(f"triggers: {settings.triggers or OFF}")

@@ -38,7 +38,7 @@ from study_app.protocol.source.document import value_at
 from study_app.protocol.source.files import unbundled, with_liquid_files
 from study_app.store.folders import SessionFolder
 from study_app.store.receipt import without_conditions
-from study_app.store.study_runs import Run, keep_what_was_run, recorded_items, run_of, runs, source_of
+from study_app.store.study_runs import Run, keep_run_content, recorded_items, run_of, runs_of_study, source_of
 from study_app.store.study_versions import content_hash, kept_content, kept_versions
 
 LOOK_MS: Final = 150
@@ -71,7 +71,7 @@ class KnownRuns(QObject):
 
     def read(self) -> tuple[Run, ...]:
         if (opened := self.editing.opened) is not None:
-            self.known = runs(self.editing.results, opened.name)
+            self.known = runs_of_study(self.editing.results, opened.name)
         return self.known
 
     def standing(self) -> Standing | None:
@@ -98,9 +98,9 @@ class KnownRuns(QObject):
 
 
 def _read(results: Path, study: str, file: Path) -> tuple[str, tuple[Run, ...], Mapping[tuple[str, str], int]]:
-    found = runs(results, study)
+    found = runs_of_study(results, study)
     with contextlib.suppress(StoreError):  # a draft that cannot be written says so
-        keep_what_was_run(file, found)
+        keep_run_content(file, found)
     return study, found, recorded_items(found)
 
 

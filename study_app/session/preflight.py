@@ -26,7 +26,7 @@ from study_app.protocol.sequences import enrolment
 from study_app.protocol.warnings.untranslated import UntranslatedText, listed_places
 from study_app.protocol.wording.languages import language_name
 from study_app.store.blinded.sealing import FRAMES_BYTES_PER_S, SAMPLE_BYTES, sealed_bytes
-from study_app.store.missing_trials import limit_words
+from study_app.store.missing_trials import limit_reason
 from study_app.video.sources import VideosFound
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class PredictedDelivery:
     @property
     def sentences(self) -> tuple[str, ...]:
         """The predicted loss as sentences without full stops: "26 of 40 trials would not be delivered: …"."""
-        why = limit_words("withheld_percent", {"withheld_percent": self.limit_percent})
+        why = limit_reason("withheld_percent", {"withheld_percent": self.limit_percent})
         missing = f"{self.missing} of {counted(self.asked, 'trial')} would not be delivered: {why}"
         out = f"{self.out} of {counted(self.judged, 'trial')} would be out of limits: {why}"
         return (*([missing] if self.missing else []), *([out] if self.out else []))

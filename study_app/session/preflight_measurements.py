@@ -15,7 +15,7 @@ from study_app.haptics.runtime.offline import law_along
 from study_app.haptics.runtime.telemetry import timing
 from study_app.session.ports import ServoPort
 from study_app.session.preflight import Measurements, Screen
-from study_app.store.atomic import probe
+from study_app.store.atomic import probe_free_bytes
 from study_app.store.blinded.blinding import sealed_hash
 
 LOOK_S = 1 / 60
@@ -56,7 +56,7 @@ def measure(
     probe_s: float | None = None
     free_bytes, fault, began = None, "", time.perf_counter()
     try:
-        free_bytes = probe(results)
+        free_bytes = probe_free_bytes(results)
         probe_s = time.perf_counter() - began
     except StoreError as error:
         fault = str(error)

@@ -37,12 +37,12 @@ from study_app.protocol.trials.stimuli import Stimulated
 from study_app.store import receipt, recordings
 from study_app.store.atomic import is_there
 from study_app.store.blinded import blinding
-from study_app.store.blinded.blinding import Key, as_recorded, opened, reading_what_ran, whole_protocol
-from study_app.store.delivered import Delivered, delivered, delivered_error, judged
-from study_app.store.folders import locate
+from study_app.store.blinded.blinding import Key, complete_protocol, open_events, protocol_errors, recorded_protocol
+from study_app.store.delivered import Delivered, delivered_error, delivered_values, judged_fields
+from study_app.store.folders import locate_session
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
-from study_app.store.progress import named
+from study_app.store.progress import attempt_name
 
 TOLERANCE: Final = 1e-9
 
@@ -131,13 +131,13 @@ def delivered_again(
     """
     block = protocol.blocks[started.block]
     adjusted = design_of(protocol, block).adjusts and interval == len(started.arrangement or "")
-    own = judged(interval_samples(samples, measured["duration_s"]))
-    return delivered(protocol, presented, protocol.tasks[block.task], own, adjusted=adjusted)
+    own = judged_fields(interval_samples(samples, measured["duration_s"]))
+    return delivered_values(protocol, presented, protocol.tasks[block.task], own, adjusted=adjusted)
 
 
 def error_again(scene: Scene, rate_hz: float, samples: Any, ended: Mapping[str, Any]) -> float | None:
     """Recompute the force error of a trial or interval from its recording and the opened line on its end."""
-    own = judged(interval_samples(samples, ended["duration_s"]))
+    own = judged_fields(interval_samples(samples, ended["duration_s"]))
     return delivered_error(own, rate_hz, scene.fade_s, partial(law_along, scene))
 
 
@@ -203,12 +203,12 @@ def replay(session_folder: Path) -> Replayed:
     (4, (), True)
     """
     began = time.perf_counter()
-    study, session = locate(session_folder)
+    study, session = locate_session(session_folder)
     kept = receipt.read(session.receipt)
     key = blinding.read_key(study.path)
     if key.hash != kept["key_hash"]:
         raise StoreError(f"{study.key} is not the key that {session.path} ran under: restore it from a copy")
-    lines = opened(journal.read(session.journal), key)
+    lines = open_events(journal.read(session.journal), key)
     protocol, devices, (drawn_from, participant) = _ran(session.receipt, kept, key, lines)
     _again(records(SAMPLE, 0), Scene(), devices[None], None)  # loads the compiled code outside of the measured time
     replayed = Replayed()
@@ -220,7 +220,7 @@ def replay(session_folder: Path) -> Replayed:
             before, resumed_at = None, resumed
         if resumed not in devices:
             raise StoreError(f"{session.receipt} lacks the device since {resumed}: restore it from a copy")
-        name = named(*which)
+        name = attempt_name(*which)
         if not isinstance(line, events.Recorded):
             why = "the journal gives no reason" if line is None else line.reason
             replayed.uncompared += (f"{name}: has no recording: {why}",)
@@ -459,7 +459,7 @@ def _ran(
 
     Devices are by the time at which they were opened again; that of the session's beginning is under None.
     """
-    with reading_what_ran(path):
+    with protocol_errors(path):
         described = {None: kept["device"]} | {entry["at"]: entry["device"] for entry in kept.get("resumed", ())}
         described |= {line.at: line.described for line in lines if isinstance(line, events.DeviceReconnected)}
         devices = {
@@ -467,4 +467,4 @@ def _ran(
             for at, device in described.items()
         }
         whose = kept["seed"], kept["participant"]
-        return as_recorded(whole_protocol(kept["protocol"], key), kept, key), devices, whose
+        return recorded_protocol(complete_protocol(kept["protocol"], key), kept, key), devices, whose

@@ -12,7 +12,7 @@ from study_app.protocol.load import at_hand, parse, protocol_hash, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial, build_schedule
 from study_app.protocol.trials.methods import TrialResult
-from study_app.store.blinded.blinding import Key, opened, own_place
+from study_app.store.blinded.blinding import Key, open_events, place_number
 from study_app.store.journals.journal_events import Event, SessionStarted
 from study_app.store.progress import Progress, progress_of, trial_results
 from study_app.store.sessions.recovery import sealed_source
@@ -54,7 +54,7 @@ def resume_at(
     lines = list(lines)
     progress = progress_of(lines)
     step = reached = _next_step(protocol, schedule, progress)
-    heard = () if key is None else trial_results(protocol, opened(lines, key))
+    heard = () if key is None else trial_results(protocol, open_events(lines, key))
     if protocol.study.resume == "block" and not exactly:
         within = _within(schedule.steps, step)
         if within is not None:  # back to the first trial of its block
@@ -70,7 +70,7 @@ def resume_at(
 
 def begun_schedule(protocol: Protocol, start: SessionStarted, key: Key) -> Schedule:
     """Return the schedule of the session whose journal begins with ``start``; ``key`` is the study's."""
-    return build_schedule(protocol, start.participant, start.seed, own_place(start, key))
+    return build_schedule(protocol, start.participant, start.seed, place_number(start, key))
 
 
 def is_rehearsal(session_receipt: Mapping[str, Any]) -> bool:

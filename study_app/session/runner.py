@@ -34,7 +34,7 @@ from study_app.session.transitions import events
 from study_app.session.transitions.state import FINAL, Phase, SessionState, Stall
 from study_app.session.transitions.table import advance, open_session
 from study_app.session.trial import Recording, RunningTrial, ball_is_back, resting_view
-from study_app.store.delivered import broken_limits, delivered, undelivered
+from study_app.store.delivered import broken_interval_limits, broken_limits, delivered_values
 from study_app.store.journals.journal_events import TargetReached
 
 STOOD_STILL_S = 3.0  # a longer gap between two trials is noted; in a trial see `trial.FROZEN_S` [choice]
@@ -302,10 +302,10 @@ class Runner:
         reasons: tuple[str, ...] = ()
         if command.interval is not None and limits.attempts is not None:
             what = command.presented, command.task
-            delivery = delivered(self._protocol, *what, running.samples, adjusted=command.adjusts)
+            delivery = delivered_values(self._protocol, *what, running.samples, adjusted=command.adjusts)
             summary |= delivery.columns
             reasons = (
-                *undelivered(limits, *what, delivery, adjusted=command.adjusts),
+                *broken_interval_limits(limits, *what, delivery, adjusted=command.adjusts),
                 *broken_limits(summary, limits.model_dump()),
             )
         return events.TaskDone(self._ports.clock(), outcome, summary, reasons)

@@ -26,14 +26,14 @@ from study_app.session.resume import find_protocol, source_to_resume
 from study_app.store import workstation
 from study_app.store.blinded.allocation import check_session
 from study_app.store.blinded.blinding import check_conditions
-from study_app.store.folders import ID_PATTERN, StudyFolder, locate, study_folder
+from study_app.store.folders import ID_PATTERN, StudyFolder, locate_session, study_folder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import SessionClock
 from study_app.store.journals.journal_events import start_of
 from study_app.store.progress import progress_of
-from study_app.store.sessions.begin import SessionStart, begin, check_participant, refuse_never_begun, used_ids
+from study_app.store.sessions.begin import SessionStart, begin_session, check_participant, refuse_never_begun, used_ids
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.recovery import check_can_go_on, refuse_finished, reopen
+from study_app.store.sessions.recovery import check_resumable, refuse_finished, reopen_store
 from study_app.store.study_runs import run_of
 from study_app.store.tables.study_files import check_study
 from study_app.store.workstation import MachineSettings
@@ -114,7 +114,7 @@ def resumed(
     StoreError says that it cannot go on: it is not a session folder, open in another program, finished, damaged, or of
     another protocol; SessionError that no protocol at hand is of its study.
     """
-    study, folder = locate(session_folder)
+    study, folder = locate_session(session_folder)
     refuse_never_begun(folder)
     lines = journal.read(folder.journal)
     start, done = start_of(lines), progress_of(lines)
@@ -122,7 +122,7 @@ def resumed(
     read = partial(source_to_resume, session_folder)
     chosen = protocol if protocol is not None else find_protocol(start, candidates, read)
     source = read(chosen)
-    check_can_go_on(session_folder, parse(source, chosen), source)
+    check_resumable(session_folder, parse(source, chosen), source)
     return NewSession(
         source=chosen,
         participant=start.participant,
@@ -293,7 +293,7 @@ def open_store(
         "video": None if videos is None else videos.describe(),
     }
     if chosen.resumes is not None:
-        store = reopen(chosen.resumes, protocol, source, now_ns=rig.servo.now_ns, **here)
+        store = reopen_store(chosen.resumes, protocol, source, now_ns=rig.servo.now_ns, **here)
     else:
         start = SessionStart(
             chosen.participant,
@@ -307,7 +307,7 @@ def open_store(
             group=chosen.group,
             **here,
         )
-        store = begin(chosen.results, protocol, source, start, clock=SessionClock(rig.servo.now_ns))
+        store = begin_session(chosen.results, protocol, source, start, clock=SessionClock(rig.servo.now_ns))
     if outlets is not None:
         store.attach(outlets)
     return store

@@ -20,7 +20,7 @@ from study_app.protocol.trials.tasks import AnyTask
 from study_app.session.ports import RecorderPort, ServoPort
 from study_app.session.tasks import Outcome, TankView, TargetReached, TaskView, track
 from study_app.session.transitions.events import StartTrial
-from study_app.store.delivered import JUDGED, delivered_error, judged
+from study_app.store.delivered import JUDGED, delivered_error, judged_fields
 from study_app.video.frames import VideoFrame, VideoSource, VideoStatistics
 
 LEAD_S = 0.6  # time of samples kept for the next recording [s]: longer than the slowest fade
@@ -273,7 +273,7 @@ class RunningTrial:
     @property
     def samples(self) -> Any:
         """The samples of the trial or interval so far (array of ``delivered.JUDGED``)."""
-        return judged(self._samples)
+        return judged_fields(self._samples)
 
     @property
     def _samples(self) -> Any:

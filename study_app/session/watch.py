@@ -26,14 +26,14 @@ from study_app.session.transitions.page_builder import task_page
 from study_app.store import receipt
 from study_app.store.blinded.blinding import (
     Key,
-    opened,
+    complete_protocol,
+    open_events,
     opened_key,
-    own_group,
+    participant_group,
+    protocol_errors,
     read_key,
-    reading_what_ran,
-    whole_protocol,
 )
-from study_app.store.folders import StudyFolder, locate
+from study_app.store.folders import StudyFolder, locate_session
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
 from study_app.store.progress import progress_of
@@ -128,14 +128,14 @@ def watched(session_folder: Path, trial: int, attempt: int = 1, interval: int = 
     """
     from study_app.store import recordings  # noqa: PLC0415 - pyarrow: only once it is needed
 
-    study, session = locate(session_folder)
+    study, session = locate_session(session_folder)
     shown, lines = opened_key(study), journal.read(session.journal)
     named = f"trial {trial}"
     begun = [at for at, line in enumerate(lines) if isinstance(line, events.TrialStarted)]
     first = next((at for at in begun if lines[at].which[:2] == (trial, attempt)), None)  # type: ignore[attr-defined]
     if first is None:
         raise StoreError(f"{session.journal} has no attempt {attempt} at {named}: choose another trial")
-    _, *own = opened([lines[0], *lines[first : next((at for at in begun if at > first), None)]], shown)
+    _, *own = open_events([lines[0], *lines[first : next((at for at in begun if at > first), None)]], shown)
     started = own[0]
     assert isinstance(started, events.TrialStarted)  # noqa: S101 - it was looked for
     which: events.Which = (trial, attempt, interval if started.has_intervals else None)
@@ -251,9 +251,9 @@ def _page(
 ) -> TaskPage:
     """Return the tank page of a trial or interval; while the study is sealed the ball has the scene's own size."""
     start, key = events.start_of(lines), read_key(study.path)
-    group = own_group(start, key)
-    with reading_what_ran(path):
-        protocol = own_protocol(whole_protocol(receipt.read(path)["protocol"], key), group, start.session)
+    group = participant_group(start, key)
+    with protocol_errors(path):
+        protocol = own_protocol(complete_protocol(receipt.read(path)["protocol"], key), group, start.session)
     body = protocol.scene.body
     if opened_key(study) is not None:
         named = key.condition(started.block, started.code) if interval is None else None

@@ -39,14 +39,14 @@ def write_file(path: Path, content: bytes | bytearray, *, waits: bool = True) ->
     StoreError
         The file cannot be written; names the file and the system's reason.
     """
-    with _passing_file(path, path) as half:
-        write_through(half, content, waits=waits)
-        _replace(half, path)
+    with _temporary_file(path, path) as half:
+        write_new_file(half, content, waits=waits)
+        _replace_file(half, path)
         if waits:
             sync_folder(path.parent)
 
 
-def _replace(half: Path, path: Path) -> None:
+def _replace_file(half: Path, path: Path) -> None:
     """Rename over the old file; retry while a viewer or virus scanner holds it on Windows."""
     for pause_s in _REPLACE_AGAIN_S:
         with contextlib.suppress(PermissionError):
@@ -57,7 +57,7 @@ def _replace(half: Path, path: Path) -> None:
 
 
 @contextlib.contextmanager
-def _passing_file(path: Path, written: Path) -> Iterator[Path]:
+def _temporary_file(path: Path, written: Path) -> Iterator[Path]:
     """Yield a temporary path next to ``path`` and remove its file at the end; errors name ``written``."""
     half = temporary_path(path)
     try:
@@ -81,7 +81,7 @@ def create_folder(path: Path, files: Mapping[str, bytes], *, waits: bool = True,
     try:
         half.mkdir()
         for name, content in files.items():
-            write_through(half / name, content, waits=waits, mode=mode)
+            write_new_file(half / name, content, waits=waits, mode=mode)
         if waits:
             sync_folder(half)
         half.rename(path)
@@ -151,7 +151,7 @@ def append_line(path: Path, line: bytes, *, waits: bool = True) -> None:
         with path.open("a+b", buffering=0) as file:
             size = file.seek(0, os.SEEK_END)
             try:
-                write_whole(file, line if _ends_whole(file, size) else b"\n" + line)
+                write_all(file, line if _ends_with_newline(file, size) else b"\n" + line)
                 if waits:
                     os.fsync(file.fileno())
             except OSError:
@@ -163,7 +163,7 @@ def append_line(path: Path, line: bytes, *, waits: bool = True) -> None:
         raise cannot_write(path, error) from error
 
 
-def write_whole(file: BinaryIO, content: bytes | bytearray) -> None:
+def write_all(file: BinaryIO, content: bytes | bytearray) -> None:
     """Write all of ``content`` to an unbuffered ``file``, in as many writes as the system needs."""
     rest = memoryview(content)
     while rest:
@@ -175,18 +175,18 @@ def temporary_path(path: Path) -> Path:
     return path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
 
 
-def temporaries(folder: Path, of: str = "") -> tuple[Path, ...]:
+def temporary_files(folder: Path, of: str = "") -> tuple[Path, ...]:
     """Return the temporary files directly in ``folder``, ``of`` a given name if set; their programs may still run."""
     paths = (path for path in folder.glob(".*.tmp") if _TEMPORARY.fullmatch(path.name))
     return tuple(sorted(path for path in paths if not of or path.name[1:-13] == of))  # without ".", and ".01234567.tmp"
 
 
-def sweep_old(folder: Path, of: str = "") -> None:
+def remove_old_temporary_files(folder: Path, of: str = "") -> None:
     """Remove old temporary files, ``of`` a name if set, from a folder into which other programs may be writing.
 
     Only files too old to be in use are removed; a file that cannot be removed is left.
     """
-    for path in temporaries(folder, of):
+    for path in temporary_files(folder, of):
         with contextlib.suppress(OSError):
             if not path.is_dir() and time.time() - path.stat().st_mtime > OLD_S:
                 path.unlink()
@@ -198,9 +198,9 @@ def paths_in(folder: Path) -> list[Path]:
     return sorted(Path(above) / name for above, folders, names in levels for name in (*folders, *names))
 
 
-def sweep(folder: Path) -> tuple[Path, ...]:
+def remove_temporary_files(folder: Path) -> tuple[Path, ...]:
     """Remove the temporary files directly in ``folder`` and return them; no other program may be writing there."""
-    leftovers = temporaries(folder)
+    leftovers = temporary_files(folder)
     for path in leftovers:
         try:
             if path.is_dir():
@@ -212,7 +212,7 @@ def sweep(folder: Path) -> tuple[Path, ...]:
     return leftovers
 
 
-def probe(folder: Path) -> int:
+def probe_free_bytes(folder: Path) -> int:
     """Check that ``folder``, or its nearest existing parent, is writable, and return its free space in bytes.
 
     A small file is written, flushed to the disk and removed; nothing else is changed.
@@ -223,8 +223,8 @@ def probe(folder: Path) -> int:
         Nothing can be written there.
     """
     place = next(path for path in (folder, *folder.absolute().parents) if is_there(path))
-    with _passing_file(place / "probe", folder) as path:
-        write_through(path, b"probe\n")
+    with _temporary_file(place / "probe", folder) as path:
+        write_new_file(path, b"probe\n")
         return shutil.disk_usage(place).free
 
 
@@ -248,7 +248,7 @@ def sync_folder(path: Path) -> None:
 def cannot_write(path: Path, error: OSError) -> StoreError:
     """Return the one-line error for ``path``: what, why, and what to do."""
     blocked = isinstance(error, FileExistsError | NotADirectoryError)
-    why = "a file is where a folder is needed" if blocked else cause(error)
+    why = "a file is where a folder is needed" if blocked else system_message(error)
     return StoreError(
         f"{path} cannot be written ({why}): free disk space, correct its permissions, close the program "
         "that uses it, or choose another folder"
@@ -272,7 +272,7 @@ def is_there(path: Path) -> bool:
     return True
 
 
-def refuse_special(path: Path) -> None:
+def refuse_special_files(path: Path) -> None:
     """Raise an error if a folder is or contains a link, a pipe or a device: it must not be copied or deleted.
 
     Raises
@@ -289,7 +289,9 @@ def refuse_special(path: Path) -> None:
 
 def cannot_read(path: Path, error: OSError) -> StoreError:
     """Return the one-line error for ``path``: what, why, and what to do."""
-    return StoreError(f"{path} cannot be read ({cause(error)}): correct its permissions, or restore it from a copy")
+    return StoreError(
+        f"{path} cannot be read ({system_message(error)}): correct its permissions, or restore it from a copy"
+    )
 
 
 def open_regular(path: Path) -> BufferedReader:
@@ -340,7 +342,7 @@ def parse_json(content: bytes | str) -> Any:
         It is not JSON, which excludes NaN and Infinity, or is nested too deeply.
     """
     try:
-        value = json.loads(content, parse_constant=_refuse)
+        value = json.loads(content, parse_constant=_refuse_constant)
     except RecursionError as error:
         raise ValueError("it is nested too deeply") from error
     level = [value]
@@ -356,7 +358,7 @@ def parse_json(content: bytes | str) -> Any:
     raise ValueError("it is nested too deeply")
 
 
-def _refuse(constant: str) -> None:
+def _refuse_constant(constant: str) -> None:
     raise ValueError(f"{constant} is not JSON")
 
 
@@ -366,21 +368,21 @@ def study_root(path: Path) -> Path:
     return parents[3] if len(parents) > 3 and parents[2].name == "data" else parents[0]
 
 
-def cause(error: OSError) -> str:
+def system_message(error: OSError) -> str:
     """Return the system's message for ``error``, without the path, which the caller's message names."""
     return error.strerror or type(error).__name__
 
 
-def _ends_whole(file: BinaryIO, size: int) -> bool:
+def _ends_with_newline(file: BinaryIO, size: int) -> bool:
     if size == 0:
         return True
     file.seek(size - 1)
     return file.read(1) == b"\n"
 
 
-def write_through(path: Path, content: bytes | bytearray, *, waits: bool = True, mode: int = 0o666) -> None:
+def write_new_file(path: Path, content: bytes | bytearray, *, waits: bool = True, mode: int = 0o666) -> None:
     """Write a new file ``path`` and, with ``waits``, flush it to the disk."""
     with open(path, "xb", buffering=0, opener=lambda name, flags: os.open(name, flags, mode)) as file:
-        write_whole(file, content)
+        write_all(file, content)
         if waits:
             os.fsync(file.fileno())

@@ -47,7 +47,7 @@ Proofs: TypeAlias = tuple[tuple[str, str], ...]
 
 def write_checksums(session: SessionFolder) -> dict[str, str]:
     """Write the SHA-256 of every file of the session; return path in the folder → SHA-256."""
-    sums = {name: hashed(session, name) for name in files(session)}
+    sums = {name: file_hash(session, name) for name in session_files(session)}
     write_file(session.checksums, checksum_bytes(sums))
     return sums
 
@@ -66,11 +66,13 @@ def renew_checksums(session: SessionFolder, rewritten: Collection[Path]) -> bool
         write_checksums(session)
         return True
     ours = [path.relative_to(session.path).as_posix() for path in rewritten if path.is_relative_to(session.path)]
-    if not (changed := [name for name in ours if hashed(session, name) != listed.get(name)]):
+    if not (changed := [name for name in ours if file_hash(session, name) != listed.get(name)]):
         return False
     if others := [name for name in changed if name != REBUILT]:
         note_rebuilt(session, f"other checksums were listed for {', '.join(others)}")
-    write_file(session.checksums, checksum_bytes(listed | {name: hashed(session, name) for name in (*ours, REBUILT)}))
+    write_file(
+        session.checksums, checksum_bytes(listed | {name: file_hash(session, name) for name in (*ours, REBUILT)})
+    )
     return True
 
 
@@ -98,7 +100,7 @@ def checksum_bytes(sums: Mapping[str, str]) -> bytes:
     return "".join(f"{sums[name]}  {name}\n" for name in sorted(sums)).encode("utf-8", "surrogateescape")
 
 
-def hashed(session: SessionFolder, name: str) -> str:
+def file_hash(session: SessionFolder, name: str) -> str:
     """Return the SHA-256 of the file ``name`` in the session's folder."""
     return sha256(session.path / name)
 
@@ -117,17 +119,15 @@ def read_checksums(session: SessionFolder) -> dict[str, str]:
     return checksums
 
 
-def files(session: SessionFolder) -> tuple[str, ...]:
+def session_files(session: SessionFolder) -> tuple[str, ...]:
     """Return the paths of the session's files in its folder, without the list itself, crash traces and system files."""
     left_out = {session.checksums.name, session.crash.name}
-    return tuple(
-        name.as_posix() for name in _paths(session) if name.name not in left_out and not _is_of_the_system(name)
-    )
+    return tuple(name.as_posix() for name in _paths(session) if name.name not in left_out and not _is_system_file(name))
 
 
 def system_files(session: SessionFolder) -> tuple[str, ...]:
     """Return the paths of visible files that operating systems or file-sharing programs left in the folder."""
-    return tuple(name.as_posix() for name in _paths(session) if _is_of_the_system(name) and not _is_hidden(name))
+    return tuple(name.as_posix() for name in _paths(session) if _is_system_file(name) and not _is_hidden(name))
 
 
 def _paths(session: SessionFolder) -> list[Path]:
@@ -139,7 +139,7 @@ def _is_hidden(name: Path) -> bool:
     return any(part.startswith(".") for part in name.parts)
 
 
-def _is_of_the_system(name: Path) -> bool:
+def _is_system_file(name: Path) -> bool:
     return _is_hidden(name) or any(_SYSTEM.fullmatch(part) for part in name.parts)
 
 
@@ -176,20 +176,20 @@ def fingerprint(sums: Mapping[str, str], lines: Iterable[Event]) -> str:
 
 def proof_of(content: bytes) -> str:
     """Return the fingerprint of a text's bytes: 60 bits of their SHA-256 in base32."""
-    letters = _letters(content)
+    letters = _base32(content)
     return "-".join(letters[at : at + 4] for at in (0, 4, 8))
 
 
 def checked_line(proof: str, place: str) -> str:
     """Return a line to print, scan or mail, with two check characters that reveal a misread character."""
-    return f"{proof}-{_check(proof, place)}  {place}"
+    return f"{proof}-{_check_characters(proof, place)}  {place}"
 
 
-def _check(proof: str, place: str) -> str:
-    return _letters(f"{proof}  {place}".lower().encode())[:2]
+def _check_characters(proof: str, place: str) -> str:
+    return _base32(f"{proof}  {place}".lower().encode())[:2]
 
 
-def _letters(content: bytes) -> str:
+def _base32(content: bytes) -> str:
     return base64.b32encode(hashlib.sha256(content).digest()).decode().lower()
 
 
@@ -205,17 +205,17 @@ def place_of(study: StudyFolder, session: SessionFolder) -> str:
     return session.path.relative_to(study.path).as_posix()
 
 
-def listed(path: Path) -> Proofs:
+def read_list(path: Path) -> Proofs:
     """Return fingerprint and session of each valid line of a list; an absent list is empty."""
-    return tuple((match[1], match[3]) for _, match in _matches(_text(path)) if match is not None)
+    return tuple((match[1], match[3]) for _, match in _matches(_list_text(path)) if match is not None)
 
 
-def unreadable(path: Path) -> tuple[int, ...]:
+def unreadable_lines(path: Path) -> tuple[int, ...]:
     """Return the numbers of the lines of a list that are not fingerprints."""
-    return tuple(number for number, match in _matches(_text(path)) if match is None)
+    return tuple(number for number, match in _matches(_list_text(path)) if match is None)
 
 
-def parsed(path: Path, text: str) -> Proofs:
+def parse_copy(path: Path, text: str) -> Proofs:
     """Return fingerprint and session or record of every line of a copy; raise StoreError for any other line."""
     proofs: list[tuple[str, str]] = []
     for number, match in _matches(text):
@@ -224,7 +224,7 @@ def parsed(path: Path, text: str) -> Proofs:
                 f"{path}, line {number} is not a fingerprint: a line must be such as "
                 "'k3vq-7m2p-xw4d  data/sub-P007/ses-01'; name a copy of a study's fingerprints.txt"
             )
-        if match[2] not in (None, _check(match[1], match[3])):
+        if match[2] not in (None, _check_characters(match[1], match[3])):
             raise StoreError(f"{path}, line {number} was misread: its last two characters are of another line")
         proofs.append((match[1], match[3]))
     if not proofs:
@@ -232,7 +232,7 @@ def parsed(path: Path, text: str) -> Proofs:
     return tuple(proofs)
 
 
-def _text(path: Path) -> str:
+def _list_text(path: Path) -> str:
     return (read_if_there(path) or b"").decode("utf-8-sig", "replace")
 
 

@@ -27,13 +27,13 @@ MISSING = "n/a"
 Row: TypeAlias = dict[str, Any]
 
 
-def guarded(text: str) -> str:
+def guard_formula(text: str) -> str:
     """Return a cell's text, preceded by an apostrophe if a spreadsheet would evaluate it as a formula."""
     return f"'{text}" if _FORMULA.match(text) else text
 
 
-def unguarded(cell: str) -> str:
-    """Return a cell's text without the apostrophe that `guarded` added."""
+def unguard_formula(cell: str) -> str:
+    """Return a cell's text without the apostrophe that `guard_formula` added."""
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
@@ -49,7 +49,7 @@ def _number(cell: str) -> float:
 
 
 _KINDS: Final[dict[Kind, _Cells]] = {
-    "text": _Cells("a text", r"[\s\S]*", unguarded),
+    "text": _Cells("a text", r"[\s\S]*", unguard_formula),
     "integer": _Cells("a whole number", r"-?[0-9]{1,18}", int),
     "number": _Cells("a number", r"-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?", _number),
     "flag": _Cells("true or false", "true|false", "true".__eq__),
@@ -134,7 +134,7 @@ optional = partial(Column, may_miss=True)
 """A column in which a cell can be ``n/a``."""
 
 
-def unsealed(columns: tuple[Column, ...]) -> tuple[Column, ...]:
+def unsealed_columns(columns: tuple[Column, ...]) -> tuple[Column, ...]:
     """Return the columns that a table has before the key is opened."""
     return tuple(column for column in columns if not column.sealed)
 
@@ -157,20 +157,20 @@ def cell_text(value: Any) -> str:
         return MISSING
     if isinstance(value, bool):
         return "true" if value else "false"
-    return repr(value) if isinstance(value, int | float) else _quoted(guarded(str(value)))
+    return repr(value) if isinstance(value, int | float) else _quote_cell(guard_formula(str(value)))
 
 
-def _quoted(text: str) -> str:
+def _quote_cell(text: str) -> str:
     if "," in text or '"' in text or "\n" in text or "\r" in text or text != text.strip():
         return '"' + text.replace('"', '""') + '"'
     return text
 
 
 def _lines(rows: Iterable[Iterable[str]]) -> bytes:
-    return "".join(f"{','.join(map(_quoted, row))}\n" for row in rows).encode()
+    return "".join(f"{','.join(map(_quote_cell, row))}\n" for row in rows).encode()
 
 
-def cells(table: bytes) -> list[list[str]]:
+def read_cells(table: bytes) -> list[list[str]]:
     """Return the records of a table as texts, the header first.
 
     Raises
@@ -190,18 +190,18 @@ def cells(table: bytes) -> list[list[str]]:
 
 def read_table(table: bytes, columns: Sequence[Column]) -> list[Row]:
     """Return the rows of a table written by `csv_bytes`, with the given columns; missing values are None."""
-    names, *rows = cells(table)
+    names, *rows = read_cells(table)
     places = [(column, names.index(column.name)) for column in columns]
     return [
         {column.name: None if row[at] == MISSING else column.value(row[at]) for column, at in places} for row in rows
     ]
 
 
-def problems(table: bytes, columns: Sequence[Column]) -> Iterator[str]:
+def table_problems(table: bytes, columns: Sequence[Column]) -> Iterator[str]:
     """Yield a sentence on each problem of a table; of each column only the first bad cell is reported."""
     expected = header(tuple(columns))
     try:
-        names, *rows = cells(table)
+        names, *rows = read_cells(table)
     except ValueError as error:
         yield str(error)
         return
@@ -224,7 +224,7 @@ def problems(table: bytes, columns: Sequence[Column]) -> Iterator[str]:
                 break
 
 
-def in_columns_of(held: bytes, table: bytes, columns: Sequence[Column]) -> tuple[bytes, tuple[Column, ...]]:
+def align_columns(held: bytes, table: bytes, columns: Sequence[Column]) -> tuple[bytes, tuple[Column, ...]]:
     """Return ``table`` limited to the columns that the existing table ``held`` must have, and these columns.
 
     ``held`` may lack later columns, which its version did not write, and ``table`` those that are sealed. If ``held``
@@ -235,8 +235,8 @@ def in_columns_of(held: bytes, table: bytes, columns: Sequence[Column]) -> tuple
     kept = tuple(column for column in present if column.name in names or not column.later)
     if kept != present:
         places = [ours.index(column.name) for column in kept]
-        table = _lines([row[place] for place in places] for row in cells(table))
-    if b"'" in table and held == _lines(map(unguarded, row) for row in cells(table)):
+        table = _lines([row[place] for place in places] for row in read_cells(table))
+    if b"'" in table and held == _lines(map(unguard_formula, row) for row in read_cells(table)):
         return held, kept
     return table, kept
 

@@ -48,7 +48,7 @@ _JUDGED = (
 _LEAST = "targets_reached"  # limited by "targets_percent"; the only measure with a lower limit
 
 
-def judged(samples: Any) -> Any:
+def judged_fields(samples: Any) -> Any:
     """Return the fields `JUDGED` of samples (n,), a third of their size."""
     rows = np.empty(len(samples), JUDGED)
     for name in JUDGED.fields or ():
@@ -75,7 +75,7 @@ class Delivered:
         return {name: value for name, value in asdict(self).items() if name != "clipped"}
 
 
-def delivered(
+def delivered_values(
     protocol: Protocol, presented: Stimulated, task: AnyTask, samples: Any, *, adjusted: bool = False
 ) -> Delivered:
     """Return the delivered values of an interval.
@@ -93,7 +93,7 @@ def delivered(
     adjusted : bool
         Whether the participant set the varied number meanwhile: then no single value was delivered.
     """
-    samples = _plausible(samples)
+    samples = _plausible_samples(samples)
     times_s = (samples["time_ns"] - samples["time_ns"][:1]) * 1e-9
     fade_s = protocol.scene.fade_s
     period_s, link = 1 / protocol.device.rate_hz, presented_condition(protocol, presented).link()
@@ -144,7 +144,7 @@ def delivered_error(
     law_n : callable
         Gives the law's forces (m, 3) [N] at times (m,) [s] of positions and velocities (m, 3) of the hand [m, m/s].
     """
-    samples = _plausible(samples)
+    samples = _plausible_samples(samples)
     times_s = (samples["time_ns"] - samples["time_ns"][:1]) * 1e-9
     moved = motion(times_s, samples["position_m"], 1 / rate_hz, TRUE_HALF_S)
     counted = moved.times_s > fade_s + SETTLED_S
@@ -168,7 +168,7 @@ def _lag_s(times_s: Times, sent_n: Vectors, model_n: Vectors, from_s: float, per
     return None if rows is None else rows * period_s
 
 
-def _plausible(samples: Any) -> Any:
+def _plausible_samples(samples: Any) -> Any:
     """Return the samples without rejected positions."""
     glitches = samples["limiters"] & LIMITER_GLITCH != 0
     return samples[~glitches] if glitches.any() else samples
@@ -188,7 +188,7 @@ def varies_damping(presented: Stimulated) -> bool:
     return (presented.vary or "").rpartition(".")[2] == DAMPING
 
 
-def undelivered(
+def broken_interval_limits(
     limits: Limits, presented: Stimulated, task: AnyTask, delivery: Delivered, *, adjusted: bool = False
 ) -> Iterator[str]:
     """Yield the key of each limit in the study's file that an interval breaks.
@@ -210,7 +210,7 @@ def undelivered(
             yield "pace_error_percent"
 
 
-def missed(
+def broken_trial_limits(
     limits: Limits, due: Presentation, holds: Sequence[bool], errors_ms: Sequence[float | None], rate_hz: float
 ) -> Iterator[str]:
     """Yield the key of the limit that a trial breaks if the delays of its intervals do not differ as requested.
@@ -237,12 +237,12 @@ def missed(
         yield "level_error_ms"
 
 
-def within_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> bool | None:
+def is_within_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> bool | None:
     """Return whether a trial's measured columns are within the protocol's limits; None without measurements.
 
     ``limits`` are those of the journal's first line, or ``Limits`` of a protocol as a mapping.
     """
-    judged = _judged(measured, limits)
+    judged = _compared_limits(measured, limits)
     return not beyond_limits(measured, limits) if judged else None
 
 
@@ -251,7 +251,7 @@ def beyond_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> t
 
     Value and limit are in the limit's unit, ms or percent.
     """
-    judged = _judged(measured, limits)
+    judged = _compared_limits(measured, limits)
     return tuple(
         comparison
         for comparison in judged
@@ -265,7 +265,7 @@ def broken_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> t
     return tuple(dict.fromkeys(keys[measure] for measure, _, _ in beyond_limits(measured, limits)))
 
 
-def _judged(measured: Mapping[str, Any], limits: Mapping[str, float]) -> list[Broken]:
+def _compared_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> list[Broken]:
     judged = [
         (measure, measured[measure] * (100 if limit.endswith("_percent") else 1), limits[limit])
         for measure, limit in _JUDGED

@@ -58,11 +58,11 @@ class Keeper:
         self._obsolete = False
         self._due_s = 0.0
 
-    def take(self, draft: Draft) -> None:
+    def resume_from(self, draft: Draft) -> None:
         """Continue from an existing draft."""
         self._own = draft.text
 
-    def edited(self, text: str, selected: Selection, now_s: float) -> None:
+    def note_edit(self, text: str, selected: Selection, now_s: float) -> None:
         """Note an edit at a time of a monotonic clock [s]."""
         if self._pending is None:
             self._due_s = now_s + REST_S
@@ -94,11 +94,11 @@ class Keeper:
         if other is not None and other.text not in {self._own, self._pending.text}:
             keep_version(self._file, other.text.encode(), "draft")
             self.others += 1
-        keep(self._file, self._pending)
+        write_draft(self._file, self._pending)
         self._own, self._pending, self._obsolete = self._pending.text, None, False
         return True
 
-    def saved(self, base: str) -> None:
+    def note_saved(self, base: str) -> None:
         """Delete the draft after its text was saved. If that fails, deletion stays due and `write` reports why.
 
         The draft of another program stays.
@@ -110,11 +110,11 @@ class Keeper:
     def _delete(self) -> None:
         other = draft_of(self._file)
         if other is None or other.text == self._own:
-            discard(self._file)
+            delete_draft(self._file)
         self._own, self._obsolete = None, False
 
 
-def keep(file: Path, draft: Draft) -> None:
+def write_draft(file: Path, draft: Draft) -> None:
     """Write the draft of a study's file.
 
     Raises
@@ -168,7 +168,7 @@ def unsaved_files(folder: Path) -> tuple[Path, ...]:
     return tuple(file for file in drafted_files() if file.parent == whole and not file.exists())
 
 
-def discard(file: Path) -> None:
+def delete_draft(file: Path) -> None:
     """Delete the draft of a study's file.
 
     Raises

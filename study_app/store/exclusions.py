@@ -12,9 +12,9 @@ from pathlib import Path
 from study_app.errors import StoreError
 from study_app.store.atomic import append_line, parse_json, read_own_if_there, write_file
 from study_app.store.columns import EXCLUSIONS
-from study_app.store.csv_files import MISSING, csv_bytes, header, unguarded
-from study_app.store.folder_lock import open_alone
-from study_app.store.folders import StudyFolder, readable
+from study_app.store.csv_files import MISSING, csv_bytes, header, unguard_formula
+from study_app.store.folder_lock import lock_folder
+from study_app.store.folders import StudyFolder, check_name_and_reason
 from study_app.store.journals import journal
 from study_app.store.progress import progress_of
 from study_app.text_tables import decoded, separator_of, wrong_length
@@ -77,18 +77,20 @@ def exclude(
         There is no such session or trial, it is excluded already, ``by`` or ``reason`` is empty, or the list cannot be
         read or written.
     """
-    by, reason = readable(by, reason, "an exclusion needs a rule or name, and a reason")
+    by, reason = check_name_and_reason(by, reason, "an exclusion needs a rule or name, and a reason")
     study = StudyFolder(folder)
-    _check_there(study, participant, session, trial)
+    _check_recorded(study, participant, session, trial)
     at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
     new = Exclusion(
         participant=participant, session=session, trial=trial, rule_or_person=by, reason=reason, excluded_at=at
     )
-    with open_alone(folder):
+    with lock_folder(folder):
         rows = exclusions(folder)
         for row in rows:
             if row.what in (new.what, (participant, session, None)):
-                raise StoreError(f"{named(new)} is already excluded, since {row.excluded_at} ({row.reason})")
+                raise StoreError(
+                    f"{describe_exclusion(new)} is already excluded, since {row.excluded_at} ({row.reason})"
+                )
         write_file(study.exclusions, exclusion_bytes((*rows, new)))
     return new
 
@@ -126,18 +128,18 @@ def include(
     StoreError
         It is not excluded, ``by`` or ``reason`` is empty, or a file cannot be read or written.
     """
-    by, reason = readable(by, reason, "reversing an exclusion needs a name and a reason")
+    by, reason = check_name_and_reason(by, reason, "reversing an exclusion needs a name and a reason")
     study = StudyFolder(folder)
-    with open_alone(folder):
+    with lock_folder(folder):
         rows = exclusions(folder)
         taken = next((row for row in rows if row.what == (participant, session, trial)), None)
         if taken is None:
-            name = named(
+            name = describe_exclusion(
                 Exclusion(
                     participant=participant, session=session, trial=trial, rule_or_person="", reason="", excluded_at=""
                 )
             )
-            listed = "; ".join(named(row) for row in rows) or "nothing"
+            listed = "; ".join(describe_exclusion(row) for row in rows) or "nothing"
             raise StoreError(f"{name} is not excluded; excluded: {listed}")
         at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
         record = {"at": at, "by": by, "reason": reason, "exclusion": asdict(taken)}
@@ -171,7 +173,7 @@ def exclusions(folder: Path) -> tuple[Exclusion, ...]:
         raise StoreError(f"{path} separates its columns by {separator!r}: save it as CSV with commas")
     if tuple(names[1]) != columns:
         raise StoreError(f"{path}: its columns must be {', '.join(columns)}, but are {', '.join(names[1])}")
-    return tuple(_exclusion(path, line, row) for line, row in rows)
+    return tuple(_parse_exclusion(path, line, row) for line, row in rows)
 
 
 def reversals(folder: Path) -> tuple[Exclusion, ...]:
@@ -183,10 +185,10 @@ def dated_reversals(folder: Path) -> tuple[tuple[Exclusion, str], ...]:
     """Return each reversed exclusion with the time of its reversal."""
     path = StudyFolder(folder).reversed_exclusions
     lines = (read_own_if_there(path, folder) or b"").split(b"\n")  # a reason may contain other line endings
-    return tuple(_reversed(path, number, line) for number, line in enumerate(lines, start=1) if line.strip())
+    return tuple(_parse_reversal(path, number, line) for number, line in enumerate(lines, start=1) if line.strip())
 
 
-def _reversed(path: Path, number: int, line: bytes) -> tuple[Exclusion, str]:
+def _parse_reversal(path: Path, number: int, line: bytes) -> tuple[Exclusion, str]:
     with contextlib.suppress(ValueError, KeyError, TypeError):
         record = parse_json(line)
         taken = Exclusion(**record["exclusion"])
@@ -201,7 +203,7 @@ def exclusion_bytes(rows: tuple[Exclusion, ...]) -> bytes:
     return csv_bytes(EXCLUSIONS, [{name: getattr(row, name) for name in header(EXCLUSIONS)} for row in rows])
 
 
-def _exclusion(path: Path, line: int, row: list[str]) -> Exclusion:
+def _parse_exclusion(path: Path, line: int, row: list[str]) -> Exclusion:
     if wrong := wrong_length(row, len(header(EXCLUSIONS))):
         raise StoreError(f"{path}, line {line}: {wrong}")
     participant, session, trial, by, reason, at, *_ = row
@@ -214,13 +216,13 @@ def _exclusion(path: Path, line: int, row: list[str]) -> Exclusion:
         participant=participant,
         session=int(session),
         trial=None if trial == MISSING else int(trial),
-        rule_or_person=unguarded(by),
-        reason=unguarded(reason),
+        rule_or_person=unguard_formula(by),
+        reason=unguard_formula(reason),
         excluded_at=at,
     )
 
 
-def _check_there(study: StudyFolder, participant: str, session: int, trial: int | None) -> None:
+def _check_recorded(study: StudyFolder, participant: str, session: int, trial: int | None) -> None:
     place = study.session(participant, session)
     if place not in study.sessions():
         known = [str(session.number) for session in study.sessions() if session.participant == participant]
@@ -237,7 +239,7 @@ def _check_there(study: StudyFolder, participant: str, session: int, trial: int 
         raise StoreError(f"participant {participant}, session {session} has no trial {trial}: it has {listed}")
 
 
-def named(row: Exclusion) -> str:
+def describe_exclusion(row: Exclusion) -> str:
     """Return a description of the excluded session or trial, for messages."""
     trial = "" if row.trial is None else f", trial {row.trial}"
     return f"participant {row.participant}, session {row.session}{trial}"

@@ -30,9 +30,9 @@ from study_app.store.atomic import (
     create_folder,
     is_there,
     parse_json,
-    sweep,
+    remove_temporary_files,
     sync_folder,
-    temporaries,
+    temporary_files,
     write_file,
 )
 from study_app.store.journals import journal
@@ -61,7 +61,7 @@ class Opening:
             self.marker.unlink(missing_ok=True)
 
 
-def open_alone(folder: Path) -> Opening:
+def lock_folder(folder: Path) -> Opening:
     """Mark ``folder`` as open in this program.
 
     Raises
@@ -74,8 +74,8 @@ def open_alone(folder: Path) -> Opening:
         write_file(opening.marker, json.dumps(_this_program()).encode())
         for marker in markers(folder):
             if marker != opening.marker:
-                if _lives(holder := _holder(marker)):
-                    raise _is_open(marker, holder)
+                if _may_be_running(holder := _holder(marker)):
+                    raise _open_elsewhere(marker, holder)
                 marker.unlink(missing_ok=True)
         sync_folder(folder)
     except OSError as error:
@@ -87,7 +87,7 @@ def open_alone(folder: Path) -> Opening:
     return opening
 
 
-def create_opened(folder: Path) -> Opening | None:
+def create_locked_folder(folder: Path) -> Opening | None:
     """Create ``folder``, locked by this program from the start; return None if it exists and is not empty."""
     opening = Opening(folder / f".open-{secrets.token_hex(4)}.json")
     try:
@@ -108,18 +108,18 @@ def markers(folder: Path) -> tuple[Path, ...]:
 
 def is_open(folder: Path) -> bool:
     """Return whether a program, perhaps this one, has ``folder`` open."""
-    return any(_lives(_holder(marker)) for marker in markers(folder))
+    return any(_may_be_running(_holder(marker)) for marker in markers(folder))
 
 
 def refuse_if_open(folder: Path) -> None:
     """Reject a folder that a program, perhaps this one, has open; nothing is changed."""
     for marker in markers(folder):
         holder = _holder(marker)
-        if _lives(holder):
-            raise _is_open(marker, holder)
+        if _may_be_running(holder):
+            raise _open_elsewhere(marker, holder)
 
 
-def never_begun(path: Path) -> bool:
+def is_never_begun(path: Path) -> bool:
     """Return whether the session folder ``path`` exists without a line in its journal or any file written later.
 
     A receipt with the session's end or a resumption is a later file.
@@ -133,7 +133,7 @@ def never_begun(path: Path) -> bool:
         return False
     try:
         early = {path / name for name in _BEFORE_THE_FIRST_LINE}
-        if set(path.iterdir()) - early - {*markers(path), *temporaries(path)}:
+        if set(path.iterdir()) - early - {*markers(path), *temporary_files(path)}:
             return False
     except OSError as error:
         raise cannot_read(path, error) from error
@@ -148,21 +148,21 @@ def never_begun(path: Path) -> bool:
     return not contents.lines and contents.damage is None
 
 
-def abandoned(path: Path) -> bool:
+def is_abandoned(path: Path) -> bool:
     """Return whether a program that has ended claimed the session folder ``path`` without beginning the session."""
-    return never_begun(path) and not is_open(path)
+    return is_never_begun(path) and not is_open(path)
 
 
-def take_over(path: Path) -> Opening | None:
+def take_over_folder(path: Path) -> Opening | None:
     """Lock and empty the session folder ``path``; return None if it was begun or another program has it open."""
-    if not abandoned(path):
+    if not is_abandoned(path):
         return None
-    opening = open_alone(path)
+    opening = lock_folder(path)
     try:
-        if not never_begun(path):
+        if not is_never_begun(path):
             opening.release()
             return None
-        sweep(path)
+        remove_temporary_files(path)
         for name in _BEFORE_THE_FIRST_LINE:
             (path / name).unlink(missing_ok=True)
     except OSError as error:
@@ -174,19 +174,19 @@ def take_over(path: Path) -> Opening | None:
     return opening
 
 
-def sweep_claims(participant: Path) -> None:
+def remove_abandoned_claims(participant: Path) -> None:
     """Remove what ended programs left in a participant's folder while they claimed or released a session.
 
     Without a marker the owner is unknown; then only folders older than any such operation are removed.
     """
-    for half in temporaries(participant):
+    for half in temporary_files(participant):
         with contextlib.suppress(OSError):  # it was begun or removed in the meantime
             old = time.time() - half.stat().st_mtime > _NO_PROGRAM_TAKES_S
             if half.is_dir() and (old or markers(half)) and not is_open(half):  # in this order: markers come
                 shutil.rmtree(half, ignore_errors=True)
 
 
-def _is_open(marker: Path, holder: dict[str, Any]) -> StoreError:
+def _open_elsewhere(marker: Path, holder: dict[str, Any]) -> StoreError:
     return StoreError(
         f"{marker.parent} is open in another program (process {holder.get('pid')} on {holder.get('host')}, since "
         f"{holder.get('at')}): wait for it, or end it there; if that program is gone, delete {marker}"
@@ -208,25 +208,25 @@ def _this_program() -> dict[str, Any]:
     return {
         "host": platform.node(),
         "pid": os.getpid(),
-        "began": process_began(os.getpid()),
+        "began": process_start_s(os.getpid()),
         "at": datetime.now().astimezone().isoformat(timespec="seconds"),
     }
 
 
-def _lives(holder: dict[str, Any]) -> bool:
+def _may_be_running(holder: dict[str, Any]) -> bool:
     """Return whether the program that wrote a marker may still run; always True for another machine."""
     if holder.get("gone"):
         return False
     if holder.get("host") != platform.node() or not isinstance(holder.get("pid"), int):
         return True
     try:
-        began = process_began(holder["pid"])
+        began = process_start_s(holder["pid"])
         return began is not None and abs(began - float(holder["began"])) < SAME_S
     except (PermissionError, KeyError, TypeError, ValueError):  # a process with this ID runs, but may be another one
         return True
 
 
-def process_began(process: int) -> float | None:
+def process_start_s(process: int) -> float | None:
     """Return the start time of the process with this ID [s since the epoch], or None if it does not run."""
     import psutil  # noqa: PLC0415 - slow to load: only where a folder is locked
 

@@ -148,7 +148,7 @@ def check_study_name(name: object) -> str:
     return name
 
 
-def locate(path: Path) -> tuple[StudyFolder, SessionFolder]:
+def locate_session(path: Path) -> tuple[StudyFolder, SessionFolder]:
     """Return the study folder and session folder of the session in ``path``.
 
     Raises
@@ -175,15 +175,15 @@ def study_folder(results: Path, study: str, *, pilot: bool = False) -> StudyFold
 
 def rehearsal_folder(results: Path, study: str) -> Path:
     """Return a new path for the folder of a rehearsal, separate from participants' data."""
-    return _free(results, f"{study}-rehearsal")
+    return _free_folder(results, f"{study}-rehearsal")
 
 
 def kept_pilot_folder(results: Path, study: str) -> Path:
     """Return a new path for the folder of a stored pilot; each pilot has its own key and therefore its own folder."""
-    return _free(results, f"{study}-pilot")
+    return _free_folder(results, f"{study}-pilot")
 
 
-def _free(results: Path, name: str) -> Path:
+def _free_folder(results: Path, name: str) -> Path:
     """Return the first of NAME-1, NAME-2 … that does not exist."""
     number = 1
     while (folder := results / f"{name}-{number}").exists():
@@ -191,7 +191,7 @@ def _free(results: Path, name: str) -> Path:
     return folder
 
 
-def readable(by: str, reason: str, why: str) -> tuple[str, str]:
+def check_name_and_reason(by: str, reason: str, why: str) -> tuple[str, str]:
     """Return a person's name and a reason as stored with the data, with single spaces.
 
     Raises

@@ -23,7 +23,7 @@ from study_app.errors import StoreError
 from study_app.store.atomic import cannot_read, parse_json, read_regular
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder, check_study_name
-from study_app.store.journals.journal_events import holds, shortened
+from study_app.store.journals.journal_events import is_valid_value, shorten_value
 
 MANIFEST: Final = "sites.json"
 FOLDER: Final = "sites"
@@ -87,12 +87,12 @@ def read_merged(folder: Path) -> Merged | None:
     try:
         held = parse_json(read_regular(path))
         if held["format"] != FORMAT:
-            shown = shortened(held["format"])
+            shown = shorten_value(held["format"])
             raise StoreError(
                 f"{path} has format {shown}, this version reads {FORMAT}: use a newer version of liquid-study"
             )
         sites = tuple(Site(**site) for site in held["sites"])
-        if sites and all(map(_is_site, sites)) and holds("protocol_hash", held["protocol_hash"]):
+        if sites and all(map(_is_site, sites)) and is_valid_value("protocol_hash", held["protocol_hash"]):
             merged = Merged(folder, check_study_name(held["study"]), held["protocol_hash"], sites)
             _refuse_links(merged)
             return merged
@@ -107,20 +107,24 @@ def read_merged(folder: Path) -> Merged | None:
 
 def _is_site(site: Site) -> bool:
     named = isinstance(site.name, str) and ID_PATTERN.fullmatch(site.name) is not None
-    typed = holds("at", site.merged_at) and holds("key_hash", site.key_hash) and isinstance(site.sessions, int)
+    typed = (
+        is_valid_value("at", site.merged_at)
+        and is_valid_value("key_hash", site.key_hash)
+        and isinstance(site.sessions, int)
+    )
     return named and typed
 
 
 def _refuse_links(merged: Merged) -> None:
     """Raise an error if a site's folder is a link: the files elsewhere would be read as if they were the copy."""
     for folder in map(merged.folder, merged.names):
-        if not (real := _real(folder)).is_relative_to(_real(merged.path)):
+        if not (real := _resolved_path(folder)).is_relative_to(_resolved_path(merged.path)):
             raise StoreError(
                 f"{folder} leads by a link out of {merged.path}, to {real}: replace the link by the folder itself"
             )
 
 
-def _real(path: Path) -> Path:
+def _resolved_path(path: Path) -> Path:
     """Return a path with links resolved; a loop of links, for which `Path.resolve` raises RuntimeError, is kept."""
     return Path(os.path.realpath(path))
 
@@ -137,7 +141,7 @@ def folders_of(folder: Path) -> dict[str, Path]:
     return {"": folder} if merged is None else {f"{name}{DASH}": merged.folder(name) for name in merged.names}
 
 
-def own_place(folder: Path, participant: str) -> tuple[Path, str]:
+def locate_participant(folder: Path, participant: str) -> tuple[Path, str]:
     """Return the results folder that holds a participant, and the participant's ID there.
 
     Raises
@@ -166,7 +170,7 @@ def session_in(folder: Path, participant: str, number: int) -> SessionFolder:
     StoreError
         The study is merged, and the ID names none of its sites.
     """
-    place, own = own_place(folder, participant)
+    place, own = locate_participant(folder, participant)
     return StudyFolder(place).session(own, number)
 
 
@@ -199,7 +203,7 @@ def sessions_in(folders: Iterable[Path]) -> tuple[SessionFolder, ...]:
 
 def merged_above(folder: Path) -> Path | None:
     """Return the merged study that contains ``folder`` as the copy of a site, or None."""
-    place = _real(folder)
+    place = _resolved_path(folder)
     inside = place.parent.name == FOLDER and (place.parents[1] / MANIFEST).is_file()
     return place.parents[1] if inside else None
 

@@ -76,10 +76,10 @@ class MissingTrials:
 
     def __str__(self) -> str:
         """Return number and reasons of the missing trials as a sentence without full stop; empty if there are none."""
-        return missing_words(self.count, self.asked, self.reasons, self.limits) if self.missing else ""
+        return missing_sentence(self.count, self.asked, self.reasons, self.limits) if self.missing else ""
 
 
-def missing_words(count: int, asked: int, reasons: Mapping[str, int], limits: Mapping[str, float]) -> str:
+def missing_sentence(count: int, asked: int, reasons: Mapping[str, int], limits: Mapping[str, float]) -> str:
     """Return "26 of 40 trials were not delivered: the safety layer withheld too much force (limit 25 %)".
 
     Parameters
@@ -92,14 +92,14 @@ def missing_words(count: int, asked: int, reasons: Mapping[str, int], limits: Ma
         The limits of the study, by their keys.
     """
     phrases = (
-        f"{limit_words(limit, limits)}{f' in {of_limit}' if len(reasons) > 1 else ''}"
+        f"{limit_reason(limit, limits)}{f' in {of_limit}' if len(reasons) > 1 else ''}"
         for limit, of_limit in reasons.items()
     )
     was = "trial was" if asked == 1 else "trials was" if count == 1 else "trials were"
     return f"{count} of {asked} {was} not delivered: {', '.join(phrases)}"
 
 
-def limit_words(limit: str, limits: Mapping[str, float]) -> str:
+def limit_reason(limit: str, limits: Mapping[str, float]) -> str:
     """Return the reason for which a presentation was invalid, with the limit: "frames were late (limit 250 ms)"."""
     reason = REASONS.get(limit, limit)
     unit = _UNITS.get(limit.rpartition("_")[2], "")

@@ -18,13 +18,13 @@ from study_app.errors import AnalysisError, StoreError
 from study_app.store.atomic import (
     append_line,
     cannot_write,
-    cause,
     open_regular,
     parse_json,
-    sweep_old,
+    remove_old_temporary_files,
+    system_message,
     temporary_path,
-    write_through,
-    write_whole,
+    write_all,
+    write_new_file,
 )
 from study_app.user_folder import data_folder
 
@@ -64,11 +64,11 @@ def write_files(to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, 
         for name, content in files.items():
             if isinstance(content, FileCopy):
                 with staged[name].open("xb", buffering=0) as file:
-                    for part in _parts(content):
-                        write_whole(file, part)
+                    for part in _file_parts(content):
+                        write_all(file, part)
                     os.fsync(file.fileno())
             else:
-                write_through(staged[name], content)
+                write_new_file(staged[name], content)
         for name, path in staged.items():
             path.replace(to / name)
     except (OSError, AnalysisError) as error:
@@ -86,11 +86,11 @@ def write_files(to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, 
             "permissions"
         ) from error
     for folder in {path.parent for path in staged.values()}:
-        sweep_old(folder)
+        remove_old_temporary_files(folder)
     return tuple(to / name for name in files)
 
 
-def _parts(copied: FileCopy) -> Iterator[bytes]:
+def _file_parts(copied: FileCopy) -> Iterator[bytes]:
     """Yield the content of a file to copy in parts; errors name this file, not the folder that is written."""
     digest = hashlib.sha256()
     try:
@@ -100,8 +100,8 @@ def _parts(copied: FileCopy) -> Iterator[bytes]:
                 yield part
     except OSError as error:
         raise AnalysisError(
-            f"{copied.source} cannot be read ({cause(error)}): nothing was written; correct its permissions, or "
-            "restore it from a copy"
+            f"{copied.source} cannot be read ({system_message(error)}): nothing was written; correct its permissions, "
+            "or restore it from a copy"
         ) from error
     if digest.hexdigest() != copied.sha256:
         raise AnalysisError(f"{copied.source} changed while it was copied: nothing was written; repeat the command")

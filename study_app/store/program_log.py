@@ -33,8 +33,8 @@ class PlainFormatter(logging.Formatter):
         """Return the record as lines; those after the first are indented."""
         record = logging.makeLogRecord(record.__dict__)
         given = record.args if isinstance(record.args, tuple) else ()
-        record.args = tuple(map(_shown, given))
-        record.msg = str(record.msg).replace("%r", "%s").replace("%d", "%s") if given else _words(record.msg)
+        record.args = tuple(map(_plain_argument, given))
+        record.msg = str(record.msg).replace("%r", "%s").replace("%d", "%s") if given else _message_format(record.msg)
         record.exc_text = record.stack_info = None
         return super().format(record)
 
@@ -60,7 +60,7 @@ def log_file() -> Path:
     return user_folder() / "log.txt"
 
 
-def keep_log() -> None:
+def start_log() -> None:
     """Start writing the program's log to `log_file`; warnings still go to the terminal."""
     logger = logging.getLogger("study_app")
     if any(isinstance(handler, _Quiet) for handler in logger.handlers):
@@ -75,7 +75,7 @@ def keep_log() -> None:
         logger.setLevel(logging.INFO)
 
 
-def kept_log() -> str:
+def read_log() -> str:
     """Return the log of all readable files, oldest line first."""
     newest = log_file()
     files = [newest.with_name(f"{newest.name}.{number}") for number in range(KEPT, 0, -1)]
@@ -103,11 +103,11 @@ def _read(path: Path) -> str:
     return ""
 
 
-def _shown(given: object) -> str:
+def _plain_argument(given: object) -> str:
     if isinstance(given, DeviceError | ServoFault):
         return str(given)
     return type(given).__name__ if isinstance(given, BaseException) else OMITTED
 
 
-def _words(message: object) -> str:
+def _message_format(message: object) -> str:
     return message if isinstance(message, str) else OMITTED

@@ -315,6 +315,6 @@ def recordable(lines: Iterable[events.Event]) -> list[events.Which]:
     ]
 
 
-def named(trial: int, attempt: int, interval: int | None) -> str:
+def attempt_name(trial: int, attempt: int, interval: int | None) -> str:
     """Return the name of an attempt: "trial 3, attempt 1", followed by the interval in a trial of intervals."""
     return f"trial {trial}, attempt {attempt}" + ("" if interval is None else f", interval {interval}")

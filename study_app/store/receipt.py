@@ -22,7 +22,7 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import block_codes, order_of
 from study_app.store.atomic import parse_json, read_own, study_root, write_file
-from study_app.store.journals.journal_events import SessionStarted, holds, plain, shortened
+from study_app.store.journals.journal_events import SessionStarted, is_valid_value, plain_json, shorten_value
 
 GENERATOR = (
     "random.Random (Mersenne Twister), one per named stream, seeded by SHA-256 of (seed, name); only .random() is "
@@ -116,14 +116,14 @@ def library_version(library: str) -> str:
 
 def write(path: Path, receipt: Mapping[str, Any]) -> None:
     """Write the receipt in one step."""
-    text = json.dumps(plain(dict(receipt)), indent=2, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(plain_json(dict(receipt)), indent=2, ensure_ascii=False, allow_nan=False)
     write_file(path, f"{text}\n".encode("utf-8", "backslashreplace"))
 
 
 def digest(held: Mapping[str, Any]) -> str:
     """Return the SHA-256 of a receipt, or of one entry of its ``resumed``, without the fields that change later."""
     lasting = {name: value for name, value in held.items() if name not in CHANGING}
-    return hashlib.sha256(json.dumps(plain(lasting), sort_keys=True).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(plain_json(lasting), sort_keys=True).encode()).hexdigest()
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -141,8 +141,8 @@ def read(path: Path) -> dict[str, Any]:
     if not isinstance(receipt, dict) or "key_hash" not in receipt:
         raise StoreError(f"{path} is not a receipt (no key_hash): restore it from a copy")
     for name, value in receipt.items():
-        if not _holds(name, value):
-            raise StoreError(f"{path} is not a receipt ({name} is {shortened(value)}): restore it from a copy")
+        if not _is_valid_field(name, value):
+            raise StoreError(f"{path} is not a receipt ({name} is {shorten_value(value)}): restore it from a copy")
     return receipt
 
 
@@ -157,12 +157,12 @@ def began_at(receipt: Mapping[str, Any]) -> str | None:
     return first.get("at") if isinstance(first, dict) and skipped else receipt.get("started_at")
 
 
-def other_format(receipt: Mapping[str, Any], start: SessionStarted) -> bool:
+def has_other_format(receipt: Mapping[str, Any], start: SessionStarted) -> bool:
     """Return whether the journal that begins with ``start`` has another format than its receipt."""
     return bool(receipt.get("format", 1) != (start.format or 1))
 
 
-def _holds(name: str, value: object) -> bool:
+def _is_valid_field(name: str, value: object) -> bool:
     """Return whether ``value`` has the type of the receipt's field ``name``."""
     if name in (
         "versions",
@@ -179,5 +179,5 @@ def _holds(name: str, value: object) -> bool:
     if name in ("plug_ins", "resumed"):
         return isinstance(value, list)
     if name in ("started_at", "ended_at"):
-        return value is None or holds("at", value)
-    return holds(name, value)
+        return value is None or is_valid_value("at", value)
+    return is_valid_value(name, value)

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from study_app.errors import StoreError
-from study_app.store.atomic import cause, sync_folder
+from study_app.store.atomic import sync_folder, system_message
 from study_app.store.journals.journal_events import Recorded, RecordingLost, Which
 
 if TYPE_CHECKING:
@@ -121,8 +121,8 @@ class Recorder:
                 return
             self._expected[trial, attempt, interval] = None
             self._queue.append(_Begin((trial, attempt, interval), rate_hz))
-            if not self._works():
-                self.thread = threading.Thread(target=self._work, name="recorder", daemon=True)
+            if not self._is_running():
+                self.thread = threading.Thread(target=self._run_writer, name="recorder", daemon=True)
                 try:
                     self.thread.start()
                 except RuntimeError as error:
@@ -135,7 +135,7 @@ class Recorder:
         if self._underway is None or count == 0:
             return
         with self.changed:
-            while self._waits and self._waiting and self._waiting + count > self._room and self._works():
+            while self._waits and self._waiting and self._waiting + count > self._room and self._is_running():
                 self.changed.wait()
             if self._waiting and self._waiting + count > self._room:
                 self._dropped += count
@@ -152,7 +152,7 @@ class Recorder:
             self._frames.extend((painted_ns, sample_ns, *seen[:2], -1 if seen[2] is None else seen[2]))
 
     def stop(self) -> None:
-        """End the running recording, if any; `kept` reports when it is on the disk."""
+        """End the running recording, if any; `collect_results` reports when it is on the disk."""
         if self._underway is None:
             return
         self._underway = None
@@ -171,19 +171,19 @@ class Recorder:
         with self.changed:
             return tuple(self._lost)
 
-    def kept(self) -> tuple[Kept, ...]:
+    def collect_results(self) -> tuple[Kept, ...]:
         """Return the recordings completed or lost since the last call."""
         with self.changed:
             completed, self._kept = tuple(self._kept), []
         return completed
 
-    def settled(self) -> bool:
+    def end_without_waiting(self) -> bool:
         """End the running recording; return, without waiting, whether it is written or the time limit has passed.
 
         Then `close` returns at once.
         """
         self._end()
-        return not self._works() or time.monotonic() >= self._patient_until_s
+        return not self._is_running() or time.monotonic() >= self._patient_until_s
 
     def _end(self, patience_s: float = PATIENCE_S) -> None:
         self.stop()
@@ -194,22 +194,22 @@ class Recorder:
             self.changed.notify_all()
 
     def close(self, patience_s: float = PATIENCE_S) -> None:
-        """End the running recording and wait at most ``patience_s`` until it is written; `kept` reports it."""
+        """End the running recording and wait up to ``patience_s`` until it is written; see `collect_results`."""
         self._end(patience_s)
         if self.thread is not None:
             self.thread.join(max(0.0, min(patience_s, self._patient_until_s - time.monotonic())))
         with self.changed:
-            reason = "the disk was too slow" if self._works() else "its thread had ended"
-            self._kept += [lost(which, reason) for which in self._expected]
+            reason = "the disk was too slow" if self._is_running() else "its thread had ended"
+            self._kept += [lost_event(which, reason) for which in self._expected]
             self._expected.clear()
 
-    def _works(self) -> bool:
+    def _is_running(self) -> bool:
         return self.thread is not None and self.thread.is_alive()
 
-    def _work(self) -> None:
+    def _run_writer(self) -> None:
         """Write queued data; runs in the recorder's thread, which the next trial restarts after a failure."""
         try:
-            self._write()
+            self._process_queue()
         except BaseException as error:
             with self.changed:
                 self._lose_all(f"its thread ended: {type(error).__name__}: {error}")
@@ -217,7 +217,7 @@ class Recorder:
 
     def _lose_all(self, reason: str) -> None:
         """Count all running and queued recordings as lost; the caller holds the lock."""
-        failed = [lost(which, reason) for which in self._expected]
+        failed = [lost_event(which, reason) for which in self._expected]
         self._kept += failed
         self._lost += failed
         self._expected.clear()
@@ -225,9 +225,9 @@ class Recorder:
         self._waiting, self._underway, self.thread = 0, None, None
         self.changed.notify_all()
 
-    def _write(self) -> None:
+    def _process_queue(self) -> None:
         """Process the queue until it is empty and closed."""
-        while (begin := self._next()) is not None:
+        while (begin := self._next_item()) is not None:
             if not isinstance(begin, _Begin):
                 continue  # data of a trial that was lost with an earlier thread
             kept = self._record(begin)
@@ -260,7 +260,7 @@ class Recorder:
             frames = np.frombuffer(end.frames, np.int64).reshape(-1, 5)
             seconds = (file.taken + end.dropped) / begin.rate_hz
             shown = self._files.write_frames(frames_path, frames, facts, seconds, self._secret)
-            return recorded(begin.which, file.finish(end.dropped), shown, end.dropped)
+            return recorded_event(begin.which, file.finish(end.dropped), shown, end.dropped)
         except Exception as error:  # noqa: BLE001 - whatever it is, the next trial's recording is still to be written
             with contextlib.suppress(Exception):  # `verify` reports files that cannot be removed
                 if shown is not None:
@@ -268,18 +268,18 @@ class Recorder:
             if end is None:
                 self._give_samples(lambda _: None)
             failed = error.__cause__ if isinstance(error, StoreError) else error
-            reason = cause(failed) if isinstance(failed, OSError) else f"{type(error).__name__}: {error}"
-            return lost(begin.which, reason)
+            reason = system_message(failed) if isinstance(failed, OSError) else f"{type(error).__name__}: {error}"
+            return lost_event(begin.which, reason)
 
     def _give_samples(self, take: Callable[[Any], object]) -> _End:
         """Pass the queued samples of a trial to ``take``; return the trial's end, or an empty one if it is missing."""
-        while (thing := self._next()) is not None:
+        while (thing := self._next_item()) is not None:
             if isinstance(thing, _End):
                 return thing
             take(thing)
         return _End(array("q"), 0)
 
-    def _next(self) -> Any:
+    def _next_item(self) -> Any:
         """Wait for the next item of the queue and return it; None when the queue is closed and empty."""
         with self.changed:
             while not self._queue and not self._closing:
@@ -293,7 +293,7 @@ class Recorder:
             return thing
 
 
-def recorded(which: Which, samples: Written, frames: Written, dropped: int) -> Recorded:
+def recorded_event(which: Which, samples: Written, frames: Written, dropped: int) -> Recorded:
     """Return the journal's event for a complete recording; files are given by their path in the session's folder."""
     trial, attempt, interval = which
     return Recorded(
@@ -312,7 +312,7 @@ def recorded(which: Which, samples: Written, frames: Written, dropped: int) -> R
     )
 
 
-def lost(which: Which, reason: str) -> RecordingLost:
+def lost_event(which: Which, reason: str) -> RecordingLost:
     """Return the journal's event for a recording that could not be stored."""
     trial, attempt, interval = which
     return RecordingLost(trial=trial, attempt=attempt, interval=interval, reason=reason)

@@ -30,7 +30,7 @@ from study_app.haptics.model.layout import SAMPLE, SAMPLE_FIELDS, SampleField, r
 from study_app.store.atomic import cannot_read, parse_json, read_regular, write_file
 from study_app.store.blinded.sealing import FRAMES_BYTES_PER_S, MARK, SAMPLE_BYTES, open_file, seal_file, sealed_bytes
 from study_app.store.csv_files import Column, Kind
-from study_app.store.journals.journal_events import plain
+from study_app.store.journals.journal_events import plain_json
 
 FRAMES: tuple[Column, ...] = (
     Column("painted_ns", "integer", "Time when the frame was shown, on the servo's clock.", unit="ns"),
@@ -120,7 +120,7 @@ def read_samples(path: Path, secret: bytes | None = None) -> Any:
     StoreError
         It cannot be read, is not a recording of samples, or is sealed.
     """
-    columns, facts = _read(path, "samples", secret)
+    columns, facts = _read_columns(path, "samples", secret)
     samples = records(SAMPLE, len(columns["tick"]))
     for field in RECORDED:
         values: Any = field.before
@@ -145,7 +145,7 @@ def read_frames(path: Path, secret: bytes | None = None) -> Any:
     StoreError
         It cannot be read, is not a recording of frames, or is sealed.
     """
-    columns, _ = _read(path, "frames", secret)
+    columns, _ = _read_columns(path, "frames", secret)
     frames = records(FRAME, len(columns["painted_ns"]))
     for name in FRAME.names or ():
         frames[name] = columns.get(name, NO_VIDEO.get(name, 0))
@@ -211,7 +211,7 @@ def _opened(path: Path, secret: bytes | None) -> Iterator[Any]:
         raise StoreError(f"{path} is damaged ({reason}): restore it from a copy") from error
 
 
-def _read(path: Path, kind: str, secret: bytes | None) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+def _read_columns(path: Path, kind: str, secret: bytes | None) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     with _opened(path, secret) as file:
         facts = _facts(path, file.metadata)
         if facts["kind"] != kind:
@@ -222,12 +222,12 @@ def _read(path: Path, kind: str, secret: bytes | None) -> tuple[dict[str, NDArra
         columns = [column.name for column in FRAMES if held >= _VIDEO_SINCE or column.name not in NO_VIDEO]
     else:
         columns = [name for field in RECORDED if field.since <= held for name in field.named()]
-    if not _are_of(table, columns, facts["rows"]):
+    if not _has_columns(table, columns, facts["rows"]):
         raise StoreError(f"{path} is damaged (its columns differ from those of {kind}): restore it from a copy")
     return {name: _numbers(table.column(name), facts["rows"]) for name in table.column_names}, facts
 
 
-def _are_of(table: pa.Table, columns: Sequence[str], rows: int) -> bool:
+def _has_columns(table: pa.Table, columns: Sequence[str], rows: int) -> bool:
     """Return whether a table has exactly these columns, each once and with all rows."""
     expected = {name: _STORED[name] for name in columns}
     held = {field.name: field.type for field in table.schema}
@@ -307,8 +307,8 @@ class SamplesFile:
 
     def _write_group(self, samples: Any) -> None:
         if self.rows == 0:
-            self._facts["first_device_force_n"] = plain(samples["device_force_n"][:1].ravel())
-            self._facts["first_command_n"] = plain(samples["command_n"][:1].ravel())
+            self._facts["first_device_force_n"] = plain_json(samples["device_force_n"][:1].ravel())
+            self._facts["first_command_n"] = plain_json(samples["command_n"][:1].ravel())
         self._device += crcs(samples["device_force_n"], self.check_rows)
         self._effect += crcs(samples["force_n"], self.check_rows)
         self._half.write(sample_columns(samples))
@@ -345,9 +345,9 @@ def sample_columns(samples: Any) -> dict[str, NDArray[Any]]:
     columns: dict[str, NDArray[Any]] = {}
     with np.errstate(invalid="ignore", over="ignore"):  # non-finite values of a fault are stored unchanged
         for field in RECORDED:
-            values = _rounded(_rows(samples, field.name), field.step)
+            values = _round_values(_rows(samples, field.name), field.step)
             if field.beside:
-                values = field.sign * (values - _rounded(_rows(samples, field.beside), field.step))
+                values = field.sign * (values - _round_values(_rows(samples, field.beside), field.step))
             if field.measured:
                 values = np.where(samples["measured"][:, np.newaxis] & field.measured, values, np.nan)
             for name, column in zip(field.named(), values.T, strict=True):
@@ -360,7 +360,7 @@ def _rows(samples: Any, name: str) -> NDArray[Any]:
     return np.reshape(samples[name], (len(samples), SAMPLE[name].shape[0] if SAMPLE[name].shape else 1))
 
 
-def _rounded(values: NDArray[Any], step: float) -> NDArray[Any]:
+def _round_values(values: NDArray[Any], step: float) -> NDArray[Any]:
     return np.asarray(np.rint(values / step) * step) if step else values
 
 

@@ -53,7 +53,7 @@ class Run:
         return held if isinstance(held, dict) else None
 
 
-def runs(results: Path, study: str) -> tuple[Run, ...]:
+def runs_of_study(results: Path, study: str) -> tuple[Run, ...]:
     """Return the contents of a study's file with which sessions were run, the newest last.
 
     Nothing is read but receipts; no sealed key. A receipt that cannot be read is left out (`verify` reports it).
@@ -87,13 +87,13 @@ def runs(results: Path, study: str) -> tuple[Run, ...]:
 def run_of(path: Path) -> Run | None:
     """Return the content with which the session of a receipt was run; None if the receipt cannot be read."""
     try:
-        return _run(path, path.stat().st_mtime_ns)
+        return _read_run(path, path.stat().st_mtime_ns)
     except (StoreError, OSError):
         return None
 
 
 @lru_cache(maxsize=4096)
-def _run(path: Path, _changed_ns: int) -> Run:
+def _read_run(path: Path, _changed_ns: int) -> Run:
     held = receipt.read(path)
     version = str(held.get("protocol", {}).get("study", {}).get("version", ""))
     simulated, pilot = bool(held.get("simulated")), bool(held.get("pilot"))
@@ -125,7 +125,7 @@ def source_of(run: Run) -> str | None:
     return None if content is None else content.decode("utf-8", "replace")
 
 
-def keep_what_was_run(file: Path, known: Iterable[Run]) -> None:
+def keep_run_content(file: Path, known: Iterable[Run]) -> None:
     """Store the file's content if sessions were run with it, before another program can change it.
 
     Raises

@@ -10,8 +10,15 @@ from pathlib import Path
 from typing import Final, Literal, TypeAlias
 
 from study_app.errors import StoreError
-from study_app.store.atomic import append_line, make_folder, parse_json, read_if_there, sweep_old, write_file
-from study_app.store.folder_lock import open_alone
+from study_app.store.atomic import (
+    append_line,
+    make_folder,
+    parse_json,
+    read_if_there,
+    remove_old_temporary_files,
+    write_file,
+)
+from study_app.store.folder_lock import lock_folder
 from study_app.user_folder import data_folder
 
 Origin: TypeAlias = Literal["saved", "found", "draft"]
@@ -42,7 +49,7 @@ def file_key(file: Path) -> str:
     return content_hash(str(file.resolve()).encode("utf-8", "surrogatepass"))[:32]
 
 
-def save(file: Path, text: str, base: str) -> str:
+def save_study(file: Path, text: str, base: str) -> str:
     """Write a study's file in one step and return its hash; the previous content is stored (`kept_content`).
 
     Parameters
@@ -62,8 +69,8 @@ def save(file: Path, text: str, base: str) -> str:
         It cannot be written, or another program saves it at this moment.
     """
     target, source = file.resolve(), text.encode()
-    with _alone(file):
-        sweep_old(target.parent, target.name)
+    with _locked_file(file):
+        remove_old_temporary_files(target.parent, target.name)
         mode = None
         if (content := read_if_there(target)) is not None:
             mode = target.stat().st_mode & 0o777
@@ -149,12 +156,12 @@ def write_whole(path: Path, content: bytes) -> None:
 
 
 @contextlib.contextmanager
-def _alone(file: Path) -> Iterator[None]:
+def _locked_file(file: Path) -> Iterator[None]:
     """Lock the file so that no other program saves it."""
     folder = data_folder() / "saving" / file_key(file)
     make_folder(folder, waits=False)
     try:
-        opening = open_alone(folder)
+        opening = lock_folder(folder)
     except StoreError as error:
         raise StoreError(f"{file} cannot be saved while another program saves it: save again ({error})") from error
     try:

@@ -14,7 +14,7 @@ from typing import Final
 
 from study_app.store import receipt, workstation
 from study_app.store.atomic import write_file
-from study_app.store.program_log import kept_log, last_error, source_place
+from study_app.store.program_log import last_error, read_log, source_place
 from study_app.workspace import workspace
 
 NAME: Final = "liquid-study-support.zip"
@@ -56,7 +56,7 @@ def write_support(path: Path, diagnosis: str = "") -> None:
 
 def _parts(diagnosis: str) -> Iterator[tuple[str, str]]:
     settings, trouble = workstation.load_or_default()
-    log = kept_log()
+    log = read_log()
     yield "README.txt", ABOUT
     yield "versions.json", _json(receipt.versions() | {name: receipt.library_version(name) for name in _DRIVERS})
     yield "settings.json", _json(_settings(settings) | ({"problem": "the file cannot be used"} if trouble else {}))

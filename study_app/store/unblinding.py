@@ -16,12 +16,29 @@ from typing import Final
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
 from study_app.store import receipt
-from study_app.store.atomic import is_there, read_if_there, read_own, study_root, sweep, sweep_old, write_file
-from study_app.store.blinded.blinding import Codes, Key, opened, read_key, reveal, reveals, verified_key, whole_protocol
+from study_app.store.atomic import (
+    is_there,
+    read_if_there,
+    read_own,
+    remove_old_temporary_files,
+    remove_temporary_files,
+    study_root,
+    write_file,
+)
+from study_app.store.blinded.blinding import (
+    Codes,
+    Key,
+    complete_protocol,
+    open_events,
+    read_key,
+    reveal,
+    reveals,
+    verified_key,
+)
 from study_app.store.checksums import replace_checksums
-from study_app.store.csv_files import in_columns_of
+from study_app.store.csv_files import align_columns
 from study_app.store.exclusions import MISSING_RULE, Exclusion, dated_reversals, exclude, exclusions, reversals
-from study_app.store.folder_lock import is_open, open_alone
+from study_app.store.folder_lock import is_open, lock_folder
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import Event, Recorded, TrialStarted, start_of
@@ -32,7 +49,7 @@ from study_app.store.tables.session_tables import table_columns
 from study_app.store.tables.study_files import (
     described_study,
     has_intervals,
-    names_sealed,
+    has_sealed_columns,
     write_description,
     write_participants,
 )
@@ -72,11 +89,11 @@ def unblind(folder: Path, by: str, reason: str) -> Unblinded:
         As for `blinding.reveal`, or another program writes to the folder; nothing has changed.
     """
     study = StudyFolder(folder)
-    with open_alone(folder) if is_there(study.key) else contextlib.nullcontext():
+    with lock_folder(folder) if is_there(study.key) else contextlib.nullcontext():
         codes = reveal(folder, by, reason)
         key = read_key(folder)
-        sweep_old(study.path)
-        sweep_old(study.data)
+        remove_old_temporary_files(study.path)
+        remove_old_temporary_files(study.data)
         left: list[str] = []
         for session in study.sessions():
             try:
@@ -103,7 +120,7 @@ def is_unblinded(folder: Path) -> bool:
     StoreError
         The list of reveals, or the description, cannot be read.
     """
-    return all_opened(folder) and names_sealed(read_if_there(StudyFolder(folder).description) or b"")
+    return has_opened_keys(folder) and has_sealed_columns(read_if_there(StudyFolder(folder).description) or b"")
 
 
 def unblind_folder(folder: Path, by: str, reason: str) -> dict[str, Unblinded]:
@@ -127,7 +144,7 @@ def unblind_folder(folder: Path, by: str, reason: str) -> dict[str, Unblinded]:
     return by_site
 
 
-def decided_late(folder: Path, rows: Sequence[Exclusion]) -> tuple[Exclusion, ...]:
+def late_exclusions(folder: Path, rows: Sequence[Exclusion]) -> tuple[Exclusion, ...]:
     """Return the exclusions decided or reversed by a person after the key was opened; none for a merged study."""
     opened_at = min(filter(None, (_moment(reveal["at"]) for reveal in reveals(folder))), default=None)
     dated = (*((row, row.excluded_at) for row in rows if row.rule_or_person not in RULES), *dated_reversals(folder))
@@ -156,7 +173,7 @@ def reveals_of(folder: Path) -> tuple[dict[str, str], ...]:
     return tuple(of_sites)
 
 
-def all_opened(folder: Path) -> bool:
+def has_opened_keys(folder: Path) -> bool:
     """Return whether the key of a study, or the keys of all sites of a merged study, were opened.
 
     Raises
@@ -182,19 +199,19 @@ def exclude_inattentive(folder: Path) -> tuple[Exclusion, ...]:
             continue
         reason = ""
         with contextlib.suppress(StoreError, KeyError, TypeError, ValueError, AttributeError):  # `verify` names it
-            reason = "; ".join(_missed(session, key))
+            reason = "; ".join(_missed_catch_trials(session, key))
         if reason:
             added.append(exclude(folder, session.participant, session.number, by=RULE, reason=reason))
     return tuple(added)
 
 
-def _missed(session: SessionFolder, key: Key) -> Iterator[str]:
+def _missed_catch_trials(session: SessionFolder, key: Key) -> Iterator[str]:
     """Yield a phrase with the number of incorrect answers to catch trials for each block with too many."""
     published = receipt.read(session.receipt)["protocol"]
     if not any("catch" in block for block in published["blocks"].values()):
         return
-    protocol = whole_protocol(published, key)
-    lines = opened(journal.read(session.journal), key)
+    protocol = complete_protocol(published, key)
+    lines = open_events(journal.read(session.journal), key)
     blocks = {line.trial: line.block for line in lines if isinstance(line, TrialStarted)}
     heard = [result for result in trial_results(protocol, lines) if result.catch]
     for block in protocol.blocks.values():
@@ -214,13 +231,13 @@ def _open_tables(study: StudyFolder, session: SessionFolder, key: Key) -> list[s
     lines = journal.read(session.journal)
     if not lines or not start_of(lines).measures_sealed:
         return []
-    with open_alone(session.path):
-        sweep(session.path)
-        sweep(session.recordings)
-        return list(_rewrite(Place(study, session, start_of(lines).study), lines, key))
+    with lock_folder(session.path):
+        remove_temporary_files(session.path)
+        remove_temporary_files(session.recordings)
+        return list(_open_files(Place(study, session, start_of(lines).study), lines, key))
 
 
-def _rewrite(place: Place, lines: list[Event], key: Key) -> list[str]:
+def _open_files(place: Place, lines: list[Event], key: Key) -> list[str]:
     """Write the sealed columns and open the recordings; a table gets no columns that its version did not have."""
     left: list[str] = []
     ours: dict[str, tuple[str, str]] = {}
@@ -228,7 +245,7 @@ def _rewrite(place: Place, lines: list[Event], key: Key) -> list[str]:
     for path, columns in zip(after, table_columns(lines, opened=True).values(), strict=True):
         held = read_if_there(path) or b""
         written = [replace(column, later=False) if column.sealed else column for column in columns]
-        sealed, content = (in_columns_of(held, whole[path], written)[0] for whole in (before, after))
+        sealed, content = (align_columns(held, whole[path], written)[0] for whole in (before, after))
         if held not in (sealed, content):
             left.append(
                 f"{path} differs from the journal, so it was not changed: "
@@ -251,7 +268,7 @@ def _rewrite(place: Place, lines: list[Event], key: Key) -> list[str]:
 
 def _recordings(place: Place, lines: list[Event], key: Key) -> Iterator[tuple[Path, tuple[str, str]]]:
     """Yield each file that was recorded sealed, with its SHA-256 before and after it is opened."""
-    for line in opened(lines, key):
+    for line in open_events(lines, key):
         if isinstance(line, Recorded) and line.opened_sha256 and line.opened_frames_sha256:
             yield place.folder.path / line.recording, (line.sha256, line.opened_sha256)
             yield place.folder.path / line.recording_frames, (line.frames_sha256, line.opened_frames_sha256)

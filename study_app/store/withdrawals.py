@@ -27,16 +27,16 @@ from study_app.store.atomic import (
     paths_in,
     read_if_there,
     read_regular,
-    refuse_special,
+    refuse_special_files,
     sync_folder,
     write_file,
 )
 from study_app.store.checksums import fingerprint, place_of, proof_of, read_checksums, sha256
 from study_app.store.exclusions import exclusion_bytes, exclusions
-from study_app.store.folder_lock import open_alone, refuse_if_open
-from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder, readable
+from study_app.store.folder_lock import lock_folder, refuse_if_open
+from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder, check_name_and_reason
 from study_app.store.journals import journal
-from study_app.store.journals.journal_events import holds
+from study_app.store.journals.journal_events import is_valid_value
 from study_app.store.merged import merged_above
 from study_app.store.output_files import Output, erase_outputs
 from study_app.store.tables.study_files import described_study, write_participants
@@ -122,23 +122,23 @@ def withdraw(
         There is no such participant, a session of theirs runs, ``by`` or ``reason`` is empty, or a file cannot be
         written or deleted; what was erased by then stays erased.
     """
-    by, reason = readable(by, reason, "a withdrawal needs initials and a reason")
+    by, reason = check_name_and_reason(by, reason, "a withdrawal needs initials and a reason")
     study = StudyFolder(folder)
     if not folder.is_dir():
         raise StoreError(f"{folder} is not a folder: give a study's folder, such as results/rek2024")
-    copies, shared = _found(study, also)
+    copies, shared = _find_copies(study, also)
     for place in (study, *copies):
-        refuse_special(place.data / f"sub-{participant}")
+        refuse_special_files(place.data / f"sub-{participant}")
     at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="seconds")
-    with open_alone(folder):
+    with lock_folder(folder):
         tombstone = _tombstone(study, participant, at, by, reason)
         erased = [study.path] if _erase(study, tombstone) else []
         outputs, elsewhere = _outputs(study.path)
-    left = [*_names(study, participant)]
+    left = [*_remaining_mentions(study, participant)]
     reached = [study.path]
     for copy in copies:
-        with open_alone(copy.path):
-            if others := _others(copy, tombstone):
+        with lock_folder(copy.path):
+            if others := _other_sessions(copy, tombstone):
                 left += [
                     f"{other} is not a copy of an erased session: {copy.path} was not changed; if it is of the same "
                     "person, withdraw from that folder, too"
@@ -146,7 +146,7 @@ def withdraw(
                 ]
             elif _erase(copy, replace(tombstone, at=at)):
                 erased.append(copy.path)
-                left += _names(copy, participant)
+                left += _remaining_mentions(copy, participant)
             known, begun = (
                 tombstones(copy).get(participant),
                 {session.begun for session in tombstone.sessions if session.begun},
@@ -159,7 +159,7 @@ def withdraw(
     left += [
         f"{export.path} is an export with data of {participant}: delete it, and make it again"
         for export in shared
-        if any(_names(export, participant, export.data, export.path / RESULTS))
+        if any(_remaining_mentions(export, participant, export.data, export.path / RESULTS))
     ]
     return Withdrawn(tombstone, tuple(erased), outputs, elsewhere, tuple(left))
 
@@ -176,7 +176,7 @@ def tombstones(study: StudyFolder) -> dict[str, Tombstone]:
     by_participant: dict[str, Tombstone] = {}
     for number, line in enumerate(content.splitlines(), start=1):
         if line.strip():
-            tombstone = _parsed(study.withdrawals, number, line)
+            tombstone = _parse_tombstone(study.withdrawals, number, line)
             by_participant[tombstone.participant] = tombstone
     return by_participant
 
@@ -207,7 +207,7 @@ def proof_of_withdrawal(tombstone: Tombstone) -> tuple[str, str]:
     return proof_of(json.dumps(asdict(tombstone)).encode()), f"withdrawals.jsonl/sub-{tombstone.participant}"
 
 
-def _parsed(path: Path, number: int, line: bytes) -> Tombstone:
+def _parse_tombstone(path: Path, number: int, line: bytes) -> Tombstone:
     try:
         held: dict[str, Any] = parse_json(line)
         sessions = tuple(ErasedSession(**fields) for fields in held.pop("sessions"))
@@ -217,7 +217,7 @@ def _parsed(path: Path, number: int, line: bytes) -> Tombstone:
         typed = all(isinstance(text, str) for text in texts) and all(
             isinstance(session.session, int) for session in sessions
         )
-        if typed and holds("at", made.at) and ID_PATTERN.fullmatch(made.participant):
+        if typed and is_valid_value("at", made.at) and ID_PATTERN.fullmatch(made.participant):
             return made
     except (ValueError, KeyError, TypeError, AttributeError):
         pass
@@ -227,7 +227,7 @@ def _parsed(path: Path, number: int, line: bytes) -> Tombstone:
     )
 
 
-def _found(study: StudyFolder, also: Iterable[Path]) -> tuple[list[StudyFolder], list[StudyFolder]]:
+def _find_copies(study: StudyFolder, also: Iterable[Path]) -> tuple[list[StudyFolder], list[StudyFolder]]:
     """Return copies of the study below ``also`` that contain sessions, and Psych-DS exports of the study."""
     by_path: dict[Path, StudyFolder] = {}
     for folder in also:
@@ -238,11 +238,11 @@ def _found(study: StudyFolder, also: Iterable[Path]) -> tuple[list[StudyFolder],
             if place != study.path.resolve() and StudyFolder(place).data.is_dir():
                 by_path[place] = StudyFolder(description.parent)
     copies = [study for study in by_path.values() if is_there(study.key) or study.sessions()]
-    name = _name(study)
-    return copies, [study for study in by_path.values() if study not in copies and _name(study) == name]
+    name = _study_name(study)
+    return copies, [study for study in by_path.values() if study not in copies and _study_name(study) == name]
 
 
-def _name(study: StudyFolder) -> str | None:
+def _study_name(study: StudyFolder) -> str | None:
     """Return the name of a dataset's study, or None if its description is not of this program."""
     with suppress(StoreError):
         return described_study(study)
@@ -266,7 +266,7 @@ def _sessions(study: StudyFolder, participant: str) -> list[SessionFolder]:
     return [session for session in study.sessions() if session.participant == participant]
 
 
-def _others(copy: StudyFolder, tombstone: Tombstone) -> list[Path]:
+def _other_sessions(copy: StudyFolder, tombstone: Tombstone) -> list[Path]:
     """Return the folders of the participant's sessions in a copy that are not among the erased sessions."""
     begun = {session.begun for session in tombstone.sessions if session.begun}
     return [
@@ -300,7 +300,7 @@ def _erase(study: StudyFolder, tombstone: Tombstone) -> bool:
         write_file(study.exclusions, exclusion_bytes(kept))
     changed = [
         kept != rows,
-        _keep_lines(study.fingerprints, lambda line: not _lists(line, study, participant)),
+        _keep_lines(study.fingerprints, lambda line: not _is_row_of(line, study, participant)),
         _keep_lines(study.reversed_exclusions, lambda line: not _reverses(line, participant)),
     ]
     name = described_study(study)
@@ -318,7 +318,7 @@ def _keep_lines(path: Path, keeps: Callable[[bytes], bool]) -> bool:
     return kept != lines
 
 
-def _lists(line: bytes, study: StudyFolder, participant: str) -> bool:
+def _is_row_of(line: bytes, study: StudyFolder, participant: str) -> bool:
     place = place_of(study, study.session(participant, 1)).rpartition("/")[0]
     return line.decode("utf-8", "replace").partition("  ")[2].strip().lower().startswith(f"{place}/".lower())
 
@@ -335,7 +335,7 @@ def _outputs(study: Path) -> tuple[tuple[Path, ...], tuple[Output, ...]]:
     return erase_outputs(study, results if own.is_relative_to(results) else own)
 
 
-def _names(study: StudyFolder, participant: str, *folders: Path) -> Iterator[str]:
+def _remaining_mentions(study: StudyFolder, participant: str, *folders: Path) -> Iterator[str]:
     """Yield the paths that still name the participant, except tombstone, allocation entry and recordings.
 
     Where ``folders`` are given, they alone are searched: in the footage of an export an ID may occur by chance.

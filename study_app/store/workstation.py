@@ -197,7 +197,7 @@ class MachineSettings(_Strict):
 DEFAULTS: Final = MachineSettings()
 
 
-def load() -> MachineSettings:
+def load_settings() -> MachineSettings:
     """Read the settings; without a file, return the defaults.
 
     Raises
@@ -213,21 +213,21 @@ def load() -> MachineSettings:
     except OSError as error:
         raise cannot_read(path, error) from error
     except (ValueError, RecursionError) as error:
-        raise _unusable(path, f"it is not JSON ({error})") from error
+        raise _unusable_file(path, f"it is not JSON ({error})") from error
     if not isinstance(document, dict):
-        raise _unusable(path, "it is not a table of settings")
+        raise _unusable_file(path, "it is not a table of settings")
     document["workspace"] = setting_of(document)
     document.pop("results", None)
     try:
         return MachineSettings.model_validate(document)
     except ValidationError as error:
-        raise _unusable(path, _first(error, document)) from error
+        raise _unusable_file(path, _first_problem(error, document)) from error
 
 
 def load_or_default() -> tuple[MachineSettings, str]:
     """Return the settings, with the reason if they are the defaults because the file is invalid (else "")."""
     try:
-        return load(), ""
+        return load_settings(), ""
     except StoreError as error:
         return DEFAULTS, str(error)
 
@@ -238,7 +238,7 @@ def device_without_force() -> str:
     return "" if settings is DEFAULTS else WITHOUT_FORCE.get(settings.device.partition(":")[0], "")
 
 
-def save(settings: MachineSettings) -> None:
+def save_settings(settings: MachineSettings) -> None:
     """Write the settings atomically; an invalid file is moved aside first.
 
     Raises
@@ -282,7 +282,7 @@ def keep_workspace(made: Workspace) -> None:
         The folders or the settings cannot be written.
     """
     create_workspace(made)
-    save(load_or_default()[0].model_copy(update={"workspace": str(made.folder.absolute())}))
+    save_settings(load_or_default()[0].model_copy(update={"workspace": str(made.folder.absolute())}))
 
 
 def remember_protocol(protocol: Path) -> None:
@@ -293,7 +293,7 @@ def remember_protocol(protocol: Path) -> None:
     StoreError
         The settings cannot be written.
     """
-    save(load_or_default()[0].with_recent(protocol))
+    save_settings(load_or_default()[0].with_recent(protocol))
 
 
 def recent_protocols() -> tuple[str, ...]:
@@ -301,14 +301,14 @@ def recent_protocols() -> tuple[str, ...]:
     return tuple(name for name in load_or_default()[0].recent if Path(name).is_file())
 
 
-def _first(error: ValidationError, document: dict[str, Any]) -> str:
+def _first_problem(error: ValidationError, document: dict[str, Any]) -> str:
     """Return one line on a problem in a settings file, preferring problems with a hint."""
     fault = min(faults_of(error, document, MachineSettings.model_json_schema()), key=lambda fault: not fault.hint)
     hint = f" ({fault.hint})" if fault.hint else ""
     return f"{'.'.join(str(step) for step in fault.path)}: {fault.message}{hint}"
 
 
-def _unusable(path: Path, why: str) -> StoreError:
+def _unusable_file(path: Path, why: str) -> StoreError:
     return StoreError(
         f"this machine's settings in {path} cannot be used, {why}: correct or delete the file, or set "
         f"{FOLDER_VARIABLE} "

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from study_app.store import receipt
-from study_app.store.blinded.blinding import opened, read_key
+from study_app.store.blinded.blinding import open_events, read_key
 from study_app.store.columns import LATER
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
-from study_app.store.verification.reproduction import reproduced
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.reproduction import reproduce_session
+from study_app.store.verification.verify_study import verify_study
 from tests.analysis.conftest import SAMPLE
 from tests.compiled import needs_servo
 from tests.journal_lines import raw
@@ -38,7 +38,7 @@ def known(session: SessionFolder, folder: Path) -> list[dict[str, float]]:
     measured = ("limiter_", "force_", "path_", "mean_speed", "duration_")
     return [
         {name: it for name, it in line.items() if name.startswith(measured) and it is not None and name not in LATER}
-        for line in raw(opened(journal.read(session.journal), read_key(folder)))
+        for line in raw(open_events(journal.read(session.journal), read_key(folder)))
         if line["event"] == "trial_ended"
     ]
 
@@ -49,10 +49,10 @@ def copy(tmp_path: Path) -> Path:
 
 
 def test_it_is_sound_and_its_orders_are_made_again() -> None:
-    found = verify(SAMPLE.path)
+    found = verify_study(SAMPLE.path)
     assert (found.errors, found.warnings) == ((), ()), MAKE_AGAIN
     assert found.sessions == 12
-    assert [reproduced(session.path).differences for session in SAMPLE.sessions()] == [[]] * 12, MAKE_AGAIN
+    assert [reproduce_session(session.path).differences for session in SAMPLE.sessions()] == [[]] * 12, MAKE_AGAIN
 
 
 def test_it_is_small_sealed_simulated_and_without_recordings() -> None:

@@ -36,7 +36,7 @@ from study_app.protocol.load import load
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
-from study_app.store.sites.merge import merge
+from study_app.store.sites.merge import merge_sites
 from study_app.workers.server import Refused, Stopped
 from tests.studies import made_up, rehearsed
 
@@ -197,7 +197,7 @@ def test_the_process_answers_stops_and_is_gone_when_closed(study: Path, tmp_path
 def test_a_merged_study_is_found_read_decided_on_and_opened(whole: Path, tmp_path: Path) -> None:
     other = rehearse_answers("demo", participants=2, seed=2, results=tmp_path / "labs/demo", features=made_up("demo"))
     pooled = tmp_path / "results" / "pooled"
-    merge({"A": whole, "B": other}, pooled)
+    merge_sites({"A": whole, "B": other}, pooled)
     (found,) = of_kind(StudiesFound, told(FindStudies(pooled.parent)))
     assert [(one.folder, one.simulated) for one in found.studies] == [(pooled, True)]
     answers = told(ReadStudy(pooled))

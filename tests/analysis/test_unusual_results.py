@@ -10,7 +10,7 @@ from study_app.analysis.export_study import export
 from study_app.protocol.load import load, parse
 from study_app.protocol.simulated import NO_FEATURES
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.sites.merge import merge
+from study_app.store.sites.merge import merge_sites
 from study_app.store.unblinding import unblind, unblind_folder
 from tests.analysis.conftest import CANNOT_JUDGE, SMALL, Results, make_results
 from tests.analysis.levels.level_studies import ADAPTIVE, matching_file
@@ -88,7 +88,7 @@ def sites_of_statements(folder: Path) -> Path:
         site: rehearse_answers("rek2024", participants=2, seed=seed, results=folder / site, features=felt)
         for seed, site in enumerate("AB", start=1)
     }
-    merge(folders, folder / "pooled")
+    merge_sites(folders, folder / "pooled")
     unblind_folder(folder / "pooled", "AK", "closed")
     return folder / "pooled"
 

@@ -16,7 +16,7 @@ from study_app import api
 from study_app.errors import ProtocolError, SessionError, StudyError
 from study_app.haptics.runtime import offline
 from study_app.protocol.load import load_scene
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.documented import ROOT, blocks
 from tests.golden import compare
@@ -154,14 +154,14 @@ def test_an_own_observer_answers_and_a_session_left_is_resumed(short: Path, tmp_
             if getattr(page, "trial", None) == trials[-1] // 2:
                 break
     assert not session.fingerprint
-    assert verify(parted).errors == ()
-    assert not [one for one in verify(parted).warnings if "subject-P001" in one.place]
+    assert verify_study(parted).errors == ()
+    assert not [one for one in verify_study(parted).warnings if "subject-P001" in one.place]
     with api.open_session(short, "P001", results=parted, seed=99, answer=observer, recordings=False) as session:
         session.run()
     tables = [api.read(folder)["responses"] for folder in (whole, parted)]
     columns = ["trial", "item", "response"]
     assert tables[0][columns].equals(tables[1][columns])
-    assert verify(parted).errors == ()
+    assert verify_study(parted).errors == ()
     with pytest.raises(StudyError, match="completed"), api.open_session(short, "P001", results=whole, seed=5):
         pass
 
@@ -178,7 +178,7 @@ def test_an_own_observer_answers_with_lists_and_numbers_of_numpy(tmp_path: Path)
 
     with api.open_session(mixed_file(tmp_path), "P001", results=tmp_path / "r", seed=2, answer=observer) as session:
         session.run()
-    assert verify(tmp_path / "r").errors == ()
+    assert verify_study(tmp_path / "r").errors == ()
     rows = api.read(tmp_path / "r")["responses"]
     told = {item: set(rows.loc[rows["item"] == item, "response"].astype(str)) for item in given}
     assert told == {"age": {"30"}, "used": {"falcon mouse"}, "pleasant": {"25.0"}, "thickness": {"2"}}
@@ -202,7 +202,7 @@ def test_an_own_observer_sets_levels(tmp_path: Path) -> None:
         api.open_session(study, "P002", results=tmp_path / "r", seed=3, answer=lambda _: "more") as session,
     ):
         session.run()
-    assert verify(tmp_path / "r").errors == ()
+    assert verify_study(tmp_path / "r").errors == ()
     api.unblind(tmp_path / "r", by="AK", reason="a test")
     rows = api.read(tmp_path / "r")["intervals"]
     settings = rows.loc[rows["participant"] == "P001", "setting"].dropna()
@@ -238,7 +238,7 @@ def test_an_answer_that_is_not_permitted_ends_the_block_and_loses_nothing(
         session.run()
     with api.open_session(short, "P001", results=tmp_path / "r", seed=1, answer=by_resistance) as session:
         session.run()
-    assert verify(tmp_path / "r").errors == ()
+    assert verify_study(tmp_path / "r").errors == ()
 
 
 @pytest.mark.slow

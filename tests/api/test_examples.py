@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.documented import ROOT
 from tests.protocol.trials import level_studies
@@ -51,7 +51,7 @@ def test_an_own_observer_runs_a_session_whose_thresholds_follow_its_noise(tmp_pa
         study = str(tmp_path / "short.toml")
         Path(study).write_text(level_studies.text_of(*level_studies.SHORT), encoding="utf-8")
     found = example("own_observer.py")["main"](tmp_path / "results", study)
-    assert verify(tmp_path / "results").errors == ()
+    assert verify_study(tmp_path / "results").errors == ()
     assert len(found) > 0
     if study == "viscosityjnd":
         assert ((found["low"] < 0.2) & (found["high"] > 0.08)).all()

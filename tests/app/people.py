@@ -20,7 +20,7 @@ from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage, TroublePage
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.recovery import check_can_go_on
+from study_app.store.sessions.recovery import check_resumable
 
 
 def window(kind):
@@ -94,7 +94,7 @@ def looking(look) -> Iterator[None]:
 def can_go_on(study: str, results: Path) -> bool:
     """Return whether P001's session has no end and is not refused by resume."""
     source = source_bytes(study)
-    check_can_go_on(results / "data" / "sub-P001" / "ses-01", parse(source, study), source)
+    check_resumable(results / "data" / "sub-P001" / "ses-01", parse(source, study), source)
     return "session_ended" not in [line["event"] for line in events(results)]
 
 

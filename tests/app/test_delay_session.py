@@ -46,7 +46,7 @@ class Room:
     def append(self, samples):
         pass
 
-    def settled(self):
+    def end_without_waiting(self):
         return True
 
     def stop(self):

@@ -21,7 +21,7 @@ from study_app.gui.results.view import ResultsPlace
 from study_app.gui.theme.theme import DARK
 from study_app.session.start import NewSession
 from study_app.store.exclusions import Exclusion
-from study_app.store.workstation import load
+from study_app.store.workstation import load_settings
 from study_app.workers.server import Crashed, Refused
 from tests.golden import compare
 from tests.golden_values import changed, value_lines
@@ -163,7 +163,7 @@ def test_settings(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: py
     machine = WorkstationController()
     qtbot.addWidget(machine.make_place())
     heard: list[str] = []
-    machine.changed.connect(lambda settings: heard.append(f"changed, kept: {settings == load()}"))
+    machine.changed.connect(lambda settings: heard.append(f"changed, kept: {settings == load_settings()}"))
     machine.troubled.connect(lambda *words: heard.append(f"troubled {words[0]}"))
     lines, before = [], list(value_lines(machine.settings, "settings"))
     actions: dict[str, Any] = {"measured": lambda values: machine.measured(*values)}

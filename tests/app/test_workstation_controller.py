@@ -13,7 +13,7 @@ from study_app.gui.kit.devices import described, settings_here, text_scale_on
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.session.start import NewSession
 from study_app.store import workstation
-from study_app.store.workstation import DEFAULTS, DisplayOffset, MachineSettings, save
+from study_app.store.workstation import DEFAULTS, DisplayOffset, MachineSettings, save_settings
 from study_app.user_folder import settings_file
 
 pytestmark = pytest.mark.slow
@@ -36,7 +36,7 @@ def test_settings_that_cannot_be_kept_are_told_and_count_all_the_same(desk, qtbo
 
 
 def test_a_device_that_nobody_knows_is_told_and_the_mouse_stands_in(qapp):
-    save(MachineSettings(device="hammer", theme="dark"))
+    save_settings(MachineSettings(device="hammer", theme="dark"))
     settings, trouble = settings_here()
     assert (settings.device, settings.theme) == ("mouse", "dark")
     assert "'hammer'" in trouble
@@ -57,7 +57,7 @@ def test_the_receipt_says_distance_width_and_offset_of_the_participants_screen(q
 
 def test_a_folder_asked_for_by_command_counts_for_this_stay(qtbot, tmp_path, monkeypatch):
     monkeypatch.delenv("LIQUID_STUDY_WORKSPACE")
-    save(MachineSettings(workspace=str(tmp_path / "set")))
+    save_settings(MachineSettings(workspace=str(tmp_path / "set")))
     asked = MainController(tmp_path / "asked")
     qtbot.addWidget(asked.window)
     assert asked.results == tmp_path / "asked"

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from study_app.cli import commands, main
 from study_app.protocol.source.files import source_bytes
 from study_app.session import replay
-from study_app.store.workstation import MachineSettings, save
+from study_app.store.workstation import MachineSettings, save_settings
 from tests.compiled import needs_servo
 
 pytestmark = pytest.mark.slow
@@ -56,7 +56,7 @@ def test_check_warns_of_what_the_device_of_this_computer_cannot_give(
     liquid_study: Run, device: str, warned: int
 ) -> None:
     if device:
-        save(MachineSettings(device=device))
+        save_settings(MachineSettings(device=device))
     assert liquid_study("check", "forcedelay").stdout.count("Mouse gives no force") == warned
 
 

@@ -15,7 +15,7 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.studies import made_up
 
@@ -99,8 +99,8 @@ def test_without_a_display_one_line_says_how_to_open_the_program(
 def test_the_demo_runs_valid_sessions_and_a_second_call_changes_nothing(workspace: Path) -> None:
     said = finish("--no-window")
     assert f"Report with figures and tables: {workspace / REPORT}" in said
-    found = verify(workspace / STUDY, None)
-    assert (found.sound, found.sessions) == (True, 2)
+    found = verify_study(workspace / STUDY, None)
+    assert (found.is_sound, found.sessions) == (True, 2)
     trials = rows(workspace, "trials")
     assert [(row["participant"], row["trial"], row["valid"]) for row in trials] == [
         (person, str(trial), "true") for person in ("P001", "P002") for trial in (1, 2, 3, 4)
@@ -155,8 +155,8 @@ def test_an_interrupted_demo_is_finished_by_the_next_call(
         program.communicate()
     assert program.returncode in {-sent, 130}
     finish("--no-window")
-    found = verify(workspace / STUDY, None)
-    assert (found.sound, found.sessions) == (True, 2), found.errors
+    found = verify_study(workspace / STUDY, None)
+    assert (found.is_sound, found.sessions) == (True, 2), found.errors
     confirmed = [(row["participant"], row["trial"], row["item"]) for row in rows(workspace, "responses")]
     assert len(confirmed) == len(set(confirmed)) == 16
     assert (workspace / REPORT).is_file()

@@ -23,8 +23,8 @@ from study_app.designer.document.steps import (
 )
 from study_app.errors import StoreError
 from study_app.protocol.source.files import protocol_hash
-from study_app.store.drafts import Draft, keep
-from study_app.store.folder_lock import open_alone
+from study_app.store.drafts import Draft, write_draft
+from study_app.store.folder_lock import lock_folder
 from study_app.store.study_settings import keep_original, kept_original
 from study_app.store.study_versions import content_hash
 from tests.designer.support.designer import DEMO
@@ -70,7 +70,7 @@ def banner(record: Record) -> None:
     for end, acts in ends.items():
         record.note("open another", lambda: designer.open("demo"))
         text = designer.file.read_text()
-        keep(designer.file, Draft(text=f"{text}# {end}\n", base=content_hash(text.encode())))
+        write_draft(designer.file, Draft(text=f"{text}# {end}\n", base=content_hash(text.encode())))
         record.note("open a draft", designer.open)
         record.ask(SetText(TITLE, "en", end))
         if end == "close":
@@ -113,7 +113,7 @@ def others(record: Record) -> None:
     record.ask(SetValue(VERSION, "0.9"))
     session = designer.results / "kitchen" / "data" / "sub-P001" / "ses-01"
     session.mkdir(parents=True)
-    opening = open_alone(session)
+    opening = lock_folder(session)
     outside("Now reach", "Reach now")
     record.ask(SetValue(VERSION, "1.0"))
     record.play("ctrl+s")

@@ -89,8 +89,8 @@ def test_report_and_settings_hold_what_was_found(found_of, tmp_path, monkeypatch
     assert document["device"]["serial"] == "EMULATED"
     assert str(tmp_path) not in text
     own = workstation.DeviceBench.model_validate(kept(found, "2026-11-21"))
-    workstation.save(workstation.DEFAULTS.with_bench(own).with_bench(own))
-    settings = workstation.load()
+    workstation.save_settings(workstation.DEFAULTS.with_bench(own).with_bench(own))
+    settings = workstation.load_settings()
     assert len(settings.benches) == 1
     assert settings.bench_of(found.device) == own
     kept_of = dynamics_of(1e-3, None, None, name="falcon-emulated", serial="EMULATED")
@@ -247,7 +247,7 @@ def test_handle_that_is_held_is_reported_and_not_kept(tmp_path, monkeypatch):
     assert done.exit_code == 3, done.output
     assert "the handle was touched" in (tmp_path / "report" / "bench.md").read_text()
     assert "Nothing was kept" in done.output
-    assert workstation.load().benches == ()
+    assert workstation.load_settings().benches == ()
 
 
 def test_refused_position_does_not_enter_the_noise():
@@ -279,13 +279,13 @@ def test_command_writes_its_report_and_keeps_what_it_found_of_a_real_device_alon
     assert done.exit_code == 0, done.output
     assert {path.name for path in (tmp_path / "report").iterdir()} == {"bench.md", "bench.json"}
     assert "its measurements are not kept" in done.output
-    assert workstation.load().benches == ()
+    assert workstation.load_settings().benches == ()
     real = replace(descriptor_of("scripted"), kind="felt")
     monkeypatch.setattr("study_app.devices.registry.descriptor_of", lambda _name: real)
     monkeypatch.chdir(tmp_path)
     done = liquid_study("devices", "bench", "scripted")
     assert done.exit_code == 0, done.output
-    (own,) = workstation.load().benches
+    (own,) = workstation.load_settings().benches
     assert own.report == str(tmp_path / "bench-scripted" / "bench.md")
     assert Path(own.report).is_file()
 

@@ -22,7 +22,7 @@ from study_app.session.simulated.observers import exploration
 from study_app.session.simulated.rehearsal import RehearsedSession
 from study_app.store.folders import StudyFolder
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.store.forging import parquet_of
 
@@ -95,7 +95,7 @@ def table(folder: StudyFolder, name: str) -> list[dict[str, str]]:
 
 def test_the_study_verifies_and_its_receipt_names_the_device(rehearsed: Rehearsed) -> None:
     folder = rehearsed.by_device
-    assert verify(folder.path).errors == ()
+    assert verify_study(folder.path).errors == ()
     receipt = json.loads(folder.sessions()[0].receipt.read_text())["device"]
     assert receipt["name"] == rehearsed.device
     assert receipt.items() >= RECEIPTS[rehearsed.device].items()

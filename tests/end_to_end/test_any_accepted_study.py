@@ -22,10 +22,10 @@ from study_app.store.journals import journal
 from study_app.store.journals.journal import SessionClock
 from study_app.store.progress import progress_of
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.recovery import reopen
+from study_app.store.sessions.recovery import reopen_store
 from study_app.store.unblinding import unblind_folder
-from study_app.store.verification.reproduction import reproduced
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.reproduction import reproduce_session
+from study_app.store.verification.verify_study import verify_study
 from tests.end_to_end.drawn_studies import drawn
 from tests.studies import begun, made_up
 
@@ -80,7 +80,7 @@ def cut_off_and_resumed(study: Protocol, source: bytes, results: Path, felt: Con
     lines = journal.read(store.folder.journal)
     passed = SimulatedTime(progress_of(lines).t_s)
     again = {"operator": "", "device": DEVICE, "screens": REHEARSED_SCREENS, "now_ns": passed.ns}
-    with reopen(store.folder.path, study, source, now=datetime.fromisoformat(lines[-1].at), **again) as store:
+    with reopen_store(store.folder.path, study, source, now=datetime.fromisoformat(lines[-1].at), **again) as store:
         run(study, store, store, felt, passed)
     ended = journal.read(store.folder.journal)[-1]
     assert ended.status == "completed" or ended.reason.startswith("the criterion of block")
@@ -89,7 +89,7 @@ def cut_off_and_resumed(study: Protocol, source: bytes, results: Path, felt: Con
 def check_outputs(study: Protocol, results: Path, to: Path) -> None:
     """Check that results are sound, exported and, if anything was asked, reported, and that no trouble is told."""
     said: list[str] = []
-    assert verify(results).errors == ()
+    assert verify_study(results).errors == ()
     assert export(results, to, warn=said.append, failed=said.append)
     if study.forms or any(study.questionnaire_of(block.id) for block in study.main_blocks):
         assert report(results, to, warn=said.append, failed=said.append)
@@ -109,8 +109,8 @@ def test_any_accepted_study_can_be_held_resumed_verified_exported_and_reported(n
     rehearse_answers(file, participants=2, seed=number, results=results, features=felt)
     cut_off_and_resumed(study, file.read_bytes(), results, felt, number)
     for session in StudyFolder(results).sessions():
-        assert reproduced(session.path).differences == []
+        assert reproduce_session(session.path).differences == []
     if number % 2:
-        assert verify(results).errors == ()
+        assert verify_study(results).errors == ()
         unblind_folder(results, by="AB", reason="a test")
     check_outputs(study, results, tmp_path / "outputs")

@@ -20,7 +20,7 @@ from study_app.session.simulated.answers_only import DEVICE, Answering, Simulate
 from study_app.session.transitions.table import open_session
 from study_app.store.journals.journal import SessionClock
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from study_app.user_folder import data_folder
 from tests.studies import begun, made_up, rehearsed
 
@@ -77,7 +77,7 @@ def test_a_report_beside_a_running_session_is_of_the_sessions_that_ended_and_dis
         assert not kept.ended.is_set()
         kept.write(10_000)
         session.join(30)
-    assert verify(results).errors == ()
+    assert verify_study(results).errors == ()
     report(results, tmp_path / "after", warn=said.append, failed=said.append)
     assert said == []
     reports = [json.loads((tmp_path / name / "report.json").read_bytes()) for name in ("beside", "after")]

@@ -12,7 +12,7 @@ import pytest
 from study_app.analysis.export_study import export
 from study_app.analysis.report.write_report import report
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.csv_files import unguarded
+from study_app.store.csv_files import unguard_formula
 from study_app.store.unblinding import unblind_folder
 from tests.analysis.levels.level_studies import levels_file
 from tests.analysis.outputs import figures_as_lines, sav_lines
@@ -66,7 +66,7 @@ def test_parquet_has_the_cells_of_the_csv_file(outputs: Path) -> None:
         for column in frame:
             for cell, value in zip(cells[column], frame[column], strict=True):
                 if isinstance(value, str):
-                    assert unguarded(cell) == value
+                    assert unguard_formula(cell) == value
                 elif pd.isna(value):
                     assert cell == "n/a"
                 else:

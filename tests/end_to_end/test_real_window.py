@@ -21,7 +21,7 @@ from study_app.gui.preflight.window import FULL as PREFLIGHT
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
 from study_app.protocol.wording.languages import words
-from study_app.store.sessions.recovery import check_can_go_on
+from study_app.store.sessions.recovery import check_resumable
 from tests.compiled import needs_servo
 from tests.end_to_end.real_windows import Program, needs_display, new_session, virtual_display, wait_for
 from tests.gui.small import ManualClock, questionnaire
@@ -63,7 +63,7 @@ def test_a_session_by_keys_and_clicks_from_the_home_window_into_the_csv(display,
     assert program.events("session_ended") == []
     (folder,) = tmp_path.glob("results/rek2024/data/sub-P042/ses-01")
     study = source_bytes(str(tmp_path / "protocols" / "rek2024.toml"))
-    check_can_go_on(folder, parse(study, "rek2024"), study)
+    check_resumable(folder, parse(study, "rek2024"), study)
 
 
 def place_in(window: QWidget, part: QWidget) -> QPoint:

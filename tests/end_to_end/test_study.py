@@ -13,10 +13,10 @@ from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import build_schedule, stream
 from study_app.protocol.source.files import shipped
 from study_app.session.replay import replay
-from study_app.store.blinded.blinding import open_or_draw_key, opened, read_key
+from study_app.store.blinded.blinding import open_events, open_or_draw_key, read_key
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.journal_lines import raw
 
@@ -59,7 +59,7 @@ def test_sessions_are_complete_and_every_response_is_there_once(rehearsed: tuple
         assert [row["code"] for row in trials] == [trial.code for trial in schedule.trials]
         assert {row["outcome"] for row in trials} == {"complete"}
         assert {(row["samples_dropped"], row["overruns"]) for row in trials} == {("0", "0")}
-        lines = raw(opened(journal.read(session.journal), read_key(folder.path)))
+        lines = raw(open_events(journal.read(session.journal), read_key(folder.path)))
         measured = [line for line in lines if line["event"] == "trial_ended"]
         assert len(measured) == len(trials)
         assert {line["limiter_non_finite"] for line in measured} == {0}
@@ -71,8 +71,8 @@ def test_sessions_are_complete_and_every_response_is_there_once(rehearsed: tuple
 
 def test_a_rehearsed_study_is_sound_and_every_force_of_it_comes_out_again(rehearsed: tuple[str, StudyFolder]) -> None:
     _, folder = rehearsed
-    assert verify(folder.path).sound
-    assert verify(folder.path).warnings == ()
+    assert verify_study(folder.path).is_sound
+    assert verify_study(folder.path).warnings == ()
     for session in folder.sessions():
         found = replay(session.path)
         assert (found.differences, found.uncompared) == ((), ())

@@ -14,7 +14,7 @@ from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.gui.home.study_facts import sources, study_facts
 from study_app.protocol.source.files import source_bytes
-from study_app.store.workstation import keep_workspace, load, recent_protocols, remember_protocol
+from study_app.store.workstation import keep_workspace, load_settings, recent_protocols, remember_protocol
 from study_app.user_folder import settings_file
 from study_app.workspace import Workspace, chosen_workspace, offered_workspace, workspace
 from tests.studies import begun
@@ -103,7 +103,7 @@ def test_the_first_start_asks_once_and_creates_nothing_before_the_answer(documen
     visit.question.accept()
     assert (tmp_path / "mine" / "protocols").is_dir()
     assert (tmp_path / "mine" / "results").is_dir()
-    assert load().workspace == str(tmp_path / "mine")
+    assert load_settings().workspace == str(tmp_path / "mine")
     assert visit.results == tmp_path / "mine" / "results"
     visit.window.close()
     visit.end()
@@ -118,7 +118,7 @@ def test_the_first_start_asks_once_and_creates_nothing_before_the_answer(documen
 def test_an_earlier_results_folder_becomes_the_workspace(documents, tmp_path):
     settings_file().parent.mkdir(parents=True)
     settings_file().write_text(json.dumps({"results": str(tmp_path / "lab" / "results"), "theme": "dark"}))
-    assert load().workspace == str(tmp_path / "lab")
+    assert load_settings().workspace == str(tmp_path / "lab")
     assert workspace().folder == tmp_path / "lab"
     (tmp_path / "file").write_text("")
     with pytest.raises(StoreError, match="file"):

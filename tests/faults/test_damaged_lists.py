@@ -17,7 +17,7 @@ from study_app.devices.falcon import calibration
 from study_app.errors import StudyError
 from study_app.store import drafts, workstation
 from study_app.store.blinded.allocation import claims
-from study_app.store.checksums import listed, unreadable
+from study_app.store.checksums import read_list, unreadable_lines
 from study_app.store.exclusions import Exclusion, reversals
 from study_app.store.folders import StudyFolder
 from study_app.store.merged import Merged, Site, all_exclusions, read_merged
@@ -84,10 +84,14 @@ KINDS: dict[str, tuple[Callable[[Path], Path], str, Callable[[Path], object]]] =
     "fingerprints": (
         lambda f: f / "fingerprints.txt",
         "k3vq-7m2p-xw4d  data/sub-P007/ses-01\n",
-        lambda f: (listed(f / "fingerprints.txt"), unreadable(f / "fingerprints.txt")),
+        lambda f: (read_list(f / "fingerprints.txt"), unreadable_lines(f / "fingerprints.txt")),
     ),
     "preregistration": (lambda f: f / preregistration.FILE, preregistration.written(COMMITMENT), use_commitment),
-    "settings": (lambda _: settings_file(), workstation.DEFAULTS.model_dump_json(), lambda _: workstation.load()),
+    "settings": (
+        lambda _: settings_file(),
+        workstation.DEFAULTS.model_dump_json(),
+        lambda _: workstation.load_settings(),
+    ),
     "workspace": (lambda _: settings_file(), '{"workspace": "/tmp", "results": "/tmp/results"}', read_workspace),
     "outputs": (
         lambda _: data_folder() / "outputs.jsonl",

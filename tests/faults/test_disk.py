@@ -17,9 +17,9 @@ from study_app.session.transitions.events import Note
 from study_app.session.transitions.state import Phase
 from study_app.store.exclusions import exclude
 from study_app.store.journals import journal
-from study_app.store.sessions.recovery import rebuild
+from study_app.store.sessions.recovery import rebuild_session
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from study_app.store.withdrawals import withdraw
 from tests.benchmarks.sessions import disk
 from tests.faults.support.worlds import StoredWorld
@@ -70,7 +70,7 @@ def test_a_disk_that_fills_up_is_waited_for_and_nothing_is_lost_or_doubled(
     assert answers(world) == answers(undisturbed)
     assert [line["n"] for line in world.lines] == list(range(1, len(world.lines) + 1))
     assert [line["event"] for line in world.lines].count("note") == 1
-    assert verify(tmp_path / "two").errors == ()
+    assert verify_study(tmp_path / "two").errors == ()
 
 
 @pytest.mark.slow
@@ -86,7 +86,7 @@ def test_a_session_whose_last_line_meets_a_full_disk_is_finished_when_there_is_r
     assert world.runner.stalled is None
     assert isinstance(world.pages[-1], EndPage)
     assert world.lines[-1]["status"] == "completed"
-    assert verify(tmp_path / "study").sound
+    assert verify_study(tmp_path / "study").is_sound
 
 
 @pytest.mark.slow
@@ -96,7 +96,7 @@ def test_a_disk_that_is_full_at_the_start_refuses_the_session_and_keeps_its_id_f
     world = StoredWorld(tmp_path / "study")
     world.start()
     finish(world)
-    assert verify(tmp_path / "study").errors == ()
+    assert verify_study(tmp_path / "study").errors == ()
 
 
 @pytest.mark.nightly
@@ -108,7 +108,7 @@ def test_a_fault_at_any_call_of_the_disk_leaves_a_session_that_begins_and_ends_s
     for call in range(MOST_CALLS):
         used = disk.Disk(kind, call)
         disk.held(tmp_path / f"{call:03d}", "P001", used)
-        assert verify(tmp_path / f"{call:03d}").errors == (), call
+        assert verify_study(tmp_path / f"{call:03d}").errors == (), call
         if not used.happened:
             return
     raise AssertionError("the session never ended")
@@ -132,7 +132,11 @@ def answered(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("kind", disk.CALLS)
 @pytest.mark.parametrize(
     "command",
-    [opened, lambda study: withdraw(study, "P002", by="AK", reason="asked"), lambda study: rebuild(study / P001)],
+    [
+        opened,
+        lambda study: withdraw(study, "P002", by="AK", reason="asked"),
+        lambda study: rebuild_session(study / P001),
+    ],
     ids=["unblind", "withdraw", "rebuild"],
 )
 def test_a_command_that_met_a_fault_at_any_call_of_the_disk_is_given_again(
@@ -144,8 +148,8 @@ def test_a_command_that_met_a_fault_at_any_call_of_the_disk_is_given_again(
             table.unlink()
         with used.used():
             disk.tried(partial(command, study))
-        rebuild(study / P001)
-        assert verify(study).errors == (), call
+        rebuild_session(study / P001)
+        assert verify_study(study).errors == (), call
         if not used.happened:
             return
     raise AssertionError("the command never ended")

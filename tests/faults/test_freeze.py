@@ -12,7 +12,7 @@ import pytest
 
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.journal_lines import raw
 
@@ -45,7 +45,7 @@ def held_with_a_freeze(folder: Path) -> tuple[dict[str, str], dict[str, str]]:
     lines = raw(journal.read(session.journal))
     assert [line["by"] for line in lines if line["event"] == "paused"] == ["program"]
     assert not any(line["event"] == "broke" for line in lines)
-    assert verify(folder / "results").errors == ()
+    assert verify_study(folder / "results").errors == ()
     with session.table("demo", "trials").open(newline="", encoding="utf-8") as file:
         frozen, again = csv.DictReader(file)
     assert (frozen["trial"], frozen["attempt"], frozen["outcome"]) == ("1", "1", "interrupted")

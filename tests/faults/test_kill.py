@@ -12,7 +12,7 @@ from study_app.protocol.orders.block_orders import orders_of
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.tables import session_tables
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.faults.support import short
 from tests.faults.support.killer_runs import outcomes_of
@@ -38,7 +38,7 @@ def rows(study: Path, name: str) -> list[dict[str, str]]:
 def answers(study: Path) -> list[dict[str, str]]:
     """Return the responses of each trial's last attempt without times and attempts."""
     found = rows(study, "responses")
-    last = {(row["trial"], row["attempt"]) for row in session_tables.latest(typed(found))}
+    last = {(row["trial"], row["attempt"]) for row in session_tables.latest_attempts(typed(found))}
     return [
         {name: cell for name, cell in row.items() if name not in TIMES}
         for row in found
@@ -51,7 +51,10 @@ def typed(found: list[dict[str, str]]) -> list[dict[str, Any]]:
 
 
 def last_attempts(study: Path) -> list[tuple[str, ...]]:
-    return [tuple(str(row[name]) for name in WHAT_RAN) for row in session_tables.latest(typed(rows(study, "trials")))]
+    return [
+        tuple(str(row[name]) for name in WHAT_RAN)
+        for row in session_tables.latest_attempts(typed(rows(study, "trials")))
+    ]
 
 
 @pytest.mark.parametrize(
@@ -89,7 +92,7 @@ def test_killed_at_random_moments_a_session_is_completed_as_if_nothing_had_been(
         told_answers(before, rows(study, "responses"))
     assert interrupted >= count / 3
     study = next(Path(outcome["folder"]) for outcome in outcomes if outcome["resumed"] == 0)
-    assert verify(study).errors == ()
+    assert verify_study(study).errors == ()
 
 
 def told_answers(held: list[str], found: list[dict[str, str]]) -> None:

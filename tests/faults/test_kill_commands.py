@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.faults.support import short
 from tests.faults.support.command_killer import COMMANDS
@@ -52,5 +52,5 @@ def test_every_file_is_as_before_or_as_after_and_the_next_run_finishes_them(
 def test_the_study_is_sound_in_the_end(outcomes: list[dict[str, Any]], command: str) -> None:
     for outcome in outcomes:
         if outcome["command"] == command:
-            findings = verify(Path(outcome["folder"]))
-            assert findings.sound, (outcome["after_s"], findings.errors)
+            findings = verify_study(Path(outcome["folder"]))
+            assert findings.is_sound, (outcome["after_s"], findings.errors)

@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
-from study_app.store.blinded.blinding import opened, read_key
+from study_app.store.blinded.blinding import open_events, read_key
 from study_app.store.columns import DELIVERED, TRIALS
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.verification.reproduction import reproduced
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.reproduction import reproduce_session
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.faults.support.killer_runs import outcomes_of
 from tests.journal_lines import raw
@@ -38,7 +38,7 @@ def told(study: Path) -> dict[tuple[Any, ...], Any]:
     """
     (session,) = StudyFolder(study).sessions()
     found: dict[tuple[Any, ...], Any] = {}
-    for line in raw(opened(journal.read(session.journal), read_key(study))):
+    for line in raw(open_events(journal.read(session.journal), read_key(study))):
         if line["event"] in OF_TRIALS:
             found[line["event"], line.get("trial", line.get("page")), line.get("interval")] = comparable(line)
     return found
@@ -87,8 +87,8 @@ def equals(study: Path, whole: dict[tuple[Any, ...], Any]) -> None:
     """Assert that a study's only session says what an uninterrupted one does, and that nothing is wrong with it."""
     assert told(study) == whole, study
     (session,) = StudyFolder(study).sessions()
-    assert reproduced(session.path).differences == []
-    assert verify(study, None).errors == ()
+    assert reproduce_session(session.path).differences == []
+    assert verify_study(study, None).errors == ()
 
 
 @pytest.mark.nightly

@@ -16,7 +16,7 @@ from study_app.protocol.load import load
 from study_app.session import start
 from study_app.session.pages import TaskPage
 from study_app.store import receipt
-from study_app.store.blinded.blinding import opened, read_key
+from study_app.store.blinded.blinding import open_events, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.verification.leaks import Telltales, find_leaks, presented_numbers, recorded_numbers, telltales
@@ -182,7 +182,7 @@ def test_nothing_seen_written_or_logged_tells_a_level(
     found = held(path, tmp_path / "results", monkeypatch, caplog)
     protocol = load(str(path))
     (place,) = StudyFolder(tmp_path / "results").sessions()
-    recorded = recorded_numbers(protocol, opened(journal.read(place.journal), read_key(tmp_path / "results")))
+    recorded = recorded_numbers(protocol, open_events(journal.read(place.journal), read_key(tmp_path / "results")))
     assert known <= presented_numbers(protocol) | recorded
     words = telltales(protocol, recorded)
     for line in (*found.words, *found.told):

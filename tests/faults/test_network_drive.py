@@ -22,8 +22,8 @@ from study_app.store import folder_lock
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal_events
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.recovery import reopen
-from study_app.store.verification.verify_study import verify
+from study_app.store.sessions.recovery import reopen_store
+from study_app.store.verification.verify_study import verify_study
 from tests.faults.support.worlds import StoredWorld
 from tests.session import small
 from tests.studies import rehearsed
@@ -65,7 +65,7 @@ def test_sessions_and_commands_do_without_locks_links_and_flushes_of_folders(dri
     world = StoredWorld(drive / "small")
     world.start()
     world.until(Phase.COMPLETE)
-    assert verify(drive / "small").sound
+    assert verify_study(drive / "small").is_sound
     study, asked = rehearsed(drive), ("--by", "AB", "--reason", "a test")
     session = study / "data" / "sub-P001" / "ses-01"
     (session / "checksums.sha256").unlink()
@@ -102,7 +102,7 @@ def test_a_drive_that_is_full_or_gone_at_a_flush_is_waited_for(
     world.until(Phase.COMPLETE)
     assert [line["n"] for line in world.lines] == list(range(1, len(world.lines) + 1))
     assert sum(len(line["items"]) for line in world.lines if line["event"] == "responses") == small.RESPONSES
-    assert verify(tmp_path / "study").sound
+    assert verify_study(tmp_path / "study").is_sound
 
 
 class Entries(list[Any]):
@@ -166,7 +166,7 @@ def test_what_another_computer_created_and_the_drive_shows_late_is_never_created
         assert before.items() <= {path: path.read_bytes() for path in study.path.rglob("*") if path.is_file()}.items()
     first.close()
     begun(study.path, "P002").close()
-    assert verify(study.path).errors == ()
+    assert verify_study(study.path).errors == ()
 
 
 def test_of_two_programs_that_do_not_see_each_others_lock_the_first_writes_no_line_over_the_seconds(
@@ -175,11 +175,11 @@ def test_of_two_programs_that_do_not_see_each_others_lock_the_first_writes_no_li
     first = begun(tmp_path / "study", "P001")
     (marker,) = folder_lock.markers(first.folder.path)
     with hide(marker):
-        second = reopen(first.folder.path, small.protocol(), b"small", operator="AB", device={}, screens={})
+        second = reopen_store(first.folder.path, small.protocol(), b"small", operator="AB", device={}, screens={})
     second.append(journal_events.Note(kind="note", text="of the second"))
     with pytest.raises(StoreError, match=r"journal\.jsonl was written by another program"):
         first.append(journal_events.Note(kind="note", text="of the first"))
     second.finish("completed")
     first.close()
     assert second.lines[-2].text == "of the second"
-    assert verify(tmp_path / "study").errors == ()
+    assert verify_study(tmp_path / "study").errors == ()

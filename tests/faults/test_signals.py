@@ -13,8 +13,8 @@ import pytest
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
 from study_app.store.folders import StudyFolder
-from study_app.store.sessions.recovery import check_can_go_on
-from study_app.store.verification.verify_study import verify
+from study_app.store.sessions.recovery import check_resumable
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.end_to_end.real_windows import COMPILED_S, Program, needs_display, virtual_display, wait_for
 from tests.faults.support import short
@@ -73,6 +73,6 @@ def test_a_signal_in_a_trial_leaves_a_session_that_can_be_resumed(
     sys.stdout.write(f"{number.name}: zero force after {zero_s:.2f} s, the end after {ended_s:.2f} s\n")
     assert zero_s < 1
     assert ended_s < 2
-    assert verify(tmp_path / "results" / "demo-scripted").errors == ()
+    assert verify_study(tmp_path / "results" / "demo-scripted").errors == ()
     source = source_bytes(str(protocol))
-    check_can_go_on(session.path, parse(source, "demo"), source)
+    check_resumable(session.path, parse(source, "demo"), source)

@@ -12,7 +12,7 @@ import pytest
 
 from study_app.session.replay import replay
 from study_app.store.folders import StudyFolder
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.end_to_end.real_windows import COMPILED_S, needs_display, virtual_display
 
@@ -94,7 +94,7 @@ def test_a_recorder_that_dies_is_told_at_once_and_records_the_next_trial(session
 
 def test_what_it_leaves_is_sound_and_its_forces_are_computed_again(session: tuple[dict[str, Any], Path]) -> None:
     _, results = session
-    assert verify(results).errors == ()
+    assert verify_study(results).errors == ()
     (folder,) = StudyFolder(results).sessions()
     again = replay(folder.path)
     assert again.recordings >= 1  # those after a gap, which a stall of the computer leaves, cannot be compared

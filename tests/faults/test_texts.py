@@ -9,10 +9,10 @@ import pytest
 from study_app.analysis.data.study_tables import load_study
 from study_app.session.transitions.events import EndRequested, Note, RepeatRequested
 from study_app.session.transitions.state import Phase
-from study_app.store.csv_files import unguarded
+from study_app.store.csv_files import unguard_formula
 from study_app.store.exclusions import exclude, exclusions
 from study_app.store.journals import journal
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.faults.support.worlds import StoredWorld
 from tests.journal_lines import raw
 
@@ -45,15 +45,15 @@ def test_a_free_text_survives_journal_tables_and_readers(tmp_path: Path, text: s
     path = world.store.folder.table("small", "trials")
     with path.open(newline="", encoding="utf-8") as file:
         first, _ = list(csv.DictReader(file))
-    assert unguarded(first["notes"]) == f"{text}\nrepeated: again: {text}"
+    assert unguard_formula(first["notes"]) == f"{text}\nrepeated: again: {text}"
     assert (first["notes"][0] == "'") == (text[0] in "=+-@")
     assert pd.read_csv(path, keep_default_na=False)["notes"][0] == first["notes"]
     excluded = exclude(tmp_path / "study", "P001", 1, by="AK", reason=text)
     assert exclusions(tmp_path / "study") == (excluded,)
     assert excluded.reason == " ".join(text.split())
-    assert verify(tmp_path / "study").errors == ()
+    assert verify_study(tmp_path / "study").errors == ()
     study = load_study(tmp_path / "study")
-    assert study.trials["notes"][0] == unguarded(first["notes"])
+    assert study.trials["notes"][0] == unguard_formula(first["notes"])
     assert study.exclusions == (excluded,)
     for table in (study.trials, study.participants):
         assert set(table["exclusion_reason"]) == {excluded.reason}

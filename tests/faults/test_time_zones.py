@@ -11,7 +11,7 @@ from PySide6.QtCore import QLocale
 from study_app.analysis.export_study import export
 from study_app.analysis.report.write_report import report
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.studies import rehearsed
 
 pytestmark = [
@@ -48,12 +48,12 @@ def test_data_are_the_same_in_every_time_zone(tmp_path: Path, travel: Callable[[
     travel("LINT-14")  # Kiritimati
     study = rehearsed(tmp_path)
     travel("NST3:30NDT")  # Newfoundland, where it is the day before
-    assert verify(study).errors == ()
+    assert verify_study(study).errors == ()
     unblind(study, "AB", "elsewhere")
     written = {}
     for zone in ("NST3:30NDT", "NPT-5:45"):
         travel(zone)
-        assert verify(study).errors == ()
+        assert verify_study(study).errors == ()
         to = tmp_path / zone[:3]
         export(study, to, extras=["wide"])
         report(study, to)

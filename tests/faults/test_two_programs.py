@@ -19,7 +19,7 @@ from study_app.errors import StoreError
 from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests import studies
 from tests.faults.support.racers import race
 from tests.journal_lines import raw
@@ -90,7 +90,7 @@ def test_two_programs_leave_a_sound_study(
         for words, code, said in ended:
             assert "Traceback" not in said
             assert code == 0 or len(said.splitlines()) == 1 or words[0] in ("export", "report", "verify"), said
-        assert verify(folder / "study").errors == (), ended
+        assert verify_study(folder / "study").errors == (), ended
         effects = [words for words, code, _ in ended if code == 0]
         if reveals := sum(words[0] == "unblind" for words in effects):
             records = (folder / "study" / "blinding" / "reveals.jsonl").read_text("utf-8").splitlines()
@@ -128,4 +128,4 @@ def test_of_two_programs_exactly_one_gets_each_id_and_both_have_the_same_key(tmp
         table = study.participants("small").read_text(encoding="utf-8").splitlines()
         assert [row.split(",")[1] for row in table[1:]] == ["P001", "P002", "P003"]
         assert not list(study.path.rglob("*.tmp"))
-        assert verify(study.path).errors == ()
+        assert verify_study(study.path).errors == ()

@@ -17,7 +17,7 @@ from study_app.session import start
 from study_app.session.pages import PausePage, TaskPage
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal, journal_events
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.faults.support import short
 from tests.faults.support.watched_program import Person
@@ -48,7 +48,7 @@ def hold(folder: Path, watch: Any) -> tuple[int | str, list[dict[str, Any]]]:
         code = str(error)
     person.leave()
     (session,) = StudyFolder(results).sessions()
-    assert verify(results).errors == ()
+    assert verify_study(results).errors == ()
     return code, raw(journal.read(session.journal))
 
 

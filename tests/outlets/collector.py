@@ -29,7 +29,7 @@ class Collector:
 def collecting() -> Iterator[Collector]:
     """Collect the markers of sessions that are rehearsed meanwhile."""
     collector = Collector()
-    begin = rehearsal.begin
+    begin = rehearsal.begin_session
 
     def begun(*given: Any, **named: Any) -> Any:
         store = begin(*given, **named)
@@ -37,5 +37,5 @@ def collecting() -> Iterator[Collector]:
         return store
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(rehearsal, "begin", begun)
+        patch.setattr(rehearsal, "begin_session", begun)
         yield collector

@@ -8,7 +8,7 @@ import pytest
 from study_app.errors import ProtocolError
 from study_app.protocol.load import parse
 from study_app.protocol.streams import stream
-from study_app.store.blinded.blinding import open_or_draw_key, read_key, whole_protocol
+from study_app.store.blinded.blinding import complete_protocol, open_or_draw_key, read_key
 from study_app.store.receipt import without_conditions
 from tests.protocol.sound import SOUND
 from tests.protocol.trials.level_studies import study
@@ -35,7 +35,7 @@ def test_published_values_are_in_the_key_and_not_in_the_receipt(tmp_path: Path) 
     assert "0.1937" not in json.dumps(shown)
     assert shown["analysis"]["participants"] == 20
     open_or_draw_key(tmp_path, protocol, random=stream(1, "key").random)
-    whole = whole_protocol(shown, read_key(tmp_path))
+    whole = complete_protocol(shown, read_key(tmp_path))
     assert whole.analysis == protocol.analysis
 
 

@@ -27,7 +27,7 @@ from study_app.session.transitions.table import open_session
 from study_app.store.blinded.blinding import open_or_draw_key, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.studies import begun
 
@@ -179,7 +179,7 @@ def test_values_are_sealed_and_a_replay_needs_no_file(study: Path, tmp_path: Pat
             assert b"1387.25" not in path.read_bytes(), path
     (tmp_path / "liquids" / "syrup.toml").unlink()
     assert replay(StudyFolder(folder).session("P001", 1).path).proved
-    assert verify(folder).sound
+    assert verify_study(folder).is_sound
 
 
 @pytest.mark.slow

@@ -197,6 +197,6 @@ def test_a_disk_that_takes_nothing_is_a_failure_with_its_reason(
     def full(_folder: Path) -> int:
         raise StoreError("the disk is full")
 
-    monkeypatch.setattr(preflight_measurements, "probe", full)
+    monkeypatch.setattr(preflight_measurements, "probe_free_bytes", full)
     facts = measured(tmp_path)
     assert "the disk is full" in refused(checks(facts, small.protocol()))

@@ -25,8 +25,8 @@ from study_app.session.transitions.table import advance, open_session
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import start_of
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.verification.reproduction import reproduced
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.reproduction import reproduce_session
+from study_app.store.verification.verify_study import verify_study
 from tests import golden
 from tests.journal_lines import event_from, event_of
 from tests.session import small
@@ -205,11 +205,11 @@ def test_receipt_keeps_the_row_and_reproduce_uses_it(square: Path, row_of: str, 
     path = store.folder.receipt
     held = json.loads(path.read_text())
     assert held["row_of"] == row_of
-    assert reproduced(store.folder.path).differences == []
-    assert verify(square.parent / "results").errors == ()
+    assert reproduce_session(store.folder.path).differences == []
+    assert verify_study(square.parent / "results").errors == ()
     path.write_text(json.dumps(held | {"row_of": "P002" if row_of == "P001" else "P001"}))
-    assert any("code" in line for line in reproduced(store.folder.path).differences)
-    assert any("row_of: differ from the journal" in str(one) for one in verify(square.parent / "results").errors)
+    assert any("code" in line for line in reproduce_session(store.folder.path).differences)
+    assert any("row_of: differ from the journal" in str(one) for one in verify_study(square.parent / "results").errors)
 
 
 def test_resumed_session_keeps_the_row(square: Path) -> None:

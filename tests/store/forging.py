@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from study_app.store.blinded.blinding import opened, opened_key, read_key, sealed
+from study_app.store.blinded.blinding import open_events, opened_key, read_key, seal_event
 from study_app.store.checksums import fingerprint, note_fingerprint, write_checksums
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal import line_bytes, read
@@ -68,10 +68,10 @@ def change(session: Path, edit: Callable[[Lines], None], after: Callable[[Lines]
     """Change the journal as somebody would who has the key, before and after it is sealed."""
     path = session / "journal.jsonl"
     key = read_key(session.parents[2])
-    lines: Lines = raw(opened(read(path), key))
+    lines: Lines = raw(open_events(read(path), key))
     edit(lines)
     start, *rest = map(event_from, lines)
-    closed = raw([start, *(sealed(start, line, key) for line in rest)])
+    closed = raw([start, *(seal_event(start, line, key) for line in rest)])
     after(closed)
     content = b""
     for number, line in enumerate(closed, start=1):

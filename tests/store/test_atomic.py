@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from study_app.errors import StoreError
-from study_app.store.atomic import append_line, create_folder, probe, write_file
+from study_app.store.atomic import append_line, create_folder, probe_free_bytes, write_file
 from tests.platforms import files_up_to
 
 
@@ -19,8 +19,12 @@ def test_what_does_not_fit_leaves_what_was_there_and_nothing_beside(tmp_path: Pa
         (1000, lambda: write_file(table, b"new\n" * 100_000), r"table\.csv cannot be written \(File too large\)"),
         (1000, lambda: create_folder(tmp_path / "blinding", {"key": b"x" * 5000}), "blinding cannot be written"),
         (100, lambda: append_line(lines, b"x" * 5000 + b"\n"), r"reveals\.jsonl cannot be written"),
-        (3, lambda: probe(tmp_path / "results"), r"results cannot be written \(File too large\): free disk space"),
-        (3, lambda: probe(table), r"table\.csv cannot be written \(a file is where a folder is needed\)"),
+        (
+            3,
+            lambda: probe_free_bytes(tmp_path / "results"),
+            r"results cannot be written \(File too large\): free disk space",
+        ),
+        (3, lambda: probe_free_bytes(table), r"table\.csv cannot be written \(a file is where a folder is needed\)"),
     ):
         with files_up_to(size), pytest.raises(StoreError, match=sentence):
             act()

@@ -9,7 +9,7 @@ from study_app.errors import StoreError
 from study_app.store import unblinding
 from study_app.store.exclusions import Exclusion, exclude, exclusions, include, reversals
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.platforms import files_up_to
 from tests.store.conftest import Start
 
@@ -56,7 +56,7 @@ def test_a_session_and_a_trial_are_left_out_with_their_reasons(folder: Path) -> 
 
 
 def test_a_rule_excludes_no_session_that_a_person_included_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(unblinding, "_missed", lambda *_: ["3 of 4 catch trials", "2 of 2 catch trials"])
+    monkeypatch.setattr(unblinding, "_missed_catch_trials", lambda *_: ["3 of 4 catch trials", "2 of 2 catch trials"])
     found = unblinding.exclude_inattentive(folder)
     assert [(row.participant, row.rule_or_person) for row in found] == [("P007", "catch"), ("P008", "catch")]
     assert {row.reason for row in found} == {"3 of 4 catch trials; 2 of 2 catch trials"}
@@ -83,7 +83,7 @@ def test_a_list_that_a_spreadsheet_saved_is_read(folder: Path) -> None:
     decided = exclusions(folder)
     path.write_bytes(codecs.BOM_UTF8 + path.read_bytes().replace(b"\n", b"\r\n"))
     assert exclusions(folder) == decided
-    assert [one for one in verify(folder).errors if one.place == "exclusions.csv"] == []
+    assert [one for one in verify_study(folder).errors if one.place == "exclusions.csv"] == []
     exclude(folder, "P007", 1, by="AB", reason="withdrew")
     assert exclusions(folder)[0] == decided[0]
     assert not path.read_bytes().startswith(codecs.BOM_UTF8)
@@ -100,8 +100,8 @@ def test_an_exclusion_is_taken_back_and_stays_on_record(folder: Path) -> None:
     assert record["exclusion"]["reason"] == "the phone rang"
     again = exclude(folder, "P007", 1, trial=2, by="AB", reason="it did", now=NOW)
     assert exclusions(folder) == (kept, again)
-    found = verify(folder)
-    assert found.sound
+    found = verify_study(folder)
+    assert found.is_sound
     assert "exclusions_reversed" not in str(found)
 
 
@@ -114,7 +114,7 @@ def test_a_reason_is_kept_as_it_can_be_read(folder: Path) -> None:
     include(folder, "P007", 1, by="CD", reason="understood late \u2029 and well")
     assert [(row.participant, row.rule_or_person) for row in reversals(folder)] == [("P007", "catch")]
     assert unblind(folder, "CD", "to analyse").left == ()
-    assert verify(folder).sound
+    assert verify_study(folder).is_sound
 
 
 def test_a_list_with_an_endless_cell_is_named(folder: Path) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from study_app.store.blinded.blinding import Key, opened, read_key, sealed
+from study_app.store.blinded.blinding import Key, open_events, read_key, seal_event
 from study_app.store.columns import TABLES
 from study_app.store.folders import StudyFolder
 from tests.journal_lines import event_from, raw
@@ -44,7 +44,9 @@ def sha256(content: object) -> str:
 
 def journal(path: Path, key: Key) -> list[dict[str, Any]]:
     """Return the lines without what differs from run to run; the recorder writes its own lines whenever it is done."""
-    lines = raw(opened([event_from(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()], key))
+    lines = raw(
+        open_events([event_from(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()], key)
+    )
     fields = (
         {name: value for name, value in line.items() if name not in UNEQUAL + ADDED and not MEASURED.match(name)}
         for line in lines
@@ -58,14 +60,16 @@ def journal(path: Path, key: Key) -> list[dict[str, Any]]:
 
 def sealed_again(start: dict[str, Any], line: dict[str, Any], key: Key) -> dict[str, Any]:
     """Return a line with its sealed values in one text, whatever is missing of it."""
-    fields = sealed(event_from(start), event_from(line), key).fields()
+    fields = seal_event(event_from(start), event_from(line), key).fields()
     of_all = {name: value for name, value in line.items() if name in ("n", "event", "t_s", "at", "previous")}
     return of_all | {name: value for name, value in fields.items() if name in line or name == "sealed"}
 
 
 def measured(path: Path, key: Key) -> list[float]:
     """Return what was measured in each trial."""
-    lines = raw(opened([event_from(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()], key))
+    lines = raw(
+        open_events([event_from(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()], key)
+    )
     return [
         value for line in lines for name, value in sorted(line.items()) if MEASURED.match(name) and value is not None
     ]
@@ -76,7 +80,7 @@ def table(path: Path, key: Key) -> list[list[str]]:
     header, *rows = csv.reader(io.StringIO(path.read_text(encoding="utf-8"), newline=""))
     if "samples_recorded" in header:
         text = (path.parent / "journal.jsonl").read_text(encoding="utf-8")
-        lines = raw(opened([event_from(json.loads(line)) for line in text.splitlines()], key))
+        lines = raw(open_events([event_from(json.loads(line)) for line in text.splitlines()], key))
         counts = {line["recording"]: str(line["samples_recorded"]) for line in lines if line["event"] == "recorded"}
         for row in rows:
             row[header.index("samples_recorded")] = counts[row[header.index("recording")]]

@@ -14,7 +14,7 @@ from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import exclude, include
 from study_app.store.progress import Progress
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests import golden
 from tests.golden_values import changed, table_lines, value_lines
 from tests.journal_lines import event_of
@@ -103,5 +103,5 @@ def test_a_journal(tmp_path: Path, pytestconfig: pytest.Config) -> None:
         session.finish("withdrawn", "felt unwell")
     told += ["== finished", *changed(before, list(lines_of(study)))]
     told += sorted(f"left open: {path.name}" for path in study.rglob(".open-*"))
-    told += [line.replace(str(tmp_path), "FOLDER") for line in value_lines(verify(study), "verify")]
+    told += [line.replace(str(tmp_path), "FOLDER") for line in value_lines(verify_study(study), "verify")]
     golden.compare(GOLDEN / "journal.txt", told, pytestconfig, mask=CHANGING)

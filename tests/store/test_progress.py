@@ -6,7 +6,7 @@ import pytest
 
 from study_app.protocol.load import parse
 from study_app.protocol.streams import stream
-from study_app.store.blinded.blinding import open_or_draw_key, read_key, whole_protocol
+from study_app.store.blinded.blinding import complete_protocol, open_or_draw_key, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.receipt import without_conditions
 from tests.protocol.trials.level_studies import text_of
@@ -27,7 +27,7 @@ def test_the_protocol_is_whole_again_with_its_key_whoever_has_which_steps(tmp_pa
     protocol = parse(f"{text_of(*shared)}{groups}".encode(), "levels")
     open_or_draw_key(tmp_path, protocol, random=stream(1, "key").random)
     shown = json.loads(json.dumps(without_conditions(protocol)))
-    assert whole_protocol(shown, read_key(tmp_path)) == protocol
+    assert complete_protocol(shown, read_key(tmp_path)) == protocol
 
 
 def test_sessions_are_listed_while_a_participant_is_withdrawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

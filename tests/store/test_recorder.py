@@ -9,7 +9,7 @@ import pytest
 
 from study_app.store import recordings
 from study_app.store.journals.journal_events import Recorded, RecordingLost
-from study_app.store.recorder import Recorder, lost
+from study_app.store.recorder import Recorder, lost_event
 from study_app.store.recordings import SamplesFile, read_facts, read_frames, read_samples
 from tests.platforms import files_up_to
 from tests.store.conftest import Make
@@ -64,7 +64,7 @@ def test_a_trial_is_on_the_disk_under_its_name_after_its_end(
     samples = samples_of(70_001)
     record(recorder, samples, chunk=1_234)
     recorder.close()
-    (kept,) = recorder.kept()
+    (kept,) = recorder.collect_results()
     assert isinstance(kept, Recorded)
     assert (kept.trial, kept.attempt, kept.samples_unrecorded, kept.samples_recorded, kept.frames_recorded) == (
         3,
@@ -80,7 +80,7 @@ def test_a_trial_is_on_the_disk_under_its_name_after_its_end(
     assert np.array_equal(read_samples(tmp_path / kept.recording)["position_m"], samples["position_m"])
     assert read_frames(tmp_path / kept.recording_frames)["age_ns"].tolist() == [1_000, 1_500]
     assert read_facts(tmp_path / kept.recording).items() >= {**FACTS, "trial": 3, "attempt": 1, "dropped": 0}.items()
-    assert recorder.kept() == ()
+    assert recorder.collect_results() == ()
 
 
 def test_beginning_the_next_trial_ends_the_one_before(recorder: Recorder, samples_of: Make) -> None:
@@ -89,10 +89,10 @@ def test_beginning_the_next_trial_ends_the_one_before(recorder: Recorder, sample
     recorder.start(2, 1, 1000.0)
     recorder.append(samples_of(20))
     recorder.close()
-    assert [kept.samples_recorded for kept in recorder.kept() if isinstance(kept, Recorded)] == [10, 20]
+    assert [kept.samples_recorded for kept in recorder.collect_results() if isinstance(kept, Recorded)] == [10, 20]
     record(recorder, samples_of(10))  # after its end
     recorder.close()
-    assert recorder.kept() == ()
+    assert recorder.collect_results() == ()
 
 
 def test_a_disk_that_stands_still_holds_nobody_up_and_drops_are_counted(
@@ -109,7 +109,7 @@ def test_a_disk_that_stands_still_holds_nobody_up_and_drops_are_counted(
     assert recorder.dropped == 30_000
     disk.works.set()
     recorder.close()
-    (kept,) = recorder.kept()
+    (kept,) = recorder.collect_results()
     assert isinstance(kept, Recorded)
     assert (kept.samples_unrecorded, kept.samples_recorded) == (30_000, 70_000)
     assert read_samples(tmp_path / kept.recording)["tick"].tolist() == list(range(70_000))
@@ -120,7 +120,7 @@ def test_in_a_rehearsal_handing_over_waits_for_room_instead(tmp_path: Path, samp
     recorder = Recorder(tmp_path / "recordings", FACTS, waits=True, room=500)
     record(recorder, samples_of(90_000), chunk=700)
     recorder.close()
-    (kept,) = recorder.kept()
+    (kept,) = recorder.collect_results()
     assert isinstance(kept, Recorded)
     assert (kept.samples_unrecorded, kept.samples_recorded) == (0, 90_000)
 
@@ -134,10 +134,10 @@ def test_a_full_disk_loses_a_recording_with_its_reason_and_the_next_is_kept(
         record(recorder, samples_of(70_000), trial=1)
         with recorder.changed:
             assert recorder.changed.wait_for(lambda: recorder.lost, 20)
-    assert recorder.kept() == (lost((1, 1, None), "File too large"),)
+    assert recorder.collect_results() == (lost_event((1, 1, None), "File too large"),)
     record(recorder, samples_of(200), trial=2)
     recorder.close()
-    (kept,) = recorder.kept()
+    (kept,) = recorder.collect_results()
     assert isinstance(kept, Recorded)
     assert sorted(path.name for path in (tmp_path / "recordings").iterdir()) == [
         "trial-002.parquet",
@@ -164,10 +164,10 @@ def test_the_end_of_a_session_does_not_wait_for_ever(tmp_path: Path, samples_of:
     record(recorder, samples_of(40_000), chunk=5_000)
     assert disk.asked.wait(20)
     recorder.close(patience_s=0.0)
-    assert recorder.kept() == (lost((3, 1, None), "the disk was too slow"),)
+    assert recorder.collect_results() == (lost_event((3, 1, None), "the disk was too slow"),)
     disk.works.set()
     recorder.close()
-    assert recorder.kept() == ()
+    assert recorder.collect_results() == ()
     assert recorder.thread is not None
     recorder.thread.join(20)
     assert list((tmp_path / "recordings").iterdir()) == [], "it was said to be lost"
@@ -179,12 +179,12 @@ def test_a_disk_that_never_comes_back_is_given_up_without_waiting(
     recorder = Recorder(tmp_path / "recordings", FACTS)
     record(recorder, samples_of(40_000), chunk=5_000)
     assert disk.asked.wait(20)
-    assert not recorder.settled()
+    assert not recorder.end_without_waiting()
     later = time.monotonic() + 31
     monkeypatch.setattr("study_app.store.recorder.time.monotonic", lambda: later)
-    assert recorder.settled()
+    assert recorder.end_without_waiting()
     recorder.close()
-    assert recorder.kept() == (lost((3, 1, None), "the disk was too slow"),)
+    assert recorder.collect_results() == (lost_event((3, 1, None), "the disk was too slow"),)
     disk.works.set()
     assert recorder.thread is not None
     recorder.thread.join(20)
@@ -210,13 +210,13 @@ def test_a_thread_that_ends_loses_its_trial_at_once_and_the_next_trial_starts_an
         with recorder.changed:
             assert recorder.changed.wait_for(lambda: recorder.lost, 10.0)
         threads[0].join(10.0)
-        assert recorder.lost == (lost((1, 1, None), "its thread ended: Ended: pulled"),)
+        assert recorder.lost == (lost_event((1, 1, None), "its thread ended: Ended: pulled"),)
         recorder.append(samples_of(10))
         recorder.stop()
     record(recorder, samples_of(20), trial=2)
     recorder.close()
-    missing, kept = recorder.kept()
-    assert missing == lost((1, 1, None), "its thread ended: Ended: pulled")
+    missing, kept = recorder.collect_results()
+    assert missing == lost_event((1, 1, None), "its thread ended: Ended: pulled")
     assert isinstance(kept, Recorded)
     assert (kept.trial, kept.samples_recorded) == (2, 20)
 
@@ -234,4 +234,4 @@ def test_a_thread_that_cannot_be_started_loses_recordings_and_not_the_session(
     assert "can't start new thread" in recorder.lost[0].reason
     record(recorder, samples_of(20), trial=2)
     recorder.close()
-    assert [type(kept) for kept in recorder.kept()] == [RecordingLost, Recorded]
+    assert [type(kept) for kept in recorder.collect_results()] == [RecordingLost, Recorded]

@@ -15,9 +15,9 @@ from study_app.session.replay import replay
 from study_app.session.simulated import rehearsal
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.sessions.recovery import rebuild
+from study_app.store.sessions.recovery import rebuild_session
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.journal_lines import raw
 
@@ -55,7 +55,7 @@ def written_by(folder: Path) -> list[str]:
 
 def test_it_is_sound_but_for_what_is_unfinished(held: tuple[Path, dict[str, tuple[str, int]]]) -> None:
     folder, expected = held
-    found = verify(folder)
+    found = verify_study(folder)
     assert found.errors == ()
     said = "\n".join(map(str, found.warnings))
     for participant, (status, _) in expected.items():
@@ -99,7 +99,7 @@ def test_an_unfinished_session_is_resumed_to_its_end(tmp_path: Path) -> None:
     rehearsal.resume(session.path, protocol=RELEASES / "0.2" / "demo.toml")
     assert session.journal.read_bytes().startswith(before)
     assert raw(journal.read(session.journal))[-1]["status"] == "completed"
-    assert verify(folder.path).errors == ()
+    assert verify_study(folder.path).errors == ()
 
 
 HELD = Path(__file__).parent / "releases" / "0.1"
@@ -113,9 +113,9 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def warned(study: Path) -> str:
-    findings = verify(study)
+    findings = verify_study(study)
     assert findings.errors == ()
-    assert findings.sound
+    assert findings.is_sound
     return "\n".join(map(str, findings.warnings))
 
 
@@ -126,7 +126,7 @@ def test_it_verifies_with_a_note(study: Path) -> None:
     changed = StudyFolder(study).session("P001", 1).journal
     content = changed.read_bytes()
     changed.write_bytes(content.replace(b'"value":4', b'"value":5', 1))
-    assert "it was changed" in "\n".join(map(str, verify(study).errors))
+    assert "it was changed" in "\n".join(map(str, verify_study(study).errors))
     changed.write_bytes(content)
 
 
@@ -156,7 +156,7 @@ def test_rebuild_mends_a_table_and_notes_the_columns_that_have_come_since(study:
     before = table.read_bytes()
     table.write_bytes(before.replace(b",4,", b",5,"))
     trials = folder.table("rek2024", "trials")
-    assert rebuild(folder.path).rewritten == (table, trials, folder.checksums, folder.rebuilt)
+    assert rebuild_session(folder.path).rewritten == (table, trials, folder.checksums, folder.rebuilt)
     assert table.read_bytes() == before
     assert folder.rebuilt.read_text().endswith(f"rebuild: other checksums were listed for {trials.name}\n")
     assert "rebuilt.txt" in warned(study)

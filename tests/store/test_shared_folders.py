@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 
 pytestmark = pytest.mark.slow
 
@@ -41,11 +41,11 @@ def session_of(study: Path) -> Path:
 def test_files_of_systems_are_noted_and_leave_the_fingerprint(study: Path) -> None:
     for name in (*OF_SYSTEMS, *HIDDEN):
         (session_of(study) / name).write_bytes(b"\0")
-    found = verify(study)
+    found = verify_study(study)
     assert found.errors == ()
     assert {Path(one.place).name for one in found.warnings} == set(OF_SYSTEMS)
     (session_of(study) / "more.csv").write_bytes(b"1\n")
-    assert any(one.place.endswith("more.csv") and "was added" in one.message for one in verify(study).errors)
+    assert any(one.place.endswith("more.csv") and "was added" in one.message for one in verify_study(study).errors)
 
 
 def test_a_file_of_a_system_that_the_list_has_belongs_to_the_fingerprint(tmp_path: Path) -> None:
@@ -54,14 +54,14 @@ def test_a_file_of_a_system_that_the_list_has_belongs_to_the_fingerprint(tmp_pat
     sums = session_of(study) / "checksums.sha256"
     (session_of(study) / "desktop.ini").write_bytes(b"[.ShellClassInfo]\n")
     sums.write_text(f"{sums.read_text()}{'0' * 64}  desktop.ini\n", encoding="utf-8")
-    assert any(one.place.endswith("desktop.ini") and "has changed" in one.message for one in verify(study).errors)
+    assert any(one.place.endswith("desktop.ini") and "has changed" in one.message for one in verify_study(study).errors)
 
 
 def test_line_endings_that_git_changed_are_named(study: Path) -> None:
     for path in session_of(study).glob("*.*"):
         if path.suffix != ".sha256":
             path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
-    said = [one.message for one in verify(study).errors]
+    said = [one.message for one in verify_study(study).errors]
     assert any("line endings were changed to CR LF, as git does with core.autocrlf" in message for message in said)
     assert not any("another line" in message for message in said)
 

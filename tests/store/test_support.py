@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from study_app import cli
 from study_app.errors import DeviceLost, StoreError, StudyError
 from study_app.store import workstation
-from study_app.store.program_log import DEVICE_FAILED, keep_log, kept_log, last_error, log_file
+from study_app.store.program_log import DEVICE_FAILED, last_error, log_file, read_log, start_log
 from study_app.store.support import write_support
 from study_app.store.workstation import DeviceBench, MachineSettings
 from study_app.workspace import WORKSPACE_VARIABLE
@@ -29,7 +29,7 @@ def logged() -> Iterator[logging.Logger]:
     logger = logging.getLogger("study_app")
     before, level = list(logger.handlers), logger.level
     logger.handlers.clear()  # a command that another test ran keeps its log there
-    keep_log()
+    start_log()
     yield logger
     for handler in logger.handlers:
         handler.close()
@@ -77,7 +77,7 @@ def test_nothing_of_a_study_is_in_it(
     axes = (1.0, 1.0, 1.0)
     measured = dict.fromkeys(("mass_kg", "damping_nspm", "friction_n", "delay_ms", "stable_nspm"), axes)
     bench = DeviceBench(name="falcon", measured="2026-11-01", report="/x/tester-home/bench.md", **measured)
-    workstation.save(
+    workstation.save_settings(
         MachineSettings(
             workspace=str(results.parent),
             operator=INITIALS,
@@ -116,7 +116,7 @@ def test_a_failure_of_the_device_is_told_in_full_and_is_the_last_error(
     log.info(DEVICE_FAILED, DeviceLost("the device 'falcon' stopped responding"))
     log.info("the device was reconnected")
     caplog.clear()
-    assert last_error(kept_log()).endswith("the device failed: the device 'falcon' stopped responding")
+    assert last_error(read_log()).endswith("the device failed: the device 'falcon' stopped responding")
 
 
 @pytest.mark.slow

@@ -9,11 +9,11 @@ from jsonschema import Draft7Validator
 
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
-from study_app.store.csv_files import Column, guarded, header, problems, read_table
-from study_app.store.journals.journal_events import journal_schema, problem
+from study_app.store.csv_files import Column, guard_formula, header, read_table, table_problems
+from study_app.store.journals.journal_events import journal_schema, line_problem
 from study_app.store.sessions.begin import check_participant
 from study_app.store.verification.leaks import telltales
-from study_app.store.workstation import ASIDE, DEFAULTS, MachineSettings, load, load_or_default, save
+from study_app.store.workstation import ASIDE, DEFAULTS, MachineSettings, load_or_default, load_settings, save_settings
 from study_app.user_folder import settings_file
 from tests.golden import compare
 from tests.transcripts import calls, played
@@ -32,7 +32,7 @@ RIGHT = dict(zip(header(COLUMNS), ("x", "7", "0.5", "true", "low", "2026-03-01T1
 
 def line(fields: dict[str, Any], **more: Any) -> tuple[str | None, bool]:
     """Return what is wrong with a line of a journal, and whether the schema refuses it."""
-    return problem(fields | more), any(Draft7Validator(journal_schema()).iter_errors(fields | more))
+    return line_problem(fields | more), any(Draft7Validator(journal_schema()).iter_errors(fields | more))
 
 
 def cell(column: str, text: str) -> tuple[list[str], bool]:
@@ -42,8 +42,8 @@ def cell(column: str, text: str) -> tuple[list[str], bool]:
     try:
         read_table(table, COLUMNS)
     except ValueError as error:
-        return list(problems(table, COLUMNS)), "is not" not in str(error)
-    return list(problems(table, COLUMNS)), True
+        return list(table_problems(table, COLUMNS)), "is not" not in str(error)
+    return list(table_problems(table, COLUMNS)), True
 
 
 def settings(content: bytes) -> str:
@@ -52,8 +52,8 @@ def settings(content: bytes) -> str:
     settings_file().write_bytes(content)
     found, said = load_or_default()
     assert found == DEFAULTS
-    save(MachineSettings(screen="DP-1", theme="dark"))
-    assert load() == MachineSettings(screen="DP-1", theme="dark")
+    save_settings(MachineSettings(screen="DP-1", theme="dark"))
+    assert load_settings() == MachineSettings(screen="DP-1", theme="dark")
     assert settings_file().with_name(ASIDE).read_bytes() == content
     return re.sub(r"\(Expecting .*\)", "(...)", said.replace(str(settings_file()), "FILE"))
 
@@ -63,7 +63,7 @@ def screen(*there: str, **chosen: Any) -> int:
 
 
 NAMES = {"ALL": ALL, "LONG": 999 * "x"}
-NAMES |= {one.__name__: one for one in (line, cell, guarded, settings, screen, check_participant)}
+NAMES |= {one.__name__: one for one in (line, cell, guard_formula, settings, screen, check_participant)}
 
 
 @pytest.mark.parametrize("file", sorted((Path(__file__).parent / "texts").iterdir()), ids=lambda file: file.stem)

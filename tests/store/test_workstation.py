@@ -14,8 +14,8 @@ from study_app.store.workstation import (
     STATEMENT_X_HEIGHT_PX,
     DisplayOffset,
     MachineSettings,
-    load,
-    save,
+    load_settings,
+    save_settings,
 )
 
 OFFSET = DisplayOffset(mean_ms=23.5, spread_ms=1.2, how="photodiode", measured="2026-11-20", screen="DP-1")
@@ -42,11 +42,11 @@ def folder(tmp_path, monkeypatch):
 
 
 def test_a_write_that_fails_leaves_the_old_settings(folder, monkeypatch):
-    save(ALL)
-    assert load() == ALL
+    save_settings(ALL)
+    assert load_settings() == ALL
     monkeypatch.setattr("study_app.store.atomic.os.fsync", _full)
     with pytest.raises(StoreError, match="machine"):
-        save(DEFAULTS)
+        save_settings(DEFAULTS)
     monkeypatch.undo()
     assert json.loads((folder / "machine.json").read_text())["screen"] == "DP-1"
     assert [path.name for path in folder.iterdir()] == ["machine.json"]

@@ -164,7 +164,7 @@ def test_check_notes_what_keeps_this_machine_from_showing_the_camera(
     camera_study: Path, installed: bool, words: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
 
-    workstation.save(MachineSettings(camera="tcp://127.0.0.1:9"))
+    workstation.save_settings(MachineSettings(camera="tcp://127.0.0.1:9"))
     if not installed:
         monkeypatch.setattr(sources, "installed", lambda: False)
     checked = CliRunner().invoke(commands, ["check", str(camera_study)])

@@ -9,7 +9,7 @@ from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded import blinding
 from study_app.store.journals.journal_events import PageShown
-from study_app.store.sessions.begin import SessionStart, begin
+from study_app.store.sessions.begin import SessionStart, begin_session
 from study_app.store.unblinding import unblind
 
 STUDY: Final = "rek2024"
@@ -25,7 +25,7 @@ def rehearsed(folder: Path) -> Path:
     results = folder / "results"
     study = rehearse_answers(STUDY, participants=PARTICIPANTS, seed=SEED, results=results / STUDY)
     blinding.reveal(study, "AK", "to show what the windows look like")
-    with begin(
+    with begin_session(
         results / f"{STUDY}-pilot",
         load(STUDY),
         source_bytes(STUDY),

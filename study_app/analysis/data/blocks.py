@@ -22,7 +22,7 @@ from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
 from study_app.protocol.trials.designs import Design, default_design
 from study_app.protocol.trials.methods import Method
 from study_app.protocol.trials.stimuli import DELAY, OF_LINK, Assumed, Stimulus, assumed_for, rises
-from study_app.store.blinded.blinding import Key, whole_protocol
+from study_app.store.blinded.blinding import Key, complete_protocol
 
 Kind: TypeAlias = Compared
 
@@ -315,7 +315,7 @@ def contrasts_of(key: Key) -> tuple[Contrast, ...]:
 def level_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[LevelBlock, ...]:
     """Return the blocks with a design of the protocol in a receipt, in the order of the session; ``key`` is open."""
     steps = [step for step in every_step_of(protocol) if "slots" in protocol["blocks"].get(step, {})]
-    whole = whole_protocol(protocol, key) if key is not None and steps else None
+    whole = complete_protocol(protocol, key) if key is not None and steps else None
     return tuple(_level_block(protocol, step, key, whole) for step in steps)
 
 

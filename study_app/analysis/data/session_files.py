@@ -26,8 +26,8 @@ from study_app.protocol.table import text_in
 from study_app.store.atomic import parse_json, read_regular
 from study_app.store.blinded.blinding import Key
 from study_app.store.columns import TRIALS_MISSING, tables_of
-from study_app.store.csv_files import MISSING, Column, cells, header
-from study_app.store.exclusions import Exclusion, named
+from study_app.store.csv_files import MISSING, Column, header, read_cells
+from study_app.store.exclusions import Exclusion, describe_exclusion
 from study_app.store.folders import SessionFolder, StudyFolder, check_study_name
 from study_app.store.journals import journal
 from study_app.store.missing_trials import MissingTrials
@@ -66,7 +66,7 @@ def tables(paths: Sequence[Path], columns: tuple[Column, ...]) -> tuple[pd.DataF
 def _texts(path: Path, columns: tuple[Column, ...]) -> tuple[Mapping[str, Sequence[str]], int]:
     """Return the cells of a file by column, and how many rows it has."""
     try:
-        names, *rows = cells(read_regular(path))
+        names, *rows = read_cells(read_regular(path))
     except OSError as error:
         raise unreadable(path, error, _again(path)) from error
     except ValueError as error:
@@ -356,6 +356,6 @@ def check_there(study: StudyFolder, trials: pd.DataFrame, listed: Sequence[Exclu
     for one in listed:
         if (one.participant, one.session) not in sessions or (one.trial is not None and one.what not in presented):
             raise AnalysisError(
-                f"{study.exclusions} excludes {named(one)}, which does not exist: correct or remove the row, so "
-                "that the intended data are excluded"
+                f"{study.exclusions} excludes {describe_exclusion(one)}, which does not exist: correct or remove the "
+                "row, so that the intended data are excluded"
             )

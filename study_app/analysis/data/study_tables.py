@@ -58,14 +58,14 @@ from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import Key
 from study_app.store.columns import INTERVALS, SEALED
 from study_app.store.exclusions import MISSING_RULE, Exclusion, exclusions, reversals
-from study_app.store.folder_lock import never_begun
+from study_app.store.folder_lock import is_never_begun
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals.journal_events import INCOMPLETE, REACHED_END
 from study_app.store.merged import DASH, Merged, read_merged
 from study_app.store.sessions.open_session import Place
 from study_app.store.tables.study_files import has_intervals
-from study_app.store.unblinding import all_opened, decided_late
-from study_app.store.verification.verify_session import Discrepancy, doubts
+from study_app.store.unblinding import has_opened_keys, late_exclusions
+from study_app.store.verification.verify_session import Discrepancy, session_discrepancies
 from study_app.store.withdrawals import tombstones
 
 Settings: TypeAlias = Mapping[tuple[str, str], Setting]
@@ -341,7 +341,7 @@ def _load_sites(merged: Merged) -> Study:
     places = {name: StudyFolder(merged.folder(name)) for name in merged.names}
     if missing := [place.path for place in places.values() if not place.path.is_dir()]:
         raise StoreError(f"{missing[0]} is missing, but {merged.manifest.name} lists it: restore it from a copy")
-    opened = all_opened(merged.path)
+    opened = has_opened_keys(merged.path)
     sites = {name: _load(place.path, sealed=not opened) for name, place in places.items() if place.sessions()}
     if not sites:
         raise AnalysisError(f"{merged.path} holds no sessions: all participants of its sites withdrew")
@@ -394,7 +394,7 @@ def pooled(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Study:
 def _load(folder: Path, *, sealed: bool = False) -> Study:
     """Read the results in a folder that is not merged; ``sealed``: as if its key was not opened."""
     place = StudyFolder(folder)
-    sessions = [session for session in place.sessions() if not never_begun(session.path)]
+    sessions = [session for session in place.sessions() if not is_never_begun(session.path)]
     if not sessions:
         raise AnalysisError(_no_sessions(place.path))
     key = None if sealed else _key(place, sessions)
@@ -431,8 +431,8 @@ def _load(folder: Path, *, sealed: bool = False) -> Study:
         trials=_with_counted(with_excluded(trials, listed), last),
         participants=participants.assign(counted=participants["status"].isin(REACHED_END) & ~participants["excluded"]),
         exclusions=listed,
-        late=decided_late(place.path, listed),
-        doubts=tuple(doubt for one in records for doubt in doubts(Place(place, one.folder, one.study))),
+        late=late_exclusions(place.path, listed),
+        doubts=tuple(doubt for one in records for doubt in session_discrepancies(Place(place, one.folder, one.study))),
         others=records[0].others,
         decided=read_decided([session.protocol.get("analysis") for session in records]),
         contrasts=() if key is None else contrasts_of(key),

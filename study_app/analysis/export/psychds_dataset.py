@@ -23,7 +23,7 @@ from study_app.protocol.source.files import (
     without_mark,
 )
 from study_app.protocol.table import text_in
-from study_app.store.atomic import cause, open_regular
+from study_app.store.atomic import open_regular, system_message
 from study_app.store.blinded.blinding import revealed_key
 from study_app.store.csv_files import Column
 from study_app.store.merged import read_merged
@@ -108,7 +108,7 @@ def _why_missing(path: Path | None) -> str:
         with open_regular(path) as file:
             file.read(1)
     except (OSError, ValueError) as error:
-        return f"cannot be read: {cause(error) if isinstance(error, OSError) else error}"
+        return f"cannot be read: {system_message(error) if isinstance(error, OSError) else error}"
     return "the file of this name has another SHA-256"
 
 

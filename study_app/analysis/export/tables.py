@@ -21,7 +21,7 @@ from study_app.analysis.levels.statistic import statistics
 from study_app.analysis.levels.tracks import OF_INTERVALS, tracks
 from study_app.analysis.questions import scored
 from study_app.store.columns import INTERVALS, RESPONSES, TRIALS_2, TRIALS_MISSING, tables_of
-from study_app.store.csv_files import Column, Kind, header, optional, unsealed
+from study_app.store.csv_files import Column, Kind, header, optional, unsealed_columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ def level_tables(study: Study) -> Iterator[Delivered]:
     if not study.levels:
         return
     intervals = tables_of(study.protocol_format)["intervals"]
-    intervals = intervals if study.revealed else unsealed(intervals)
+    intervals = intervals if study.revealed else unsealed_columns(intervals)
     yield delivered("intervals", (*intervals, *JUDGED, TRIALS_MISSING), study.intervals)
     if not study.revealed:
         return
@@ -146,7 +146,7 @@ def deliver(study: Study) -> tuple[Delivered, ...]:
     opened = OPENED if study.revealed else ()
     achieved = (*OPENED, ACHIEVED) if study.revealed else ()
     trials = tables_of(study.protocol_format)["trials"]
-    trials = trials if study.revealed else unsealed(trials)
+    trials = trials if study.revealed else unsealed_columns(trials)
     responses = tables_of(study.protocol_format)["responses"]
     about = achieved if responses is RESPONSES else _may_miss(achieved)
     judged = (*JUDGED, TRIALS_MISSING) if study.levels else JUDGED

@@ -32,7 +32,7 @@ from study_app.protocol.tracks import condition_of, design_of, method_of, standa
 from study_app.protocol.trials.stimuli import assumed_for
 from study_app.protocol.warnings.expected_precision import expected_of, precision_plan, precision_rows, threshold_plan
 from study_app.psychophysics.people import BETWEEN_PEOPLE
-from study_app.store.exclusions import MISSING_RULE, named
+from study_app.store.exclusions import MISSING_RULE, describe_exclusion
 from study_app.store.merged import DASH, folders_of
 
 FILE: Final = "preregistration.md"
@@ -468,7 +468,7 @@ def _differences(study: Study, sites: Mapping[str, Commitment | None], committed
     yield from _other_participants(study, committed.participants)
     by_person = [one for one in study.exclusions if one.rule_or_person not in committed.rules]
     for one in by_person[:SHOWN]:
-        yield f"an exclusion by no preregistered rule: {named(one)}: {one.reason} ({one.rule_or_person})"
+        yield f"an exclusion by no preregistered rule: {describe_exclusion(one)}: {one.reason} ({one.rule_or_person})"
     if len(by_person) > SHOWN:
         yield f"{len(by_person) - SHOWN} more exclusions by no preregistered rule, in report.json"
     if study.decided.changed:

@@ -46,8 +46,8 @@ from study_app.analysis.wording import counted, listed, ms, number, significant
 from study_app.discovery import by_name
 from study_app.protocol.orders.balance import Evenness
 from study_app.store.delivered import broken_limits
-from study_app.store.exclusions import named
-from study_app.store.missing_trials import MISSING_PERCENT, MissingTrials, limit_words
+from study_app.store.exclusions import describe_exclusion
+from study_app.store.missing_trials import MISSING_PERCENT, MissingTrials, limit_reason
 
 
 def of_levels(results: Results) -> tuple[str, ...]:
@@ -371,7 +371,7 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         yield paragraph(f"Motors masked: {listed(answers)}.")
     yield heading(3, "Exclusions")
     gone = [
-        f"{named(one)}: {one.reason} ({one.rule_or_person}, {one.excluded_at}"
+        f"{describe_exclusion(one)}: {one.reason} ({one.rule_or_person}, {one.excluded_at}"
         f"{', after the key was opened' if one in study.late else ''})"
         for one in study.exclusions
     ]
@@ -454,7 +454,7 @@ def _missing(study: Study) -> Iterator[str]:
             ("Session", lambda one: one.session),
             ("missing", lambda one: f"{one.missing.count} of {one.missing.asked}"),
             ("of which", lambda one: listed([f"{_track(study, *of)}: {n}" for of, n in one.missing.tracks.items()])),
-            ("because", lambda one: listed([limit_words(limit, one.missing.limits) for limit in one.missing.reasons])),
+            ("because", lambda one: listed([limit_reason(limit, one.missing.limits) for limit in one.missing.reasons])),
             ("session", lambda one: "counted" if one.counted else "not counted"),
             words=5,
         )

@@ -56,7 +56,7 @@ from study_app.session.transitions.events import (
     broken,
 )
 from study_app.store.blinded.allocation import session_protocol
-from study_app.store.blinded.blinding import opened
+from study_app.store.blinded.blinding import open_events
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal_events
 from study_app.store.journals.journal_events import start_of
@@ -188,7 +188,7 @@ class SessionBridge(QObject):
         self.failure: BaseException | None = None
         ports = Ports(parts.servo, parts.journal, self.present, parts.clock, parts.recorder)
         if parts.recorder is not None:
-            ports = replace(ports, settled=parts.recorder.settled)
+            ports = replace(ports, settled=parts.recorder.end_without_waiting)
         if parts.videos is not None:
             ports = replace(ports, video=parts.videos.source)
         self._leaves = False
@@ -643,7 +643,7 @@ def connect_windows(
     ``videos`` are open.
     """
     clock, device, servo = store.clock.seconds, rig.device, rig.servo
-    journal = WatchedJournal(store, progress_of(opened(store.lines, store.key)), clock)
+    journal = WatchedJournal(store, progress_of(open_events(store.lines, store.key)), clock)
     described = descriptor_of(chosen.device)
     protocol, schedule, start = plan
     hand = hand_of(device)

@@ -49,11 +49,11 @@ from study_app.session.start import (
     videos_of,
 )
 from study_app.store import receipt
-from study_app.store.folders import locate
+from study_app.store.folders import locate_session
 from study_app.store.journals import journal_events
 from study_app.store.sessions.begin import refuse_never_begun
 from study_app.store.study_versions import keep_content
-from study_app.store.verification.proofs import leave
+from study_app.store.verification.proofs import write_proof
 from study_app.store.workstation import remember_protocol
 from study_app.workspace import workspace
 
@@ -333,7 +333,7 @@ class LiveSession(QObject):
         if (proof := self.bridge.parts.journal.fingerprint) and self._store is not None:
             tell = self._progress or logging.getLogger(__name__).info
             tell(f"fingerprint of the session, also in the study's fingerprints.txt: {proof}")
-            leave(self._store.place.study_folder, tell)
+            write_proof(self._store.place.study_folder, tell)
         if self._progress is not None and self._store is not None:
             status, folder = self.bridge.parts.journal.progress.ended, self._store.folder.path
             self._progress(f"session {status}: {folder}" if status else f"session not finished: {folder}")
@@ -507,7 +507,7 @@ def resume(
         It cannot go on (finished, of a changed protocol, open elsewhere); or device or servo failed while it ran.
     """
     folder = Path(session_folder)
-    session = locate(folder)[1]
+    session = locate_session(folder)[1]
     refuse_never_begun(session)
     if is_rehearsal(receipt.read(session.receipt)):
         from study_app.session.simulated import rehearsal  # noqa: PLC0415 - the compiler: only once it is needed

@@ -35,7 +35,7 @@ from study_app.session.resume import begun_schedule
 from study_app.session.start import NewSession, Ready, measured
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.blinded.blinding import read_key
-from study_app.store.folders import StudyFolder, locate
+from study_app.store.folders import StudyFolder, locate_session
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import start_of
 
@@ -244,7 +244,7 @@ def _goes_on(chosen: NewSession, protocol: Protocol) -> tuple[tuple[str, str], .
     if chosen.resumes is None:
         return ()
     own = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
-    lines = journal.read(locate(chosen.resumes)[1].journal)
+    lines = journal.read(locate_session(chosen.resumes)[1].journal)
     return resumed_rows(own, begun_schedule(own, start_of(lines), read_key(chosen.results)), lines)
 
 

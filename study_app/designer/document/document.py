@@ -39,7 +39,7 @@ from study_app.store.drafts import Draft, Keeper, draft_of, unsaved_files
 from study_app.store.folder_lock import is_open
 from study_app.store.folders import StudyFolder
 from study_app.store.study_runs import Run
-from study_app.store.study_versions import content_hash, keep_content, save, write_whole
+from study_app.store.study_versions import content_hash, keep_content, save_study, write_whole
 from study_app.workspace import workspace
 
 
@@ -127,7 +127,7 @@ def write_new(study: Study, name: str) -> Path:
     Raises Refused if the name is not permitted, or taken; StoreError if it cannot be written.
     """
     file = check_free(name)
-    save(file, copy_of(study, name).text, "")
+    save_study(file, copy_of(study, name).text, "")
     return file
 
 
@@ -256,13 +256,13 @@ class Document:
     def note_edit(self, now_s: float) -> None:
         """Let the draft follow an edit; a text that is the file's again needs none."""
         if self.edited or not self.base:
-            self.keeper.edited(self.study.text, self.selected, now_s)
+            self.keeper.note_edit(self.study.text, self.selected, now_s)
         else:
             self._settle()
 
     def _settle(self) -> None:
         """Forget the draft: the text is the file's."""
-        self.keeper.saved(self.base)
+        self.keeper.note_saved(self.base)
         self.kept = None
 
     def write_draft(self, now_s: float | None = None) -> bool:
@@ -278,7 +278,7 @@ class Document:
         self._settle()
 
     def give_up(self) -> None:
-        self.keeper.saved("")
+        self.keeper.note_saved("")
         self.keeper.write()
 
     def changed_outside(self) -> bool:
@@ -305,7 +305,7 @@ class Document:
         """Restore the draft of the file that was not saved, as one step."""
         if (draft := draft_of(self.file)) is None:
             return
-        self.keeper.take(draft)
+        self.keeper.resume_from(draft)
         if draft.text != self.saved:
             self.draft = draft
             self.edit("Restore the draft", text=draft.text)
@@ -348,7 +348,7 @@ class Document:
             )
         self._bring_files(source)
         keep_content(source)
-        self.base = save(self.file, self.study.text, self.base)
+        self.base = save_study(self.file, self.study.text, self.base)
         self.saved, self.draft = self.study.text, None
         self._settle()
 
@@ -404,7 +404,7 @@ def open_new(study: Study, name: str) -> Document:
 def open_unsaved(file: Path, draft: Draft) -> Document:
     """Open a study that was never saved, from its draft."""
     opened = Document(Study(draft.text, file.parent), draft.selected or FIRST, file, draft=draft)
-    opened.keeper.take(draft)
+    opened.keeper.resume_from(draft)
     return opened
 
 

@@ -50,8 +50,8 @@ from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.folders import StudyFolder
 from study_app.store.unblinding import unblind
-from study_app.store.verification.reproduction import reproduced
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.reproduction import reproduce_session
+from study_app.store.verification.verify_study import verify_study
 
 SHIPPED: Final[dict[str, Observer]] = {
     "viscosityjnd": OBSERVER,
@@ -373,8 +373,8 @@ def rehearsed(one: Known, source: bytes, seed: int) -> Rehearsed:
         file.write_bytes(source)
         rehearse(str(file), participants=REHEARSED, seed=seed, results=folder, observer=one.observer)
         sessions = StudyFolder(folder).sessions()
-        findings = len(verify(folder, None).errors)
-        findings += sum(len(reproduced(session.path).differences) for session in sessions)
+        findings = len(verify_study(folder, None).errors)
+        findings += sum(len(reproduce_session(session.path).differences) for session in sessions)
         findings += sum(not replay(session.path).proved for session in sessions)
         unblind(folder, "validate", "to compare with what is known")
         study = load_study(folder)

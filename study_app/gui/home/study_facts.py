@@ -32,7 +32,7 @@ from study_app.store.blinded.allocation import session_protocol
 from study_app.store.blinded.blinding import read_key
 from study_app.store.drafts import draft_files, draft_of, unsaved_files
 from study_app.store.folder_lock import is_open
-from study_app.store.folders import locate
+from study_app.store.folders import locate_session
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import COMPLETED, INCOMPLETE, start_of
 from study_app.store.study_settings import kept_original
@@ -308,7 +308,7 @@ def interrupted(
         if session.status != "unfinished" or not candidates or is_open(session.folder):
             continue
         try:
-            folder = locate(session.folder)[1]
+            folder = locate_session(session.folder)[1]
             if is_rehearsal(receipt.read(folder.receipt)):
                 continue
             lines = journal.read(folder.journal)
@@ -316,7 +316,7 @@ def interrupted(
             read = partial(source_to_resume, session.folder)
             source = find_protocol(begun, candidates, read)
             protocol = parse(read(source), source)
-            study = locate(session.folder)[0]
+            study = locate_session(session.folder)[0]
             protocol = session_protocol(study, protocol, session.participant, begun.session)
             schedule = begun_schedule(protocol, begun, read_key(study.path))
             step = resume_at(protocol, schedule, lines).step

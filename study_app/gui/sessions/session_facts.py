@@ -26,7 +26,7 @@ from study_app.store.merged import session_in
 from study_app.store.missing_trials import MissingTrials
 from study_app.store.progress import progress_of
 from study_app.store.study_runs import run_of
-from study_app.store.tables.study_files import participants
+from study_app.store.tables.study_files import participant_rows
 
 Kind: TypeAlias = Literal["", "pilot", "simulated", "sample"]
 KINDS: dict[Kind, str] = {"": "Participants", "pilot": "Pilot", "simulated": "Simulated", "sample": "Sample"}
@@ -103,7 +103,7 @@ def sessions(results: Path, answers_of: Mapping[str, int]) -> tuple[SessionFacts
     found: list[SessionFacts] = []
     for data in sorted(results.glob("*/data")):
         with contextlib.suppress(StoreError):  # not ours, or not readable: the commands say why when asked about it
-            rows = participants(StudyFolder(data.parent))
+            rows = participant_rows(StudyFolder(data.parent))
             found += session_facts(data.parent, rows, _exclusions(data.parent), answers_of)
     return tuple(sorted(found, key=lambda session: (not session.needs_care, -session.started.timestamp())))
 

@@ -29,10 +29,10 @@ from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.gui.widgets.row_table import CHIP_ROLE, Rows, Table
 from study_app.number_text import capitalised, counted
-from study_app.store.blinded.blinding import opened, opened_key
+from study_app.store.blinded.blinding import open_events, opened_key
 from study_app.store.delivered import beyond_limits
 from study_app.store.exclusions import Exclusion, exclusions
-from study_app.store.folders import locate
+from study_app.store.folders import locate_session
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import UNDELIVERED, Answer, Event, Note, Repeat, TrialStarted, start_of
 from study_app.store.missing_trials import MISSING_PERCENT, MissingTrials
@@ -85,9 +85,9 @@ def read_record(folder: Path) -> SessionRecord:
     StoreError
         It is no session's folder, or its journal or the list of exclusions cannot be read.
     """
-    study, session = locate(folder)
+    study, session = locate_session(folder)
     key = opened_key(study)
-    lines = opened(journal.read(session.journal), key)
+    lines = open_events(journal.read(session.journal), key)
     if not lines:
         raise StoreError(f"{session.journal} has no line: the session did not begin")
     listed = exclusions(study.path)
@@ -198,7 +198,7 @@ def _words(row: Mapping[str, Any]) -> str:
 
 
 def _about(lines: Sequence[Event], happened: str) -> str:
-    start, row = start_of(lines), session_tables.participant(lines)
+    start, row = start_of(lines), session_tables.participant_row(lines)
     ended = row["session_ended_at"]
     said = [
         f"group {start.group}" if start.group is not None else "",

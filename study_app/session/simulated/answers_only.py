@@ -52,7 +52,7 @@ from study_app.store.folders import StudyFolder, rehearsal_folder
 from study_app.store.journals.journal import SessionClock
 from study_app.store.journals.journal_events import Event as Line
 from study_app.store.journals.journal_events import FormShown, Note, PageShown, TrialStarted, start_of
-from study_app.store.sessions.begin import SessionStart, begin
+from study_app.store.sessions.begin import SessionStart, begin_session
 from study_app.store.sessions.simulated_sessions import SimulatedStudy
 from study_app.workspace import workspace
 
@@ -290,7 +290,7 @@ def begin_at(results: Path, study: Protocol, source: bytes, start: SessionStart,
     if step and answering.state.index < step:
         raise SessionError(f"step {step + 1} is not reached: {lines.reason or 'the session ends before it'}")
     clock = SessionClock(lambda: 0, datetime.now().astimezone() - timedelta(seconds=passed.seconds))
-    with begin(results, study, source, start, clock=clock) as store:
+    with begin_session(results, study, source, start, clock=clock) as store:
         if store.key.codes != shown.codes:
             raise SessionError(f"{results} holds sessions with another seed: use a new folder")
         if step:

@@ -16,7 +16,7 @@ from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.presented.presented_levels import ends
 from study_app.protocol.tracks import condition_of, stimulus_of
 from study_app.protocol.trials.stimuli import OF_CONDITION, Stimulated
-from study_app.store.delivered import delivered, judged, undelivered
+from study_app.store.delivered import broken_interval_limits, delivered_values, judged_fields
 
 INERTIAL = {effect.name for effect in EFFECTS if effect.damping_nspm is not None}
 
@@ -38,10 +38,10 @@ def undelivered_levels(protocol: Protocol) -> Iterator[str]:
             presented = Stimulated(
                 condition_of(protocol, stimulus), stimulus.vary, stimulus.comparison(standard, level)
             )
-            samples = judged(samples_along(scene, Motion(t_s, scene.origin_m + scene.scale * hand_m)))
+            samples = judged_fields(samples_along(scene, Motion(t_s, scene.origin_m + scene.scale * hand_m)))
             samples["time_ns"], samples["position_m"] = np.rint(1e9 * t_s), hand_m
-            delivery = delivered(protocol, presented, task, samples)
-            if "level_error_percent" in undelivered(protocol.limits, presented, task, delivery):
+            delivery = delivered_values(protocol, presented, task, samples)
+            if "level_error_percent" in broken_interval_limits(protocol.limits, presented, task, delivery):
                 missed.append(f"{level:.3g}")
         if missed:
             yield (

@@ -69,17 +69,17 @@ from study_app.store import receipt
 from study_app.store.atomic import is_there
 from study_app.store.blinded.allocation import session_protocol, simulated_groups
 from study_app.store.blinded.blinding import Key
-from study_app.store.checksums import listed, place_of
-from study_app.store.folder_lock import never_begun
-from study_app.store.folders import StudyFolder, locate, rehearsal_folder
+from study_app.store.checksums import place_of, read_list
+from study_app.store.folder_lock import is_never_begun
+from study_app.store.folders import StudyFolder, locate_session, rehearsal_folder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import SessionClock
 from study_app.store.journals.journal_events import Event as Line
 from study_app.store.journals.journal_events import start_of
 from study_app.store.progress import progress_of
-from study_app.store.sessions.begin import SessionStart, begin, used_ids
+from study_app.store.sessions.begin import SessionStart, begin_session, used_ids
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.recovery import rebuild, reopen
+from study_app.store.sessions.recovery import rebuild_session, reopen_store
 from study_app.store.tables.study_files import check_study
 from study_app.store.withdrawals import tombstones
 from study_app.workspace import workspace
@@ -559,10 +559,10 @@ def finish_session(
     """
     folder = StudyFolder(results)
     session = folder.session(participant, 1)
-    is_finished = place_of(folder, session) in {place for _, place in listed(folder.fingerprints)}
+    is_finished = place_of(folder, session) in {place for _, place in read_list(folder.fingerprints)}
     if is_finished or participant in tombstones(folder):
         return
-    if not is_there(session.path) or never_begun(session.path):
+    if not is_there(session.path) or is_never_begun(session.path):
         source = source_bytes(protocol)
         study = parse(source, str(protocol))
         opening = open_session(study, source, participant, seed=seed, device=device, results=results)
@@ -570,7 +570,7 @@ def finish_session(
     elif progress_of(journal.read(session.journal)).ended is None:
         _run_to_end(participant, reopen_session(session.path, protocol=protocol), progress)
     else:  # the program was killed between the session's last line and its proofs
-        rebuild(session.path)
+        rebuild_session(session.path)
         if progress is not None:
             progress(f"{participant}: tables and checksums of the finished session rebuilt")
 
@@ -656,7 +656,7 @@ def open_session(
             row_of=row_of,
             group=group,
         )
-        store = begin(results, study, source, start, clock=SessionClock(rig.servo.now_ns))
+        store = begin_session(results, study, source, start, clock=SessionClock(rig.servo.now_ns))
         own = session_protocol(StudyFolder(results), store.as_recorded(study), participant, session)
         with store:
             rehearsed = RehearsedSession(
@@ -705,9 +705,9 @@ def reopen_session(
     SessionError
         No protocol at hand is the session's, or the session broke; what was kept before is safe.
     """
-    lines = journal.read(locate(session_folder)[1].journal)
+    lines = journal.read(locate_session(session_folder)[1].journal)
     begun = start_of(lines)
-    if not is_rehearsal(receipt.read(locate(session_folder)[1].receipt)):
+    if not is_rehearsal(receipt.read(locate_session(session_folder)[1].receipt)):
         raise SessionError(f"{session_folder} is a participant's session, not a simulated one: resume it by a window")
     read = partial(source_to_resume, session_folder)
     name = find_protocol(begun, read=read) if protocol is None else str(protocol)
@@ -715,7 +715,7 @@ def reopen_session(
     study = parse(source, name)
     person, seed = begun.participant, begun.seed
     with rehearsal_rig(study, person, seed, begun.device or "") as rig:
-        store = reopen(
+        store = reopen_store(
             session_folder,
             study,
             source,
@@ -725,7 +725,7 @@ def reopen_session(
             now_ns=rig.servo.now_ns,
             now=max(datetime.now().astimezone(), datetime.fromisoformat(lines[-1].at)),
         )
-        own = session_protocol(locate(session_folder)[0], store.as_recorded(study), person, begun.session)
+        own = session_protocol(locate_session(session_folder)[0], store.as_recorded(study), person, begun.session)
         schedule = begun_schedule(own, begun, store.key)
         with store:
             start = resume_at(own, schedule, lines, store.key)

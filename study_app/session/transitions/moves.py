@@ -54,7 +54,7 @@ from study_app.session.transitions.steps import (
     start_trial,
     which,
 )
-from study_app.store.delivered import delay_error_ms, missed
+from study_app.store.delivered import broken_trial_limits, delay_error_ms
 from study_app.store.journals import journal_events as journal
 from study_app.store.journals.journal_events import CAUSE_WITHHELD
 
@@ -127,7 +127,10 @@ def end_task(state: SessionState, event: TaskDone) -> Result:
         error_ms = delay_error_ms(due.intervals[state.interval - 1], event.summary)
         state = replace(state, errors_ms=(*state.errors_ms, error_ms))
         holds, protocol = design.arrangements[due.arrangement], state.plan.protocol
-        reasons = (*event.invalid, *missed(protocol.limits, due, holds, state.errors_ms, protocol.device.rate_hz))
+        reasons = (
+            *event.invalid,
+            *broken_trial_limits(protocol.limits, due, holds, state.errors_ms, protocol.device.rate_hz),
+        )
         if (setting := state.adjusting) is not None:
             measures["setting"] = setting.level(state.place)
         ended = journal.IntervalEnded(

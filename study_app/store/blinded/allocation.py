@@ -35,10 +35,10 @@ from study_app.store.atomic import (
     parse_json,
     read_own,
     sync_folder,
-    write_through,
+    write_new_file,
 )
 from study_app.store.blinded.blinding import Key, read_key
-from study_app.store.blinded.sealing import open_text, seal
+from study_app.store.blinded.sealing import open_text, seal_values
 from study_app.store.folders import StudyFolder
 
 _STEM: Final = re.compile(r"(?:[a-z0-9_]+-)?[0-9]{3,}(?:-[A-Za-z0-9]+)?")
@@ -104,10 +104,10 @@ def allocate(
     """
     if not key.groups and group is None and not is_there(study.allocated):
         return None
-    if (known := allocated(study, key, participant)) is not None:
+    if (known := allocation_of(study, key, participant)) is not None:
         return known
     held = claims(study)
-    replaced = _claim_of(held, row_of) if counts_places(held) else None
+    replaced = _claim_of(held, row_of) if has_counted_places(held) else None
     taken = [claim.entry for claim in held] + [begun.entry for begun in entries_begun(study).values()]
     if key.groups:
         group = None
@@ -123,13 +123,13 @@ def allocate(
                 path=path,
                 entry=entry,
                 participant=participant,
-                sealed="" if group is not None else _sealed(key, entry, participant),
+                sealed="" if group is not None else _seal_group(key, entry, participant),
                 group=group,
                 replaces=None if replaced is None else replaced.participant,
-                place_in_group=counts_places(held),
+                place_in_group=has_counted_places(held),
             )
             try:
-                write_through(path, json.dumps(_content(claim)).encode() + b"\n", waits=waits)
+                write_new_file(path, json.dumps(_claim_content(claim)).encode() + b"\n", waits=waits)
             except FileExistsError:  # another program claimed this entry first
                 if replaced is not None:
                     raise StoreError(f"{path} was changed: restore it from a copy") from None
@@ -141,7 +141,7 @@ def allocate(
         raise cannot_write(study.allocated, error) from error
 
 
-def allocated(study: StudyFolder, key: Key, participant: str) -> Allocation | None:
+def allocation_of(study: StudyFolder, key: Key, participant: str) -> Allocation | None:
     """Return the allocation of a participant, or None if there is none yet."""
     if (claim := _claim_of(claims(study), participant)) is not None:
         if not is_unchanged(claim, key):
@@ -175,7 +175,7 @@ def check_session(
     refuse_beyond_last(protocol, session)
     check_choice(protocol, claims(study), participant, group=group, row_of=row_of)
     if protocol.groups and is_there(study.key):
-        known = allocated(study, read_key(study.path), participant)
+        known = allocation_of(study, read_key(study.path), participant)
         group = group if known is None else known.group
     if group is not None:
         own_protocol(protocol, group, session)
@@ -208,7 +208,7 @@ def _check_replaced(
     held: Sequence[Claim], participant: str, own: Claim | None, *, group: str | None, row_of: str
 ) -> None:
     replaced = _claim_of(held, row_of)
-    if not counts_places(held):
+    if not has_counted_places(held):
         if enrolment(row_of) is None:
             raise StudyError(
                 f"row of {row_of!r}: an earlier version began this folder, where the number in the ID assigns rows; "
@@ -261,7 +261,7 @@ def session_protocol(study: StudyFolder, protocol: Protocol, participant: str, s
     """
     if not protocol.groups:
         return own_protocol(protocol, None, session)
-    allocation = allocated(study, read_key(study.path), participant)
+    allocation = allocation_of(study, read_key(study.path), participant)
     if allocation is None:
         raise StoreError(f"participant {participant} has no entry in {study.allocated}: restore it from a copy")
     return own_protocol(protocol, allocation.group, session)
@@ -270,13 +270,13 @@ def session_protocol(study: StudyFolder, protocol: Protocol, participant: str, s
 def claims(study: StudyFolder) -> list[Claim]:
     """Return the contents of all entries' files, by group and entry; replacements after the participant replaced."""
     paths = [path for path in study.allocated.glob("*.json") if _STEM.fullmatch(path.stem)]
-    all_claims = [_claim(study, path) for path in paths]
+    all_claims = [_read_claim(study, path) for path in paths]
     return sorted(
         all_claims, key=lambda claim: (claim.group or "", claim.entry, claim.replaces is not None, claim.path)
     )
 
 
-def counts_places(held: Iterable[Claim]) -> bool:
+def has_counted_places(held: Iterable[Claim]) -> bool:
     """Return whether places in groups assign rows of squares: not in folders with claims of an earlier version."""
     return all(claim.place_in_group for claim in held if claim.participant)
 
@@ -285,7 +285,7 @@ def is_unchanged(claim: Claim, key: Key) -> bool:
     """Return whether an entry's file has the group that the key gives, or a pre-existing group."""
     if claim.group is not None or not key.groups:
         return claim.group is not None and not key.groups
-    opened = open_text(_whose(claim.entry, claim.participant), claim.sealed, key.nonce, frozenset({"group"}))
+    opened = open_text(_entry_owner(claim.entry, claim.participant), claim.sealed, key.nonce, frozenset({"group"}))
     return opened is not None and opened.get("group") == group_of(key.groups, key.nonce, claim.entry)
 
 
@@ -308,7 +308,7 @@ def _claim_of(held: Iterable[Claim], participant: str | None) -> Claim | None:
     return next((claim for claim in held if participant and claim.participant == participant), None)
 
 
-def _content(claim: Claim) -> dict[str, Any]:
+def _claim_content(claim: Claim) -> dict[str, Any]:
     """Return the content of an entry's file."""
     optional = {
         "group": claim.group,
@@ -320,7 +320,7 @@ def _content(claim: Claim) -> dict[str, Any]:
     return own | {name: value for name, value in optional.items() if value is not None}
 
 
-def _claim(study: StudyFolder, path: Path) -> Claim:
+def _read_claim(study: StudyFolder, path: Path) -> Claim:
     """Read the claim in an entry's file; it is empty if the file is damaged."""
     try:
         held = parse_json(read_own(path, study.path))
@@ -334,7 +334,7 @@ def _claim(study: StudyFolder, path: Path) -> Claim:
             place_in_group=held.get("place_in_group", False),
         )
         named = study.allocation(claim.entry, claim.group, claim.participant if claim.replaces else None)
-        if named == path and _content(claim) == held:
+        if named == path and _claim_content(claim) == held:
             return claim
     except (StoreError, ValueError, KeyError, TypeError, AttributeError):
         pass
@@ -352,9 +352,9 @@ def _allocation(claim: Claim, key: Key) -> Allocation:
     )
 
 
-def _sealed(key: Key, entry: int, participant: str) -> str:
-    return seal(_whose(entry, participant), {"group": group_of(key.groups, key.nonce, entry)}, key.nonce)
+def _seal_group(key: Key, entry: int, participant: str) -> str:
+    return seal_values(_entry_owner(entry, participant), {"group": group_of(key.groups, key.nonce, entry)}, key.nonce)
 
 
-def _whose(entry: int, participant: str) -> list[object]:
+def _entry_owner(entry: int, participant: str) -> list[object]:
     return ["allocated", entry, participant]

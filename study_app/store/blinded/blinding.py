@@ -37,9 +37,9 @@ from study_app.protocol.streams import draw_secret, group_of, own_code, place_in
 from study_app.protocol.table import RECORDED
 from study_app.store import receipt
 from study_app.store.atomic import append_line, create_folder, is_there, parse_json, read_own
-from study_app.store.blinded.sealing import TASK_BYTES, open_text, seal
+from study_app.store.blinded.sealing import TASK_BYTES, open_text, seal_values
 from study_app.store.columns import SEALED
-from study_app.store.folders import SessionFolder, StudyFolder, readable
+from study_app.store.folders import SessionFolder, StudyFolder, check_name_and_reason
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
 
@@ -109,7 +109,7 @@ def open_or_draw_key(
     drawn: Literal["system", "seed"] = "system" if random is None else "seed"
     if not is_there(study.key):
         _refuse_if_lost(study)
-        content = _seal(protocol, drawn, random or secrets.SystemRandom().random, files)
+        content = _sealed_key(protocol, drawn, random or secrets.SystemRandom().random, files)
         create_folder(study.blinding, {study.key.name: content}, mode=0o600)
     key = verified_key(study)
     if key.drawn != drawn:
@@ -143,7 +143,7 @@ def _refuse_other_conditions(study: StudyFolder, key: Key, protocol: Protocol) -
         )
 
 
-def same_conditions(folder: Path, protocol: Protocol) -> bool:
+def has_same_conditions(folder: Path, protocol: Protocol) -> bool:
     """Return whether the key was sealed for the liquids, conditions, stimuli and blocks of ``protocol``."""
     return verified_key(StudyFolder(folder)).tables_hash == _tables_hash(protocol)
 
@@ -156,7 +156,7 @@ def reveal(folder: Path, by: str, reason: str) -> Codes:
     StoreError
         ``by`` or ``reason`` is empty, or the key is missing, unreadable or not the one the sessions ran under.
     """
-    by, reason = readable(by, reason, "opening the key is recorded with a name and a reason")
+    by, reason = check_name_and_reason(by, reason, "opening the key is recorded with a name and a reason")
     study = StudyFolder(folder)
     if not is_there(study.key) and not study.sessions():
         raise StoreError(
@@ -217,18 +217,18 @@ def _is_reveal(record: object) -> bool:
     return (
         _is_texts(record)
         and isinstance(record, dict)
-        and events.holds("at", record.get("at"))
+        and events.is_valid_value("at", record.get("at"))
         and all(record.get(name, "").strip() for name in ("by", "reason", "key_hash"))
     )
 
 
-def _seal(protocol: Protocol, drawn: str, random: Callable[[], float], files: Mapping[str, str]) -> bytes:
+def _sealed_key(protocol: Protocol, drawn: str, random: Callable[[], float], files: Mapping[str, str]) -> bytes:
     content: dict[str, Any] = {
         "format": max(_FORMATS) if protocol.design_questions else min(_FORMATS),
         "drawn": drawn,
         "nonce": draw_secret(random).hex(),
         "codes": draw_key(protocol, random),
-        "tables": _tables(protocol),
+        "tables": _sealed_tables(protocol),
         "tables_hash": _tables_hash(protocol),
     }
     if files:
@@ -238,7 +238,7 @@ def _seal(protocol: Protocol, drawn: str, random: Callable[[], float], files: Ma
     return base64.encodebytes(json.dumps(content, ensure_ascii=False).encode())
 
 
-def _tables(protocol: Protocol) -> dict[str, Any]:
+def _sealed_tables(protocol: Protocol) -> dict[str, Any]:
     """Return the tables that a receipt omits; ``blocks`` has the presented values of each block with a design."""
     tables = protocol.model_dump(mode="json", include={"conditions", "liquids", "stimuli", "designs", "methods"})
     if protocol.design_questions:
@@ -263,7 +263,7 @@ def _tables_hash(protocol: Protocol) -> str:
         "blocks": {name: [block_codes(protocol, block), block.conditions] for name, block in protocol.blocks.items()},
     }
     if protocol.design_questions:
-        written["designs"] = _tables(protocol)["blocks"]
+        written["designs"] = _sealed_tables(protocol)["blocks"]
     if protocol.randomises:
         written["groups"] = protocol.shares
     return hashlib.sha256(json.dumps(written, sort_keys=True).encode()).hexdigest()
@@ -354,7 +354,7 @@ def _refuse_if_lost(study: StudyFolder) -> None:
         )
 
 
-def whole_protocol(published: Mapping[str, Any], key: Key) -> Protocol:
+def complete_protocol(published: Mapping[str, Any], key: Key) -> Protocol:
     """Return the complete protocol: that of a receipt, with the parts sealed in the key.
 
     Raises
@@ -381,11 +381,11 @@ def whole_protocol(published: Mapping[str, Any], key: Key) -> Protocol:
     return Protocol.model_validate(whole, context=RECORDED)
 
 
-def sealed(start: events.SessionStarted, event: events.Event, key: Key) -> events.Event:
+def seal_event(start: events.SessionStarted, event: events.Event, key: Key) -> events.Event:
     """Return an event with its blinded fields sealed, as written in the journal of the session ``start``."""
     if start.own_codes and isinstance(event, events.TrialStarted):
         own = own_code(list(key.codes[event.block]), key.nonce, start.participant, event.block, event.code)
-        text = seal([*_whose(start, event), "code"], {"code": event.code}, key.nonce)
+        text = seal_values([*_line_owner(start, event), "code"], {"code": event.code}, key.nonce)
         event = replace(event, code=own, sealed_code=text)
     line, names = event.line(), _SEALED_IN.get(type(event), frozenset())
     measured = {name: value for name, value in line.items() if name in names}
@@ -393,13 +393,13 @@ def sealed(start: events.SessionStarted, event: events.Event, key: Key) -> event
         return event
     rest = {name: value for name, value in line.items() if name not in names}
     if isinstance(event, events.EndOfTask):
-        text = seal(_whose(start, event), measured, key.nonce, TASK_BYTES)
+        text = seal_values(_line_owner(start, event), measured, key.nonce, TASK_BYTES)
     else:
-        text = seal(_whose(start, event), measured, key.nonce)
+        text = seal_values(_line_owner(start, event), measured, key.nonce)
     return events.read_event({**rest, "sealed": text})
 
 
-def opened(lines: Iterable[events.Event], key: Key | None) -> list[events.Event]:
+def open_events(lines: Iterable[events.Event], key: Key | None) -> list[events.Event]:
     """Return a journal's lines with their sealed fields opened; unchanged without a ``key``.
 
     Raises
@@ -411,17 +411,17 @@ def opened(lines: Iterable[events.Event], key: Key | None) -> list[events.Event]
     if key is None or not lines:
         return lines
     start = events.start_of(lines)
-    return [replace(start, group=own_group(start, key)), *(_opened(start, line, key) for line in lines[1:])]
+    return [replace(start, group=participant_group(start, key)), *(_open_event(start, line, key) for line in lines[1:])]
 
 
-def own_group(start: events.SessionStarted, key: Key) -> str | None:
+def participant_group(start: events.SessionStarted, key: Key) -> str | None:
     """Return the group of a session's participant; None in a study without groups."""
     if start.entry is None or start.group is not None:
         return start.group
     return group_of(key.groups, key.nonce, start.entry)
 
 
-def own_place(start: events.SessionStarted, key: Key) -> int | None:
+def place_number(start: events.SessionStarted, key: Key) -> int | None:
     """Return the number that assigns a session its rows of squares, or None to use the number in the participant's id.
 
     It is the participant's place in the group. Without groups, and where a study with groups began under a version that
@@ -443,7 +443,7 @@ def opened_key(folder: StudyFolder) -> Key | None:
     return read_key(folder.path) if reveals(folder.path) else None
 
 
-def _opened(start: events.SessionStarted, line: events.Event, key: Key) -> events.Event:
+def _open_event(start: events.SessionStarted, line: events.Event, key: Key) -> events.Event:
     opened: dict[str, Any] = {}
     for name, more, names in (
         ("sealed", [], _SEALED_IN.get(type(line), frozenset())),
@@ -451,7 +451,7 @@ def _opened(start: events.SessionStarted, line: events.Event, key: Key) -> event
     ):
         if (text := getattr(line, name, None)) is None:
             continue
-        if (measured := open_text([*_whose(start, line), *more], text, key.nonce, names)) is None:
+        if (measured := open_text([*_line_owner(start, line), *more], text, key.nonce, names)) is None:
             raise StoreError(
                 f"line {line.n} of the journal cannot be decrypted with the study's key: it was changed; restore it "
                 "from a copy"
@@ -460,7 +460,7 @@ def _opened(start: events.SessionStarted, line: events.Event, key: Key) -> event
     return events.read_event({**line.line(), **opened}) if opened else line
 
 
-def _whose(start: events.SessionStarted, line: Any) -> list[object]:
+def _line_owner(start: events.SessionStarted, line: Any) -> list[object]:
     """Return the owner of a line's sealed text: an attempt at a trial, or a participant's entry."""
     if isinstance(line, events.Allocated):
         return ["allocated", line.entry, start.participant]
@@ -471,10 +471,10 @@ def _whose(start: events.SessionStarted, line: Any) -> list[object]:
 
 def sealed_model(protocol: Protocol, participant: str, session: int, key: Key) -> str:
     """Return the effects and chosen laws of each liquid as a sealed text for one session."""
-    return seal(_session_owner(participant, session), {"liquids": _resolved(protocol)}, key.nonce)
+    return seal_values(_session_owner(participant, session), {"liquids": _resolved_effects(protocol)}, key.nonce)
 
 
-def as_recorded(protocol: Protocol, receipt: Mapping[str, Any], key: Key) -> Protocol:
+def recorded_protocol(protocol: Protocol, receipt: Mapping[str, Any], key: Key) -> Protocol:
     """Return the protocol with the estimator, effects and laws that a session's receipt records.
 
     Receipts of earlier versions record the estimator alone.
@@ -504,7 +504,7 @@ def as_recorded(protocol: Protocol, receipt: Mapping[str, Any], key: Key) -> Pro
 
 
 @contextlib.contextmanager
-def reading_what_ran(receipt: Path) -> Iterator[None]:
+def protocol_errors(receipt: Path) -> Iterator[None]:
     """Convert errors raised while a protocol is made from receipt and key into `StoreError`."""
     try:
         yield
@@ -516,7 +516,7 @@ def reading_what_ran(receipt: Path) -> Iterator[None]:
         ) from None
 
 
-def _resolved(protocol: Protocol) -> dict[str, Any]:
+def _resolved_effects(protocol: Protocol) -> dict[str, Any]:
     chosen = [effect.name for effect in EFFECTS if effect.choose is not None]
     by_liquid = {}
     for name in sorted(protocol.liquids):

@@ -32,15 +32,15 @@ _PIECE_BYTES = 65_536  # encrypted at once
 _LENGTH_BYTES = 8
 
 
-def seal(whose: Sequence[object], values: Mapping[str, Any], secret: bytes, block_bytes: int = 1024) -> str:
+def seal_values(whose: Sequence[object], values: Mapping[str, Any], secret: bytes, block_bytes: int = 1024) -> str:
     """Return values as a sealed text; ``whose`` identifies their owner, and is needed to open it.
 
     The text is filled up to a multiple of ``block_bytes``, so that its length does not depend on the values.
     """
-    said = json.dumps(events.plain(values), allow_nan=False, separators=(",", ":")).encode()
+    said = json.dumps(events.plain_json(values), allow_nan=False, separators=(",", ":")).encode()
     said = said.ljust(-(-len(said) // block_bytes) * block_bytes)
     tag = _tag(json.dumps(whose).encode(), said, secret)
-    return (tag + _combined(said, tag, secret)).hex()
+    return (tag + _xor_keystream(said, tag, secret)).hex()
 
 
 def open_text(whose: Sequence[object], text: str, secret: bytes, names: frozenset[str]) -> dict[str, Any] | None:
@@ -50,8 +50,12 @@ def open_text(whose: Sequence[object], text: str, secret: bytes, names: frozense
     except ValueError:
         content = b""
     tag = content[:_TAG_BYTES]
-    said = _combined(content[_TAG_BYTES:], tag, secret)
-    return _measured(said, names) if hmac.compare_digest(tag, _tag(json.dumps(whose).encode(), said, secret)) else None
+    said = _xor_keystream(content[_TAG_BYTES:], tag, secret)
+    return (
+        _sealed_columns(said, names)
+        if hmac.compare_digest(tag, _tag(json.dumps(whose).encode(), said, secret))
+        else None
+    )
 
 
 def sealed_bytes(seconds: float, bytes_per_s: float) -> int:
@@ -68,7 +72,7 @@ def seal_file(content: bytes, size: int, secret: bytes) -> bytearray:
     said[: _LENGTH_BYTES + len(content)] = len(content).to_bytes(_LENGTH_BYTES) + content
     tag = _tag(MARK, said, secret)
     sealed[:start] = MARK + tag
-    _combine_pieces(said, tag, secret)
+    _xor_in_place(said, tag, secret)
     return sealed
 
 
@@ -77,20 +81,20 @@ def open_file(sealed: bytes, secret: bytes) -> bytes | None:
     start = len(MARK) + _TAG_BYTES
     tag = sealed[len(MARK) : start]
     said = memoryview(bytearray(sealed))[start:]
-    _combine_pieces(said, tag, secret)
+    _xor_in_place(said, tag, secret)
     if not hmac.compare_digest(tag, _tag(MARK, said, secret)):
         return None
     return bytes(said[_LENGTH_BYTES : _LENGTH_BYTES + int.from_bytes(said[:_LENGTH_BYTES])])
 
 
-def _measured(said: bytes, names: frozenset[str]) -> dict[str, Any]:
+def _sealed_columns(said: bytes, names: frozenset[str]) -> dict[str, Any]:
     """Return the columns of a text with a valid tag, without values that a holder of the key could have forged."""
     try:
         measured = parse_json(said)
     except ValueError:
         return {}
     items = measured.items() if isinstance(measured, dict) else ()
-    return {name: value for name, value in items if name in names and events.holds(name, value)}
+    return {name: value for name, value in items if name in names and events.is_valid_value(name, value)}
 
 
 def _tag(whose: bytes, said: bytes | memoryview, secret: bytes) -> bytes:
@@ -99,12 +103,12 @@ def _tag(whose: bytes, said: bytes | memoryview, secret: bytes) -> bytes:
     return tag.digest()[:_TAG_BYTES]
 
 
-def _combine_pieces(text: memoryview, tag: bytes, secret: bytes) -> None:
+def _xor_in_place(text: memoryview, tag: bytes, secret: bytes) -> None:
     """Encrypt or decrypt a text in place, in pieces, so that other threads can run."""
     for at in range(0, len(text), _PIECE_BYTES):
-        text[at : at + _PIECE_BYTES] = _combined(text[at : at + _PIECE_BYTES], tag + at.to_bytes(8), secret)
+        text[at : at + _PIECE_BYTES] = _xor_keystream(text[at : at + _PIECE_BYTES], tag + at.to_bytes(8), secret)
 
 
-def _combined(text: bytes | memoryview, tag: bytes, secret: bytes) -> bytes:
+def _xor_keystream(text: bytes | memoryview, tag: bytes, secret: bytes) -> bytes:
     stream = hashlib.shake_256(secret + tag).digest(len(text))
     return (int.from_bytes(text) ^ int.from_bytes(stream)).to_bytes(len(text))

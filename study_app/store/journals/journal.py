@@ -34,10 +34,10 @@ from study_app.store.atomic import (
     read_regular,
     study_root,
     sync_folder,
+    write_all,
     write_file,
-    write_whole,
 )
-from study_app.store.journals.journal_events import EVENTS, Event, problem, read_event, shortened
+from study_app.store.journals.journal_events import EVENTS, Event, line_problem, read_event, shorten_value
 
 FORMAT = 2
 OTHER_LINE_ENDINGS = (
@@ -115,10 +115,10 @@ def read(path: Path) -> list[Event]:
     StoreError
         It cannot be read, or is damaged before its last line.
     """
-    return whole(path).lines
+    return read_complete(path).lines
 
 
-def whole(path: Path) -> Contents:
+def read_complete(path: Path) -> Contents:
     """Read the journal; raise StoreError for any damage other than an incomplete last line."""
     contents = scan(path)
     if contents.damage is not None:
@@ -143,17 +143,17 @@ def scan(path: Path) -> Contents:
         if not isinstance(line, dict):
             return Contents(lines, whole_bytes, damage=f"{path}, line {number}: damaged; restore it from a copy")
         if line.get("n") != number:
-            shown = shortened(line.get("n"))
+            shown = shorten_value(line.get("n"))
             damage = f"{path}, line {number}: its n is {shown}: lines are missing or duplicated; restore it from a copy"
             return Contents(lines, whole_bytes, damage=damage)
         version = line.get("version", version)
-        wrong = problem(line)
+        wrong = line_problem(line)
         if wrong is None and version == study_app.__version__ and line["event"] not in EVENTS:
-            wrong = f"has an event {shortened(line['event'])}, which version {version} does not write"
+            wrong = f"has an event {shorten_value(line['event'])}, which version {version} does not write"
         if wrong is not None:
             damage = f"{path}, line {number} {wrong}: it was changed; restore it from a copy"
             return Contents(lines, whole_bytes, damage=damage)
-        if (wrong := _break(line, hashed.hexdigest(), chained=chained)) is not None:
+        if (wrong := _chain_error(line, hashed.hexdigest(), chained=chained)) is not None:
             if pieces[0].endswith(b"\r"):
                 return Contents(lines[:-1], whole_bytes, damage=f"{path}, line 1: {OTHER_LINE_ENDINGS}")
             return Contents(lines[:-1], whole_bytes, damage=f"{path}, line {number} {wrong}")
@@ -164,7 +164,7 @@ def scan(path: Path) -> Contents:
     return Contents(lines, whole_bytes, torn_bytes=len(tail), hash=hashed)
 
 
-def _break(line: Mapping[str, Any], before: str, *, chained: bool) -> str | None:
+def _chain_error(line: Mapping[str, Any], before: str, *, chained: bool) -> str | None:
     """Return how a line contradicts the lines before it, whose SHA-256 is ``before``; None if it does not.
 
     ``chained`` tells whether the line before has ``previous``: then this one must have it. The first line of a journal
@@ -293,7 +293,7 @@ class Journal:
                 f"{self.path} is closed: {event.event!r} came after the session's end and was not recorded"
             )
         line = line_of(event, self._lines + 1, self.clock, t_s, previous=self._hash.hexdigest())
-        if (wrong := problem(line)) is not None:
+        if (wrong := line_problem(line)) is not None:
             raise StoreError(
                 f"{self.path}, line {line['n']} {wrong}: it was not written; report this to the developers"
             )
@@ -323,7 +323,7 @@ class Journal:
             raise cannot_write(self.path, failed)
 
     @property
-    def closed(self) -> bool:
+    def is_closed(self) -> bool:
         """Whether the journal is closed: it accepts no more lines."""
         return self.file.closed
 
@@ -378,12 +378,12 @@ class Journal:
             failed = self._torn
             try:
                 if self._torn:
-                    self._take_back()
+                    self._remove_torn_line()
                 self._torn = True
-                write_whole(self.file, content)
+                write_all(self.file, content)
             except OSError:
                 with contextlib.suppress(OSError):  # tried again before the next line
-                    self._take_back()
+                    self._remove_torn_line()
                 raise
             self._torn = False
             self._unflushed += content
@@ -400,7 +400,7 @@ class Journal:
                     del self._unflushed[-len(content) :]
                     self._size -= len(content)
                     with contextlib.suppress(OSError):
-                        self._take_back()
+                        self._remove_torn_line()
                     self._torn = True
                 raise
 
@@ -409,7 +409,7 @@ class Journal:
         with self.flushing:
             with self._changed:
                 if self._torn:
-                    self._take_back()
+                    self._remove_torn_line()
                 waiting = len(self._unflushed)
             if waiting:
                 try:
@@ -443,9 +443,9 @@ class Journal:
             except OSError as error:
                 self._failed = error
 
-    def _take_back(self) -> None:
+    def _remove_torn_line(self) -> None:
         """Remove a partly written line, and write again the lines that may not be on the disk."""
         self.file.truncate(self._size)
         self.file.seek(self._size - len(self._unflushed))
-        write_whole(self.file, bytes(self._unflushed))
+        write_all(self.file, bytes(self._unflushed))
         self._torn = False

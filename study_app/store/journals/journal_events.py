@@ -75,7 +75,9 @@ def _are_answers(value: object) -> bool:
     return isinstance(value, list) and all(
         isinstance(answer, dict)
         and all(
-            name in answer and holds(_kind_name(answer, name), answer[name]) for name in _RESPONSE if name != "kind"
+            name in answer and is_valid_value(_kind_name(answer, name), answer[name])
+            for name in _RESPONSE
+            if name != "kind"
         )
         for answer in value
     )
@@ -240,7 +242,7 @@ class Event:
 
     def line(self) -> dict[str, Any]:
         """Return the whole line as it is written."""
-        line = {"n": self.n, "event": self.event, "t_s": self.t_s, "at": self.at, **plain(self.fields())}
+        line = {"n": self.n, "event": self.event, "t_s": self.t_s, "at": self.at, **plain_json(self.fields())}
         return line if self.previous is None else {**line, "previous": self.previous}
 
 
@@ -619,7 +621,7 @@ _KINDS = dict(_known_kinds())
 """The kind of each field of the events that this version knows, and whether it may be null."""
 
 
-def problem(line: Mapping[str, Any]) -> str | None:
+def line_problem(line: Mapping[str, Any]) -> str | None:
     """Return a sentence on the first error in a line of a journal, or None.
 
     A line must have all fields of its event, and every field in the dictionary must be of its kind, also in events of
@@ -634,13 +636,13 @@ def problem(line: Mapping[str, Any]) -> str | None:
     if kind.one_of and sum(name in line for name in kind.one_of) != 1:
         return f"({event}) is not about one of {', '.join(kind.one_of)}"
     for name in line:
-        if not holds(known := _kind_name(line, name), line[name]):
-            return f"({event}) holds {name} {shortened(line[name])}, expected: {_KINDS[known][0].description}"
+        if not is_valid_value(known := _kind_name(line, name), line[name]):
+            return f"({event}) holds {name} {shorten_value(line[name])}, expected: {_KINDS[known][0].description}"
     return None if 0 <= line["t_s"] <= _MOST_SECONDS else f"({event}) has t_s {line['t_s']:g}"
 
 
 def journal_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a journal line in which `problem` finds no error."""
+    """Return the JSON Schema of a journal line in which `line_problem` finds no error."""
     of_fields = {name: _schema_of(name) for name in _KINDS if name not in {"answer", "value"}}
     answer = {
         "type": "object",
@@ -677,7 +679,7 @@ def _schema_of(name: str) -> dict[str, Any]:
 
 
 def read_event(line: Mapping[str, Any]) -> Event:
-    """Return the event of a journal line in which `problem` finds no error."""
+    """Return the event of a journal line in which `line_problem` finds no error."""
     kind, others = EVENTS.get(line["event"], UnknownEvent), dict(line)
     if kind is not UnknownEvent:
         del others["event"]
@@ -687,14 +689,14 @@ def read_event(line: Mapping[str, Any]) -> Event:
     return kind(**own, others=others)
 
 
-def plain(value: Any) -> Any:
+def plain_json(value: Any) -> Any:
     """Return ``value`` for JSON: numpy numbers as plain ones, tuples as lists, non-finite numbers as None."""
     if isinstance(value, dict):
-        return {str(name): plain(item) for name, item in value.items()}
+        return {str(name): plain_json(item) for name, item in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
+        return [plain_json(item) for item in value]
     if hasattr(value, "tolist"):  # a numpy array or number
-        return plain(value.tolist())
+        return plain_json(value.tolist())
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
@@ -705,7 +707,7 @@ def _kind_name(held: Mapping[str, Any], name: str) -> str:
     return "answer" if name == "value" and "kind" in held else name
 
 
-def shortened(value: object) -> str:
+def shorten_value(value: object) -> str:
     """Return ``value`` as text for messages, shortened."""
     shown = repr(value)
     return shown if len(shown) <= SHOWN else f"{shown[:SHOWN]}…"
@@ -716,7 +718,7 @@ def unknown_events(lines: Sequence[Event]) -> Iterator[str]:
     yield from {line.event: None for line in lines if isinstance(line, UnknownEvent)}
 
 
-def holds(name: str, value: object) -> bool:
+def is_valid_value(name: str, value: object) -> bool:
     """Return whether ``value`` has the type of the field ``name``; an unknown field may have any."""
     if name not in _KINDS:
         return True

@@ -18,10 +18,23 @@ from study_app.protocol.orders.schedule import stream
 from study_app.protocol.source.files import unbundled
 from study_app.protocol.trials.stimuli import LEVEL_RULES
 from study_app.store import receipt
-from study_app.store.atomic import cannot_write, is_there, make_folder, sweep_old, sync_folder, temporary_path
-from study_app.store.blinded.allocation import Allocation, allocate, allocated, check_session
+from study_app.store.atomic import (
+    cannot_write,
+    is_there,
+    make_folder,
+    remove_old_temporary_files,
+    sync_folder,
+    temporary_path,
+)
+from study_app.store.blinded.allocation import Allocation, allocate, allocation_of, check_session
 from study_app.store.blinded.blinding import Key, open_or_draw_key, reveals, sealed_model
-from study_app.store.folder_lock import Opening, abandoned, create_opened, sweep_claims, take_over
+from study_app.store.folder_lock import (
+    Opening,
+    create_locked_folder,
+    is_abandoned,
+    remove_abandoned_claims,
+    take_over_folder,
+)
 from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import FORMAT, Journal, SessionClock
@@ -93,7 +106,7 @@ class SessionStart:
     group: str | None = None
 
 
-def begin(
+def begin_session(
     results: Path, protocol: Protocol, source: bytes, start: SessionStart, *, clock: SessionClock | None = None
 ) -> SessionStore:
     """Claim a session in the study folder ``results`` and write all files needed before the first trial.
@@ -198,7 +211,9 @@ def first_records(
         "resumed": [],
         **fields,
         "generator": receipt.GENERATOR,
-        **surroundings(protocol, start.device, start.screens, clock, start.motors_masked, start.outlets, start.video),
+        **session_environment(
+            protocol, start.device, start.screens, clock, start.motors_masked, start.outlets, start.video
+        ),
         "protocol": receipt.without_conditions(protocol),
     }
     return started, first_receipt
@@ -213,7 +228,7 @@ def note_allocation(store: SessionStore) -> None:
     known = [line for session in sessions if is_there(session.journal) for line in journal.scan(session.journal).lines]
     if any(isinstance(line, Allocated) for line in known):
         return
-    allocation = allocated(study, store.key, folder.participant)
+    allocation = allocation_of(study, store.key, folder.participant)
     if allocation is not None:
         store.append(Allocated(entry=allocation.entry, sealed=allocation.sealed))
 
@@ -229,7 +244,7 @@ def make_recorder(place: Place, start: SessionStarted, clock: SessionClock, key:
     return Recorder(place.folder.recordings, facts, secret=secret, waits=start.simulated)
 
 
-def surroundings(
+def session_environment(
     protocol: Protocol,
     device: Mapping[str, Any],
     screens: Mapping[str, Any],
@@ -319,7 +334,7 @@ class UsedIds:
 def used_ids(folder: StudyFolder) -> UsedIds:
     """Read the used ids and session numbers of a study."""
     sessions = folder.sessions()
-    held = frozenset((session.participant, session.number) for session in sessions if not abandoned(session.path))
+    held = frozenset((session.participant, session.number) for session in sessions if not is_abandoned(session.path))
     return UsedIds(
         folder.path, held, tuple(sorted({session.participant for session in sessions})), tuple(tombstones(folder))
     )
@@ -353,7 +368,7 @@ def refuse_never_begun(session: SessionFolder) -> None:
     StoreError
         Says how it is begun.
     """
-    if abandoned(session.path):
+    if is_abandoned(session.path):
         raise StoreError(
             f"{session.path} was created, but the program ended before the session began, so it cannot be resumed: "
             f"begin a new session of participant {session.participant}, number {session.number} (run)"
@@ -365,12 +380,12 @@ def _claim(place: Place) -> Opening:
     path = place.folder.path
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        sweep_claims(path.parent)
-        opening = create_opened(path) or take_over(path)
+        remove_abandoned_claims(path.parent)
+        opening = create_locked_folder(path) or take_over_folder(path)
     except OSError as error:
         raise cannot_write(path, error) from error
     except StoreError:
-        _take_away_empty(path.parent)
+        _remove_if_empty(path.parent)
         raise
     if opening is None:
         raise used_ids(place.study_folder).refusal(place.folder.participant, place.folder.number)
@@ -385,10 +400,10 @@ def _unclaim(place: Place, opening: Opening) -> None:
         path.rename(away)
     shutil.rmtree(away if is_there(away) else path, ignore_errors=True)
     opening.release()
-    _take_away_empty(path.parent)
+    _remove_if_empty(path.parent)
 
 
-def _take_away_empty(folder: Path) -> None:
+def _remove_if_empty(folder: Path) -> None:
     with contextlib.suppress(OSError):
         folder.rmdir()
 
@@ -425,6 +440,6 @@ def _open(
             place.study_folder, protocol.study, protocol.format, intervals=bool(protocol.design_questions)
         )
         for folder in (place.study_folder.path, place.study_folder.data):
-            sweep_old(folder)
+            remove_old_temporary_files(folder)
         failing.pop_all()
     return store

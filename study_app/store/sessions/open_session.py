@@ -20,7 +20,7 @@ from study_app.outlets.session_outlets import Outlets
 from study_app.protocol.model import Protocol
 from study_app.store import csv_files, receipt
 from study_app.store.atomic import write_file
-from study_app.store.blinded.blinding import Key, as_recorded, opened, opened_key, sealed
+from study_app.store.blinded.blinding import Key, open_events, opened_key, recorded_protocol, seal_event
 from study_app.store.checksums import fingerprint, note_fingerprint, write_checksums
 from study_app.store.exclusions import exclude_incomplete
 from study_app.store.folder_lock import Opening
@@ -49,8 +49,8 @@ class SessionStore:
     ``journal`` receives events, ``opening`` locks the folder until it is released; ``key`` translates codes while the
     session runs; ``clock`` gives the journal's times; ``recorder`` records the trials' samples and frames, or is None
     in a session without recordings; ``behind`` is why the tables on disk are older than the journal, or None;
-    ``fingerprint`` is empty until the session has ended. Made by `begin`; by ``recovery.reopen`` from ``lines`` written
-    before.
+    ``fingerprint`` is empty until the session has ended. Made by `begin_session`, or by ``recovery.reopen_store`` from
+    ``lines`` written before.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class SessionStore:
         StoreError
             The receipt cannot be decrypted with the study's key.
         """
-        return as_recorded(protocol, self._receipt, self.key)
+        return recorded_protocol(protocol, self._receipt, self.key)
 
     def attach(self, outlets: Outlets) -> None:
         """Start sending markers of the session's events, beginning with its start or resumption."""
@@ -131,7 +131,7 @@ class SessionStore:
             if start.measures_sealed and isinstance(event, events.TargetReached):
                 self._hold_target(event)
                 return
-            event = sealed(start, self._with_targets(event), self.key)
+            event = seal_event(start, self._with_targets(event), self.key)
         self._mark(event)
         self._lines.append(self.journal.append(event, t_s=event.t_s, waits=waits))
         self._marked = None
@@ -182,8 +182,8 @@ class SessionStore:
         try:
             self._keep_recordings()
             for path, content in table_files(self.place, self._lines, opened_key(self.place.study_folder)):
-                if self.journal.closed or self._written.get(path) != content:
-                    write_file(path, content, waits=self.journal.closed)
+                if self.journal.is_closed or self._written.get(path) != content:
+                    write_file(path, content, waits=self.journal.is_closed)
                     self._written[path] = content
         except StoreError as error:
             self.behind = error
@@ -201,7 +201,7 @@ class SessionStore:
         StoreError
             One of them could not be written; earlier journal lines are safe. Called again, it continues from there.
         """
-        if self._over or not self.journal.closed:
+        if self._over or not self.journal.is_closed:
             if self.recorder is not None:
                 self.recorder.close()
             self._keep_recordings()
@@ -248,8 +248,8 @@ class SessionStore:
         self._over = True
         if self.recorder is not None:
             self.recorder.close(LEAVING_S)
-        if not self.journal.closed:
-            with contextlib.suppress(StoreError):  # `reopen` finds recordings without a line in the journal
+        if not self.journal.is_closed:
+            with contextlib.suppress(StoreError):  # `reopen_store` finds recordings without a line in the journal
                 self._keep_recordings()
                 if self._outlets_lost:
                     self._write_receipt()
@@ -281,7 +281,7 @@ class SessionStore:
     def _keep_recordings(self) -> None:
         """Write the results of recordings (files, or the reason for a loss) and failures of outlets to the journal."""
         if self.recorder is not None:
-            self._kept += self.recorder.kept()
+            self._kept += self.recorder.collect_results()
         while self._kept:
             self.append(self._kept[0], waits=False)
             del self._kept[0]
@@ -309,7 +309,7 @@ def table_files(place: Place, lines: Sequence[events.Event], key: Key | None) ->
 
     ``key`` is the study's opened key; without it the sealed columns are left out.
     """
-    lines = opened(lines, key)
+    lines = open_events(lines, key)
     rows = session_tables.SessionRows(lines)
     columns = session_tables.table_columns(lines, opened=key is not None)
     return tuple(

@@ -22,26 +22,26 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.source.files import bundled, hashes_in, unbundled
 from study_app.store import receipt
-from study_app.store.atomic import is_there, paths_in, read_own, sweep, write_file
-from study_app.store.blinded.blinding import Key, open_or_draw_key, opened_key, read_key, same_conditions
+from study_app.store.atomic import is_there, paths_in, read_own, remove_temporary_files, write_file
+from study_app.store.blinded.blinding import Key, has_same_conditions, open_or_draw_key, opened_key, read_key
 from study_app.store.checksums import (
     fingerprint,
-    listed,
     note_fingerprint,
     note_rebuilt,
     place_of,
     read_checksums,
+    read_list,
     renew_checksums,
 )
-from study_app.store.folder_lock import open_alone, refuse_if_open
-from study_app.store.folders import RECORDING_NAME, SessionFolder, StudyFolder, locate
+from study_app.store.folder_lock import lock_folder, refuse_if_open
+from study_app.store.folders import RECORDING_NAME, SessionFolder, StudyFolder, locate_session
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
 from study_app.store.journals.journal import Contents, Journal, SessionClock
 from study_app.store.merged import refuse_merged
 from study_app.store.progress import Progress, progress_of, recordable
-from study_app.store.recorder import lost, recorded, recording_files
-from study_app.store.sessions.begin import make_recorder, note_allocation, refuse_never_begun, surroundings
+from study_app.store.recorder import lost_event, recorded_event, recording_files
+from study_app.store.sessions.begin import make_recorder, note_allocation, refuse_never_begun, session_environment
 from study_app.store.sessions.open_session import Place, SessionStore, table_files
 from study_app.store.tables import session_tables
 from study_app.store.tables.study_files import write_description, write_participants
@@ -54,7 +54,7 @@ MOST_GAP_S = 366 * 86400.0
 
 @dataclass(frozen=True, slots=True)
 class Rebuilt:
-    """The result of `rebuild`.
+    """The result of `rebuild_session`.
 
     ``rewritten`` files were missing or differed from the journal, ``swept`` were temporary files of a killed program;
     ``torn_bytes`` at the journal's end are an incomplete line, and were not changed.
@@ -65,7 +65,7 @@ class Rebuilt:
     torn_bytes: int
 
 
-def reopen(
+def reopen_store(
     session_folder: Path,
     protocol: Protocol,
     source: bytes,
@@ -117,14 +117,14 @@ def reopen(
         other files, or of another protocol (the differences are named where they are not blinded); the key is not
         in order; or the folder cannot be written. But for the torn tail nothing has changed then.
     """
-    study_folder, folder = locate(session_folder)
+    study_folder, folder = locate_session(session_folder)
     refuse_never_begun(folder)
     refuse_merged(study_folder.path)
-    opening = open_alone(folder.path)
+    opening = lock_folder(folder.path)
     try:
-        left = _left(study_folder, folder, protocol, source)
+        left = _read_interrupted(study_folder, folder, protocol, source)
         contents = left.contents
-        gap_s, clock = _go_on(contents.lines, now_ns, now)
+        gap_s, clock = _continued_clock(contents.lines, now_ns, now)
         recorder = make_recorder(left.place, left.start, clock, left.key)
         opened = Journal.reopen(folder.journal, contents, clock)
     except BaseException:
@@ -136,14 +136,14 @@ def reopen(
         failing.callback(store.close)
         at_s = round(clock.seconds(), 6)
         version, name = study_app.__version__, device.get("name")
-        around = surroundings(protocol, device, screens, clock, motors_masked, outlets, video)
+        around = session_environment(protocol, device, screens, clock, motors_masked, outlets, video)
         entry = {"at": clock.at(at_s), **gap, **around}
         told: dict[str, Any] = {"torn_bytes": contents.torn_bytes, "device": name, "version": version}
         store.append(events.SessionResumed(**gap, **told, receipt_hash=receipt.digest(entry)), t_s=at_s)
         note_allocation(store)
-        sweep(folder.path)
+        remove_temporary_files(folder.path)
         if is_there(folder.recordings):
-            sweep(folder.recordings)
+            remove_temporary_files(folder.recordings)
         for event in _recordings_found(folder, contents.lines, left.key) if left.start.recordings else ():
             store.append(event)
         store.note_resumed(entry)
@@ -154,18 +154,18 @@ def reopen(
     return store
 
 
-def check_can_go_on(session_folder: Path, protocol: Protocol, source: bytes) -> None:
-    """Raise the errors of `reopen` before any preparation; nothing is changed.
+def check_resumable(session_folder: Path, protocol: Protocol, source: bytes) -> None:
+    """Raise the errors of `reopen_store` before any preparation; nothing is changed.
 
     Raises
     ------
     StoreError
-        As `reopen`.
+        As `reopen_store`.
     """
-    study_folder, folder = locate(session_folder)
+    study_folder, folder = locate_session(session_folder)
     refuse_never_begun(folder)
     refuse_if_open(folder.path)
-    _left(study_folder, folder, protocol, source)
+    _read_interrupted(study_folder, folder, protocol, source)
 
 
 def sealed_source(session_folder: Path, source: bytes) -> bytes:
@@ -176,15 +176,15 @@ def sealed_source(session_folder: Path, source: bytes) -> bytes:
     StoreError
         It is not a session folder.
     """
-    study_folder, _ = locate(session_folder)
+    study_folder, _ = locate_session(session_folder)
     try:
         files = read_key(study_folder.path).files
-    except StoreError:  # `reopen` reports the error
+    except StoreError:  # `reopen_store` reports the error
         return source
     return bundled(unbundled(source)[0], files.get, hashes_in(source)) if files else source
 
 
-def rebuild(session_folder: Path) -> Rebuilt:
+def rebuild_session(session_folder: Path) -> Rebuilt:
     """Recreate the files derived from a session's journal.
 
     These are its tables, the study's table of participants, the receipt's status and the checksums and fingerprint of a
@@ -197,12 +197,14 @@ def rebuild(session_folder: Path) -> Rebuilt:
         It is not a session folder, open in another program, or its journal is empty, damaged or tells less than the
         session's other files; or a file cannot be written.
     """
-    study_folder, folder = locate(session_folder)
-    with open_alone(folder.path):
-        contents = journal.whole(folder.journal)
+    study_folder, folder = locate_session(session_folder)
+    with lock_folder(folder.path):
+        contents = journal.read_complete(folder.journal)
         place = Place(study_folder, folder, events.start_of(contents.lines).study)
-        refuse_if_cut(place, contents.lines)
-        swept = sweep(folder.path) + (sweep(folder.recordings) if is_there(folder.recordings) else ())
+        refuse_truncated_journal(place, contents.lines)
+        swept = remove_temporary_files(folder.path) + (
+            remove_temporary_files(folder.recordings) if is_there(folder.recordings) else ()
+        )
         table = study_folder.participants(place.study)
         before = _content(table)
         tables = table_files(place, contents.lines, opened_key(study_folder))
@@ -219,18 +221,18 @@ def rebuild(session_folder: Path) -> Rebuilt:
         return Rebuilt(tuple(rewritten), swept, contents.torn_bytes)
 
 
-def refuse_if_cut(place: Place, lines: Sequence[events.Event]) -> None:
+def refuse_truncated_journal(place: Place, lines: Sequence[events.Event]) -> None:
     """Raise an error if the journal has less information than the session's other files, which would be replaced."""
     for name in events.unknown_events(lines):
         raise StoreError(
             f"{place.folder.journal} has events {name!r}, which this version does not know: use the version that wrote "
             "them"
         )
-    for path, what in (*beyond(place, lines), *_ended_or_recorded(place, lines)):
+    for path, what in (*files_beyond_journal(place, lines), *_ended_or_recorded(place, lines)):
         raise StoreError(f"{path} {what}: {RESTORE}")
 
 
-def beyond(place: Place, lines: Sequence[events.Event]) -> Iterator[tuple[Path, str]]:
+def files_beyond_journal(place: Place, lines: Sequence[events.Event]) -> Iterator[tuple[Path, str]]:
     """Yield path and description of each file (receipt, checksums, tables) that contains more than the journal.
 
     A session that has ended has a complete journal. After a power cut the trials table may have one more trial, since
@@ -250,7 +252,7 @@ def beyond(place: Place, lines: Sequence[events.Event]) -> Iterator[tuple[Path, 
     rows = session_tables.SessionRows(lines)
     for name, spare in (("responses", 0), ("trials", 1), ("intervals", 1)):
         path, given = folder.table(place.study, name), len(rows.table(name))
-        if (row_count := _rows(path, place.study_folder.path)) > given + spare:
+        if (row_count := _count_rows(path, place.study_folder.path)) > given + spare:
             yield path, f"has {row_count} rows, and the journal gives {given}"
 
 
@@ -259,7 +261,7 @@ def _ended_or_recorded(place: Place, lines: Sequence[events.Event]) -> Iterator[
     folder, study = place.folder, place.study_folder
     if isinstance(lines[-1], events.SessionEnded):
         return
-    if place_of(study, folder) in {session for _, session in listed(study.fingerprints)}:
+    if place_of(study, folder) in {session for _, session in read_list(study.fingerprints)}:
         yield study.fingerprints, f"lists {place_of(study, folder)} as ended, but its journal has no end"
     of_trials = {path for which in recordable(lines) for path in recording_files(folder.recordings, *which)}
     for path in paths_in(folder.recordings):
@@ -267,7 +269,7 @@ def _ended_or_recorded(place: Place, lines: Sequence[events.Event]) -> Iterator[
             yield path, "is of a trial that the journal never started"
 
 
-def _rows(path: Path, root: Path) -> int:
+def _count_rows(path: Path, root: Path) -> int:
     """Return the number of rows of a table; 0 if it is not a table, since nothing is lost by making it again."""
     try:
         text = read_own(path, root).decode("utf-8", "replace")
@@ -288,15 +290,15 @@ class _Left:
     key: Key
 
 
-def _left(study_folder: StudyFolder, folder: SessionFolder, protocol: Protocol, source: bytes) -> _Left:
+def _read_interrupted(study_folder: StudyFolder, folder: SessionFolder, protocol: Protocol, source: bytes) -> _Left:
     """Read the data of an interrupted session; raise an error if it cannot be resumed with this protocol."""
-    contents = journal.whole(folder.journal)
+    contents = journal.read_complete(folder.journal)
     start = _unfinished(folder, contents.lines)
     place = Place(study_folder, folder, start.study)
     first = receipt.read(folder.receipt)
-    if receipt.other_format(first, start):
+    if receipt.has_other_format(first, start):
         raise StoreError(f"{folder.journal} has another format than its receipt states: restore it from a copy")
-    refuse_if_cut(place, contents.lines)
+    refuse_truncated_journal(place, contents.lines)
     _same_protocol(place, first, start, protocol, source)
     draw = stream(start.seed, "blinding").random if start.simulated else None
     return _Left(place, contents, start, first, open_or_draw_key(study_folder.path, protocol, draw))
@@ -328,7 +330,7 @@ def _same_protocol(
     if protocol_hash(source) == start.protocol_hash:
         return
     changes = list(differences(first["protocol"], json.loads(json.dumps(receipt.without_conditions(protocol)))))
-    if not same_conditions(place.study_folder.path, protocol):
+    if not has_same_conditions(place.study_folder.path, protocol):
         changes.append(CONDITIONS_DIFFER)
     if not changes:
         changes.append("only comments, order or notation")
@@ -340,7 +342,7 @@ def _same_protocol(
     )
 
 
-def _go_on(
+def _continued_clock(
     lines: list[events.Event], now_ns: Callable[[], int], now: datetime | None
 ) -> tuple[float | None, SessionClock]:
     """Return the gap since the last line [s], None if unknown, and the clock that continues after it."""
@@ -364,12 +366,12 @@ def _recordings_found(folder: SessionFolder, lines: list[events.Event], key: Key
         try:
             dropped = recordings.read_facts(samples, key.nonce)["dropped"]
             kept, shown = (recordings.read_written(path, key.nonce) for path in (samples, frames))
-            yield recorded(which, kept, shown, dropped)
+            yield recorded_event(which, kept, shown, dropped)
         except StoreError:
             if not is_there(samples):  # frames are written first and are not a recording by themselves
                 with contextlib.suppress(OSError):
                     frames.unlink(missing_ok=True)
-            yield lost(which, "the program ended before it was complete")
+            yield lost_event(which, "the program ended before it was complete")
 
 
 def _renew_receipt(folder: SessionFolder, lines: list[events.Event]) -> list[Path]:
@@ -388,7 +390,7 @@ def _renew_receipt(folder: SessionFolder, lines: list[events.Event]) -> list[Pat
 def _renew_proof(place: Place, lines: list[events.Event], rewritten: list[Path]) -> list[Path]:
     """Renew the checksums and list a missing fingerprint; return the written paths. Format 1 has neither."""
     study, folder = place.study_folder, place.folder
-    listed_places = {session for _, session in listed(study.fingerprints)}
+    listed_places = {session for _, session in read_list(study.fingerprints)}
     has_none = lines[-1].previous is not None and place_of(study, folder) not in listed_places
     noted = [folder.rebuilt] if has_none else []
     if has_none:

@@ -22,12 +22,12 @@ from study_app.protocol.source.files import unbundled
 from study_app.store import receipt
 from study_app.store.atomic import create_folder, make_folder
 from study_app.store.blinded.allocation import allocate
-from study_app.store.blinded.blinding import open_or_draw_key, opened_key, reveals, sealed
+from study_app.store.blinded.blinding import open_or_draw_key, opened_key, reveals, seal_event
 from study_app.store.checksums import checksum_bytes, fingerprint, note_fingerprint
-from study_app.store.folder_lock import Opening, open_alone
+from study_app.store.folder_lock import Opening, lock_folder
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal import SessionClock, line_bytes, line_of
-from study_app.store.journals.journal_events import Allocated, Event, SessionEnded, plain, read_event, start_of
+from study_app.store.journals.journal_events import Allocated, Event, SessionEnded, plain_json, read_event, start_of
 from study_app.store.sessions.begin import SessionStart, check_participant, first_records, used_ids
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.tables.study_files import check_study, write_description, write_participants
@@ -96,7 +96,7 @@ class SimulatedStudy:
         self.started, first_receipt = first_records(
             protocol, source, start, key_hash=self.key.hash, measures_sealed=sealed_measures, clock=SessionClock()
         )
-        self.receipt = plain(first_receipt)
+        self.receipt = plain_json(first_receipt)
 
     def begin(self, participant: str, clock: SessionClock, group: str | None = None) -> SimulatedSession:
         """Return a new session, in a pre-existing ``group`` if the study has these; it is written at its end."""
@@ -127,7 +127,7 @@ class SimulatedStudy:
 
     def __enter__(self) -> Self:
         """Write the study's description, which identifies its folder."""
-        self._opening = open_alone(self.folder.path)
+        self._opening = lock_folder(self.folder.path)
         write_description(
             self.folder, self.protocol.study, self.protocol.format, intervals=bool(self.protocol.design_questions)
         )
@@ -174,7 +174,7 @@ class SimulatedSession:
     def append(self, event: Event, *, t_s: float | None = None) -> None:
         """Store a line of the journal in memory; ``t_s`` is its time [s], by default now."""
         if self.lines:
-            event = sealed(start_of(self.lines), event, self._study.key)
+            event = seal_event(start_of(self.lines), event, self._study.key)
         line = line_of(event, len(self.lines) + 1, self.clock, t_s, previous=self._hash.hexdigest())
         self.lines.append(read_event(line))
         content = line_bytes(line)

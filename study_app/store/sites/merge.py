@@ -21,15 +21,15 @@ from study_app.store.atomic import (
     is_there,
     open_regular,
     paths_in,
-    refuse_special,
-    sweep,
+    refuse_special_files,
+    remove_temporary_files,
     sync_folder,
-    temporaries,
+    temporary_files,
     temporary_path,
     write_file,
 )
 from study_app.store.blinded.blinding import Key, verified_key
-from study_app.store.folder_lock import create_opened, is_open, never_begun, open_alone, refuse_if_open
+from study_app.store.folder_lock import create_locked_folder, is_never_begun, is_open, lock_folder, refuse_if_open
 from study_app.store.folders import ID_PATTERN, StudyFolder
 from study_app.store.merged import FOLDER, Merged, Site, merged_above, read_merged
 from study_app.store.tables.study_files import described_study
@@ -58,7 +58,7 @@ class _Source:
     begun: Mapping[str, Path]
 
 
-def merge(given: Mapping[str, Path], to: Path) -> Merged:
+def merge_sites(given: Mapping[str, Path], to: Path) -> Merged:
     """Copy the results folders of sites into the merged study ``to``, which is created or extended.
 
     Parameters
@@ -78,8 +78,8 @@ def merge(given: Mapping[str, Path], to: Path) -> Merged:
     merged = read_merged(to)
     _check_names(given, merged)
     _check_places(given, to, merged)
-    present = () if merged is None else tuple(_source(name, merged.folder(name)) for name in merged.names)
-    new = tuple(_source(name, path) for name, path in given.items())
+    present = () if merged is None else tuple(_read_source(name, merged.folder(name)) for name in merged.names)
+    new = tuple(_read_source(name, path) for name, path in given.items())
     if empty := next((name for name, source in zip(given, new, strict=True) if not source.begun), None):
         raise StoreError(f"site {empty}: {given[empty]} holds no sessions: merge it when it does")
     ran = new[0].protocol_hash if merged is None else merged.protocol_hash
@@ -91,13 +91,13 @@ def merge(given: Mapping[str, Path], to: Path) -> Merged:
     )
     if merged is None:
         made = Merged(to, new[0].study, ran, sites)
-        _create(made, new)
+        _create_merged(made, new)
     else:
         made = Merged(to, merged.study, merged.protocol_hash, (*merged.sites, *sites))
-        with open_alone(to):
+        with lock_folder(to):
             if read_merged(to) != merged:
                 raise StoreError(f"{to} was changed by another program meanwhile: merge again")
-            _add(made, new)
+            _add_sites(made, new)
     return made
 
 
@@ -132,7 +132,7 @@ def _check_places(given: Mapping[str, Path], to: Path, merged: Merged | None) ->
             raise StoreError(f"site {name}: {path} lies within {to}: name a folder outside of it with --to")
 
 
-def _source(name: str, path: Path) -> _Source:
+def _read_source(name: str, path: Path) -> _Source:
     """Read the properties of a results folder that must agree between sites."""
     study = StudyFolder(path)
     described = described_study(study)
@@ -141,13 +141,13 @@ def _source(name: str, path: Path) -> _Source:
             f"site {name}: {path} is not the results folder of a study (no {study.description.name}): name one such as "
             "results/rek2024"
         )
-    refuse_special(path.resolve())
+    refuse_special_files(path.resolve())
     try:
-        state = _state(path)
+        state = _folder_state(path)
     except OSError as error:
         raise cannot_read(path, error) from error
     refuse_if_open(path)
-    sessions = [session for session in study.sessions() if not never_begun(session.path)]
+    sessions = [session for session in study.sessions() if not is_never_begun(session.path)]
     for session in sessions:
         refuse_if_open(session.path)
     receipts = [receipt.read(session.receipt) for session in sessions]
@@ -202,16 +202,16 @@ def _check_sessions(sources: tuple[_Source, ...]) -> None:
             seen[begun] = path
 
 
-def _create(merged: Merged, sources: tuple[_Source, ...]) -> None:
+def _create_merged(merged: Merged, sources: tuple[_Source, ...]) -> None:
     """Create the folder atomically."""
     target = merged.path.absolute()
     half = temporary_path(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        for path in temporaries(target.parent, target.name):  # left by interrupted merges
+        for path in temporary_files(target.parent, target.name):  # left by interrupted merges
             if path.is_dir() and not is_open(path):
                 shutil.rmtree(path, ignore_errors=True)
-        opening = create_opened(half)
+        opening = create_locked_folder(half)
         (half / FOLDER).mkdir()
         for source in sources:
             _copy(source, half / FOLDER / source.name)
@@ -230,10 +230,10 @@ def _create(merged: Merged, sources: tuple[_Source, ...]) -> None:
         shutil.rmtree(half, ignore_errors=True)
 
 
-def _add(merged: Merged, sources: tuple[_Source, ...]) -> None:
+def _add_sites(merged: Merged, sources: tuple[_Source, ...]) -> None:
     """Copy further sites into the folder; they count once they are listed."""
     place = merged.path / FOLDER
-    sweep(place)
+    remove_temporary_files(place)
     copies: list[Path] = []
     try:
         for source in sources:
@@ -259,11 +259,11 @@ def _copy(source: _Source, to: Path) -> None:
     for place in (to, *(path for path in paths_in(to) if path.is_dir() and not path.is_symlink())):
         sync_folder(place)
     refuse_if_open(source.path)
-    if _state(source.path) != source.state:
+    if _folder_state(source.path) != source.state:
         raise StoreError(f"{source.path} was changed while it was copied: merge when no program uses it")
 
 
-def _state(path: Path) -> list[tuple[Path, int, int]]:
+def _folder_state(path: Path) -> list[tuple[Path, int, int]]:
     """Return path, size and modification time of every file in a folder, to detect changes."""
     states = [(entry, entry.lstat()) for entry in paths_in(path)]
     return [(entry, held.st_size, held.st_mtime_ns) for entry, held in states if not entry.is_dir()]
@@ -278,7 +278,7 @@ def _copy_file(source: str, to: str, *, follow_symlinks: bool = True) -> str:
     return to
 
 
-def unlisted(merged: Merged) -> tuple[Path, ...]:
+def stray_entries(merged: Merged) -> tuple[Path, ...]:
     """Return the entries next to the sites that are not listed, left by an interrupted merge or added by hand."""
     place = merged.path / FOLDER
     return tuple(sorted(path for path in place.iterdir() if path.name not in merged.names)) if place.is_dir() else ()

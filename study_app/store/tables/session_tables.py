@@ -9,8 +9,8 @@ from typing import Any, Final
 
 from study_app.errors import StoreError
 from study_app.store.columns import DELIVERED, INTERVALS, TRIALS, TRIALS_MISSING, VIDEO, tables_of
-from study_app.store.csv_files import Column, Row, header, unsealed
-from study_app.store.delivered import within_limits
+from study_app.store.csv_files import Column, Row, header, unsealed_columns
+from study_app.store.delivered import is_within_limits
 from study_app.store.journals import journal_events as events
 from study_app.store.progress import progress_of
 
@@ -37,8 +37,8 @@ class SessionRows:
         self.trials: list[Row] = []
         self.intervals: list[Row] = []
         self._start = events.start_of(lines)
-        self._session = _session(self._start)
-        self._group = _group(self._start)
+        self._session = _session_cells(self._start)
+        self._group = _group_cells(self._start)
         self._measured_names = (*_MEASURED, *header(VIDEO)) if self._group else _MEASURED
         self._limits = self._start.limits
         self._started: dict[tuple[int, int], events.TrialStarted] = {}
@@ -61,23 +61,23 @@ class SessionRows:
                 repeats = bool(self.trials) and self.trials[-1]["trial"] == line.trial
                 self._started[which], self._places[which] = line, len(self.trials)
                 later = {**dict.fromkeys(header(VIDEO)), "intervals": 0 if line.has_intervals else None}
-                self.trials.append(_trial(self._session, line) | (later if self._group else {}) | self._group)
+                self.trials.append(_trial_row(self._session, line) | (later if self._group else {}) | self._group)
                 if self._reconnected and repeats:
-                    _note(self.trials[-1], f"presented again: {self._reconnected}")
+                    _add_note(self.trials[-1], f"presented again: {self._reconnected}")
                 self._reconnected = ""
             case events.TrialEnded(outcome=outcome):
                 row = self._row_of(line)
-                row |= self._measured(line)
-                valid = within_limits(row, self._start.limits) if outcome != events.UNDELIVERED else False
+                row |= self._measures_row(line)
+                valid = is_within_limits(row, self._start.limits) if outcome != events.UNDELIVERED else False
                 row |= {"outcome": outcome, "valid": valid}
             case events.Responses():
                 if (trial := self._started.get((line.trial, line.attempt))) is None:
                     raise _never_started(line)
                 about = {name: getattr(trial, name) for name in _TRIAL_COLUMNS}
-                self.responses += [_response(self._session, about, answer, line.at) for answer in line.items]
+                self.responses += [_response_row(self._session, about, answer, line.at) for answer in line.items]
             case events.FormAnswered():
                 about = {**dict.fromkeys(_TRIAL_COLUMNS), "form": line.form, "after_block": line.after}
-                self.responses += [_response(self._session, about, answer, line.at) for answer in line.items]
+                self.responses += [_response_row(self._session, about, answer, line.at) for answer in line.items]
             case events.SessionEnded() | events.SessionResumed():
                 self._interrupt()
             case events.IntervalStarted():
@@ -87,7 +87,7 @@ class SessionRows:
                 row |= {name: line.others.get(name) for name in (*self._measured_names, *_DELIVERED)}
                 row["ended_s"] = line.t_s
                 row |= {"outcome": outcome, "invalid_reasons": " ".join(reasons) or None}
-                row |= {"valid": within_limits(row, self._start.limits) if not reasons else False}
+                row |= {"valid": is_within_limits(row, self._start.limits) if not reasons else False}
             case events.Recorded():
                 self._row_of(line).update((name, getattr(line, name)) for name in _RECORDED)
             case events.RecordingLost():
@@ -98,11 +98,11 @@ class SessionRows:
                 withheld = self._broke == events.CAUSE_WITHHELD
                 failed = f"the device failed and was connected again ({self._broke})"
                 self._reconnected = f"{events.CAUSE_WITHHELD} and continued" if withheld else failed
-                _note(self.trials[-1], self._reconnected)
+                _add_note(self.trials[-1], self._reconnected)
             case events.Note() if self.trials:
-                _note(self.trials[-1], line.text, mark=line.kind == "mark")
+                _add_note(self.trials[-1], line.text, mark=line.kind == "mark")
             case events.Repeat() if self.trials:
-                _note(self.trials[-1], f"repeated: {line.reason}")
+                _add_note(self.trials[-1], f"repeated: {line.reason}")
 
     def _row_of(self, line: events.OfAttempt) -> Row:
         """Return the row of the interval or trial to which a line belongs."""
@@ -129,14 +129,14 @@ class SessionRows:
         trial["intervals"] += 1
         self.intervals.append(_interval_row(trial, self._started[which], line, earlier))
 
-    def _measured(self, line: events.TrialEnded) -> Row:
+    def _measures_row(self, line: events.TrialEnded) -> Row:
         """Return the measures of a completed trial, combined from all its intervals if it has a design."""
         which = line.trial, line.attempt
         if not self._started[which].has_intervals:
             return {name: line.others.get(name) for name in self._measured_names}
         rows = [self.intervals[at] for key, at in self._intervals.items() if key[:2] == which]
         names = self._measured_names
-        return {name: _combined(name, [row[name] for row in rows if row.get(name) is not None]) for name in names}
+        return {name: _combine_values(name, [row[name] for row in rows if row.get(name) is not None]) for name in names}
 
     def _interrupt(self) -> None:
         """Set the outcome of a trial without an end to interrupted."""
@@ -153,20 +153,24 @@ def table_columns(lines: Sequence[events.Event], *, opened: bool) -> dict[str, t
     tables = tables_of(events.start_of(lines).protocol_format or 1)
     names = ("responses", "trials", "intervals") if events.start_of(lines).intervals else ("responses", "trials")
     shows = opened or not events.start_of(lines).measures_sealed
-    return {name: tables[name] if shows else unsealed(tables[name]) for name in names}
+    return {name: tables[name] if shows else unsealed_columns(tables[name]) for name in names}
 
 
-def participant(lines: Sequence[events.Event]) -> Row:
+def participant_row(lines: Sequence[events.Event]) -> Row:
     """Return the session's row of the participants table."""
     start, rows, done = events.start_of(lines), SessionRows(lines), progress_of(lines)
-    main = [row for row in latest(rows.trials) if row["phase"] == "main" and row["outcome"] in ("complete", "timeout")]
-    after_main = latest(row for row in rows.responses if row["phase"] == "main")
+    main = [
+        row
+        for row in latest_attempts(rows.trials)
+        if row["phase"] == "main" and row["outcome"] in ("complete", "timeout")
+    ]
+    after_main = latest_attempts(row for row in rows.responses if row["phase"] == "main")
     in_forms = (row for row in rows.responses if row.get("form") is not None)
     answered = [row for row in (*after_main, *in_forms) if row["first_choice_s"] is not None]
     verdicts = [row["valid"] for row in main if row["valid"] is not None]
     return {
-        **_session(start),
-        **_group(start),
+        **_session_cells(start),
+        **_group_cells(start),
         "status": "unfinished" if done.ended is None else done.ended,
         "session_started_at": start.at,
         "session_ended_at": next((line.at for line in reversed(lines) if isinstance(line, events.SessionEnded)), None),
@@ -180,7 +184,7 @@ def participant(lines: Sequence[events.Event]) -> Row:
     }
 
 
-def latest(rows: Iterable[Row]) -> list[Row]:
+def latest_attempts(rows: Iterable[Row]) -> list[Row]:
     """Return the rows of the last attempt at each trial, in order."""
     rows = list(rows)
     last: dict[int, int] = {}
@@ -208,7 +212,7 @@ def _interval_row(trial: Row, started: events.TrialStarted, line: events.Interva
     }
 
 
-def _combined(name: str, values: list[Any]) -> Any:
+def _combine_values(name: str, values: list[Any]) -> Any:
     if not values:
         return None
     if _OF_TRIAL[name] == "max":
@@ -218,16 +222,16 @@ def _combined(name: str, values: list[Any]) -> Any:
     return round(combined, 6) if isinstance(combined, float) else combined
 
 
-def _session(start: events.SessionStarted) -> Row:
+def _session_cells(start: events.SessionStarted) -> Row:
     return {name: getattr(start, name) for name in _SESSION_COLUMNS}
 
 
-def _group(start: events.SessionStarted) -> Row:
+def _group_cells(start: events.SessionStarted) -> Row:
     """Return the cell of the participant's group if it was opened; no cell in format 1."""
     return {"group": start.group} if (start.protocol_format or 1) > 1 else {}
 
 
-def _response(session: Row, about: Row, answer: events.Response, answered_at: str) -> Row:
+def _response_row(session: Row, about: Row, answer: events.Response, answered_at: str) -> Row:
     """Return the row of an answer; format 2 adds its kind, and the answer as text and as number."""
     value = answer.value
     plain = answer.kind is None or value is None
@@ -251,7 +255,7 @@ def _response(session: Row, about: Row, answer: events.Response, answered_at: st
     return {name: row[name] for name in header(tables_of(2 if answer.kind else 1)["responses"])}
 
 
-def _trial(session: Row, line: events.TrialStarted) -> Row:
+def _trial_row(session: Row, line: events.TrialStarted) -> Row:
     row: Row = dict.fromkeys(header(TRIALS)) | session
     row |= {name: getattr(line, name) for name in (*_TRIAL_COLUMNS, "of")}
     return row | {"trial_started_at": line.at, "trial_started_s": line.t_s, "marked": False}
@@ -263,7 +267,7 @@ def _never_started(line: events.OfAttempt) -> StoreError:
     )
 
 
-def _note(row: Row, text: str, *, mark: bool = False) -> None:
+def _add_note(row: Row, text: str, *, mark: bool = False) -> None:
     row["marked"] = row["marked"] or mark
     if text:
         row["notes"] = text if row["notes"] is None else f"{row['notes']}\n{text}"

@@ -16,7 +16,7 @@ from study_app.protocol.model import StudyHead
 from study_app.protocol.table import text_in
 from study_app.store import csv_files, receipt
 from study_app.store.atomic import is_there, parse_json, read_own, write_file
-from study_app.store.blinded.blinding import Key, opened, opened_key, reveals
+from study_app.store.blinded.blinding import Key, open_events, opened_key, reveals
 from study_app.store.columns import (
     GROUP,
     LATER,
@@ -28,7 +28,7 @@ from study_app.store.columns import (
     with_missing_trials,
 )
 from study_app.store.csv_files import Column, Row, header
-from study_app.store.folder_lock import never_begun
+from study_app.store.folder_lock import is_never_begun
 from study_app.store.folders import SessionFolder, StudyFolder, check_study_name
 from study_app.store.journals import journal
 from study_app.store.merged import MANIFEST, folders_of, refuse_merged
@@ -54,7 +54,7 @@ rebuilt.txt
 """
 
 
-def participants(folder: StudyFolder) -> list[csv_files.Row]:
+def participant_rows(folder: StudyFolder) -> list[csv_files.Row]:
     """Return one row per session with a journal, by participant and number."""
     key = opened_or_none(folder)
     return [row for session in folder.sessions() for row in _row_of(session, key)]
@@ -86,23 +86,23 @@ def row_of(session: SessionFolder, key: Key | None) -> list[csv_files.Row]:
     """Return a list with the row of one session, empty if it has not begun. ``key`` is the study's opened key."""
     try:
         contents = journal.scan(session.journal) if is_there(session.journal) else journal.Contents([], 0)
-        if not contents.lines and never_begun(session.path):
+        if not contents.lines and is_never_begun(session.path):
             return []
     except StoreError:  # an unreadable session must not prevent reading the others
-        return [_damaged(session, {})]
-    return [row_from(session, contents, key) if contents.lines else _damaged(session, {})]
+        return [_damaged_row(session, {})]
+    return [row_from(session, contents, key) if contents.lines else _damaged_row(session, {})]
 
 
 def row_from(session: SessionFolder, contents: journal.Contents, key: Key | None) -> csv_files.Row:
     """Return the row of a session from its journal's contents, as a list."""
     try:
-        row = session_tables.participant(opened(contents.lines, key))
+        row = session_tables.participant_row(open_events(contents.lines, key))
     except StoreError:  # an unreadable session must not prevent reading the others
-        return _damaged(session, contents.lines[0].line())
+        return _damaged_row(session, contents.lines[0].line())
     return row if contents.damage is None else row | {"status": "damaged"}
 
 
-def _damaged(session: SessionFolder, start: Mapping[str, Any]) -> csv_files.Row:
+def _damaged_row(session: SessionFolder, start: Mapping[str, Any]) -> csv_files.Row:
     """Return the row of a session whose journal gives none, from its folder, first line and receipt."""
     if not start:
         with contextlib.suppress(StoreError):
@@ -122,12 +122,12 @@ def write_participants(folder: StudyFolder, study: str) -> None:
     writer has seen the lines of the others and the table is complete.
     """
     path = folder.participants(study)
-    content = table_bytes(folder, participants(folder))
+    content = table_bytes(folder, participant_rows(folder))
     if path.is_file() and path.read_bytes() == content:
         return
     while True:
         write_file(path, content)
-        again = table_bytes(folder, participants(folder))
+        again = table_bytes(folder, participant_rows(folder))
         if again == content:
             return
         content = again
@@ -179,7 +179,7 @@ def description_bytes(study: StudyHead, *, sealed: bool, protocol_format: int = 
     return (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode()
 
 
-def describes_alike(content: bytes, expected: bytes) -> bool:
+def is_same_description(content: bytes, expected: bytes) -> bool:
     """Return whether two descriptions agree on the study and on all columns except `LATER`.
 
     Earlier versions of the program lack columns, describe others in other words, and add a pattern of the cells, which
@@ -212,7 +212,7 @@ def write_description(
     tables have them.
     """
     held = read_own(folder.description, folder.path) if is_there(folder.description) else b""
-    sealed = not (reveals(folder.path) or names_sealed(held))
+    sealed = not (reveals(folder.path) or has_sealed_columns(held))
     content = description_bytes(study, sealed=sealed, protocol_format=protocol_format, intervals=intervals)
     if held != content:
         write_file(folder.description, content)
@@ -225,7 +225,7 @@ def has_intervals(protocol: Mapping[str, Any]) -> bool:
     return any("slots" in block for block in protocol["blocks"].values())
 
 
-def names_sealed(content: bytes) -> bool:
+def has_sealed_columns(content: bytes) -> bool:
     """Return whether a description names a sealed column; a pre-existing group is not sealed."""
     with contextlib.suppress(AttributeError, KeyError, TypeError, ValueError):
         names = {variable["name"] for variable in parse_json(content)["variableMeasured"]}
@@ -280,7 +280,7 @@ def participants_of(folder: Path) -> list[Row]:
     return [
         {**row, "participant": f"{prefix}{row['participant']}"}
         for prefix, place in folders_of(folder).items()
-        for row in participants(StudyFolder(place))
+        for row in participant_rows(StudyFolder(place))
     ]
 
 

@@ -59,7 +59,7 @@ def telltales(protocol: Protocol, recorded: Iterable[float] = ()) -> Telltales:
 
     ``recorded`` are `recorded_numbers`.
     """
-    terms = _words(protocol.model_dump(mode="json", include={"liquids", "conditions"}, exclude_unset=True))
+    terms = _telling_words(protocol.model_dump(mode="json", include={"liquids", "conditions"}, exclude_unset=True))
     return Telltales(terms | _all_spelled({*presented_numbers(protocol), *recorded}))
 
 
@@ -104,8 +104,8 @@ def certain_telltales(tables: Tables, published: Any, levels: Iterable[float] = 
     ``tables`` are the sealed key's, ``published`` is the receipt's protocol, ``levels`` are `presented_numbers`.
     """
     known = " ".join(text for _, text in _texts(published, "", frozenset()))
-    every = _words(tables) | _all_spelled(levels)
-    certain = (word for word in every if not word[0].isdigit() or _digits(word) >= _TELLING_DIGITS)
+    every = _telling_words(tables) | _all_spelled(levels)
+    certain = (word for word in every if not word[0].isdigit() or _count_digits(word) >= _TELLING_DIGITS)
     return Telltales(word for word in certain if not Telltales([word]).in_text(known))
 
 
@@ -179,7 +179,7 @@ def _texts(value: Any, place: str, passed_over: frozenset[str]) -> Iterator[tupl
         yield place, str(value)
 
 
-def _words(tables: Tables) -> set[str]:
+def _telling_words(tables: Tables) -> set[str]:
     spellings: set[str] = set()
 
     def collect(value: Any) -> None:
@@ -214,6 +214,6 @@ def _spelled(value: float) -> Iterator[str]:
             yield repr(float(scaled))
 
 
-def _digits(word: str) -> int:
+def _count_digits(word: str) -> int:
     """Return the number of significant digits of a number."""
     return len(re.sub(r"[^0-9]", "", word.partition("e")[0]).strip("0"))

@@ -19,10 +19,10 @@ from study_app.errors import StoreError
 from study_app.store import workstation
 from study_app.store.atomic import read_if_there, write_file
 from study_app.store.blinded.blinding import reveals
-from study_app.store.checksums import Proofs, checked_line, listed, parsed, proof_of
+from study_app.store.checksums import Proofs, checked_line, parse_copy, proof_of, read_list
 from study_app.store.exclusions import exclusions, reversals
 from study_app.store.folders import StudyFolder
-from study_app.store.verification.time_stamps import WAITS_S, checked_stamp, optional_library, stamped
+from study_app.store.verification.time_stamps import WAITS_S, checked_stamp, optional_library, request_stamp
 from study_app.store.withdrawals import proof_of_withdrawal, tombstones
 
 STORE: Final = ("liquid-study", "signing key of the lab")
@@ -36,7 +36,7 @@ class Proof:
     told: tuple[str, ...] = ()
 
 
-def records(study: StudyFolder) -> Proofs:
+def record_proofs(study: StudyFolder) -> Proofs:
     """Return fingerprint and name of each record (withdrawal, reveal, exclusion) of a study."""
     rows = (*exclusions(study.path), *reversals(study.path))
     name = study.exclusions.name
@@ -45,17 +45,17 @@ def records(study: StudyFolder) -> Proofs:
     return (*map(proof_of_withdrawal, tombstones(study).values()), *opened, *dict.fromkeys(excluded))
 
 
-def lines_of(study: StudyFolder) -> str:
+def proof_lines(study: StudyFolder) -> str:
     """Return the lines that prove the current state of a study."""
-    lines = [checked_line(*proof) for proof in (*listed(study.fingerprints), *records(study))]
+    lines = [checked_line(*proof) for proof in (*read_list(study.fingerprints), *record_proofs(study))]
     if not lines:
         raise StoreError(f"{study.path} has no session that ended: there is nothing to prove yet")
     return "".join(f"{line}\n" for line in lines)
 
 
-def signed(lines: str) -> str:
+def sign_lines(lines: str) -> str:
     """Return the signature of ``lines`` as a line, made with the lab's key, which is created if missing."""
-    key = _key(draws=True)
+    key = _signing_key(draws=True)
     public = base64.b64encode(key.public_key().public_bytes_raw()).decode()
     return f"signature {public} {base64.b64encode(key.sign(lines.encode())).decode()}\n"
 
@@ -85,10 +85,10 @@ def read_proof(path: Path) -> Proof:
             )
         else:
             above += line
-    return Proof(parsed(path, above), tuple(told))
+    return Proof(parse_copy(path, above), tuple(told))
 
 
-def leave(study: StudyFolder, say: Callable[[str], object]) -> None:
+def write_proof(study: StudyFolder, say: Callable[[str], object]) -> None:
     """Write the study's proof, signed and stamped, into the folder of the settings in the background."""
     settings = workstation.load_or_default()[0]
     if settings.proofs is None:
@@ -109,15 +109,15 @@ def leave(study: StudyFolder, say: Callable[[str], object]) -> None:
 
 def proof_text(study: StudyFolder, *, server: str = "", sign: bool | None = None) -> str:
     """Return a study's proof, signed (None: if the lab has a key) and stamped if a ``server`` (URL) is given."""
-    lines, below = lines_of(study), ""
-    if sign or (sign is None and _key(draws=False) is not None):
-        below += signed(lines)
+    lines, below = proof_lines(study), ""
+    if sign or (sign is None and _signing_key(draws=False) is not None):
+        below += sign_lines(lines)
     if server:
-        below += stamped(lines, server)
+        below += request_stamp(lines, server)
     return lines + below
 
 
-def _key(*, draws: bool) -> Any:
+def _signing_key(*, draws: bool) -> Any:
     """Return the lab's private key from the system's key store; if missing, None or, with ``draws``, a new one."""
     if not draws and None in (find_spec("keyring"), find_spec("cryptography")):
         return None
@@ -142,7 +142,7 @@ def _check_signature(path: Path, lines: str, public: str, signature: str) -> str
         key.verify(base64.b64decode(signature), lines.encode())
     except (wrong, ValueError) as error:
         raise StoreError(f"{path} is not what was signed: it was changed") from error
-    own = _key(draws=False)
+    own = _signing_key(draws=False)
     if own is not None and own.public_key().public_bytes_raw() != key.public_bytes_raw():
         raise StoreError(f"{path} is signed with another key ({public}) than this computer's: it was replaced")
     return f"is signed with {'the key of this computer' if own is not None else f'{public}: compare it with your key'}"

@@ -55,7 +55,11 @@ def check_recording(file: Path, folder: Path, findings: Findings) -> list[str]:
     said = []
     for name, stream in ours:
         try:
-            of = _markers(file, stream, expected, findings) if name == MARKERS else _samples(file, stream, findings)
+            of = (
+                _check_markers(file, stream, expected, findings)
+                if name == MARKERS
+                else _check_samples(file, stream, findings)
+            )
             said += [*of, f"clock of '{name}': {clock_drift(stream)}"]
         except (ArithmeticError, LookupError, TypeError, ValueError) as error:
             why = f"{type(error).__name__}: {error}"
@@ -89,7 +93,7 @@ def _read(file: Path) -> list[Any]:
     return list(streams)
 
 
-def _markers(
+def _check_markers(
     file: Path, stream: Mapping[str, Any], expected: Mapping[SessionFolder, Sequence[str]], findings: Findings
 ) -> Iterator[str]:
     """Compare markers with the journals: between the first and the last, none may be missing or added."""
@@ -141,7 +145,7 @@ def _error_ms(session: SessionFolder, stream: Mapping[str, Any], at: Mapping[str
     return max(1e3 * float(np.abs(np.array(part) - np.median(part)).max()) for part in parts if part)
 
 
-def _samples(file: Path, stream: Mapping[str, Any], findings: Findings) -> Iterator[str]:
+def _check_samples(file: Path, stream: Mapping[str, Any], findings: Findings) -> Iterator[str]:
     """Count lost and late samples of a stream."""
     stamps_s = np.asarray(stream["time_stamps"], float)
     labels = [channel["label"][0] for channel in stream["info"]["desc"][0]["channels"][0]["channel"]]
@@ -173,14 +177,14 @@ def clock_drift(stream: Mapping[str, Any]) -> str:
     parts = zip(np.split(times_s, resets), np.split(values_s, resets), strict=True)
     said = []
     for t_s, v_s in parts:
-        slope, residual_s = _line(t_s, v_s)
+        slope, residual_s = _fit_line(t_s, v_s)
         if math.isfinite(slope):
             span = f"over {np.ptp(t_s):.0f} s, offsets within {1e3 * residual_s:.2g} ms of a line"
             said.append(f"drift {1e6 * slope:+.2g} ppm {span}")
     return "; ".join([counted(len(resets), "reset"), *said])
 
 
-def _line(t_s: NDArray[np.float64], v_s: NDArray[np.float64]) -> tuple[float, float]:
+def _fit_line(t_s: NDArray[np.float64], v_s: NDArray[np.float64]) -> tuple[float, float]:
     """Return slope and largest residual of a line through offsets; the slope is NaN for fewer than three."""
     if len(t_s) < 3 or np.ptp(t_s) == 0:
         return math.nan, math.nan

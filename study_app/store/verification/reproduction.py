@@ -20,8 +20,8 @@ from study_app.protocol.tracks import adjusting_of, design_of
 from study_app.protocol.trials.stimuli import LEVEL_RULES
 from study_app.store import receipt
 from study_app.store.blinded import blinding
-from study_app.store.blinded.blinding import opened, own_group, own_place, read_key, whole_protocol
-from study_app.store.folders import locate
+from study_app.store.blinded.blinding import complete_protocol, open_events, participant_group, place_number, read_key
+from study_app.store.folders import locate_session
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
 from study_app.store.progress import trial_results
@@ -35,7 +35,7 @@ class Reproduced:
     followed: list[str] = field(default_factory=list)
 
 
-def reproduced(session_folder: Path) -> Reproduced:
+def reproduce_session(session_folder: Path) -> Reproduced:
     """Compare a session with the orders and levels computed from its receipt, the study's key and its answers.
 
     Raises
@@ -43,7 +43,7 @@ def reproduced(session_folder: Path) -> Reproduced:
     StoreError
         It is not a session folder, or its receipt or journal, or the study's key, cannot be read.
     """
-    study, folder = locate(session_folder)
+    study, folder = locate_session(session_folder)
     ran, lines, key = receipt.read(folder.receipt), journal.read(folder.journal), read_key(study.path)
     if key.hash != ran["key_hash"]:
         raise StoreError(f"{study.key} is not the key that {folder.path} ran under: restore it from a copy")
@@ -53,10 +53,10 @@ def reproduced(session_folder: Path) -> Reproduced:
     complete = ran["status"] in events.REACHED_END
     try:
         start = events.start_of(lines)
-        protocol = own_protocol(whole_protocol(ran["protocol"], key), own_group(start, key), ran["session"])
-        place = own_place(replace(start, row_of=ran.get("row_of")), key)
+        protocol = own_protocol(complete_protocol(ran["protocol"], key), participant_group(start, key), ran["session"])
+        place = place_number(replace(start, row_of=ran.get("row_of")), key)
         schedule = build_schedule(protocol, participant, seed, place)
-        recorded = recorded_trials(opened(lines, key) if lines and events.start_of(lines).own_codes else lines)
+        recorded = recorded_trials(open_events(lines, key) if lines and events.start_of(lines).own_codes else lines)
     except (KeyError, TypeError, AttributeError, ValueError):  # the reason could reveal a condition
         raise StoreError(
             f"{folder.path}: receipt, key and journal do not give the session: verify the study's folder"
@@ -64,7 +64,7 @@ def reproduced(session_folder: Path) -> Reproduced:
     reproduction = Reproduced([*reproduce(protocol, seed, participant, recorded, complete=complete, place=place)])
     if lines and events.start_of(lines).intervals:
         compared = _Compared(protocol, Key(key.codes, key.nonce), schedule)
-        _levels(compared, lines, key, reproduction)
+        _compare_levels(compared, lines, key, reproduction)
         versions = ran["versions"]  # here receipts of 0.2.1 may have the rules as a text
         if compared.differences and str(ran.get("level_rules", versions.get("level rules"))) != str(LEVEL_RULES):
             reproduction.followed.append(
@@ -74,12 +74,14 @@ def reproduced(session_folder: Path) -> Reproduced:
     return reproduction
 
 
-def _levels(compared: "_Compared", lines: list[events.Event], key: blinding.Key, reproduction: Reproduced) -> None:
+def _compare_levels(
+    compared: "_Compared", lines: list[events.Event], key: blinding.Key, reproduction: Reproduced
+) -> None:
     """Compare the levels presented in trials of intervals with the computed ones."""
     try:
-        lines = opened(lines, key)
+        lines = open_events(lines, key)
         for index, line in enumerate(lines):
-            compared.take(line, lines[:index])
+            compared.compare_line(line, lines[:index])
     except StoreError as error:
         reproduction.differences.append(f"levels cannot be compared: {error}")
         return
@@ -103,10 +105,10 @@ class _Compared:
         self._schedule = schedule
         self._planned = {trial.number: trial for trial in self._schedule.trials}
 
-    def take(self, line: events.Event, before: Sequence[events.Event]) -> None:
+    def compare_line(self, line: events.Event, before: Sequence[events.Event]) -> None:
         """Compare one line with the level that follows from the lines before it."""
         if isinstance(line, events.IntervalEnded | events.Responses):
-            self._take_setting(line, before)
+            self._compare_setting(line, before)
         if not isinstance(line, events.TrialStarted | events.PassedOver) or line.trial not in self._planned:
             return
         trial = self._planned[line.trial]
@@ -132,7 +134,7 @@ class _Compared:
             self.differences.append(f"trial {trial.number}, attempt {line.attempt}: {what}")
         self._note(block, trial.number, follows)
 
-    def _take_setting(self, line: events.IntervalEnded | events.Responses, before: Sequence[events.Event]) -> None:
+    def _compare_setting(self, line: events.IntervalEnded | events.Responses, before: Sequence[events.Event]) -> None:
         """Compare a level set by the participant with its start plus its steps, and the answer with their sum.
 
         Lines that do not belong to a setting are ignored.

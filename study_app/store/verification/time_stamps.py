@@ -28,7 +28,7 @@ def optional_library(name: str) -> Any:
         raise StoreError(f"a proof with {name.partition('.')[0]} {EXTRA}") from error
 
 
-def stamped(lines: str, server: str) -> str:
+def request_stamp(lines: str, server: str) -> str:
     """Request a time stamp of ``lines`` from ``server`` (URL) and return it as a line.
 
     The answer must grant a token over exactly these lines, with the nonce of the request, and come from the configured
@@ -44,7 +44,7 @@ def stamped(lines: str, server: str) -> str:
     if not server.startswith(("http://", "https://")):
         raise StoreError(f"{without_login(server)} is not a server of time stamps: give a URL such as {_EXAMPLE}")
     answers = queue.SimpleQueue[bytes | Exception]()
-    threading.Thread(target=_ask, args=(server, request.as_bytes(), answers), daemon=True).start()
+    threading.Thread(target=_post_request, args=(server, request.as_bytes(), answers), daemon=True).start()
     try:
         answer = answers.get(timeout=WAITS_S)  # the time-out of a connection applies to each packet
         if not isinstance(answer, Exception):
@@ -80,7 +80,7 @@ def check_granted(answer: bytes, request: Any) -> None:
         raise ValueError("the token answers another request")
 
 
-def _ask(server: str, question: bytes, answers: queue.SimpleQueue[bytes | Exception]) -> None:
+def _post_request(server: str, question: bytes, answers: queue.SimpleQueue[bytes | Exception]) -> None:
     """Put the server's answer, truncated after `LONGEST`, or the error of the request; follow no redirect."""
     import urllib.request as network  # noqa: PLC0415 - loads the network's modules: only where a stamp is asked for
 

@@ -3,8 +3,8 @@
 Of a session that is open in a program only the journal is judged, which that program does not change again; its other
 files follow the journal. If `fingerprints.txt` lists it as ended, its fingerprint is compared even if a lock says that
 it is open.
-`verify` checks everything and takes its time; `doubts` checks a session before an analysis reads it, unless its files
-keep their checksums.
+`verify_study` checks everything, which takes a while; `session_discrepancies` checks a session before an analysis
+reads it, unless its files keep their checksums.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ import study_app
 from study_app.errors import PlugInError, StoreError
 from study_app.number_text import counted
 from study_app.store import csv_files, receipt
-from study_app.store.atomic import is_there, parse_json, read_own, read_regular, study_root, temporaries
-from study_app.store.blinded.blinding import Key, opened, opened_key, whole_protocol
-from study_app.store.checksums import files, fingerprint, hashed, read_checksums, system_files
+from study_app.store.atomic import is_there, parse_json, read_own, read_regular, study_root, temporary_files
+from study_app.store.blinded.blinding import Key, complete_protocol, open_events, opened_key
+from study_app.store.checksums import file_hash, fingerprint, read_checksums, session_files, system_files
 from study_app.store.csv_files import Column
-from study_app.store.folder_lock import is_open, never_begun
+from study_app.store.folder_lock import is_never_begun, is_open
 from study_app.store.folders import FINGERPRINTS, SessionFolder
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
 from study_app.store.journals.journal import OTHER_LINE_ENDINGS, Contents
-from study_app.store.progress import Progress, named, progress_of, recordable
+from study_app.store.progress import Progress, attempt_name, progress_of, recordable
 from study_app.store.recorder import recording_files
 from study_app.store.sessions.open_session import Place, table_files
-from study_app.store.sessions.recovery import RESTORE, beyond
+from study_app.store.sessions.recovery import RESTORE, files_beyond_journal
 from study_app.store.tables.session_tables import table_columns
 from study_app.store.tables.study_files import opened_or_none, row_from
 
@@ -72,11 +72,11 @@ class Findings:
     plug_ins: dict[str, list[str]] = field(default_factory=dict)
 
     @property
-    def sound(self) -> bool:
+    def is_sound(self) -> bool:
         """Whether there are no errors."""
         return not self.errors
 
-    def take(self, others: Findings) -> None:
+    def extend(self, others: Findings) -> None:
         """Add the findings of ``others``."""
         self.errors += others.errors
         self.warnings += others.warnings
@@ -132,28 +132,30 @@ def check_session(place: Place, key: Key | None, findings: Findings, *, recordin
     errors = Findings(findings.folder)
     checked = CheckedSession(place=place, running=is_open(place.folder.path))
     with errors.reading(place.folder.path):
-        checked = _check(place, key, errors, running=checked.running, recordings=recordings)
+        checked = _check_files(place, key, errors, running=checked.running, recordings=recordings)
     if errors.errors and not checked.running and is_open(place.folder.path):
         return check_session(place, key, findings, recordings=recordings)
-    findings.take(errors)
+    findings.extend(errors)
     return checked
 
 
-def _check(place: Place, key: Key | None, findings: Findings, *, running: bool, recordings: bool) -> CheckedSession:
+def _check_files(
+    place: Place, key: Key | None, findings: Findings, *, running: bool, recordings: bool
+) -> CheckedSession:
     folder = place.folder
     if running:
         findings.warning(folder.path, "is open in another program")
     else:
-        for path in (*temporaries(folder.path), *temporaries(folder.recordings)):
+        for path in (*temporary_files(folder.path), *temporary_files(folder.recordings)):
             findings.warning(path, "is an incomplete file of a program that was ended; rebuild removes it")
         if is_there(folder.crash) and folder.crash.stat().st_size:
             findings.warning(folder.crash, "shows where the program crashed: send it to the developers")
-    contents = _journal(folder, findings, running=running)
+    contents = _check_journal(folder, findings, running=running)
     lines = contents.lines
     if not running:
-        _receipt(folder, lines, key, findings)
+        _check_receipt(folder, lines, key, findings)
     if not lines:
-        return CheckedSession(place=place, readable=running or never_begun(folder.path), running=running)
+        return CheckedSession(place=place, readable=running or is_never_begun(folder.path), running=running)
     start = events.start_of(lines)
     expected = {"participant": folder.participant, "session": folder.number, "study": place.study}
     for name, value in expected.items():
@@ -161,27 +163,29 @@ def _check(place: Place, key: Key | None, findings: Findings, *, running: bool, 
             findings.error(folder.journal, f"is of {name} {told!r}, but is stored with those of {value!r}")
     told = lines
     with findings.reading(folder.journal):
-        told = opened(lines, key)
-    for wrong in (*wrong_responses(lines), *_removed(lines)):
+        told = open_events(lines, key)
+    for wrong in (*wrong_responses(lines), *_unconfirmed_answers(lines)):
         findings.error(folder.journal, wrong)
     ended = isinstance(lines[-1], events.SessionEnded)
     hashes = {}
     if ended or not running:
-        names = (*files(folder), *_listed_system_files(folder))
+        names = (*session_files(folder), *_listed_system_files(folder))
         hashes = {name: _hash(folder, name) for name in names if recordings or not name.endswith(".parquet")}
     if not running:
-        _tables(place, lines, findings, ended=ended)
+        _check_tables(place, lines, findings, ended=ended)
         if ended:
-            _checksums(folder, told, hashes, findings, recordings=recordings)
+            _check_checksums(folder, told, hashes, findings, recordings=recordings)
         if recordings:
-            _recordings(folder, told, key, hashes, findings, ended=ended)
+            _check_recordings(folder, told, key, hashes, findings, ended=ended)
     for name in system_files(folder):
         if name not in hashes:
             findings.warning(folder.path / name, "is a file of an operating system or of a program that shares files")
     if is_there(folder.rebuilt):
         with findings.reading(folder.rebuilt):
             for line in read_own(folder.rebuilt, study_root(folder.rebuilt)).decode("utf-8", "replace").splitlines():
-                findings.warning(folder.rebuilt, f"{events.shortened(line)}; only a copy of {FINGERPRINTS} proves more")
+                findings.warning(
+                    folder.rebuilt, f"{events.shorten_value(line)}; only a copy of {FINGERPRINTS} proves more"
+                )
     return CheckedSession(
         place=place,
         readable=True,
@@ -193,11 +197,11 @@ def _check(place: Place, key: Key | None, findings: Findings, *, running: bool, 
     )
 
 
-def _journal(folder: SessionFolder, findings: Findings, *, running: bool) -> Contents:
+def _check_journal(folder: SessionFolder, findings: Findings, *, running: bool) -> Contents:
     """Check the journal and return its contents, without lines if they cannot be those of the session."""
     nothing = Contents([], 0)
     if not is_there(folder.journal):
-        if never_begun(folder.path):
+        if is_never_begun(folder.path):
             if not running:
                 findings.warning(
                     folder.path,
@@ -216,7 +220,7 @@ def _journal(folder: SessionFolder, findings: Findings, *, running: bool) -> Con
     if contents.torn_bytes and not running:
         findings.warning(folder.journal, f"it ends with an incomplete line of {counted(contents.torn_bytes, 'byte')}")
     if not contents.lines:
-        if running or never_begun(folder.path):
+        if running or is_never_begun(folder.path):
             if not running:
                 findings.warning(folder.journal, "has no complete line: nothing was recorded")
         elif contents.damage is None:
@@ -242,7 +246,7 @@ def _journal(folder: SessionFolder, findings: Findings, *, running: bool) -> Con
     return contents
 
 
-def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, findings: Findings) -> None:
+def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, findings: Findings) -> None:
     path = folder.receipt
     if not lines and not is_there(path):
         return  # claimed but never begun
@@ -261,7 +265,7 @@ def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, 
     optional = ("row_of", "group")
     compared = [name for name in (*receipt.COPIED_FIELDS, *optional) if name in held or name in optional]
     differing = [name for name in compared if held.get(name) != getattr(start, name)]
-    differing += _differing(held, lines)
+    differing += _differing_fields(held, lines)
     if not differing and start.receipt_hash not in (None, receipt.digest(held)):
         differing = ["what the session began with"]
     if differing:
@@ -276,7 +280,7 @@ def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, 
         )
     if key is not None and not _is_protocol(held, start, key):
         findings.error(path, "its protocol was changed: restore it from a copy")
-    if receipt.other_format(held, start):
+    if receipt.has_other_format(held, start):
         findings.error(
             folder.journal, f"has another format than {path.name} states: it was changed; restore it from a copy"
         )
@@ -294,7 +298,7 @@ def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, 
         findings.error(folder.journal, f"its status is {last.status!r}, though the last page was left: it was changed")
 
 
-def _differing(held: Mapping[str, Any], lines: Sequence[events.Event]) -> list[str]:
+def _differing_fields(held: Mapping[str, Any], lines: Sequence[events.Event]) -> list[str]:
     """Return the fields of a receipt that the journal contradicts, without those copied from its first line."""
     start = events.start_of(lines)
     resumed = {line.at: line.receipt_hash for line in lines if isinstance(line, events.SessionResumed)}
@@ -320,7 +324,7 @@ def _differing(held: Mapping[str, Any], lines: Sequence[events.Event]) -> list[s
 def _is_protocol(held: Mapping[str, Any], start: events.SessionStarted, key: Key) -> bool:
     """Return whether a receipt's protocol, completed from the key, is valid and as this version writes it."""
     try:
-        whole = receipt.without_conditions(whole_protocol(held["protocol"], key))
+        whole = receipt.without_conditions(complete_protocol(held["protocol"], key))
     except PlugInError:  # the plug-in is missing; `verify` reports it
         return True
     except (KeyError, TypeError, AttributeError, ValueError):
@@ -328,7 +332,7 @@ def _is_protocol(held: Mapping[str, Any], start: events.SessionStarted, key: Key
     return start.version != study_app.__version__ or parse_json(json.dumps(whole)) == held["protocol"]
 
 
-def _removed(lines: Sequence[events.Event]) -> Iterator[str]:
+def _unconfirmed_answers(lines: Sequence[events.Event]) -> Iterator[str]:
     """Yield a sentence on each trial or form whose answers were never confirmed although the session continued."""
     chosen: dict[int, int] = {}
     form: events.FormShown | None = None
@@ -378,11 +382,11 @@ def _same_answer(listed_answer: events.Answer, given: events.Answer) -> bool:
     )
 
 
-def _tables(place: Place, lines: list[events.Event], findings: Findings, *, ended: bool) -> None:
+def _check_tables(place: Place, lines: list[events.Event], findings: Findings, *, ended: bool) -> None:
     """Compare the tables with those made from the journal; report tables that contain more than the journal."""
     telling: set[Path] = set()
     with contextlib.suppress(StoreError):  # already reported for receipt or journal
-        for path, what in beyond(place, lines):
+        for path, what in files_beyond_journal(place, lines):
             findings.error(path, f"{what}: {RESTORE}")
             telling.add(path)
     try:
@@ -409,7 +413,7 @@ def check_table(
     except OSError:
         findings.error(path, "is missing or cannot be read; rebuild makes it again")
         return
-    expected, columns = csv_files.in_columns_of(content, expected, columns)
+    expected, columns = csv_files.align_columns(content, expected, columns)
     pairs = zip_longest(content.split(b"\n"), expected.split(b"\n"))
     differing = [number for number, (held, whole) in enumerate(pairs, start=1) if held != whole]
     follows = all(map(may_differ, differing))
@@ -417,14 +421,14 @@ def check_table(
         report = findings.warning if follows else findings.error
         report(path, f"differs from the journal, from line {differing[0]} on; rebuild renews it")
     if not (differing and follows):  # a row may be partly written: earlier versions wrote in place
-        for problem in csv_files.problems(content, columns):
+        for problem in csv_files.table_problems(content, columns):
             findings.error(path, problem)
 
 
 def _hash(folder: SessionFolder, name: str) -> str:
     """Return the current SHA-256 of a session's file, "" if it cannot be read."""
     try:
-        return hashed(folder, name)
+        return file_hash(folder, name)
     except StoreError:
         return ""
 
@@ -437,7 +441,7 @@ def _listed_system_files(folder: SessionFolder) -> Iterator[str]:
             yield from (name for name in names if name in listed)
 
 
-def _checksums(
+def _check_checksums(
     folder: SessionFolder,
     lines: Sequence[events.Event],
     hashes: Mapping[str, str],
@@ -472,7 +476,7 @@ def _checksums(
                 findings.error(path, OTHER_LINE_ENDINGS if unchanged else CHANGED)
 
 
-def _recordings(
+def _check_recordings(
     folder: SessionFolder,
     lines: list[events.Event],
     key: Key | None,
@@ -486,10 +490,10 @@ def _recordings(
     known = {line.which for line in lines if isinstance(line, events.Recorded | events.RecordingLost)}
     for line in lines:
         if isinstance(line, events.RecordingLost):
-            findings.warning(folder.recordings, f"{named(*line.which)} has none: {line.reason}")
+            findings.warning(folder.recordings, f"{attempt_name(*line.which)} has none: {line.reason}")
         if not isinstance(line, events.Recorded):
             continue
-        which = named(*line.which)
+        which = attempt_name(*line.which)
         if line.samples_unrecorded:
             findings.warning(folder.path / line.recording, f"lacks {line.samples_unrecorded} samples")
         for kind, name, rows, digests in (
@@ -503,11 +507,13 @@ def _recordings(
             if hashes[name] not in digests:
                 findings.error(folder.path / name, f"has changed since it was recorded ({which})")
             if rows is not None:  # without a key sealed files cannot be read, as already reported
-                _facts(folder, line, kind, name, rows, key, findings)
+                _check_facts(folder, line, kind, name, rows, key, findings)
     if events.start_of(lines).recordings:
         for planned in recordable(lines)[: None if ended else -1]:
             if planned not in known:
-                findings.warning(folder.recordings, f"{named(*planned)} has none, and the journal gives no reason")
+                findings.warning(
+                    folder.recordings, f"{attempt_name(*planned)} has none, and the journal gives no reason"
+                )
     of_trials = {
         path.relative_to(folder.path).as_posix()
         for recorded in recordable(lines)
@@ -521,7 +527,7 @@ def _recordings(
             findings.warning(folder.path / name, f"is in no line of the journal{then}")
 
 
-def _facts(
+def _check_facts(
     folder: SessionFolder, line: events.Recorded, kind: str, name: str, rows: int, key: Key | None, findings: Findings
 ) -> None:
     from study_app.store import recordings  # noqa: PLC0415 - loads the Parquet library, where there are recordings
@@ -548,7 +554,7 @@ class Discrepancy:
         return f"{self.path} {self.what}: {self.remedy}"
 
 
-def doubts(place: Place) -> tuple[Discrepancy, ...]:
+def session_discrepancies(place: Place) -> tuple[Discrepancy, ...]:
     """Return the discrepancies of a session's journal, receipt, tables and checksums.
 
     Once the session has ended they are compared with their checksums: files that keep these are as they were when the
@@ -560,7 +566,7 @@ def doubts(place: Place) -> tuple[Discrepancy, ...]:
     if is_open(folder.path):
         return ()
     discrepancies = (Discrepancy(folder.rebuilt, REBUILT_AFTER, COMPARE),) if is_there(folder.rebuilt) else ()
-    if _as_ended(place):
+    if _is_as_ended(place):
         return discrepancies
     told = Findings(folder.path)
     check_session(place, None, told, recordings=False)
@@ -576,13 +582,15 @@ def doubts(place: Place) -> tuple[Discrepancy, ...]:
     )
 
 
-def _as_ended(place: Place) -> bool:
+def _is_as_ended(place: Place) -> bool:
     """Return whether journal, receipt and tables match the checksums of the session's end."""
     folder = place.folder
     tables = [folder.table(place.study, name) for name in ("responses", "trials", "intervals")]
     tables = [path for path in tables if path != tables[-1] or is_there(path)]  # few studies have intervals
     try:
         listed = read_checksums(folder)
-        return all(listed.get(it.name) == hashed(folder, it.name) for it in (folder.journal, folder.receipt, *tables))
+        return all(
+            listed.get(it.name) == file_hash(folder, it.name) for it in (folder.journal, folder.receipt, *tables)
+        )
     except StoreError:
         return False

@@ -21,30 +21,30 @@ from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
 from study_app.protocol.source.files import without_mark
 from study_app.store import csv_files, exclusions, receipt
-from study_app.store.atomic import is_there, read_own, read_regular, temporaries
+from study_app.store.atomic import is_there, read_own, read_regular, temporary_files
 from study_app.store.blinded import blinding
 from study_app.store.blinded.allocation import Claim, claims, entries_begun, is_unchanged
-from study_app.store.blinded.blinding import Key, opened, sealed_hash, whole_protocol
-from study_app.store.checksums import Proofs, checked_line, listed, place_of, unreadable
+from study_app.store.blinded.blinding import Key, complete_protocol, open_events, sealed_hash
+from study_app.store.checksums import Proofs, checked_line, place_of, read_list, unreadable_lines
 from study_app.store.columns import EXCLUSIONS
 from study_app.store.folder_lock import is_open
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.merged import Merged, Site, read_merged
 from study_app.store.sessions.open_session import Place
-from study_app.store.sites.merge import unlisted
+from study_app.store.sites.merge import stray_entries
 from study_app.store.study_runs import run_of
 from study_app.store.tables.study_files import (
     columns_of,
     described_study,
-    describes_alike,
     description_bytes,
     has_intervals,
-    names_sealed,
+    has_sealed_columns,
+    is_same_description,
     table_bytes,
 )
 from study_app.store.verification.leaks import certain_telltales, find_leaks, presented_numbers, recorded_numbers
-from study_app.store.verification.proofs import Proof, read_proof, records
+from study_app.store.verification.proofs import Proof, read_proof, record_proofs
 from study_app.store.verification.verify_session import CheckedSession, Findings, check_session, check_table
 from study_app.store.withdrawals import Tombstone, describe_session, proof_of_withdrawal, tombstones
 
@@ -53,7 +53,7 @@ IN_FILES: Final = ("question", "task", "method")
 Sessions: TypeAlias = list[CheckedSession]
 
 
-def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
+def verify_study(folder: Path, fingerprints: Path | None = None) -> Findings:
     """Check a whole study, merged or not.
 
     Parameters
@@ -75,9 +75,9 @@ def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
         copy = None if fingerprints is None else (fingerprints, read_proof(fingerprints))
         sessions = _verify_study(folder, copy, findings)
     elif fingerprints is None:
-        _between(merged, findings)
+        _check_sites(merged, findings)
         sessions = []
-        for site in filter(Path.is_dir, map(merged.folder, merged.names)):  # `_between` reports the missing ones
+        for site in filter(Path.is_dir, map(merged.folder, merged.names)):  # `_check_sites` reports the missing ones
             with findings.reading(site):
                 sessions += _verify_study(site, None, findings)
     else:
@@ -99,29 +99,29 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findi
     key = None
     with findings.reading(study.key):
         key = blinding.read_key(study.path)
-    early = listed(study.fingerprints)
-    withdrawn = _withdrawn(study, findings)
+    early = read_list(study.fingerprints)
+    withdrawn = _check_withdrawals(study, findings)
     sessions = [check_session(Place(study, session, name), key, findings) for session in study.sessions()]
-    _plug_ins(study, findings)
-    _contents(study, findings)
-    _participants(study, name, sessions, findings)
+    _check_plug_ins(study, findings)
+    _check_contents(study, findings)
+    _check_participants(study, name, sessions, findings)
     if early_journals := sum(session.row is not None and not session.chained for session in sessions):
         many = "1 journal is" if early_journals == 1 else f"{early_journals} journals are"
         findings.warning(study.data, f"{many} of format 1, whose lines cannot show whether an earlier line was changed")
-    _fingerprints(study, sessions, early, findings)
+    _check_fingerprints(study, sessions, early, findings)
     if copy is not None:
-        _copy(study, sessions, withdrawn, *copy, findings)
-    _description(study, findings)
-    _exclusions(study, sessions, findings)
-    _reveals(study, key, findings)
+        _check_copy(study, sessions, withdrawn, *copy, findings)
+    _check_description(study, findings)
+    _check_exclusions(study, sessions, findings)
+    _check_reveals(study, key, findings)
     check_allocation(study, key, withdrawn, findings)
-    _blinding(study, key, findings)
-    for path in (*temporaries(folder), *temporaries(study.data)):
+    _check_blinding(study, key, findings)
+    for path in (*temporary_files(folder), *temporary_files(study.data)):
         findings.warning(path, "is an incomplete file of a program that was ended, or is being written")
     return sessions
 
 
-def _plug_ins(study: StudyFolder, findings: Findings) -> None:
+def _check_plug_ins(study: StudyFolder, findings: Findings) -> None:
     """Collect the plug-ins that the sessions used, and report those that are not installed."""
     used = receipt.recorded_plug_ins(session.receipt for session in study.sessions())
     findings.plug_ins |= used
@@ -134,7 +134,7 @@ def _plug_ins(study: StudyFolder, findings: Findings) -> None:
             findings.warning(study.data, f"{what}: what only the plug-in can tell was not checked")
 
 
-def _contents(study: StudyFolder, findings: Findings) -> None:
+def _check_contents(study: StudyFolder, findings: Findings) -> None:
     """Report versions under which different contents of the study's file were run."""
     runs = filter(None, (run_of(session.receipt) for session in study.sessions()))
     hashes: dict[str, set[str]] = {}
@@ -191,7 +191,7 @@ def _same_entry(claim: Claim, replaced: Claim | None) -> bool:
     return replaced is not None and (claim.group, claim.entry) == (replaced.group, replaced.entry)
 
 
-def _withdrawn(study: StudyFolder, findings: Findings) -> dict[str, Tombstone]:
+def _check_withdrawals(study: StudyFolder, findings: Findings) -> dict[str, Tombstone]:
     """Return the withdrawals, and report unfinished ones."""
     try:
         withdrawn = tombstones(study)
@@ -208,7 +208,7 @@ def _withdrawn(study: StudyFolder, findings: Findings) -> dict[str, Tombstone]:
     return withdrawn
 
 
-def _participants(study: StudyFolder, name: str, sessions: Sessions, findings: Findings) -> None:
+def _check_participants(study: StudyFolder, name: str, sessions: Sessions, findings: Findings) -> None:
     """Check the participants table if the journals of all sessions could be read.
 
     Lines of sessions that have not ended may be behind their journals. The table is not judged where a program writes
@@ -228,22 +228,22 @@ def _participants(study: StudyFolder, name: str, sessions: Sessions, findings: F
         or any(is_open(session.path) for session in now)
     )
     if not (told.errors and written):
-        findings.take(told)
+        findings.extend(told)
 
 
-def _fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, findings: Findings) -> None:
+def _check_fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, findings: Findings) -> None:
     """Compare the sessions with the study's own list, read before they were checked.
 
     A program lists a session once its files are final, just before it lets go of it: a listed one is judged even where
     it is open.
     """
     path = study.fingerprints
-    for number in unreadable(path):
+    for number in unreadable_lines(path):
         findings.error(path, f"line {number} is not a fingerprint: restore it from a copy")
-    _compare(study, sessions, early, path.name, findings)
+    _compare_proofs(study, sessions, early, path.name, findings)
     if is_open(study.path):  # written by a program that lists a session just after creating it
         return
-    known = {place for _, place in listed(path)}
+    known = {place for _, place in read_list(path)}
     for session in sessions:
         if (
             session.fingerprint
@@ -254,7 +254,7 @@ def _fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, finding
             findings.error(path, f"lacks {place_of(study, session.place.folder)}, which has ended; rebuild adds it")
 
 
-def _copy(
+def _check_copy(
     study: StudyFolder,
     sessions: Sessions,
     withdrawn: Mapping[str, Tombstone],
@@ -268,8 +268,10 @@ def _copy(
     erased: set[tuple[str, str]] = set()
     recorded: Proofs = ()
     with contextlib.suppress(StoreError):  # already reported
-        recorded = records(study)
-    kept = _as_named(proof.lines, [*withdrawn, *(session.place.folder.participant for session in sessions)], recorded)
+        recorded = record_proofs(study)
+    kept = _with_study_spelling(
+        proof.lines, [*withdrawn, *(session.place.folder.participant for session in sessions)], recorded
+    )
     for participant, tombstone in withdrawn.items():
         folders = [study.session(participant, erased.session) for erased in tombstone.sessions]
         own = {
@@ -287,7 +289,7 @@ def _copy(
         if not place.startswith("data/") and (record, place) not in recorded:
             what = f"lacks what {path} lists as {record} ({place}): it was deleted or changed"
             findings.error(study.path / place.partition("/")[0], what)
-    _compare(study, sessions, copy, str(path), findings)
+    _compare_proofs(study, sessions, copy, str(path), findings)
     known = {place for _, place in copy}
     for session in sessions:
         if session.fingerprint and not session.running and place_of(study, session.place.folder) not in known:
@@ -295,7 +297,7 @@ def _copy(
             findings.error(session.place.folder.path, f"{lacks}: it was added, or ended, after that copy was made")
 
 
-def _as_named(lines: Proofs, participants: Iterable[str], recorded: Proofs) -> Proofs:
+def _with_study_spelling(lines: Proofs, participants: Iterable[str], recorded: Proofs) -> Proofs:
     """Normalise the case of participant IDs in ``lines`` to the study's spelling."""
     known = {*participants, *(place.rpartition("sub-")[2] for _, place in recorded)}
     names = {name.lower(): name for name in known} | {name: name for name in known}
@@ -304,7 +306,7 @@ def _as_named(lines: Proofs, participants: Iterable[str], recorded: Proofs) -> P
     )
 
 
-def _compare(
+def _compare_proofs(
     study: StudyFolder, sessions: Sessions, proofs: Iterable[tuple[str, str]], name: str, findings: Findings
 ) -> None:
     by_place = {place_of(study, session.place.folder): session for session in sessions}
@@ -320,19 +322,19 @@ def _compare(
             findings.error(path, f"is not the session that {name} lists as {proof}: it was changed ({now})")
 
 
-def _description(study: StudyFolder, findings: Findings) -> None:
+def _check_description(study: StudyFolder, findings: Findings) -> None:
     """Compare the description with the one that this version writes for the study in one of the receipts."""
     held = read_own(study.description, study.path)
-    sealed = not (blinding.reveals(study.path) or names_sealed(held))
+    sealed = not (blinding.reveals(study.path) or has_sealed_columns(held))
     heads: set[bytes] = set()
-    for protocol in _published(study):
+    for protocol in _published_protocols(study):
         with contextlib.suppress(KeyError, TypeError, ValueError):  # said of the receipt already
             head, number = StudyHead.model_validate(protocol["study"]), protocol.get("format", 1)
             intervals = has_intervals(protocol)
             heads.add(description_bytes(head, sealed=sealed, protocol_format=number, intervals=intervals))
     if not heads or held in heads:
         return
-    if any(describes_alike(held, head) for head in heads):
+    if any(is_same_description(held, head) for head in heads):
         findings.warning(
             study.description, "describes the columns as an earlier version of the program did", shares=True
         )
@@ -340,7 +342,7 @@ def _description(study: StudyFolder, findings: Findings) -> None:
         findings.error(study.description, "differs from what this version writes for the study in the receipts")
 
 
-def _published(study: StudyFolder) -> Iterator[dict[str, Any]]:
+def _published_protocols(study: StudyFolder) -> Iterator[dict[str, Any]]:
     """Yield the protocols of the receipts that can be read."""
     for session in study.sessions():
         with contextlib.suppress(StoreError):  # said of the receipt already
@@ -349,14 +351,14 @@ def _published(study: StudyFolder) -> Iterator[dict[str, Any]]:
                 yield protocol
 
 
-def _exclusions(study: StudyFolder, sessions: Sessions, findings: Findings) -> None:
+def _check_exclusions(study: StudyFolder, sessions: Sessions, findings: Findings) -> None:
     with findings.reading(study.reversed_exclusions):
         exclusions.reversals(study.path)
     with findings.reading(study.exclusions):
         rows = exclusions.exclusions(study.path)
         if not is_there(study.exclusions):
             return
-        for problem in csv_files.problems(without_mark(read_regular(study.exclusions)), EXCLUSIONS):
+        for problem in csv_files.table_problems(without_mark(read_regular(study.exclusions)), EXCLUSIONS):
             findings.error(study.exclusions, problem)
         trials = {
             (session.place.folder.participant, session.place.folder.number): session.trials for session in sessions
@@ -364,10 +366,10 @@ def _exclusions(study: StudyFolder, sessions: Sessions, findings: Findings) -> N
         for row in rows:
             known = trials.get((row.participant, row.session))
             if known is None or (row.trial is not None and row.trial not in known):
-                findings.error(study.exclusions, f"there is no {exclusions.named(row)}")
+                findings.error(study.exclusions, f"there is no {exclusions.describe_exclusion(row)}")
 
 
-def _reveals(study: StudyFolder, key: Key | None, findings: Findings) -> None:
+def _check_reveals(study: StudyFolder, key: Key | None, findings: Findings) -> None:
     with findings.reading(study.reveals):
         for number, torn in blinding.unreadable_reveals(study.path):
             if torn:
@@ -381,23 +383,23 @@ def _reveals(study: StudyFolder, key: Key | None, findings: Findings) -> None:
                 findings.error(study.reveals, f"reveal {number} was of another key")
 
 
-def _blinding(study: StudyFolder, key: Key | None, findings: Findings) -> None:
+def _check_blinding(study: StudyFolder, key: Key | None, findings: Findings) -> None:
     """Report where a condition is revealed although the key is sealed, without naming it."""
-    published = next(_published(study), None)
+    published = next(_published_protocols(study), None)
     if key is None or blinding.reveals(study.path) or published is None:
         return
     levels: frozenset[float] = frozenset()
     with contextlib.suppress(KeyError, TypeError, AttributeError, ValueError):  # a receipt that lacks required fields
-        protocol = whole_protocol(published, key)
+        protocol = complete_protocol(published, key)
         levels = presented_numbers(protocol)
         for session in study.sessions() if has_intervals(published) else ():  # others present no levels
             with contextlib.suppress(StoreError):  # already reported for the journal
-                levels |= recorded_numbers(protocol, opened(journal.read(session.journal), key))
+                levels |= recorded_numbers(protocol, open_events(journal.read(session.journal), key))
     for leak in find_leaks(study.path, certain_telltales(key.tables, published, levels)):
         findings.warning(study.path, f"{leak.place} reveals a condition, although the key is sealed")
 
 
-def _between(merged: Merged, findings: Findings) -> None:
+def _check_sites(merged: Merged, findings: Findings) -> None:
     """Compare the sites with the list of sites, and check that no session is in two sites."""
     seen: dict[str, Path] = {}
     for site in merged.sites:
@@ -409,7 +411,7 @@ def _between(merged: Merged, findings: Findings) -> None:
         if sealed_hash(folder) != site.key_hash:
             key = StudyFolder(folder).key
             findings.error(key, f"is not the key that site {site.name} was merged with: restore it from a copy")
-        _compare_site(merged, site, findings)
+        _check_site(merged, site, findings)
         for session in StudyFolder(folder).sessions():
             with contextlib.suppress(StoreError):  # said when the site is checked
                 if (other := receipt.read(session.receipt)["protocol_hash"]) != merged.protocol_hash:
@@ -420,13 +422,13 @@ def _between(merged: Merged, findings: Findings) -> None:
                     session.path, f"is a copy of {twin.relative_to(merged.path).as_posix()}: it counts twice"
                 )
             seen[begun] = session.path
-    for path in unlisted(merged):
+    for path in stray_entries(merged):
         findings.warning(path, f"is not a site that {merged.manifest.name} lists, so it is ignored")
-    for path in temporaries(merged.path):
+    for path in temporary_files(merged.path):
         findings.warning(path, "is an incomplete file of a program that was ended, or is being written")
 
 
-def _compare_site(merged: Merged, site: Site, findings: Findings) -> None:
+def _check_site(merged: Merged, site: Site, findings: Findings) -> None:
     """Compare a site's folder with its entry in the list of sites; only withdrawn sessions may be missing."""
     study = StudyFolder(merged.folder(site.name))
     if (name := described_study(study)) not in (None, merged.study):

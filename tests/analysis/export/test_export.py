@@ -11,7 +11,7 @@ from study_app.analysis.export.tables import Delivered
 from study_app.analysis.export_study import export
 from study_app.errors import AnalysisError
 from study_app.store.columns import SEALED
-from study_app.store.csv_files import Column, unguarded
+from study_app.store.csv_files import Column, unguard_formula
 from study_app.store.output_files import write_files
 from tests.analysis.conftest import Results
 
@@ -88,7 +88,7 @@ def test_a_text_is_no_formula_in_a_spreadsheet_and_a_negative_number_a_number(re
     export(rek.folder, to)
     found = rows(to, "trials")
     assert {row["exclusion_reason"] for row in found} == {"'=1+1"}
-    assert {unguarded(row["exclusion_reason"]) for row in found} == {"=1+1"}
+    assert {unguard_formula(row["exclusion_reason"]) for row in found} == {"=1+1"}
     frame = pd.DataFrame({"text": ["-1"], "number": [-1.5]})
     columns = (Column("text", "text", ""), Column("number", "number", ""))
     assert table_bytes(Delivered("numbers", columns, frame)) == b"text,number\n'-1,-1.5\n"

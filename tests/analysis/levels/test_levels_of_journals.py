@@ -14,7 +14,7 @@ import pytest
 from study_app.analysis.export_study import export
 from study_app.analysis.report.write_report import report
 from study_app.protocol.load import load
-from study_app.store.blinded.blinding import opened, read_key, whole_protocol
+from study_app.store.blinded.blinding import complete_protocol, open_events, read_key
 from study_app.store.columns import INTERVALS
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
@@ -50,7 +50,7 @@ def answered(folder: Path, block: str) -> list[Answered]:
     key = read_key(folder)
     for session in StudyFolder(folder).sessions():
         started: dict[int, dict[str, Any]] = {}
-        for line in raw(opened(journal.read(session.journal), key)):
+        for line in raw(open_events(journal.read(session.journal), key)):
             if line["event"] == "trial_started" and line["block"] == block:
                 started[line["trial"]] = line
             elif line["event"] == "responses" and line["trial"] in started:
@@ -136,7 +136,7 @@ def test_the_report_of_a_sealed_study_shows_counts_and_times_by_code_and_no_leve
     assert not list(tmp_path.glob("levels-*"))
     key = read_key(sealed_levels)
     published = read(StudyFolder(sealed_levels).sessions()[0].receipt)["protocol"]
-    levels = presented_numbers(whole_protocol(published, key))
+    levels = presented_numbers(complete_protocol(published, key))
     assert levels == presented_numbers(load(str(sealed_levels.parent / "levels.toml")))
     words = certain_telltales(key.tables, published, levels)
     for path in tmp_path.iterdir():

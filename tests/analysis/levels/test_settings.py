@@ -16,7 +16,7 @@ from study_app.protocol.trials.designs import Adjusted
 from study_app.protocol.trials.methods import default_method
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.blinded.blinding import opened, read_key
+from study_app.store.blinded.blinding import open_events, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.unblinding import unblind
@@ -85,7 +85,9 @@ def test_before_unblinding_there_are_steps_and_no_level(sealed: Path, tmp_path: 
     key = read_key(sealed)
     levels: list[Any] = []
     for session in StudyFolder(sealed).sessions():
-        levels += [line["setting"] for line in raw(opened(journal.read(session.journal), key)) if line.get("setting")]
+        levels += [
+            line["setting"] for line in raw(open_events(journal.read(session.journal), key)) if line.get("setting")
+        ]
     assert levels
     assert not [level for level in levels if f"{level:.5g}" in text]
     assert "Not yet revealed" in text

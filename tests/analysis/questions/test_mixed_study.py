@@ -15,8 +15,8 @@ from study_app.protocol.simulated import TrialFeatures
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import exclude
 from study_app.store.folders import StudyFolder
-from study_app.store.verification.reproduction import reproduced
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.reproduction import reproduce_session
+from study_app.store.verification.verify_study import verify_study
 from tests.protocol.forms.mixed import mixed_file
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
@@ -70,8 +70,8 @@ def test_order_is_reproduced_where_answers_hid_questions(tmp_path: Path) -> None
     sessions = StudyFolder(folder).sessions()
     asked = len(load_study(folder).answered.query("item == 'pleasant'"))
     assert 0 < asked < 2 * len(sessions)  # hidden from some
-    assert [reproduced(session.path).differences for session in sessions] == [[]] * 8
-    assert verify(folder).errors == ()
+    assert [reproduce_session(session.path).differences for session in sessions] == [[]] * 8
+    assert verify_study(folder).errors == ()
 
 
 def test_excluded_session_counts_in_no_form(folder: Path, tmp_path: Path) -> None:
@@ -105,8 +105,8 @@ def test_a_form_after_each_block_is_analysed_block_by_block(tmp_path: Path, orde
     named = (name, name if grouped else f'{name}\nblock_order = "{order}"')
     protocol = mixed_file(tmp_path, *sequence, named)
     folder = rehearse_answers(protocol, participants=PEOPLE, seed=1, results=tmp_path / "results", features=felt)
-    assert verify(folder).errors == ()
-    assert [reproduced(session.path).differences for session in StudyFolder(folder).sessions()] == [[]] * PEOPLE
+    assert verify_study(folder).errors == ()
+    assert [reproduce_session(session.path).differences for session in StudyFolder(folder).sessions()] == [[]] * PEOPLE
     study = load_study(folder)
     began = study.trials.sort_values("trial").groupby("participant").first()
     assert set(began["part"]) == {1}
@@ -153,7 +153,7 @@ def test_a_form_after_the_last_of_exchanged_blocks_has_all_its_answers(tmp_path:
         ('name = "mixed"', f'name = "mixed"\nblock_order = "{order}"'),
     )
     folder = rehearse_answers(protocol, participants=PEOPLE, seed=1, results=tmp_path / "results", features=felt)
-    assert verify(folder).errors == ()
+    assert verify_study(folder).errors == ()
     study = load_study(folder)
     rows = study.answered.query("form == 'load' and item == 'effort'")
     counts = Counter(rows["after_block"].fillna("0"))

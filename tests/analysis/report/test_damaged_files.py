@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from study_app.analysis.data.study_tables import load_study
 from study_app.cli import commands
 from study_app.store.folders import SessionFolder, StudyFolder
-from study_app.store.sessions.recovery import rebuild
+from study_app.store.sessions.recovery import rebuild_session
 from tests.analysis.conftest import SAMPLE
 
 
@@ -58,7 +58,7 @@ def test_a_table_changed_by_hand_is_named_with_what_mends_it(copy: StudyFolder) 
     path = another_answer(session)
     (line,) = told(copy)
     assert line.startswith(f"{path} differs from the journal, from line 2 on; rebuild renews it: liquid-study verify")
-    rebuild(session.path)
+    rebuild_session(session.path)
     assert told(copy) == []
 
 

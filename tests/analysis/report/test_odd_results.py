@@ -21,7 +21,7 @@ from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store import receipt
 from study_app.store.exclusions import exclude, include
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.analysis.conftest import SAMPLE, Results, make_results, twelve
 from tests.protocol.groups.grouped import GROUPS, STUDY
 
@@ -151,4 +151,4 @@ def test_preexisting_groups_are_reported_before_unblinding_as_not_randomised(tmp
     assert group_counts(load_study(study)) == {"first_thick": 2, "first_thin": 3}
     trials = load_study(study).trials
     assert set(trials["group"]) == {"first_thick", "first_thin"}
-    assert not verify(study).errors
+    assert not verify_study(study).errors

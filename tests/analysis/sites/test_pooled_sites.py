@@ -13,7 +13,7 @@ from study_app.analysis.report.write_report import report
 from study_app.errors import StoreError
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import exclude
-from study_app.store.sites.merge import merge
+from study_app.store.sites.merge import merge_sites
 from study_app.store.unblinding import unblind, unblind_folder
 from study_app.store.withdrawals import withdraw
 from tests.analysis.levels.level_studies import ADAPTIVE
@@ -32,7 +32,7 @@ def sealed(tmp_path_factory: pytest.TempPathFactory) -> Path:
         site: rehearse_answers("rek2024", participants=3, seed=seed, results=root / site, features=made_up("rek2024"))
         for seed, site in enumerate("AB", start=1)
     }
-    merge(folders, root / "pooled")
+    merge_sites(folders, root / "pooled")
     return root / "pooled"
 
 
@@ -40,7 +40,7 @@ def sealed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def opened(sealed: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the same with both keys open."""
     folder = tmp_path_factory.mktemp("opened") / "pooled"
-    merge(_copied(sealed, folder.parent), folder)
+    merge_sites(_copied(sealed, folder.parent), folder)
     unblind_folder(folder, "AK", "closed")
     return folder
 
@@ -73,7 +73,7 @@ def test_codes_of_sealed_sites_are_never_pooled(sealed: Path, tmp_path: Path) ->
 
 def test_a_study_is_sealed_until_the_last_key_is_open(sealed: Path, tmp_path: Path) -> None:
     folders = _copied(sealed, tmp_path)
-    merge(folders, tmp_path / "pooled")
+    merge_sites(folders, tmp_path / "pooled")
     unblind(tmp_path / "pooled/sites/B", "AK", "closed")
     half = load_study(tmp_path / "pooled")
     assert not half.revealed
@@ -84,14 +84,14 @@ def test_a_study_is_sealed_until_the_last_key_is_open(sealed: Path, tmp_path: Pa
 
 
 def test_a_site_whose_folder_is_missing_is_not_left_out(sealed: Path, tmp_path: Path) -> None:
-    merge(_copied(sealed, tmp_path), tmp_path / "pooled")
+    merge_sites(_copied(sealed, tmp_path), tmp_path / "pooled")
     shutil.rmtree(tmp_path / "pooled/sites/B")
     with pytest.raises(StoreError, match=r"sites/B is missing, but sites\.json lists it"):
         load_study(tmp_path / "pooled")
 
 
 def test_a_site_without_the_preregistration_of_another_is_named(sealed: Path, tmp_path: Path) -> None:
-    merge(_copied(sealed, tmp_path), tmp_path / "pooled")
+    merge_sites(_copied(sealed, tmp_path), tmp_path / "pooled")
     found = load_study(tmp_path / "pooled")
     one = Commitment(
         study=found.name,
@@ -135,7 +135,7 @@ def test_answers_are_pooled_by_condition(opened: Path) -> None:
 
 
 def test_exclusions_and_withdrawals_of_a_site_are_those_of_the_merged_study(opened: Path, tmp_path: Path) -> None:
-    merge(_copied(opened, tmp_path), tmp_path / "pooled")
+    merge_sites(_copied(opened, tmp_path), tmp_path / "pooled")
     exclude(tmp_path / "pooled/sites/B", "P001", 1, by="AK", reason="coughed")
     withdraw(tmp_path / "pooled/sites/A", "P002", by="AK", reason="asked")
     found = load_study(tmp_path / "pooled")
@@ -156,7 +156,7 @@ def test_a_merged_study_of_levels_is_reported_sealed_and_opened(tmp_path: Path) 
         )
         for seed, site in enumerate("AB", start=1)
     }
-    merge(folders, tmp_path / "pooled")
+    merge_sites(folders, tmp_path / "pooled")
     sealed = load_study(tmp_path / "pooled")
     assert {one.code[:2] for block in sealed.levels for one in block.settings} == {"A-", "B-"}
     report(tmp_path / "pooled", tmp_path / "sealed", failed=pytest.fail)

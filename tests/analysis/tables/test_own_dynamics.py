@@ -16,7 +16,7 @@ from study_app.analysis.data.motion import Targets, performance, reaches, submov
 from study_app.analysis.data.study_tables import load_study, pooled
 from study_app.errors import AnalysisError
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.blinded.blinding import opened, read_key
+from study_app.store.blinded.blinding import open_events, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import TrialEnded
@@ -177,7 +177,7 @@ def test_reaches_are_those_that_the_session_decided_and_absent_recordings_are_to
     unblind(folder, by="AB", reason="a test")
     ended = {
         line.trial: line
-        for line in opened(journal.read(session.journal), read_key(folder))
+        for line in open_events(journal.read(session.journal), read_key(folder))
         if isinstance(line, TrialEnded)
     }
     study = load_study(folder)

@@ -13,7 +13,7 @@ from study_app.errors import StoreError
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
 from study_app.store.columns import RESPONSES, TRIALS
-from study_app.store.csv_files import csv_bytes, problems, read_table
+from study_app.store.csv_files import csv_bytes, read_table, table_problems
 from tests.analysis.conftest import Results, make_results
 from tests.analysis.tables.differing_answers import by_condition, refusal
 from tests.store.earlier import TRIALS_HEADER
@@ -179,7 +179,7 @@ def test_a_changed_table_is_refused_with_file_row_and_value(real: Results, old: 
     assert str(path) in message
     found = re.search(r"(row \d+), column (\w+: '.*?' is .*?);", message)
     if found:  # `verify` refuses the same cell in the same row
-        assert list(problems(path.read_bytes(), RESPONSES)) == [", ".join(found.groups())]
+        assert list(table_problems(path.read_bytes(), RESPONSES)) == [", ".join(found.groups())]
 
 
 def test_quotes_change_nothing(real: Results) -> None:

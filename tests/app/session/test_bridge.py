@@ -52,7 +52,7 @@ class SlowRecorder:
 
     append = frame = stop = start
 
-    def settled(self):
+    def end_without_waiting(self):
         return self.on_disk
 
 

@@ -33,8 +33,8 @@ from study_app.store.journals import journal
 from study_app.store.progress import progress_of
 from study_app.store.sessions import recovery
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.verification.reproduction import reproduced
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.reproduction import reproduce_session
+from study_app.store.verification.verify_study import verify_study
 
 FAULTS = ("none", "killed", "torn", "unplugged", "disk full", "two operators", "clock set back", "slept")
 MOST_RESUMED = 20
@@ -139,14 +139,14 @@ def main() -> None:
             session = StudyFolder(folder).session(person, 1)
             resumed += finish(session, fault)
             done = progress_of(journal.read(session.journal))
-            if found := reproduced(session.path).differences:
+            if found := reproduce_session(session.path).differences:
                 raise AssertionError(found)
             faults[fault] += 1
             simulated_s += done.t_s
             if not (number + 1) % max(asked.sessions // 6, 1):
                 sys.stdout.write(f"after {number + 1} sessions: {state()}\n")
             sys.stderr.write(f"{number} {study} {fault} {time.monotonic() - began:.0f} s\n")
-        errors = [str(error) for folder in sorted(Path(kept).iterdir()) for error in verify(folder).errors]
+        errors = [str(error) for folder in sorted(Path(kept).iterdir()) for error in verify_study(folder).errors]
     listed = ", ".join(f"{count} {fault}" for fault, count in sorted(faults.items()))
     sys.stdout.write(
         f"{faults.total()} sessions of {len(studies)} studies ({listed}), resumed {resumed} times, "

@@ -25,9 +25,9 @@ from study_app.session.runner import RETRY_S
 from study_app.session.transitions.state import Phase
 from study_app.store import atomic
 from study_app.store.journals import journal
-from study_app.store.sessions.recovery import rebuild
+from study_app.store.sessions.recovery import rebuild_session
 from study_app.store.verification.verify_session import Findings
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.benchmarks.sessions.day import state
 from tests.faults.support.worlds import StoredWorld
 from tests.session import small
@@ -61,7 +61,7 @@ class Disk:
 
         return refuse
 
-    def write(self, file: BinaryIO, content: bytes, whole: Callable[..., None] = atomic.write_whole) -> None:
+    def write(self, file: BinaryIO, content: bytes, whole: Callable[..., None] = atomic.write_all) -> None:
         if self.fails("write"):
             whole(file, content[: len(content) // 2] if self.kind == "short write" else b"")
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -73,8 +73,8 @@ class Disk:
             mock.patch.object(os, "fsync", self.refusing("fsync", lambda *_: None)),
             mock.patch.object(os, "rename", self.refusing("replace", os.rename)),
             mock.patch.object(os, "replace", self.refusing("replace", os.replace)),
-            mock.patch.object(atomic, "write_whole", self.write),
-            mock.patch.object(journal, "write_whole", self.write),
+            mock.patch.object(atomic, "write_all", self.write),
+            mock.patch.object(journal, "write_all", self.write),
         ):
             yield
 
@@ -106,7 +106,7 @@ def held(folder: Path, person: str, disk: Disk) -> None:
         session = world.store.folder
         tried(world.store.close)
         if not session.checksums.exists():
-            tried(lambda: rebuild(session.path))
+            tried(lambda: rebuild_session(session.path))
     lines = journal.read(session.journal)
     answers = sum(len(line.fields()["items"]) for line in lines if line.event == "responses")
     assert answers == ANSWERS, (person, disk.kind, answers)
@@ -131,7 +131,7 @@ def main() -> None:
                 sys.stdout.flush()
         found = Findings(Path(kept))
         for study in sorted(found.folder.iterdir()):
-            found.take(verify(study))
+            found.take(verify_study(study))
     few = times[:100], times[-100:]
     listed = ", ".join(f"{count} {kind}" for kind, count in sorted(happened.items()))
     sys.stdout.write(

@@ -18,10 +18,10 @@ from study_app.designer.document.toml_edits import Set
 from study_app.errors import ProtocolError, StoreError, StudyError
 from study_app.protocol.load import load, parse
 from study_app.protocol.source.files import protocol_hash, shipped
-from study_app.store.drafts import REST_S, Draft, Keeper, discard, draft_of, drafted_files, keep
+from study_app.store.drafts import REST_S, Draft, Keeper, delete_draft, draft_of, drafted_files, write_draft
 from study_app.store.receipt import without_conditions
-from study_app.store.study_runs import Run, keep_what_was_run, runs
-from study_app.store.study_versions import ChangedOutsideError, content_hash, kept_content, kept_versions, save
+from study_app.store.study_runs import Run, keep_run_content, runs_of_study
+from study_app.store.study_versions import ChangedOutsideError, content_hash, kept_content, kept_versions, save_study
 from study_app.user_folder import data_folder
 from tests.designer.document.grown import PROTOCOLS
 
@@ -80,10 +80,10 @@ def test_typed_refuses_half_a_character() -> None:
 def test_files_with_a_draft_are_listed(tmp_path: Path) -> None:
     assert drafted_files() == ()
     for name in ("b.toml", "a.toml"):
-        keep(tmp_path / name, Draft(text="a = 1\n", base=""))
+        write_draft(tmp_path / name, Draft(text="a = 1\n", base=""))
     (data_folder() / "drafts" / "broken.json").write_text("{")
     assert drafted_files() == (tmp_path.resolve() / "a.toml", tmp_path.resolve() / "b.toml")
-    discard(tmp_path / "a.toml")
+    delete_draft(tmp_path / "a.toml")
     assert drafted_files() == (tmp_path.resolve() / "b.toml",)
 
 
@@ -92,7 +92,7 @@ def test_keeper_writes_within_its_rest_however_fast_edits_follow(tmp_path: Path)
     written = []
     for tick in range(300):
         now = tick / 100
-        keeper.edited("x" * tick, (), now)
+        keeper.note_edit("x" * tick, (), now)
         if keeper.write_if_due(now):
             written.append(now)
     assert written[0] == REST_S
@@ -103,7 +103,7 @@ def test_keeper_writes_within_its_rest_however_fast_edits_follow(tmp_path: Path)
     found = draft_of(tmp_path / "a.toml")
     assert found is not None
     assert found.text == "x" * 299
-    keeper.saved("hash")
+    keeper.note_saved("hash")
     assert draft_of(tmp_path / "a.toml") is None
 
 
@@ -111,20 +111,20 @@ def test_the_draft_of_another_program_is_kept_as_a_version_and_not_discarded(tmp
     file = tmp_path / "a.toml"
     one, other = Keeper(file, ""), Keeper(file, "")
     for keeper, text in ((one, "mine"), (other, "yours"), (one, "mine again")):
-        keeper.edited(text, (), 0.0)
+        keeper.note_edit(text, (), 0.0)
         keeper.write()
     assert [kept_content(kept.hash) for kept in kept_versions(file)] == [b"mine", b"yours"]
     assert {kept.origin for kept in kept_versions(file)} == {"draft"}
     assert (one.others, other.others) == (1, 1)
-    other.saved("hash")
+    other.note_saved("hash")
     assert draft_of(file) is not None
-    one.saved("hash")
+    one.note_saved("hash")
     assert draft_of(file) is None
 
 
 def test_a_draft_that_cannot_be_written_stays_due(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     keeper = Keeper(tmp_path / "a.toml", "")
-    keeper.edited("x", (), 0.0)
+    keeper.note_edit("x", (), 0.0)
     monkeypatch.setenv("LIQUID_STUDY_DATA", str(tmp_path / "file"))
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(StoreError, match="a file is where a folder is needed"):
@@ -136,7 +136,7 @@ def test_a_draft_that_cannot_be_written_stays_due(tmp_path: Path, monkeypatch: p
 @pytest.mark.parametrize("content", [b"", b"{", b"[]", b'{"text": 1, "base": "", "selected": [], "kept_at": ""}'])
 def test_a_broken_draft_is_none(tmp_path: Path, content: bytes) -> None:
     file = tmp_path / "a.toml"
-    keep(file, Draft(text="x", base=""))
+    write_draft(file, Draft(text="x", base=""))
     (path,) = Path(os.environ["LIQUID_STUDY_DATA"], "drafts").glob("*.json")
     path.write_bytes(content)
     assert draft_of(file) is None
@@ -165,22 +165,22 @@ def test_runs_counts_sessions_pilots_and_rehearsals_by_content(tmp_path: Path) -
     session(tmp_path / "demo-pilot-2", "P001", other, pilot=True, simulated=True)  # played and kept
     session(tmp_path / "demo-rehearsal-1", "P001", other, simulated=True)
     (tmp_path / "demo" / "data" / "sub-P004" / "ses-01").mkdir(parents=True)
-    found = runs(tmp_path, "demo")
+    found = runs_of_study(tmp_path, "demo")
     assert [(run.version, run.sessions, run.pilots, run.rehearsals) for run in found] == [
         ("1.0", 2, 1, 0),
         ("1.1", 1, 1, 1),
     ]
     assert [run.hash for run in found] == [protocol_hash(one), protocol_hash(other)]
     assert found[0].protocol == json.loads(json.dumps(without_conditions(parse(one, "demo"))))
-    assert runs(tmp_path, "other") == ()
+    assert runs_of_study(tmp_path, "other") == ()
 
 
 def test_a_content_that_was_run_is_kept_before_the_file_changes(tmp_path: Path) -> None:
     file = tmp_path / "demo.toml"
     file.write_text(TEXT, encoding="utf-8")
-    keep_what_was_run(file, [Run(hash="another", version="1.0", sessions=1)])
+    keep_run_content(file, [Run(hash="another", version="1.0", sessions=1)])
     assert kept_content(content_hash(TEXT.encode())) is None
-    keep_what_was_run(file, [Run(hash=content_hash(TEXT.encode()), version="1.0", sessions=1)])
+    keep_run_content(file, [Run(hash=content_hash(TEXT.encode()), version="1.0", sessions=1)])
     assert kept_content(content_hash(TEXT.encode())) == TEXT.encode()
 
 
@@ -227,7 +227,7 @@ def test_save_replaces_the_file_keeps_its_permissions_and_its_previous_content(t
     for half in (*halves, fresh := file.with_name(".study.toml.4567cdef.tmp")):
         half.write_text("a =")
         os.utime(half, None if half == fresh else (0, 0))  # another program may be writing the fresh one
-    after = save(link, "a = 2\r\n", base)
+    after = save_study(link, "a = 2\r\n", base)
     assert [half.exists() for half in (*halves, fresh)] == [False, True, True]
     assert file.read_bytes() == b"a = 2\r\n"
     assert link.is_symlink()
@@ -236,27 +236,27 @@ def test_save_replaces_the_file_keeps_its_permissions_and_its_previous_content(t
     assert kept_content(after) == b"a = 2\r\n"
     assert kept_content("0" * 64) is None
     assert [(kept.hash, kept.origin) for kept in kept_versions(file)] == [(base, "found"), (after, "saved")]
-    save(file, "a = 1\r\n", after)
+    save_study(file, "a = 1\r\n", after)
     assert [kept.hash for kept in kept_versions(link)] == [base, after]
 
 
 def test_save_refuses_a_file_that_another_program_changed(tmp_path: Path) -> None:
     file = tmp_path / "study.toml"
-    base = save(file, "a = 1\n", "")
+    base = save_study(file, "a = 1\n", "")
     with pytest.raises(ChangedOutsideError, match="changed by another program"):
-        save(file, "a = 2\n", "")
+        save_study(file, "a = 2\n", "")
     file.write_text("b = 1\n")
     with pytest.raises(ChangedOutsideError, match="changed by another program"):
-        save(file, "a = 2\n", base)
+        save_study(file, "a = 2\n", base)
     assert file.read_text() == "b = 1\n"
     file.unlink()
     with pytest.raises(ChangedOutsideError, match="deleted or moved"):
-        save(file, "a = 2\n", base)
+        save_study(file, "a = 2\n", base)
 
 
 def test_lines_of_the_list_that_cannot_be_read_are_left_out(tmp_path: Path) -> None:
     file = tmp_path / "study.toml"
-    base = save(file, "a = 1\n", "")
+    base = save_study(file, "a = 1\n", "")
     (path,) = (data_folder() / "versions").glob("*.jsonl")
     path.write_bytes(b'{"hash": "torn\n[]\n{"hash": "x", "origin": "else"}\n' + path.read_bytes())
     assert [kept.hash for kept in kept_versions(file)] == [base]

@@ -22,7 +22,7 @@ from study_app.protocol.warnings.study_warnings import level_warnings
 from study_app.psychophysics.people import BETWEEN_PEOPLE
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.folders import StudyFolder
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 
 
@@ -48,7 +48,7 @@ ADAPTIVE = {"viscosity-jnd", "delay-detection"}
 def test_each_template_is_rehearsed(name: str, tmp_path: Path) -> None:
     folder = rehearse(str(FOLDER / f"{name}.toml"), participants=1, seed=1, results=tmp_path / name, recordings=False)
     assert len(StudyFolder(folder).sessions()) == 1
-    assert verify(folder).sound
+    assert verify_study(folder).is_sound
 
 
 @pytest.mark.parametrize("name", templates())

@@ -24,7 +24,7 @@ from study_app.gui.sessions.session_facts import sessions
 from study_app.gui.widgets.controls import CompactStop
 from study_app.session.pages import ChoicePage, FeedbackPage, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.transitions.page_builder import preview
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.app.lab.worlds import PATIENCE
 from tests.app.people import window
 from tests.compiled import needs_servo
@@ -108,7 +108,7 @@ def play_to_the_end(qtbot: Any, designer: Any) -> Player:
 def kept(qtbot: Any, designer: Any) -> Path:
     qtbot.mouseClick(designer.place.header.strip.buttons["keep"], Qt.MouseButton.LeftButton)
     (study,) = designer.results.iterdir()
-    assert verify(study).sound, verify(study)
+    assert verify_study(study).is_sound, verify_study(study)
     return Path(study)
 
 

@@ -101,11 +101,11 @@ class TestOpening:
             name="force-dimension", serial="10233", measured="2026-11-24", mass_kg=axes, damping_nspm=axes,
             friction_n=axes, delay_ms=axes, stable_nspm=axes, count_m=12e-6,
         )  # fmt: skip
-        workstation.save(workstation.DEFAULTS.with_bench(bench))
+        workstation.save_settings(workstation.DEFAULTS.with_bench(bench))
         with opened(standin) as device:
             assert device.dynamics.unknown == ()
             assert device.dynamics[1:3] == (12e-6, 0.22)
-        workstation.save(workstation.DEFAULTS.with_bench(bench.model_copy(update={"serial": "10234"})))
+        workstation.save_settings(workstation.DEFAULTS.with_bench(bench.model_copy(update={"serial": "10234"})))
         with opened(standin) as device:  # another one's
             assert device.dynamics.assumed == ("count_m", "mass_kg")
 

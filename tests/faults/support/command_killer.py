@@ -17,7 +17,7 @@ from pathlib import Path
 from study_app.analysis.export_study import export
 from study_app.analysis.report.write_report import report
 from study_app.session.simulated import rehearsal
-from study_app.store.sessions.recovery import rebuild
+from study_app.store.sessions.recovery import rebuild_session
 from study_app.store.unblinding import unblind
 from tests.faults.support.killer import SEED, forked
 
@@ -48,7 +48,7 @@ def run(command: str, study: Path, folder: Path) -> None:
         case "report":
             report(study, folder)
         case "rebuild":
-            rebuild(folder / P001)
+            rebuild_session(folder / P001)
         case "unblind":
             assert unblind(folder, "AB", "done").left == ()
 

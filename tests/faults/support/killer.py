@@ -18,7 +18,7 @@ from functools import partial
 from pathlib import Path
 
 from study_app.session.simulated import rehearsal
-from study_app.store.sessions.recovery import rebuild
+from study_app.store.sessions.recovery import rebuild_session
 
 SEED = 7
 
@@ -74,7 +74,7 @@ def going_on(protocol: str, folder: Path) -> Callable[[], object]:
     place = folder / "data" / "sub-P001" / "ses-01"
     journal = place / "journal.jsonl"
     if has_ended(journal):
-        return partial(rebuild, place)
+        return partial(rebuild_session, place)
     if journal.exists() and b"\n" in journal.read_bytes():
         return partial(rehearsal.resume, place, protocol=protocol)
     return partial(session, protocol, folder)

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QApplication, QFileDialog
 from study_app.gui.home import view
 from study_app.gui.widgets.background import wait_for_jobs
 from study_app.protocol.source.files import source_bytes
-from study_app.store.drafts import Draft, discard, keep
+from study_app.store.drafts import Draft, delete_draft, write_draft
 from study_app.store.study_settings import keep_original
 from tests.gui.home.home_window import hold, open_home
 from tests.gui.transcript import compare, story
@@ -61,14 +61,14 @@ def changes_of_studies(home, folder, chooses):
     fresh_text = 'format = 2\n[study]\nname = "fresh"\ntitle = "Fresh"\n'
     yield (
         "the program was killed",
-        come_back(lambda: keep(file, Draft(text=text.replace('"Own"', '"Else"', 1), base=""))),
+        come_back(lambda: write_draft(file, Draft(text=text.replace('"Own"', '"Else"', 1), base=""))),
     )
     keep_original(fresh, "demo")
-    yield "a study was never saved", come_back(lambda: keep(fresh, Draft(text=fresh_text, base="")))
+    yield "a study was never saved", come_back(lambda: write_draft(fresh, Draft(text=fresh_text, base="")))
     for name in ("fresh", "own", "demo"):
         yield pen(name)
     yield "press New study", home.new_study.click
-    yield "the draft is that of the file", come_back(lambda: keep(file, Draft(text=text, base="")))
+    yield "the draft is that of the file", come_back(lambda: write_draft(file, Draft(text=text, base="")))
     elsewhere = folder / "elsewhere.toml"
     elsewhere.write_text(text.replace('name = "own"', 'name = "elsewhere"'), encoding="utf-8")
     for chosen in (elsewhere, folder / "broken.toml"):
@@ -130,7 +130,7 @@ def test_the_card_that_one_went_on_from_keeps_the_keyboard_and_is_in_sight(qtbot
         made = text.replace('name = "own"', f'name = "{name}"').replace("Zest", f"Study {name}")
         (tmp_path / "protocols" / f"{name}.toml").write_text(made, encoding="utf-8")
     file = tmp_path / "protocols" / ("own.toml" if after == "saved" else "fresh.toml")
-    keep(file, Draft(text=text.replace("Zest", "Else"), base=""))
+    write_draft(file, Draft(text=text.replace("Zest", "Else"), base=""))
     home = open_home(qtbot, tmp_path / "results")
     home.main.resize(1366, 768)
     home.main.activateWindow()
@@ -139,7 +139,7 @@ def test_the_card_that_one_went_on_from_keeps_the_keyboard_and_is_in_sight(qtbot
     pen = home.grid.cards[0].pen
     assert pen.text() == "Continue"
     qtbot.mouseClick(pen, Qt.MouseButton.LeftButton)
-    discard(file)
+    delete_draft(file)
     home.enter()
     qtbot.waitUntil(lambda: not any(card.facts.draft for card in home.grid.cards))
     QApplication.processEvents()

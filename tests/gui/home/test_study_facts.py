@@ -32,9 +32,9 @@ from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import PageStep, build_schedule
 from study_app.protocol.source.files import source_bytes
 from study_app.session.resume import REHEARSED_SCREENS
-from study_app.store.drafts import Draft, draft_files, keep
+from study_app.store.drafts import Draft, draft_files, write_draft
 from study_app.store.exclusions import exclude
-from study_app.store.folder_lock import open_alone
+from study_app.store.folder_lock import lock_folder
 from study_app.store.journals import journal_events
 from study_app.store.study_settings import keep_original
 from tests import studies
@@ -125,7 +125,7 @@ def test_sessions_are_told_as_they_were_held(tmp_path, pytestconfig):
     (holiday / "journal.jsonl").write_text("[]\nno journal\n")
     lines += ["== all", *told(tmp_path)]
     lines += [read_record(tmp_path / "demo" / "data" / "sub-P020" / "ses-01").about]
-    opening = open_alone(tmp_path / "demo" / "data" / "sub-P022" / "ses-01")
+    opening = lock_folder(tmp_path / "demo" / "data" / "sub-P022" / "ses-01")
     lines += ["== P022 is open in a program", *told(tmp_path)]
     opening.release()
     (tmp_path / "demo" / "exclusions.csv").write_text("nonsense")
@@ -179,8 +179,8 @@ def test_drafts_come_first_the_newest_of_all_and_a_copy_names_its_original(tmp_p
     for number, name in enumerate(("saved", "older", "newer", "broken")):
         file, own = protocols / f"{name}.toml", text.replace('name = "demo"', f'name = "{name}"')
         file.write_text(own if name != "broken" else own.replace("format = ", "form = "), encoding="utf-8")
-        keep(file, Draft(text=own.replace("force_limit_n = 6", "force_limit_n = 5") if number else own, base=""))
-    keep(protocols / "fresh.toml", Draft(text='[study]\ntitle = "Fresh"\n', base=""))
+        write_draft(file, Draft(text=own.replace("force_limit_n = 6", "force_limit_n = 5") if number else own, base=""))
+    write_draft(protocols / "fresh.toml", Draft(text='[study]\ntitle = "Fresh"\n', base=""))
     for name, at in (("older", "2026-11-20T08:00:00+01:00"), ("newer", "2026-11-20T08:30:00+00:00")):
         (kept,) = (file for file in draft_files() if f"{name}.toml" in file.read_text(encoding="utf-8"))
         kept.write_text(json.dumps(json.loads(kept.read_bytes()) | {"kept_at": at}), encoding="utf-8")

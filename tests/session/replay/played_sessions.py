@@ -10,7 +10,7 @@ from typing import Any
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.folders import StudyFolder
-from study_app.store.verification.reproduction import reproduced
+from study_app.store.verification.reproduction import reproduce_session
 from tests.faults.support import short
 from tests.protocol import edited_studies
 from tests.protocol.trials.matching import text_of
@@ -54,7 +54,7 @@ class Recorded(Files):
             yield from (f"{kind}: {one}" for one in getattr(found, kind))
 
     def reproduce(self) -> Iterator[str]:
-        found = reproduced(self.root)
+        found = reproduce_session(self.root)
         yield from (f"differs: {one}" for one in found.differences)
         yield from (f"followed: {one}" for one in found.followed)
 

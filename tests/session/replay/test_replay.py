@@ -22,10 +22,10 @@ from study_app.session.replay import Replayed, replay
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.session.transitions.events import Begin, Continue, EndRequested, PauseRequested, ResumeRequested
 from study_app.store import recordings
-from study_app.store.blinded.blinding import opened, read_key
+from study_app.store.blinded.blinding import open_events, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.sessions.recovery import reopen
+from study_app.store.sessions.recovery import reopen_store
 from tests.compiled import needs_servo
 from tests.faults.support import short
 from tests.journal_lines import raw
@@ -74,7 +74,7 @@ def resumed_on_another_device(folder: Path) -> Path:
         place: Path = store.folder.path
     with LightDevice() as device, Servo(device, clock=VirtualClock(), elements=100) as servo:
         described = Rig(device, servo).described
-        with reopen(
+        with reopen_store(
             place, small.protocol(), b"small", operator="", device=described, screens={}, now_ns=servo.now_ns
         ) as store:
             runner, wait = held(store, device, servo)
@@ -123,7 +123,7 @@ def test_the_error_of_the_force_sent_comes_out_again_and_another_is_named(
     rehearsed: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study = StudyFolder(rehearsed)
-    lines = raw(opened(journal.read(session(rehearsed) / "journal.jsonl"), read_key(study.path)))
+    lines = raw(open_events(journal.read(session(rehearsed) / "journal.jsonl"), read_key(study.path)))
     errors = [line["delivered_error"] for line in lines if line["event"] == "trial_ended"]
     felt = [error for error in errors if error is not None]  # some of its trials are shorter than the fade-in
     assert len(felt) > 0
@@ -148,7 +148,7 @@ def test_a_session_is_replayed_with_the_model_that_its_receipt_records(
     monkeypatch.setattr(gate, "_budget_n", lambda _scene, total_n: 0.9 * total_n)
     monkeypatch.setattr(formats, "ESTIMATOR", "ewma")
     comes_out(place, 4)
-    monkeypatch.setattr(replay_module, "as_recorded", lambda protocol, _receipt, _key: protocol)
+    monkeypatch.setattr(replay_module, "recorded_protocol", lambda protocol, _receipt, _key: protocol)
     assert replay(place).differences
 
 

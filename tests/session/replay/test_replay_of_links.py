@@ -14,7 +14,7 @@ from study_app.protocol.presented.presentation import presented_by
 from study_app.session import replay as replay_module
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.blinded.blinding import opened, read_key
+from study_app.store.blinded.blinding import open_events, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.unblinding import unblind
@@ -52,7 +52,7 @@ def test_another_seed_of_the_link_is_found(rehearsed: Path, monkeypatch: pytest.
 def test_the_session_measures_the_delays_that_were_requested(rehearsed: Path) -> None:
     (session,) = StudyFolder(rehearsed).sessions()
     key, protocol = read_key(rehearsed), parse(STUDY.encode(), "late.toml")
-    lines = raw(opened(journal.read(session.journal), key))
+    lines = raw(open_events(journal.read(session.journal), key))
     started = {line["trial"]: line for line in lines if line["event"] == "trial_started"}
     ended = [line for line in lines if line["event"] == "interval_ended"]
     assert len(ended) == 6

@@ -8,12 +8,12 @@ import pytest
 
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse, resume
-from study_app.store.blinded.blinding import opened, read_key, whole_protocol
+from study_app.store.blinded.blinding import complete_protocol, open_events, read_key
 from study_app.store.journals import journal
 from study_app.store.receipt import read
 from study_app.store.verification.leaks import certain_telltales, find_leaks, recorded_numbers
-from study_app.store.verification.reproduction import reproduced
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.reproduction import reproduce_session
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.journal_lines import event_from, raw
 from tests.protocol.trials.matching import ALONE, DELAY, text_of
@@ -57,7 +57,7 @@ def session_of(study: Path) -> Path:
 
 
 def lines_of(session: Path) -> list[dict[str, Any]]:
-    return raw(opened(journal.read(session / "journal.jsonl"), read_key(session.parents[2])))
+    return raw(open_events(journal.read(session / "journal.jsonl"), read_key(session.parents[2])))
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_a_session_that_was_killed_and_resumed_is_set_as_one_that_was_not(
     resume(session, protocol=protocol)
     assert [row[:2] for row in kept()[0]] == [row[:2] for row in whole[0]]
     assert kept() == whole
-    assert reproduced(session).differences == []
+    assert reproduce_session(session).differences == []
     assert replay(session).differences == ()
 
 
@@ -90,7 +90,7 @@ def test_other_numbers_are_set_and_proved(edits: tuple[tuple[str, str], ...], tm
     path = tmp_path / "matching.toml"
     path.write_text(text_of(SHORT, unjudged, *edits))
     session = session_of(rehearse(path, participants=1, seed=5, results=tmp_path / "study"))
-    assert reproduced(session).differences == []
+    assert reproduce_session(session).differences == []
     proved = replay(session)
     assert (proved.differences, proved.uncompared) == ((), ())
     lines = lines_of(session)
@@ -101,7 +101,7 @@ def test_other_numbers_are_set_and_proved(edits: tuple[tuple[str, str], ...], tm
 
 def test_every_level_that_steps_led_to_is_looked_for_and_stands_nowhere(study: Path) -> None:
     lines, key = lines_of(session_of(study)), read_key(study)
-    protocol = whole_protocol(read(session_of(study) / "receipt.json")["protocol"], key)
+    protocol = complete_protocol(read(session_of(study) / "receipt.json")["protocol"], key)
     numbers = recorded_numbers(protocol, map(event_from, lines))
     assert {line["setting"] for line in lines if line.get("setting") is not None} <= numbers
     assert len(numbers) > sum(line["event"] == "trial_started" for line in lines) + 6
@@ -113,5 +113,5 @@ def test_every_level_that_steps_led_to_is_looked_for_and_stands_nowhere(study: P
 def test_a_level_that_was_set_is_found_in_a_note(session: Path) -> None:
     level = next(line["setting"] for line in lines_of(session) if len(str(line.get("setting"))) > 6)
     (session / "note.txt").write_text(f"it was {level!r}", encoding="utf-8")
-    warnings = [str(one) for one in verify(session.parents[2], None).warnings]
+    warnings = [str(one) for one in verify_study(session.parents[2], None).warnings]
     assert any("note.txt, line 1 reveals a condition, although the key is sealed" in one for one in warnings)

@@ -17,7 +17,7 @@ from study_app.session.runner import Runner
 from study_app.session.transitions.events import Begin, Continue, PauseRequested, RepeatRequested, ResumeRequested
 from study_app.session.transitions.state import Phase
 from study_app.session.trial import SETTLED_S
-from study_app.store.blinded.blinding import opened
+from study_app.store.blinded.blinding import open_events
 from study_app.store.journals.journal import SessionClock
 from study_app.store.tables.session_tables import SessionRows
 from tests.compiled import needs_servo
@@ -128,7 +128,7 @@ class Judged:
                         runner.frame_shown(servo.now_ns() + 3_000_000, view.sample_time_ns)
                     runner.poll()
             self.row = next(
-                row for row in SessionRows(opened(store.lines, store.key)).trials if row["outcome"] == "complete"
+                row for row in SessionRows(open_events(store.lines, store.key)).trials if row["outcome"] == "complete"
             )
 
 

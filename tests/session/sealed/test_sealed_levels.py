@@ -162,7 +162,10 @@ def operator_views(folder: Path, protocol: Path) -> list[Any]:
 def presented(folder: Path) -> list[Any]:
     """Return level and arrangement of each trial, and the condition of those of statements."""
     (place,) = StudyFolder(folder).sessions()
-    lines, codes = raw(blinding.opened(journal.read(place.journal), read_key(folder))), read_key(folder).codes["said"]
+    lines, codes = (
+        raw(blinding.open_events(journal.read(place.journal), read_key(folder))),
+        read_key(folder).codes["said"],
+    )
     started = [line for line in lines if line["event"] == "trial_started"]
     return [(line.get("level"), line.get("arrangement"), codes.get(line["code"], "")) for line in started]
 
@@ -211,7 +214,7 @@ def numbers_of(folder: Path, what: str) -> Trials:
     found: Trials = {}
     for session in StudyFolder(folder).sessions():
         lines = journal.read(session.journal)
-        presented = {line["n"]: line for line in raw(blinding.opened(lines, key))}
+        presented = {line["n"]: line for line in raw(blinding.open_events(lines, key))}
         found |= every_number(session, "levels", raw(lines), lambda line, of=presented: str(of[line["n"]][what]))
     return found
 

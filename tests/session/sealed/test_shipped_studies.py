@@ -8,7 +8,7 @@ import pytest
 from study_app.protocol.load import load
 from study_app.protocol.source.files import shipped
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.blinded.blinding import opened, read_key
+from study_app.store.blinded.blinding import open_events, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import TrialStarted
@@ -28,7 +28,7 @@ def presented_in(folder: Path, block: str) -> Trials:
     key, found = read_key(folder), {}
     for session in StudyFolder(folder).sessions():
         lines = journal.read(session.journal)
-        started = {line.n: line for line in opened(lines, key) if isinstance(line, TrialStarted)}
+        started = {line.n: line for line in open_events(lines, key) if isinstance(line, TrialStarted)}
 
         def presented(line: dict[str, Any], of: dict[int, TrialStarted] = started) -> str | None:
             trial = of[line["n"]]

@@ -12,7 +12,7 @@ from study_app.session.simulated import answers_only
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import condition_features, rehearse
 from study_app.store import receipt
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.store.forging import cover_up
 from tests.studies import made_up
@@ -46,7 +46,7 @@ def test_by_default_it_keeps_apart_from_participants(tmp_path: Path, monkeypatch
 
 
 def test_the_folder_is_sound_and_every_row_says_simulated(twelve: Path) -> None:
-    found = verify(twelve)
+    found = verify_study(twelve)
     assert (found.errors, found.warnings, found.sessions) == ((), (), 12)
     for name, held in tables(twelve).items():
         assert held, name
@@ -58,7 +58,7 @@ def test_a_receipt_that_was_changed_with_its_proofs_differs_from_the_journal(twe
     path = study / "data/sub-P001/ses-01/receipt.json"
     receipt.write(path, receipt.read(path) | {"screens": {}})
     cover_up(study)
-    assert "what the session began with: differ from the journal" in "\n".join(map(str, verify(study).errors))
+    assert "what the session began with: differ from the journal" in "\n".join(map(str, verify_study(study).errors))
 
 
 def test_the_same_call_gives_the_same_answers_and_another_seed_others(twelve: Path, tmp_path: Path) -> None:
@@ -119,6 +119,6 @@ def test_ended_by_the_user_it_leaves_whole_sessions_and_their_table(
     folder = tmp_path / "rek2024"
     with pytest.raises(KeyboardInterrupt):
         rehearse_answers("rek2024", participants=9, seed=1, results=folder, features=FELT, progress=enough)
-    found = verify(folder)
+    found = verify_study(folder)
     assert (found.errors, found.sessions) == ((), 3)
     assert load_study(folder).n == 3

@@ -6,7 +6,7 @@ import pytest
 
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.blinded.blinding import opened, read_key
+from study_app.store.blinded.blinding import open_events, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from tests.compiled import needs_servo
@@ -23,7 +23,7 @@ def test_every_interval_is_delivered_as_requested(tmp_path: Path, study: str) ->
     path.write_text(text_of(f"limits_{study}"), encoding="utf-8")
     results = rehearse(path, participants=1, seed=1, results=tmp_path / "results")
     session = StudyFolder(results).sessions()[0]
-    lines = raw(opened(journal.read(session.journal), read_key(results)))
+    lines = raw(open_events(journal.read(session.journal), read_key(results)))
     intervals = [line for line in lines if line["event"] == "interval_ended"]
     assert intervals
     for line in intervals:

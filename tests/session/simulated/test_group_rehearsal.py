@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 
 from study_app.session.simulated.rehearsal import rehearse, resume
-from study_app.store.blinded.blinding import opened, read_key
+from study_app.store.blinded.blinding import open_events, read_key
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
-from study_app.store.verification.reproduction import reproduced
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.reproduction import reproduce_session
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.journal_lines import raw
 from tests.protocol.groups.grouped import GROUPS, STUDY
@@ -21,7 +21,7 @@ pytestmark = [pytest.mark.slow, needs_servo]
 
 def told(study: Path, session: SessionFolder) -> tuple[str, list[tuple[Any, ...]], list[Any]]:
     """Return the group, the trials and the answers of a session."""
-    lines = raw(opened(journal.read(session.journal), read_key(study)))
+    lines = raw(open_events(journal.read(session.journal), read_key(study)))
     trials = {line["trial"]: (line["block"], line["code"]) for line in lines if line["event"] == "trial_started"}
     answers = {line["trial"]: line["items"][0]["value"] for line in lines if line["event"] == "responses"}
     return lines[0]["group"], sorted(trials.items()), sorted(answers.items())
@@ -53,6 +53,6 @@ def test_a_resumed_participant_stays_in_the_group_and_answers_alike(study: Path,
         session.receipt.write_text(text)
         resume(session.path, protocol=study.parent / "grouped.toml")
         assert told(folder, session) == whole
-        assert reproduced(session.path).differences == []
+        assert reproduce_session(session.path).differences == []
     assert groups == {"first_thin", "first_thick"}
-    assert verify(folder, None).errors == ()
+    assert verify_study(folder, None).errors == ()

@@ -18,7 +18,7 @@ from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.exclusions import MISSING_RULE, exclusions, include
 from study_app.store.folders import StudyFolder
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 
 pytestmark = [pytest.mark.slow, needs_servo]
@@ -97,8 +97,8 @@ def test_every_surface_says_that_no_trial_was_delivered(
     assert f"Note: {would}, predicted for a delay of 1 tick." in checked
     assert told[0].startswith("P001: 0 responses")
     assert told[0].endswith(f"; {SENTENCE}")
-    assert [str(one) for one in verify(rehearsed).warnings] == [f"data/sub-P001/ses-01: {SENTENCE}"]
-    assert verify(rehearsed).sound
+    assert [str(one) for one in verify_study(rehearsed).warnings] == [f"data/sub-P001/ses-01: {SENTENCE}"]
+    assert verify_study(rehearsed).is_sound
     (facts,) = sessions(rehearsed.parent, {})
     assert (status_chip(facts)[2], str(facts.missing), facts.counts) == ("Incomplete", SENTENCE, False)
     record = read_record(facts.folder)

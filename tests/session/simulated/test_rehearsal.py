@@ -55,7 +55,7 @@ def test_a_signal_within_a_write_leaves_a_journal_that_can_be_resumed(
         rehearsal.rehearse("demo", participants=1, seed=1, results=tmp_path)
     (session,) = StudyFolder(tmp_path).sessions()
     assert sent
-    assert journal.whole(session.journal).lines[7].n == 8
+    assert journal.read_complete(session.journal).lines[7].n == 8
     rehearsal.resume(session.path)
     responses = [line for line in journal.read(session.journal) if isinstance(line, Responses)]
     assert [line.trial for line in responses] == [1, 2, 3, 4]

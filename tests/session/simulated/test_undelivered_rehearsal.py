@@ -12,11 +12,11 @@ from click.testing import CliRunner
 from study_app.cli import commands
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse, resume
-from study_app.store.blinded.blinding import opened, read_key
+from study_app.store.blinded.blinding import open_events, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.verification.reproduction import reproduced
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.reproduction import reproduce_session
+from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.journal_lines import raw
 from tests.protocol.edited_studies import text_of
@@ -48,7 +48,9 @@ def session(study: Path, tmp_path: Path) -> Path:
 
 
 def lines_of(session: Path) -> list[dict[str, Any]]:
-    return [dict(line) for line in raw(opened(journal.read(session / "journal.jsonl"), read_key(session.parents[2])))]
+    return [
+        dict(line) for line in raw(open_events(journal.read(session / "journal.jsonl"), read_key(session.parents[2])))
+    ]
 
 
 def rows_of(session: Path, table: str) -> list[dict[str, str]]:
@@ -105,9 +107,9 @@ def test_tables_say_invalid_and_why_without_a_number(session: Path) -> None:
 def test_journal_recordings_and_answers_agree(study: Path) -> None:
     session = StudyFolder(study).sessions()[0].path
     assert replay(session).proved
-    found = reproduced(session)
+    found = reproduce_session(session)
     assert (found.differences, found.followed) == ([], ["thicker: 4 of 4 levels follow from the answers"])
-    checked = verify(study, None)
+    checked = verify_study(study, None)
     lost = (
         "2 of 4 trials were not delivered: the force was not as requested (limit 5 %) in 2, the force limit was reached"
     )
@@ -123,7 +125,7 @@ def test_a_session_ended_between_two_attempts_goes_on_to_the_same_answers(sessio
     again = lines_of(session)
     assert outcomes(again) == outcomes(whole)
     assert answers(again) == answers(whole)
-    assert reproduced(session).differences == []
+    assert reproduce_session(session).differences == []
 
 
 INERTIA = """

@@ -18,16 +18,16 @@ from study_app.session.resume import begun_schedule
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import ConditionFeatures
 from study_app.store.blinded import allocation
-from study_app.store.blinded.allocation import allocate, allocated, claims, session_protocol
+from study_app.store.blinded.allocation import allocate, allocation_of, claims, session_protocol
 from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import start_of
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.recovery import reopen
+from study_app.store.sessions.recovery import reopen_store
 from study_app.store.unblinding import unblind
-from study_app.store.verification.reproduction import reproduced
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.reproduction import reproduce_session
+from study_app.store.verification.verify_study import verify_study
 from tests import studies
 from tests.faults.support.killer import die, forked
 from tests.faults.support.racers import race
@@ -60,7 +60,7 @@ def test_participants_have_entries_in_the_order_of_their_first_sessions(
             assert allocate(StudyFolder(tmp_path / "s"), store.key, participant).entry == number  # type: ignore[union-attr]
     assert [claim.participant for claim in claims(StudyFolder(tmp_path / "s"))] == ["P009", "P001", "X"]
     assert synced == [StudyFolder(tmp_path / "s").allocated] * 3, "before they count"
-    assert not verify(tmp_path / "s").errors
+    assert not verify_study(tmp_path / "s").errors
 
 
 def test_a_participant_keeps_the_group_in_session_2(tmp_path: Path) -> None:
@@ -69,7 +69,7 @@ def test_a_participant_keeps_the_group_in_session_2(tmp_path: Path) -> None:
     for participant in ("P001", "P002"):
         for session in (1, 2):
             with begun(study.path, participant, session) as store:
-                found = allocated(study, store.key, participant)
+                found = allocation_of(study, store.key, participant)
                 assert found is not None
                 assert groups.setdefault(participant, found.group) == found.group
                 assert ("allocated" in events(store)) == (session == 1), "once per participant"
@@ -86,7 +86,7 @@ def test_no_file_names_a_group_of_a_participant(tmp_path: Path) -> None:
     for number in range(12):
         study = StudyFolder(tmp_path / f"s{number}")
         with begun(study.path, "P001") as store:
-            found = allocated(study, store.key, "P001")
+            found = allocation_of(study, store.key, "P001")
             line = next(line for line in raw(store.lines) if line["event"] == "allocated")
             (claim,) = (json.loads(path.read_text()) for path in study.allocated.iterdir())
         assert found is not None
@@ -113,7 +113,7 @@ def test_two_programs_at_once_never_share_an_entry(tmp_path: Path) -> None:
         yield found.entry
 
     assert sorted(entry for answers in race(entered, 40) for entry in answers) == list(range(1, 81))
-    counts = Counter(allocated(study, key, claim.participant).group for claim in claims(study))  # type: ignore[union-attr]
+    counts = Counter(allocation_of(study, key, claim.participant).group for claim in claims(study))  # type: ignore[union-attr]
     assert counts == dict.fromkeys(GROUP_NAMES, 40)
 
 
@@ -128,7 +128,7 @@ def test_a_program_killed_between_claim_and_first_line_leaves_a_consistent_folde
         patched.setattr("study_app.store.sessions.begin.first_records", die)
         assert forked(lambda: begun(study.path, "P001")) == -signal.SIGKILL
     assert [claim.participant for claim in claims(study)] == ["P000", "P001"]
-    found = verify(study.path)
+    found = verify_study(study.path)
     assert not found.errors
     assert any("who has no session yet" in str(warning) for warning in found.warnings)
     with begun(study.path, "P002") as other, begun(study.path, "P001") as store:
@@ -143,9 +143,9 @@ def test_a_session_resumed_before_its_allocation_was_journalled_journals_it(
         patched.setattr("study_app.store.sessions.begin.note_allocation", lambda _: None)
         with begun(tmp_path / "s", "P001") as store:
             assert events(store) == ["session_started"]
-    with reopen(store.folder.path, grouped(), SOURCE, operator="", device={}, screens={}) as again:
+    with reopen_store(store.folder.path, grouped(), SOURCE, operator="", device={}, screens={}) as again:
         assert events(again)[-1] == "allocated"
-    with reopen(store.folder.path, grouped(), SOURCE, operator="", device={}, screens={}) as again:
+    with reopen_store(store.folder.path, grouped(), SOURCE, operator="", device={}, screens={}) as again:
         assert events(again).count("allocated") == 1
 
 
@@ -159,7 +159,7 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
     held = [path.read_text() for path in (first, second, third)]
 
     def errors() -> str:
-        return "\n".join(str(error) for error in verify(study.path).errors)
+        return "\n".join(str(error) for error in verify_study(study.path).errors)
 
     assert errors() == ""
     second.unlink()
@@ -185,7 +185,7 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
     with begun(study.path, "P005") as store:
         assert store.lines[0].entry == 5
     assert errors() == ""
-    assert "it stays unused" in "\n".join(map(str, verify(study.path).warnings))
+    assert "it stays unused" in "\n".join(map(str, verify_study(study.path).warnings))
     (study.allocated / "\u00b2.json").write_text("{}")  # a digit that int() refuses
     (loop := study.allocated / "006.json").symlink_to(loop)
     assert errors() == "blinding/allocated/006.json: was changed: restore it from a copy"
@@ -206,17 +206,17 @@ def test_a_rehearsal_allocates_from_its_seed_and_reproduces(tmp_path: Path) -> N
     study = StudyFolder(folder)
     key = open_or_draw_key(folder, grouped(), stream(3, "blinding").random)
     for session in study.sessions():
-        found = allocated(study, key, session.participant)
+        found = allocation_of(study, key, session.participant)
         assert found is not None
         own = own_protocol(grouped(), found.group, 1)
         lines = journal.read(session.journal)
         trials = [line["code"] for line in raw(lines) if line["event"] == "trial_started"]
         assert trials == [trial.code for trial in begun_schedule(own, start_of(lines), key).trials]
-        assert reproduced(session.path).differences == []
-    assert not verify(folder).errors
+        assert reproduce_session(session.path).differences == []
+    assert not verify_study(folder).errors
     unblind(folder, "AB", "a test")
-    assert not verify(folder).errors
-    assert verify(folder).sound
+    assert not verify_study(folder).errors
+    assert verify_study(folder).is_sound
     table = study.participants("grouped").read_text().splitlines()
     assert table[0].endswith(",group")
     assert Counter(line.rsplit(",", 1)[1] for line in table[1:]) == dict.fromkeys(GROUP_NAMES, 2)

@@ -13,12 +13,12 @@ from study_app.cli import commands
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.checksums import write_checksums
 from study_app.store.exclusions import exclusions, include
-from study_app.store.folder_lock import open_alone
+from study_app.store.folder_lock import lock_folder
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal_events import TrialStarted
 from study_app.store.unblinding import unblind
-from study_app.store.verification.reproduction import reproduced
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.reproduction import reproduce_session
+from study_app.store.verification.verify_study import verify_study
 from tests.protocol.trials.level_studies import SHORT, text_of
 
 pytestmark = [pytest.mark.nightly, pytest.mark.slow]
@@ -81,7 +81,7 @@ def test_nothing_is_excluded_before_unblinding_and_both_are_after(study: Path) -
     assert [(block, of) for block, _, of in counts] == [("hard", "10"), ("viscosity", "20")]
     assert all(0.2 < int(wrong) / int(of) <= 1 for _, wrong, of in counts)
     assert f"excluded  participant P001, session 1: {rows[0].reason}" in ran.output
-    found = verify(study)
+    found = verify_study(study)
     assert [str(one) for one in found.errors] == []
 
 
@@ -104,7 +104,7 @@ def test_sessions_that_cannot_be_excluded_are_named(study: Path) -> None:
 
 
 def test_running_sessions_are_not_judged(study: Path) -> None:
-    opening = open_alone(StudyFolder(study).session("P001", 1).path)
+    opening = lock_folder(StudyFolder(study).session("P001", 1).path)
     try:
         found = unblind(study, "AB", "to analyse")
     finally:
@@ -115,7 +115,7 @@ def test_running_sessions_are_not_judged(study: Path) -> None:
 
 def test_levels_of_a_study_with_catch_trials_follow_and_the_tables_name_them(study: Path) -> None:
     for session in StudyFolder(study).sessions():
-        assert reproduced(session.path).followed[-1:] == ["viscosity: 60 of 60 levels follow from the answers"]
+        assert reproduce_session(session.path).followed[-1:] == ["viscosity: 60 of 60 levels follow from the answers"]
         with next(session.path.rglob("*intervals*.csv")).open(encoding="utf-8") as file:
             assert "catch" not in next(csv.reader(file))
     unblind(study, "AB", "to analyse")
@@ -136,16 +136,16 @@ def test_sessions_of_versions_without_catch_trials_are_reproduced_and_unblinded(
     (tmp_path / "levels.toml").write_text(text_of(*SHORT))
     study = rehearse(tmp_path / "levels.toml", participants=1, seed=2, results=tmp_path / "study", recordings=False)
     (session,) = StudyFolder(study).sessions()
-    assert reproduced(session.path).followed == ["viscosity: 12 of 12 levels follow from the answers"]
+    assert reproduce_session(session.path).followed == ["viscosity: 12 of 12 levels follow from the answers"]
     assert unblind(study, "AB", "to analyse").left == ()
     (path,) = session.path.rglob("*intervals*.csv")
     with path.open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert {row.pop("catch") for row in rows} == {"n/a"}
-    assert verify(study).errors == ()
+    assert verify_study(study).errors == ()
     with path.open("w", encoding="utf-8", newline="") as file:  # as the earlier version unblinded it
         writer = csv.DictWriter(file, rows[0], lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
     write_checksums(session)
-    assert verify(study).errors == ()
+    assert verify_study(study).errors == ()

@@ -15,12 +15,12 @@ from study_app.protocol.orders.durations import own_protocol
 from study_app.session.resume import begun_schedule
 from study_app.session.start import resumed
 from study_app.store.blinded.allocation import claims
-from study_app.store.blinded.blinding import own_group, read_key
+from study_app.store.blinded.blinding import participant_group, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal_events import start_of
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.verification.reproduction import reproduced
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.reproduction import reproduce_session
+from study_app.store.verification.verify_study import verify_study
 from study_app.store.withdrawals import withdraw
 from tests import studies
 from tests.protocol.groups.grouped import STUDY
@@ -51,7 +51,7 @@ def begun(folder: Path, source: bytes, participant: str, **given: object) -> Ses
 def order_of(protocol: Protocol, store: SessionStore) -> tuple[str, ...]:
     """Return what a session presents, block and code of each trial: its order, where codes do not depend on chance."""
     start = start_of(store.lines)
-    own = own_protocol(protocol, own_group(start, store.key), start.session)
+    own = own_protocol(protocol, participant_group(start, store.key), start.session)
     return tuple(trial.block for trial in begun_schedule(own, start, store.key).trials)
 
 
@@ -67,7 +67,7 @@ class Lab:
     def arrive(self, who: str, group: str | None, row_of: str | None = None, *, stays: bool) -> None:
         protocol = parse(self.source, "grouped")
         with begun(self.folder, self.source, who, group=group, row_of=row_of) as store:
-            own = own_group(start_of(store.lines), store.key)
+            own = participant_group(start_of(store.lines), store.key)
             assert own is not None
             if row_of is not None:
                 assert self.lost.pop(row_of) == own, "a replacement takes the group of who is replaced"
@@ -102,7 +102,7 @@ def test_orders_are_even_in_each_group_when_participants_drop_out_and_are_replac
     assert len(lab.orders) == 14
     if not edits:
         assert Counter(group for group, _ in lab.orders.values()) == {"experts": 7, "novices": 7}
-    assert not verify(lab.folder).errors
+    assert not verify_study(lab.folder).errors
 
 
 def test_sixteen_participants_have_each_order_four_times_in_each_group(tmp_path: Path) -> None:
@@ -136,7 +136,7 @@ def test_a_preexisting_group_is_recorded_and_never_inferred(tmp_path: Path) -> N
     assert [line.rsplit(",", 1)[1] for line in table[1:]] == ["novices", "novices"], "shown while the key is sealed"
     variables = json.loads(study.description.read_text())["variableMeasured"]
     assert "group" in [variable["name"] for variable in variables]
-    assert not verify(study.path).errors
+    assert not verify_study(study.path).errors
 
 
 def _written(folder: Path, source: bytes) -> str:
@@ -176,16 +176,16 @@ def test_a_participant_who_withdrew_is_replaced_in_the_group(tmp_path: Path) -> 
     folder, source = tmp_path / "s", source_of()
     for who in ("P001", "P002"):
         with begun(folder, source, who) as store:
-            group = own_group(start_of(store.lines), store.key)
+            group = participant_group(start_of(store.lines), store.key)
             order = order_of(parse(source, "grouped"), store)
             store.finish("withdrawn")
     withdraw(folder, "P002", by="AB", reason="asked for it")
     with begun(folder, source, "P050", row_of="P002") as store:
-        assert own_group(start_of(store.lines), store.key) == group
+        assert participant_group(start_of(store.lines), store.key) == group
         assert order_of(parse(source, "grouped"), store) == order
         assert start_of(store.lines).row_of == "P002"
         store.finish("completed")
-    assert not verify(folder).errors
+    assert not verify_study(folder).errors
 
 
 @pytest.mark.parametrize("edits", [(), (PREEXISTING,)], ids=["randomised", "pre-existing"])
@@ -211,7 +211,7 @@ def test_verify_names_an_entry_that_was_changed(tmp_path: Path, edits: tuple[tup
 
 
 def _errors(study: StudyFolder) -> str:
-    return "\n".join(map(str, verify(study.path).errors))
+    return "\n".join(map(str, verify_study(study.path).errors))
 
 
 def test_a_folder_of_an_earlier_version_goes_on_by_the_numbers_of_ids(tmp_path: Path) -> None:
@@ -228,7 +228,7 @@ def test_a_folder_of_an_earlier_version_goes_on_by_the_numbers_of_ids(tmp_path: 
             assert start.entry == len(claims(study)), "a replacement has an entry of its own"
             orders[who] = order_of(parse(source, "grouped"), store)
             store.finish("completed")
-        assert not reproduced(store.folder.path).differences[1:], "only the trials that were not run"
+        assert not reproduce_session(store.folder.path).differences[1:], "only the trials that were not run"
     assert orders["P002"] != orders["P003"] or orders["P004"] != orders["P003"]
     assert orders["P060"] == orders["P003"]
     with pytest.raises(StudyError, match="the number in the ID assigns rows"):

@@ -9,13 +9,13 @@ from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.blinded.blinding import opened, read_key
+from study_app.store.blinded.blinding import open_events, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import TrialStarted
 from study_app.store.unblinding import unblind
-from study_app.store.verification.reproduction import reproduced
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.reproduction import reproduce_session
+from study_app.store.verification.verify_study import verify_study
 from tests.studies import made_up
 
 PEOPLE = 8
@@ -35,13 +35,13 @@ def test_one_look_at_a_condition_tells_nothing_of_other_participants(tmp_path: P
     meant: dict[str, set[str]] = {}
     for session in StudyFolder(folder).sessions():
         lines = journal.read(session.journal)
-        for line, whole in zip(lines, opened(lines, key), strict=True):
+        for line, whole in zip(lines, open_events(lines, key), strict=True):
             if isinstance(line, TrialStarted) and isinstance(whole, TrialStarted) and line.block == "delays":
                 meant.setdefault(line.code, set()).add(key.condition(whole.block, whole.code))
-        found = reproduced(session.path)
+        found = reproduce_session(session.path)
         assert found.differences == []
     assert meant == {"D1": {"prompt", "late"}, "D2": {"prompt", "late"}}
-    assert verify(folder).errors == ()
+    assert verify_study(folder).errors == ()
 
     blinded, usual = (evaluate(load_study(one)) for one in (folder, same))
     assert [dict(block.findings) for block in blinded.blocks] == [{}, {}]
@@ -49,7 +49,7 @@ def test_one_look_at_a_condition_tells_nothing_of_other_participants(tmp_path: P
 
     for one in (folder, same):
         assert unblind(one, by="AB", reason="a test").left == ()
-        assert verify(one).errors == ()
+        assert verify_study(one).errors == ()
     assert coded(folder) == coded(same)
 
 

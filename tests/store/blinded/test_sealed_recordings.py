@@ -13,7 +13,7 @@ from study_app.errors import StoreError
 from study_app.store.blinded.blinding import read_key, reveal
 from study_app.store.recordings import read_frames, read_samples
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from study_app.store.withdrawals import withdraw
 from tests.journal_lines import event_of
 from tests.platforms import needs_fork
@@ -63,7 +63,7 @@ def test_recordings_of_about_one_length_are_equally_long_and_are_read_with_the_k
         read_samples(samples)
     assert len(read_samples(samples, read_key(study).nonce)) == 2_500
     assert read_frames(frames, read_key(study).nonce)["painted_ns"].tolist() == [20]
-    assert verify(study).errors == ()
+    assert verify_study(study).errors == ()
 
 
 def test_an_unblinded_study_holds_the_recordings_of_one_that_was_never_sealed(
@@ -80,7 +80,7 @@ def test_an_unblinded_study_holds_the_recordings_of_one_that_was_never_sealed(
     assert {name: ours[name] for name in ours if name.endswith((".parquet", ".csv"))} == {
         name: theirs[name] for name in theirs if name.endswith((".parquet", ".csv"))
     }
-    for found in (verify(study, Path(kept)), verify(other)):
+    for found in (verify_study(study, Path(kept)), verify_study(other)):
         assert (found.errors, found.warnings) == ((), ())
 
 
@@ -99,7 +99,7 @@ def test_a_sealed_recording_is_withdrawn(study: Path) -> None:
     done = withdraw(study, "P007", by="AB", reason="asked")
     assert (done.folders, done.left) == ((study,), ())
     assert not [path for path in study.rglob("*") if path.is_file() and held[100:200] in path.read_bytes()]
-    assert verify(study).errors == ()
+    assert verify_study(study).errors == ()
 
 
 def in_line(event: str, **changes: Any) -> Any:
@@ -111,9 +111,9 @@ def in_line(event: str, **changes: Any) -> Any:
 
 def test_what_differs_from_the_sealed_value_is_found_before_the_study_is_opened(study: Path) -> None:
     change(study / SESSION, in_line("recorded", samples_recorded=2_499))
-    assert f"{RECORDING}: holds rows 2500, the journal says 2499" in map(str, verify(study).errors)
+    assert f"{RECORDING}: holds rows 2500, the journal says 2499" in map(str, verify_study(study).errors)
     forge(study / SESSION / "journal.jsonl", in_line("recorded", sealed="00" * 1040))
-    assert "cannot be decrypted with the study's key" in "".join(map(str, verify(study).errors))
+    assert "cannot be decrypted with the study's key" in "".join(map(str, verify_study(study).errors))
 
 
 def test_a_changed_recording_is_named_and_not_opened(study: Path) -> None:
@@ -146,7 +146,7 @@ def test_an_unblinding_that_is_killed_anywhere_is_finished_by_the_next(study: Pa
         code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
         for name in (RECORDING, FRAMES):
             assert (copy / name).read_bytes() in (sealed[name], opened[name])
-        assert not [error for error in verify(copy).errors if ".parquet" in str(error)]
+        assert not [error for error in verify_study(copy).errors if ".parquet" in str(error)]
         assert unblind(copy, "AB", "again").left == ()
         assert contents(copy) == opened
         kills += 1

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from study_app.store.blinded.blinding import opened, read_key
+from study_app.store.blinded.blinding import open_events, read_key
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import Event, IntervalEnded, TargetReached, TrialEnded
 from tests.journal_lines import event_of
@@ -41,7 +41,7 @@ def test_journals_look_alike_however_many_targets_were_reached(start: Start, cou
 def test_the_key_opens_their_times(start: Start) -> None:
     times_s = [0.731, 1.482, 2.113004]
     lines, folder = lines_of(start, times_s)
-    (ended,) = (line for line in opened(lines, read_key(folder)) if isinstance(line, TrialEnded))
+    (ended,) = (line for line in open_events(lines, read_key(folder)) if isinstance(line, TrialEnded))
     assert ended.reached_s == times_s
     assert ended.others["targets_reached"] == 3
 
@@ -53,7 +53,7 @@ def test_each_interval_has_its_own_times(start: Start) -> None:
         store.append(event_of("interval_started", trial=1, attempt=1, interval=interval))
         store.append(event_of("target_reached", trial=1, target=0, t_task_s=at_s))
         store.append(event_of("interval_ended", trial=1, attempt=1, interval=interval, outcome="complete"))
-    lines = opened(store.lines, store.key)
+    lines = open_events(store.lines, store.key)
     store.close()
     assert [line.reached_s for line in lines if isinstance(line, IntervalEnded)] == [[0.811], [1.922]]
     assert not any(isinstance(line, TargetReached) for line in lines)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from study_app.errors import StoreError
-from study_app.store.blinded.blinding import Key, opened, sealed
+from study_app.store.blinded.blinding import Key, open_events, seal_event
 from study_app.store.columns import SEALED, TRIALS_2
 from tests.journal_lines import event_of
 
@@ -28,12 +28,12 @@ def key(nonce: bytes = bytes(32)) -> Key:
 
 
 def ended(measured: dict[str, Any], **changes: Any) -> dict[str, Any]:
-    return sealed(START, event_of("trial_ended", **WHICH | measured | changes), key()).fields() | {"n": 2}
+    return seal_event(START, event_of("trial_ended", **WHICH | measured | changes), key()).fields() | {"n": 2}
 
 
 def found_in(line: dict[str, Any], event: str = "trial_ended", *, used: Key | None = None, start: Any = START) -> Any:
     """Return the fields of a line after the key was opened."""
-    return opened([start, event_of(event, **line)], used or key())[1].fields()
+    return open_events([start, event_of(event, **line)], used or key())[1].fields()
 
 
 def test_what_tells_a_condition_is_sealed_and_nothing_else() -> None:
@@ -51,7 +51,7 @@ def test_it_opens_whole_and_numpys_numbers_plain() -> None:
     found = {"force_mean_n": 0.25, "ticks": 7, "withheld_share": None}
     assert found_in(line) == {**WHICH, **MEASURED, **found}
     lines = [START, event_of("trial_ended", **line)]
-    assert opened(lines, None) == lines
+    assert open_events(lines, None) == lines
 
 
 @pytest.mark.slow
@@ -80,7 +80,7 @@ def test_equal_numbers_of_two_trials_look_different() -> None:
 
 def test_what_was_changed_or_moved_does_not_open_nor_with_another_key() -> None:
     line, place = ended(MEASURED), {"trial": 3, "attempt": 1, "interval": 1}
-    interval = sealed(START, event_of("interval_ended", **place, force_mean_n=0.5), key()).fields() | {"n": 2}
+    interval = seal_event(START, event_of("interval_ended", **place, force_mean_n=0.5), key()).fields() | {"n": 2}
     assert found_in(interval, "interval_ended")["force_mean_n"] == 0.5
     moved = [line | change for change in ({"sealed": "00" * 500}, {"sealed": ""}, {"sealed": "x"}, {"trial": 4})]
     moved += [line | {"attempt": 2}, interval]

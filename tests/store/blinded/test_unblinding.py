@@ -8,17 +8,17 @@ import pytest
 
 from study_app.protocol.model import Protocol, StudyHead
 from study_app.store import unblinding as module
-from study_app.store.blinded.blinding import open_or_draw_key, opened, reveal
+from study_app.store.blinded.blinding import open_events, open_or_draw_key, reveal
 from study_app.store.checksums import replace_checksums
 from study_app.store.columns import SEALED, TRIALS
-from study_app.store.csv_files import csv_bytes, header, read_table, unsealed
+from study_app.store.csv_files import csv_bytes, header, read_table, unsealed_columns
 from study_app.store.folders import REBUILT, StudyFolder
 from study_app.store.journals import journal, journal_events
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.recovery import rebuild, reopen
+from study_app.store.sessions.recovery import rebuild_session, reopen_store
 from study_app.store.tables.study_files import description_bytes
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.journal_lines import event_of, raw
 from tests.store.conftest import SOURCE, Attend, Start, ticking_clock
 from tests.store.forging import Lines, cover_up, forge
@@ -34,15 +34,15 @@ def tables_in(folder: Path) -> dict[str, bytes]:
 
 
 def sound(folder: Path) -> bool:
-    findings = verify(folder)
+    findings = verify_study(folder)
     assert not [str(error) for error in findings.errors]
-    return findings.sound
+    return findings.is_sound
 
 
 def test_a_sealed_study_holds_no_column_that_tells_a_condition(tmp_path: Path, finished: Start) -> None:
     store = finished()
     folder = tmp_path / "study"
-    assert names(store.folder.table("brackish", "trials")) == set(header(unsealed(TRIALS)))
+    assert names(store.folder.table("brackish", "trials")) == set(header(unsealed_columns(TRIALS)))
     for path in folder.rglob("*.*"):
         if path.is_file():
             held = path.read_bytes()
@@ -104,7 +104,7 @@ def test_opening_again_changes_no_table_and_finishes_what_was_broken_off(
         unblind(folder, "AB", "done")
     monkeypatch.undo()
     monkeypatch.setattr("os.fsync", lambda _: None)
-    assert not verify(folder).sound
+    assert not verify_study(folder).is_sound
     assert unblind(folder, "AB", "again").left == ()
     assert sound(folder)
     held = tables_in(folder)
@@ -117,7 +117,7 @@ def test_a_session_goes_on_as_it_began(tmp_path: Path, protocol: Protocol, start
     with start() as store:
         attend(store)
     unblind(tmp_path / "study", "AB", "done")
-    again = reopen(store.folder.path, protocol, SOURCE, operator="AB", device={"name": "scripted"}, screens={})
+    again = reopen_store(store.folder.path, protocol, SOURCE, operator="AB", device={"name": "scripted"}, screens={})
     told = {"block": "delays", "phase": "main", "part": 2, "index": 2, "of": 2, "code": "D1"}
     again.append(journal_events.TrialStarted(trial=6, attempt=1, **told))
     again.append(event_of("trial_ended", trial=6, attempt=1, outcome="complete", force_mean_n=1.25))
@@ -129,7 +129,7 @@ def test_a_session_goes_on_as_it_began(tmp_path: Path, protocol: Protocol, start
 
 def in_clear(store: SessionStore, study: StudyHead) -> None:
     """Make of a finished session one of an earlier version, which sealed nothing."""
-    lines = raw(opened(journal.read(store.folder.journal), store.key))
+    lines = raw(open_events(journal.read(store.folder.journal), store.key))
     del lines[0]["measures_sealed"]
 
     def clear(held: Lines) -> None:
@@ -149,7 +149,7 @@ def test_a_study_of_an_earlier_version_stays_sound_sealed_and_opened(
     folder = tmp_path / "study"
     assert names(store.folder.table("brackish", "trials")) == set(header(TRIALS))
     assert sound(folder)
-    assert rebuild(store.folder.path).rewritten == ()
+    assert rebuild_session(store.folder.path).rewritten == ()
     later = finished("P008")
     assert not SEALED & names(later.folder.table("brackish", "trials"))
     assert sound(folder)
@@ -163,7 +163,7 @@ def test_a_study_of_an_earlier_version_stays_sound_sealed_and_opened(
 def test_a_table_of_an_earlier_version_is_opened_without_the_column_that_it_did_not_know(finished: Start) -> None:
     store = finished()
     folder, path = store.place.study_folder.path, store.folder.table(store.place.study, "trials")
-    earlier = tuple(column for column in unsealed(TRIALS) if column.name != "recording_lost")
+    earlier = tuple(column for column in unsealed_columns(TRIALS) if column.name != "recording_lost")
     sealed = path.read_bytes()
     path.write_bytes(csv_bytes(earlier, read_table(sealed, earlier)))
     replace_checksums(
@@ -172,4 +172,4 @@ def test_a_table_of_an_earlier_version_is_opened_without_the_column_that_it_did_
     for _ in range(2):
         assert unblind(folder, by="AB", reason="a test").left == ()
         assert names(path) == set(header(TRIALS)) - {"recording_lost"}
-    assert verify(folder).errors == ()
+    assert verify_study(folder).errors == ()

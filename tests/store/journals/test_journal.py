@@ -16,7 +16,7 @@ from jsonschema import Draft7Validator
 from study_app.errors import StoreError
 from study_app.store.journals import journal_events
 from study_app.store.journals.journal import Journal, SessionClock, read, scan
-from study_app.store.journals.journal_events import journal_schema, problem, unknown_events
+from study_app.store.journals.journal_events import journal_schema, line_problem, unknown_events
 from tests.journal_lines import event_of, raw
 from tests.store.conftest import AWKWARD, Start
 
@@ -192,4 +192,4 @@ def test_an_event_of_another_version_is_told_once_and_what_the_store_writes_is_k
     assert list(unknown_events(list(map(journal_events.read_event, lines)))) == ["weather"]
     written = finished(recordings=True).lines
     assert list(unknown_events(written)) == []
-    assert {problem(each) for each in (*lines, *raw(written))} == {None}
+    assert {line_problem(each) for each in (*lines, *raw(written))} == {None}

@@ -127,7 +127,7 @@ def test_a_flush_that_fails_behind_is_told_with_the_next_line_and_loses_none(
     third = journal.append(event_of("seen", item="calm"), waits=False)
     with pytest.raises(StoreError, match="Input/output error"):
         journal.close()
-    assert journal.closed
+    assert journal.is_closed
     journal.close()
     assert read(disk.path)[:3] == [first, shown, second]
     assert [line.n for line in (first, shown, second, third)] == [1, 2, 3, 4]

@@ -8,7 +8,7 @@ import pytest
 
 from study_app.protocol.model import Protocol
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.recovery import reopen
+from study_app.store.sessions.recovery import reopen_store
 from tests.store.conftest import SOURCE, Start
 
 Again = Start
@@ -29,7 +29,7 @@ def again(tmp_path: Path, protocol: Protocol) -> Again:
             "screens": {},
             "now_ns": lambda: next(ticks),
         }
-        return reopen(**(arguments | given))
+        return reopen_store(**(arguments | given))
 
     return reopened
 

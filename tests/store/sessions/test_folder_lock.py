@@ -13,8 +13,8 @@ import psutil
 import pytest
 
 from study_app.errors import StoreError
-from study_app.store.folder_lock import is_open, markers, open_alone, process_began
-from study_app.store.folders import StudyFolder, locate, study_folder
+from study_app.store.folder_lock import is_open, lock_folder, markers, process_start_s
+from study_app.store.folders import StudyFolder, locate_session, study_folder
 from study_app.store.sessions.begin import used_ids
 from tests.faults.support.racers import race
 from tests.platforms import needs_fork
@@ -22,7 +22,7 @@ from tests.platforms import needs_fork
 
 def other(folder: Path, **changes: Any) -> Path:
     """Leave the marker of another program in ``folder``."""
-    with_own = open_alone(folder)
+    with_own = lock_folder(folder)
     holder = json.loads(with_own.marker.read_bytes()) | changes
     with_own.release()
     marker = folder / ".open-0123abcd.json"
@@ -39,16 +39,16 @@ def ended_process() -> int:
 def test_a_folder_is_open_in_one_program_until_it_lets_go(tmp_path: Path) -> None:
     for name in (".open-me.json", "open-0123abcd.json", ".open-0123abcd.json.bak"):
         (tmp_path / name).write_text("of no program")
-    first = open_alone(tmp_path)
+    first = lock_folder(tmp_path)
     assert is_open(tmp_path)
     by = rf"is open in another program \(process {os.getpid()} on .*: wait for it, or end it there"
     with pytest.raises(StoreError, match=by):
-        open_alone(tmp_path)
+        lock_folder(tmp_path)
     assert markers(tmp_path) == (first.marker,)
     for _ in range(2):
         first.release()
         assert not is_open(tmp_path)
-    open_alone(tmp_path).release()
+    lock_folder(tmp_path).release()
     assert len(list(tmp_path.iterdir())) == 3
 
 
@@ -62,7 +62,7 @@ def test_the_marker_of_a_program_that_is_gone_is_passed_over(tmp_path: Path, cha
         changes = {"pid": ended_process()}
     marker = other(tmp_path, **changes)
     assert not is_open(tmp_path)
-    mine = open_alone(tmp_path)
+    mine = lock_folder(tmp_path)
     assert markers(tmp_path) == (mine.marker,)
     assert not marker.exists()
     mine.release()
@@ -70,7 +70,7 @@ def test_the_marker_of_a_program_that_is_gone_is_passed_over(tmp_path: Path, cha
 
 def test_a_killed_program_that_nobody_has_waited_for_is_gone(tmp_path: Path) -> None:
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as program:
-        other(tmp_path, pid=program.pid, began=process_began(program.pid))
+        other(tmp_path, pid=program.pid, began=process_start_s(program.pid))
         assert is_open(tmp_path)
         program.kill()
         os.waitid(os.P_PID, program.pid, os.WEXITED | os.WNOWAIT)
@@ -88,7 +88,7 @@ def test_a_program_that_may_live_is_not_disturbed(tmp_path: Path, holder: str) -
     marker.write_text(holder.replace("HOST", json.dumps(platform.node())))
     assert is_open(tmp_path)
     with pytest.raises(StoreError, match=r"if that program is gone, delete .*\.open-0123abcd\.json"):
-        open_alone(tmp_path)
+        lock_folder(tmp_path)
     assert markers(tmp_path) == (marker,)
 
 
@@ -96,7 +96,7 @@ def test_neither_a_set_clock_nor_a_hidden_process_ends_an_opening(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On Linux the wall time at which a process began is computed from the clock of now."""
-    opening = open_alone(tmp_path)
+    opening = lock_folder(tmp_path)
     create_time, boot_time = psutil.Process.create_time, psutil.boot_time
     monkeypatch.setattr(psutil.Process, "create_time", lambda self: create_time(self) + 3600 * psutil.LINUX)
     monkeypatch.setattr(psutil, "boot_time", lambda: boot_time() + 3600)
@@ -118,7 +118,7 @@ def test_of_programs_that_come_at_once_never_two_get_in(tmp_path: Path) -> None:
     @contextmanager
     def opened(_program: int, number: int) -> Iterator[bool]:
         try:
-            opening = open_alone(tmp_path / str(number))
+            opening = lock_folder(tmp_path / str(number))
         except StoreError:
             yield False
         else:
@@ -170,9 +170,9 @@ def test_a_sessions_folder_is_known_from_its_path(tmp_path: Path) -> None:
     study = StudyFolder(tmp_path.resolve() / "rek2024")
     session = study.session("P007", 3)
     session.path.mkdir(parents=True)
-    assert locate(session.path) == (study, session)
+    assert locate_session(session.path) == (study, session)
     (tmp_path / "link").symlink_to(session.path)
-    assert locate(tmp_path / "link") == (study, session)
+    assert locate_session(tmp_path / "link") == (study, session)
     assert study_folder(Path("results"), "rek2024", pilot=True).path == Path("results/rek2024-pilot")
 
 
@@ -184,4 +184,4 @@ def test_other_folders_are_no_sessions(tmp_path: Path, name: str) -> None:
     if name != "gone":
         (tmp_path / name).mkdir(parents=True)
     with pytest.raises(StoreError, match="is not a session folder: name one such as results/rek2024/data"):
-        locate(tmp_path / name)
+        locate_session(tmp_path / name)

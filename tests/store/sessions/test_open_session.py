@@ -15,7 +15,7 @@ from study_app.store import receipt
 from study_app.store.journals import journal, journal_events
 from study_app.store.recordings import read_facts
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.journal_lines import event_of
 from tests.store.conftest import Make, Start
 
@@ -110,7 +110,7 @@ def test_an_end_that_was_half_written_is_finished_by_another_call(
             store.finish("completed")
     store.finish("completed")
     assert [line.event for line in store.lines].count("session_ended") == 1
-    assert verify(store.place.study_folder.path).errors == ()
+    assert verify_study(store.place.study_folder.path).errors == ()
 
 
 def test_while_it_runs_only_the_journal_is_waited_for_and_at_its_end_every_table(

@@ -3,8 +3,8 @@ import pytest
 from study_app.errors import StoreError
 from study_app.store.journals import journal, journal_events
 from study_app.store.sessions.open_session import SessionStore, table_files
-from study_app.store.sessions.recovery import rebuild
-from study_app.store.verification.verify_session import doubts
+from study_app.store.sessions.recovery import rebuild_session
+from study_app.store.verification.verify_session import session_discrepancies
 from tests.journal_lines import event_of
 from tests.store.conftest import Attend, Start
 from tests.store.sessions.conftest import every_byte
@@ -28,7 +28,7 @@ def test_half_written_files_are_taken_away_and_nothing_else(ended: SessionStore)
     half[0].mkdir()
     for path in (half[0] / "inside", *half[1:], *kept):
         path.write_bytes(b"x")
-    assert rebuild(here).swept == tuple(half)
+    assert rebuild_session(here).swept == tuple(half)
     assert [path.exists() for path in (*half, *kept)] == [False] * 3 + [True] * 5
 
 
@@ -60,9 +60,9 @@ def test_of_a_journal_cut_at_any_byte_everything_whole_is_rebuilt_and_the_journa
         whole = sum(end <= size for end in ends)
         if whole == 0:
             with pytest.raises(StoreError, match="does not begin with session_started"):
-                rebuild(store.folder.path)
+                rebuild_session(store.folder.path)
             continue
-        done = rebuild(store.folder.path)
+        done = rebuild_session(store.folder.path)
         assert done.torn_bytes == size - ends[whole - 1]
         assert [(file, file.read_bytes()) for file, _ in expected[whole - 1]] == list(expected[whole - 1])
         assert path.read_bytes() == content[:size]
@@ -74,7 +74,7 @@ def test_a_session_that_is_open_is_left_alone(start: Start) -> None:
     with start() as store:
         before = every_byte(store.folder.path)
         with pytest.raises(StoreError, match="is open in another program"):
-            rebuild(store.folder.path)
+            rebuild_session(store.folder.path)
         assert every_byte(store.folder.path) == before
 
 
@@ -82,6 +82,6 @@ def test_a_folder_under_a_tables_name_is_a_doubt(ended: SessionStore) -> None:
     path = ended.folder.table("brackish", "trials")
     path.unlink()
     path.mkdir()
-    (doubt,) = doubts(ended.place)
+    (doubt,) = session_discrepancies(ended.place)
     assert doubt.path == path
     assert "cannot be read" in str(doubt)

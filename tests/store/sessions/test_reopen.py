@@ -13,7 +13,7 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial, build_schedule
 from study_app.store import receipt
-from study_app.store.blinded.blinding import opened
+from study_app.store.blinded.blinding import open_events
 from study_app.store.folder_lock import is_open
 from study_app.store.journals import journal, journal_events
 from study_app.store.recorder import recording_files
@@ -158,7 +158,7 @@ def test_recordings_without_a_line_are_taken_up_if_whole_and_lost_if_not(
         store.recorder.append(samples_of(100 * trial.number))
         store.recorder.stop()
     store.recorder.close()
-    store.append(store.recorder.kept()[0])
+    store.append(store.recorder.collect_results()[0])
     store.journal.close()
     store.opening.release()
     torn = store.folder.recordings / ".trial-003.parquet.0123abcd.tmp"
@@ -180,7 +180,7 @@ def test_recordings_without_a_line_are_taken_up_if_whole_and_lost_if_not(
             ("recorded", 2),
             ("recording_lost", 3),
         ]
-        assert opened(resumed.lines, resumed.key)[told_of[1].n - 1].samples_recorded == 200
+        assert open_events(resumed.lines, resumed.key)[told_of[1].n - 1].samples_recorded == 200
         assert len(read_samples(resumed.folder.path / told_of[1].recording, resumed.key.nonce)) == 200
         assert told_of[2].reason == "the program ended before it was complete"
         recorder = resumed.recorder

@@ -12,7 +12,7 @@ from study_app.haptics.model.estimators import Ewma, Kalman
 from study_app.haptics.model.gate import resolve
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
-from study_app.store.blinded.blinding import as_recorded, sealed_model
+from study_app.store.blinded.blinding import recorded_protocol, sealed_model
 from study_app.store.sessions.open_session import SessionStore
 from tests.protocol.trials import level_studies
 from tests.store.conftest import Start, Tables
@@ -77,7 +77,7 @@ def test_receipts_of_earlier_versions_give_the_estimator_alone(begun: SessionSto
     held = receipt_of(begun)
     del held["resolved"]
     held["protocol"]["scene"]["velocity"] = {"kind": "ewma", "alpha": 0.2}
-    used = as_recorded(protocol, held, begun.key)
+    used = recorded_protocol(protocol, held, begun.key)
     assert used.scene.velocity == Ewma(alpha=0.2)
     assert used.liquids == protocol.liquids
 
@@ -91,7 +91,7 @@ def test_a_changed_text_or_one_of_another_session_is_refused(begun: SessionStore
         (text, dataclasses.replace(key, nonce=bytes(32))),
     ):
         with pytest.raises(StoreError, match=r"receipt of P007 cannot be decrypted with the study's key \(resolved\)"):
-            as_recorded(protocol, held | {"resolved": other}, used)
+            recorded_protocol(protocol, held | {"resolved": other}, used)
 
 
 def test_a_liquid_whose_delay_is_varied_keeps_its_effects(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from study_app.store import receipt
 from study_app.store.journals import journal, journal_events
 from study_app.store.progress import progress_of
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.recovery import reopen
+from study_app.store.sessions.recovery import reopen_store
 from tests.outlets.collector import Collector
 from tests.store.conftest import SOURCE, Start
 
@@ -87,7 +87,7 @@ def test_a_resumed_session_begins_with_its_resumption_and_outlets_of_its_own(
         assert progress_of(store.lines).outlets_lost == outlets.lost
     path, later = store.folder.path, Collector()
     sent: dict[str, Any] = {"device": {"name": "scripted"}, "screens": {}, "outlets": {"a": {}}}
-    with reopen(path, protocol, SOURCE, operator="AB", **sent) as again:
+    with reopen_store(path, protocol, SOURCE, operator="AB", **sent) as again:
         assert progress_of(again.lines).outlets_lost == {}
         again.attach(later)
         assert later.events == ["session_resumed"]

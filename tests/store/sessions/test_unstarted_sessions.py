@@ -11,13 +11,13 @@ import pytest
 
 from study_app import app
 from study_app.errors import StoreError
-from study_app.store.folder_lock import abandoned, markers, never_begun, open_alone
+from study_app.store.folder_lock import is_abandoned, is_never_begun, lock_folder, markers
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal, journal_events
 from study_app.store.sessions import begin, open_session
 from study_app.store.sessions.begin import used_ids
-from study_app.store.sessions.recovery import reopen
-from study_app.store.verification.verify_study import verify
+from study_app.store.sessions.recovery import reopen_store
+from study_app.store.verification.verify_study import verify_study
 from tests.faults.support.killer import die, forked
 from tests.platforms import needs_fork
 from tests.store.conftest import SOURCE, Start
@@ -70,12 +70,12 @@ def test_it_cannot_be_resumed_but_begun_where_no_program_takes_it_over(
 ) -> None:
     place = left.session("P004", 1)
     for go_on in (
-        lambda: reopen(place.path, protocol, SOURCE, operator="", device={}, screens={}),
+        lambda: reopen_store(place.path, protocol, SOURCE, operator="", device={}, screens={}),
         lambda: app.resume(place.path),
     ):
         with pytest.raises(StoreError, match=r"it cannot be resumed: begin a new session of participant P004"):
             go_on()
-    with open_alone(place.path):
+    with lock_folder(place.path):
         before = sorted(place.path.iterdir())
         with pytest.raises(StoreError, match="P004 already has session 1"):
             start("P004")
@@ -88,7 +88,7 @@ def test_it_cannot_be_resumed_but_begun_where_no_program_takes_it_over(
         store.finish("completed")
     with pytest.raises(StoreError, match="P004 already has session 1"):
         start("P004")
-    found = verify(left.path)
+    found = verify_study(left.path)
     assert (found.errors, found.warnings) == ((), ())
     assert (place.path / "journal.jsonl").read_text().startswith('{"n":1,"event":"session_started"')
 
@@ -115,7 +115,7 @@ def test_what_a_program_killed_while_claiming_left_is_swept_with_the_next_claim(
     assert used_ids(study).suggested() == "P004"
     start("P004").finish("completed")
     assert [path.name for path in place.iterdir()] == ["ses-01"]
-    assert verify(study.path).errors == ()
+    assert verify_study(study.path).errors == ()
 
 
 def test_a_claim_whose_program_lives_or_is_not_known_stays(study: StudyFolder, start: Start) -> None:
@@ -123,7 +123,7 @@ def test_a_claim_whose_program_lives_or_is_not_known_stays(study: StudyFolder, s
     claimed, unmarked, old = (place / f".ses-02.{number:08x}.tmp" for number in range(3))
     for half in (claimed, unmarked, old):
         half.mkdir(parents=True)
-    open_alone(claimed)
+    lock_folder(claimed)
     os.utime(old, (0, 0))
     os.utime(claimed, (0, 0))
     start("P004").close()
@@ -135,9 +135,9 @@ def test_a_session_that_began_is_never_taken_over(study: StudyFolder, start: Sta
     folder = study.session("P005", 1)
     whole = folder.journal.read_bytes()
     folder.journal.write_bytes(b"#" + whole + whole)
-    assert not never_begun(folder.path)
+    assert not is_never_begun(folder.path)
     for missing in (folder.receipt, folder.journal):
         missing.unlink()
-        assert not abandoned(folder.path), "its tables are there"
+        assert not is_abandoned(folder.path), "its tables are there"
         with pytest.raises(StoreError, match="P005 already has session 1"):
             start("P005")

@@ -12,12 +12,12 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.folder_lock import open_alone
+from study_app.store.folder_lock import lock_folder
 from study_app.store.merged import read_merged
-from study_app.store.sessions.recovery import rebuild
+from study_app.store.sessions.recovery import rebuild_session
 from study_app.store.sites import merge as merging
-from study_app.store.sites.merge import merge
-from study_app.store.verification.verify_study import verify
+from study_app.store.sites.merge import merge_sites
+from study_app.store.verification.verify_study import verify_study
 from study_app.store.withdrawals import withdraw
 from tests.faults.support.killer import die, forked
 from tests.platforms import needs_fork
@@ -49,8 +49,8 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def test_an_open_folder_is_refused(labs: dict[str, Path], results: Path, tmp_path: Path) -> None:
     lab = Path(shutil.copytree(labs["A"], tmp_path / "lab"))
-    with open_alone(lab / "data/sub-P001/ses-01"), pytest.raises(StoreError, match="is open in another program"):
-        merge({"A": lab}, results / "pooled")
+    with lock_folder(lab / "data/sub-P001/ses-01"), pytest.raises(StoreError, match="is open in another program"):
+        merge_sites({"A": lab}, results / "pooled")
     assert list(results.parent.glob("**/.*.tmp")) == []
 
 
@@ -66,7 +66,7 @@ def test_a_folder_that_changes_while_it_is_copied_is_refused(
 
     monkeypatch.setattr("shutil.copytree", copy_while_a_session_ends)
     with pytest.raises(StoreError, match="was changed while it was copied"):
-        merge({"A": lab}, results / "pooled")
+        merge_sites({"A": lab}, results / "pooled")
     assert list(results.iterdir()) == []
 
 
@@ -79,7 +79,7 @@ def merge_until(count: int, lab: Path, to: Path) -> None:
 
     for module, name in ((merging, "_copy_file"), (merging, "write_file"), (merging, "sync_folder"), (Path, "rename")):
         setattr(module, name, watched(getattr(module, name)))
-    merge({"C": lab}, to)
+    merge_sites({"C": lab}, to)
 
 
 @needs_fork
@@ -89,19 +89,19 @@ def test_a_killed_merge_leaves_the_old_state_or_the_new_one(exists: bool, labs: 
     for kill_at in (0, 3, 10, *range(20, 60, 2), *range(60, 90)):
         shutil.rmtree(to, ignore_errors=True)
         if exists:
-            merge({"A": labs["A"]}, to)
+            merge_sites({"A": labs["A"]}, to)
             old = contents(to)
         code = forked(lambda count=kill_at: merge_until(count, labs["C"], to))
         merged = read_merged(to)
         listed = () if merged is None else merged.names
         states.append(listed)
         if merged is not None:
-            assert verify(to).sound
+            assert verify_study(to).is_sound
         if "C" not in listed:
             assert code == -signal.SIGKILL
             held = {} if merged is None else contents(to)
             assert {name: held.get(name) for name in old} == old
-            assert merge({"C": labs["C"]}, to).names[-1] == "C"
+            assert merge_sites({"C": labs["C"]}, to).names[-1] == "C"
         assert contents(to / "sites/C") == contents(labs["C"])
         assert [path.name for path in (to / "sites").iterdir() if path.name not in ("A", "C")] == []
         if code == 0:
@@ -113,13 +113,13 @@ def test_an_unfinished_session_that_was_deleted_at_a_site_is_missed(labs: dict[s
     lab = Path(shutil.copytree(labs["A"], results / "lab"))
     session = lab / "data/sub-P002/ses-01"
     unfinished(session)
-    assert verify(lab).sound
-    pooled = merge({"A": lab, "B": labs["B"]}, results / "pooled").path
-    assert verify(pooled).sound
+    assert verify_study(lab).is_sound
+    pooled = merge_sites({"A": lab, "B": labs["B"]}, results / "pooled").path
+    assert verify_study(pooled).is_sound
     assert (pooled / "sites/A/blinding/key.sealed").stat().st_mode & 0o777 == 0o600
     shutil.rmtree(pooled / "sites/A/data/sub-P002")
     said = "sites/A: has 1 of the 2 sessions that sites.json lists: restore the others from a copy"
-    assert said in list(map(str, verify(pooled).errors))
+    assert said in list(map(str, verify_study(pooled).errors))
 
 
 def test_a_withdrawal_that_reaches_an_older_copy_after_merging_is_no_error(
@@ -128,9 +128,9 @@ def test_a_withdrawal_that_reaches_an_older_copy_after_merging_is_no_error(
     """The site withdrew the participant, then a copy from before was merged, and then withdrawn from."""
     lab, older = (Path(shutil.copytree(labs["A"], tmp_path / name)) for name in ("lab", "older"))
     withdraw(lab, "P001", by="AK", reason="asked", now=datetime.now().astimezone() - timedelta(hours=1))
-    pooled = merge({"A": older, "B": labs["B"]}, results / "pooled").path
+    pooled = merge_sites({"A": older, "B": labs["B"]}, results / "pooled").path
     assert withdraw(lab, "P001", by="AK", reason="asked", also=[results]).folders == (pooled / "sites/A",)
-    assert verify(pooled).sound
+    assert verify_study(pooled).is_sound
 
 
 def unfinished(session: Path) -> None:
@@ -144,4 +144,4 @@ def unfinished(session: Path) -> None:
     fingerprints = session.parents[2] / "fingerprints.txt"
     kept = [line for line in fingerprints.read_text().splitlines(keepends=True) if session.parent.name not in line]
     fingerprints.write_text("".join(kept))
-    rebuild(session)
+    rebuild_session(session)

@@ -13,7 +13,13 @@ from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.presented.presentation import Presentation
 from study_app.protocol.trials.stimuli import Stimulated
-from study_app.store.delivered import delivered, delivered_error, judged, missed, undelivered
+from study_app.store.delivered import (
+    broken_interval_limits,
+    broken_trial_limits,
+    delivered_error,
+    delivered_values,
+    judged_fields,
+)
 from tests.golden import compare
 from tests.protocol.edited_studies import text_of
 from tests.transcripts import acts, played, value_of
@@ -75,11 +81,11 @@ class Interval:
     def find(self, vary: str, value: float, condition: str = "damper") -> str:
         """Tell what was delivered of a level, and which limits that breaks."""
         presented, task = Stimulated(condition, vary, value), self.protocol.tasks[self.task]
-        found = delivered(self.protocol, presented, task, judged(self.found))
+        found = delivered_values(self.protocol, presented, task, judged_fields(self.found))
         told = ", ".join(
             f"{name} {round(one, 4) + 0.0:g}" for name, one in asdict(found).items() if isinstance(one, float)
         )
-        return f"{told}; broken: {[*undelivered(self.protocol.limits, presented, task, found)]}"
+        return f"{told}; broken: {[*broken_interval_limits(self.protocol.limits, presented, task, found)]}"
 
 
 def begun(start: str) -> Interval:
@@ -109,12 +115,14 @@ def test_delays_are_judged_by_the_difference_of_their_errors(
     errors_ms: list[float | None], holds: tuple[bool, ...], broken: list[str]
 ) -> None:
     limits = parse(STUDY.encode(), "delivered.toml").limits
-    assert [*missed(limits, Presentation(10.0, 50.0, 0, (DELAY, DELAY)), holds, errors_ms, 1000.0)] == broken
-    assert [*missed(limits, Presentation(0.1, 8.0, 0, (DAMPING, DAMPING)), holds, errors_ms, 1000.0)] == []
+    assert [
+        *broken_trial_limits(limits, Presentation(10.0, 50.0, 0, (DELAY, DELAY)), holds, errors_ms, 1000.0)
+    ] == broken
+    assert [*broken_trial_limits(limits, Presentation(0.1, 8.0, 0, (DAMPING, DAMPING)), holds, errors_ms, 1000.0)] == []
 
 
 def error(found: Any, fade_s: float = 0.3, b_nspm: float = 8.0) -> float | None:
-    return delivered_error(judged(found), 1000.0, fade_s, lambda _t_s, _x_m, v_mps: -b_nspm * v_mps)
+    return delivered_error(judged_fields(found), 1000.0, fade_s, lambda _t_s, _x_m, v_mps: -b_nspm * v_mps)
 
 
 def test_the_error_of_the_force_sent_is_its_difference_from_the_law_on_the_motion():

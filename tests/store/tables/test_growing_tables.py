@@ -9,8 +9,8 @@ from study_app.protocol.model import Protocol
 from study_app.store.blinded.blinding import reveal
 from study_app.store.journals import journal_events
 from study_app.store.sessions.open_session import SessionStore, table_files
-from study_app.store.sessions.recovery import check_can_go_on, rebuild
-from study_app.store.verification.verify_study import verify
+from study_app.store.sessions.recovery import check_resumable, rebuild_session
+from study_app.store.verification.verify_study import verify_study
 from tests.journal_lines import event_of
 from tests.platforms import files_up_to
 from tests.store.conftest import SOURCE, Start
@@ -120,11 +120,11 @@ def test_a_table_that_was_cut_off_is_accepted_and_completed(
         whole = path.read_bytes()
     for size in range(whole.index(b"\n") + 1, len(whole), 7):
         path.write_bytes(whole[:size])
-        found = verify(store.place.study_folder.path)
+        found = verify_study(store.place.study_folder.path)
         assert found.errors == ()
         assert any("differs from the journal" in one.message for one in found.warnings)
-        check_can_go_on(store.folder.path, protocol, SOURCE)
-        assert path in rebuild(store.folder.path).rewritten
+        check_resumable(store.folder.path, protocol, SOURCE)
+        assert path in rebuild_session(store.folder.path).rewritten
         assert path.read_bytes() == whole
 
 

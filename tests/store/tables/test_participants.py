@@ -11,9 +11,9 @@ from study_app.errors import StoreError
 from study_app.gui.sessions.session_facts import sessions
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.sessions.recovery import rebuild
+from study_app.store.sessions.recovery import rebuild_session
 from study_app.store.tables import study_files
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.journal_lines import raw
 from tests.store.conftest import Start
 
@@ -67,9 +67,9 @@ def test_a_journal_that_gives_no_row_stops_no_other_session_and_is_marked(
     first, second = table(tmp_path / "study")
     assert (first["participant"], first["session"], first["status"]) == ("P001", "1", "damaged")
     assert (second["participant"], second["status"]) == ("P002", "completed")
-    assert not verify(tmp_path / "study").sound
+    assert not verify_study(tmp_path / "study").is_sound
     with pytest.raises(StoreError):
-        rebuild(store.folder.path)
+        rebuild_session(store.folder.path)
 
 
 def into_a_folder(path: Path) -> None:
@@ -97,7 +97,7 @@ def test_a_file_that_cannot_be_read_hides_no_session_and_stops_none(
     there = "damaged" if name == "journal.jsonl" else "completed"
     assert [row["status"] for row in table(tmp_path / "study")] == [there, "completed"]
     assert [one.participant for one in sessions(tmp_path, {})] == ["P001", "P002"]
-    findings = verify(tmp_path / "study")
+    findings = verify_study(tmp_path / "study")
     assert findings.sessions == 2
     assert any("P001/ses-01" in str(error) and name in str(error) for error in findings.errors)
     assert not any("P002" in str(error) for error in findings.errors)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from study_app.store.columns import TRIALS
-from study_app.store.csv_files import MISSING, Column, csv_bytes, guarded, header, in_columns_of, read_table
+from study_app.store.csv_files import MISSING, Column, align_columns, csv_bytes, guard_formula, header, read_table
 from study_app.store.journals.journal_events import Event
 from study_app.store.tables.session_tables import SessionRows
 from tests.journal_lines import event_of
@@ -49,7 +49,10 @@ class Script:
 def test_any_text_comes_back_through_the_csv_module(texts: list[tuple[str, str]]) -> None:
     content = csv_bytes(TEXT, [{"first": first, "second": second} for first, second in texts])
     read_back = list(csv.reader(io.StringIO(content.decode("utf-8"), newline="")))
-    assert read_back == [["first", "second"], *([guarded(first), guarded(second)] for first, second in texts)]
+    assert read_back == [
+        ["first", "second"],
+        *([guard_formula(first), guard_formula(second)] for first, second in texts),
+    ]
     kept = [
         {name: None if text == MISSING else text for name, text in zip(header(TEXT), row, strict=True)} for row in texts
     ]
@@ -79,14 +82,14 @@ def test_a_table_that_was_written_before_texts_were_guarded_is_what_the_journal_
     now = csv_bytes(TEXT, [{"first": "=1+2", "second": 'a, "b"'}, {"first": "'", "second": "+"}])
     early = now.replace(b"'=", b"=").replace(b"'+", b"+")
     assert early != now
-    assert in_columns_of(early, now, TEXT) == (early, TEXT)
+    assert align_columns(early, now, TEXT) == (early, TEXT)
     changed = early.replace(b"=1+2", b"=1+3")
-    assert in_columns_of(changed, now, TEXT) == (now, TEXT)
+    assert align_columns(changed, now, TEXT) == (now, TEXT)
 
 
 def test_numbers_in_the_columns_of_an_earlier_version_stand_as_they_were_written() -> None:
     columns = (Column("time_s", "number", "Time."), Column("late_s", "number", "Time.", minimum=0, later=True))
     now = csv_bytes(columns, [{"time_s": 16, "late_s": 1.5}, {"time_s": 16.0, "late_s": -1}])
-    early, kept = in_columns_of(b"time_s\n", now, columns)
+    early, kept = align_columns(b"time_s\n", now, columns)
     assert (early, kept) == (b"time_s\n16\n16.0\n", columns[:1])
     assert csv_bytes(kept, read_table(early, kept)) == early

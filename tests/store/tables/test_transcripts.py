@@ -8,7 +8,7 @@ import pytest
 
 from study_app.store.journals.journal_events import Event
 from study_app.store.progress import progress_of
-from study_app.store.tables.session_tables import SessionRows, participant
+from study_app.store.tables.session_tables import SessionRows, participant_row
 from tests.golden import compare
 from tests.journal_lines import event_of
 from tests.transcripts import acts, every, played, value_of
@@ -70,7 +70,7 @@ class Lines:
                 yield f"{name} {told}"
 
     def person(self) -> Iterator[str]:
-        yield str({column: value for column, value in participant(self._lines).items() if value is not None})
+        yield str({column: value for column, value in participant_row(self._lines).items() if value is not None})
 
     def progress(self) -> Iterator[str]:
         found = progress_of(self._lines)

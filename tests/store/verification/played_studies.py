@@ -15,15 +15,15 @@ from study_app.protocol.orders.schedule import build_schedule
 from study_app.store import receipt
 from study_app.store.blinded import blinding
 from study_app.store.exclusions import exclude, exclusions
-from study_app.store.folder_lock import open_alone
+from study_app.store.folder_lock import lock_folder
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal_events
-from study_app.store.sessions.recovery import check_can_go_on, rebuild, reopen
+from study_app.store.sessions.recovery import check_resumable, rebuild_session, reopen_store
 from study_app.store.tables.study_files import write_participants
 from study_app.store.unblinding import unblind
 from study_app.store.verification.proofs import proof_text
 from study_app.store.verification.verify_session import Findings
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from study_app.store.withdrawals import Tombstone, add_tombstone, describe_session, withdraw
 from tests.golden import CHANGING
 from tests.journal_lines import event_of
@@ -152,29 +152,29 @@ class Changed(Files):
 
     def verify(self, *, kept: bool = False) -> Iterator[str]:
         """Tell what is found, with fingerprints that were kept elsewhere if that is asked for."""
-        found = verify(self.study, self.kept if kept else None)
-        yield f"{found.sessions} sessions, {found.running} running: {'sound' if found.sound else 'not sound'}"
+        found = verify_study(self.study, self.kept if kept else None)
+        yield f"{found.sessions} sessions, {found.running} running: {'sound' if found.is_sound else 'not sound'}"
         yield from (f"error: {one}" for one in found.errors)
         yield from (f"warning: {one}" for one in found.warnings)
 
     def rebuild(self, session: str = P007) -> Iterator[str]:
-        done = rebuild(self.study / session)
+        done = rebuild_session(self.study / session)
         yield f"rebuilt {[path.name for path in done.rewritten]}, torn {done.torn_bytes}"
 
     def go_on(self, comment: bytes = b"", **changes: Any) -> Iterator[str]:
         """Look whether the session can go on, with a study of other values."""
-        check_can_go_on(self.study / P007, _changed(changes), SOURCE + comment)
+        check_resumable(self.study / P007, _changed(changes), SOURCE + comment)
         yield "it can go on"
 
     def reopen(self, comment: bytes = b"", **changes: Any) -> Iterator[str]:
         """Let it go on, and leave it; yield what that adds to the journal."""
         given: dict[str, Any] = {"operator": "CD", "device": {"name": "mouse"}, "screens": {}}
-        with reopen(self.study / P007, _changed(changes), SOURCE + comment, **given) as store:
+        with reopen_store(self.study / P007, _changed(changes), SOURCE + comment, **given) as store:
             yield from (f"{line.event} {getattr(line, 'torn_bytes', '')}" for line in store.lines[-1:])
 
     def open(self) -> None:
         """Let another program have the session open."""
-        self.opening = open_alone(self.study / self.session)
+        self.opening = lock_folder(self.study / self.session)
 
     def key_for(self, **changes: Any) -> Iterator[str]:
         """Ask for the study's key with a study of other values, as a session that begins does."""

@@ -18,10 +18,10 @@ from study_app.store.blinded import blinding
 from study_app.store.exclusions import exclude
 from study_app.store.journals import journal_events
 from study_app.store.journals.journal import scan
-from study_app.store.sessions.recovery import check_can_go_on, rebuild
+from study_app.store.sessions.recovery import check_resumable, rebuild_session
 from study_app.store.unblinding import unblind
-from study_app.store.verification.reproduction import reproduced
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.reproduction import reproduce_session
+from study_app.store.verification.verify_study import verify_study
 from tests.damage import with_a_bit_flipped, with_an_odd_value, with_deep_nesting
 from tests.journal_lines import event_of
 from tests.store.conftest import SOURCE, Attend, Make, Start
@@ -76,17 +76,17 @@ def test_no_damage_ends_in_a_traceback_or_hides_a_session(
         look_at(tmp_path, study, protocol)
         copy = shutil.copytree(study, tmp_path / "elsewhere" / "study", dirs_exist_ok=True)
         with contextlib.suppress(StudyError):
-            rebuild(copy / Path(name).parent)
+            rebuild_session(copy / Path(name).parent)
 
 
 def look_at(results: Path, study: Path, protocol: Protocol) -> None:
     """Read everything as the commands and the home window do: nothing but an error for people may come of it."""
     assert {facts.participant for facts in sessions(results, {})} == {"P007", "P008"}
     actions: tuple[Callable[[], object], ...] = (
-        lambda: verify(study),
-        lambda: reproduced(study / FINISHED),
-        lambda: reproduced(study / UNFINISHED),
-        lambda: check_can_go_on(study / UNFINISHED, protocol, SOURCE),
+        lambda: verify_study(study),
+        lambda: reproduce_session(study / FINISHED),
+        lambda: reproduce_session(study / UNFINISHED),
+        lambda: check_resumable(study / UNFINISHED, protocol, SOURCE),
         lambda: blinding.revealed_key(study),
     )
     for action in actions:
@@ -102,7 +102,7 @@ def test_a_damaged_journal_is_listed_as_damaged_and_never_sound(
     content, chance = path.read_bytes(), random.Random(SEED)  # noqa: S311 - a fixed choice of damage
     for _ in range(CASES):
         path.write_bytes(damage(content, chance))
-        assert not verify(study).sound
+        assert not verify_study(study).is_sound
         listed = {facts.participant: facts.status for facts in sessions(tmp_path, {})}
         assert listed["P008"] == "unfinished"
         if scan(path).damage is not None:
@@ -154,5 +154,5 @@ def test_a_changed_bit_of_a_recording_is_an_error_and_never_a_traceback(session:
             with contextlib.suppress(StudyError):
                 read(path, secret)
         if number % 20 == 0:
-            findings = verify(session.parents[2])
+            findings = verify_study(session.parents[2])
             assert any(name in str(error) for error in findings.errors)

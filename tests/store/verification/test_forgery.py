@@ -16,10 +16,10 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.simulated import TrialFeatures
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store import receipt
-from study_app.store.checksums import listed
+from study_app.store.checksums import read_list
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal_events as events
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.protocol.forms.mixed import mixed_file
 from tests.store.conftest import Start, Tables
 from tests.store.forging import Lines, cover_up, forge
@@ -40,7 +40,7 @@ def study(tmp_path: Path, finished: Start) -> Path:
 
 
 def told(study: Path, kept: Path | None = None) -> str:
-    return "\n".join(map(str, verify(study, kept).errors))
+    return "\n".join(map(str, verify_study(study, kept).errors))
 
 
 def forget_a_participant(study: Path) -> None:
@@ -56,7 +56,7 @@ def test_a_session_that_was_aborted_before_its_last_page_came_again_is_sound(
     store.append(events.PageShown(page="consent"))
     store.append(events.PageLeft(page="consent"))
     store.finish("aborted", "tired")
-    found = verify(tmp_path / "study")
+    found = verify_study(tmp_path / "study")
     assert (found.errors, found.warnings) == ((), ())
 
 
@@ -84,7 +84,7 @@ def test_a_removed_confirmation_is_found_where_the_session_went_on(
     shorter = 'sequence = ["start", "stir", "load", "usability", "end"]', 'sequence = ["start", "stir", "end"]'
     file = mixed_file(tmp_path, shorter)
     study = rehearse_answers(file, participants=1, seed=1, results=tmp_path / "mixed", features=felt)
-    assert verify(study).errors == ()
+    assert verify_study(study).errors == ()
     journal = study / "data" / "sub-P001" / "ses-01" / "journal.jsonl"
 
     def edit(lines: Lines) -> None:
@@ -106,7 +106,7 @@ def test_a_session_that_left_its_last_page_was_not_aborted(tmp_path: Path) -> No
 
 def test_a_fingerprint_is_what_the_documentation_says(study: Path) -> None:
     """It can be computed without this program: SHA-256 of some lines of the list, in base32."""
-    proofs = listed(StudyFolder(study).fingerprints)
+    proofs = read_list(StudyFolder(study).fingerprints)
     assert proofs
     for proof, place in proofs:
         lines = (study / place / "checksums.sha256").read_text().splitlines(keepends=True)
@@ -129,7 +129,7 @@ def test_a_copy_that_is_none_is_named(study: Path, tmp_path: Path, content: byte
     if content is not None:
         path.write_bytes(content)
     with pytest.raises(StoreError, match=sentence):
-        verify(study, path)
+        verify_study(study, path)
 
 
 def test_the_command_compares_with_the_copy(study: Path, tmp_path: Path) -> None:

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from study_app.session.simulated.rehearsal import rehearse, resume
-from study_app.store.blinded.blinding import opened, read_key
+from study_app.store.blinded.blinding import open_events, read_key
 from study_app.store.journals import journal
 from study_app.store.unblinding import unblind
-from study_app.store.verification.reproduction import reproduced
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.reproduction import reproduce_session
+from study_app.store.verification.verify_study import verify_study
 from tests.journal_lines import raw
 from tests.protocol.trials.level_studies import BLOCK, HEAD
 from tests.session.pairs import short_text
@@ -53,7 +53,7 @@ def test_levels_are_in_the_tables_only_after_unblinding(session: Path) -> None:
     assert {row["presented"] for row in opened_rows} == {"standard", "comparison"}
     assert {row["level"] for row in opened_rows} == {"0.2", "0.4", "0.8"}
     assert {row["standard"] for row in opened_rows} == {"1.0", "2.0"}
-    assert verify(session.parents[2], None).errors == ()
+    assert verify_study(session.parents[2], None).errors == ()
 
 
 @pytest.mark.parametrize("share", [0.2, 0.45, 0.7, 0.95])
@@ -61,7 +61,7 @@ def test_a_session_that_was_killed_and_resumed_presents_and_is_answered_as_one_t
     session: Path, protocol: Path, share: float
 ) -> None:
     def told() -> tuple[list[Any], list[Any]]:
-        lines = raw(opened(journal.read(session / "journal.jsonl"), read_key(session.parents[2])))
+        lines = raw(open_events(journal.read(session / "journal.jsonl"), read_key(session.parents[2])))
         last = {line["trial"]: line for line in lines if line["event"] == "trial_started"}
         levels = [(n, line["level"], line["standard"], line["arrangement"]) for n, line in sorted(last.items())]
         answers = {line["trial"]: line["items"][0]["value"] for line in lines if line["event"] == "responses"}
@@ -71,7 +71,7 @@ def test_a_session_that_was_killed_and_resumed_presents_and_is_answered_as_one_t
     cut(session, round(share * (session / "journal.jsonl").stat().st_size))
     resume(session, protocol=protocol)
     assert told() == whole
-    assert reproduced(session).differences == []
+    assert reproduce_session(session).differences == []
 
 
 def test_compared_conditions_follow_from_the_key(tmp_path: Path) -> None:
@@ -80,6 +80,6 @@ def test_compared_conditions_follow_from_the_key(tmp_path: Path) -> None:
     path = tmp_path / "pairs.toml"
     path.write_text(text.replace("min_s = 1", "min_s = 0.3"))
     study = rehearse(path, participants=1, seed=2, results=tmp_path / "study", recordings=False)
-    found = reproduced(next((study / "data").glob("sub-*/ses-*")))
+    found = reproduce_session(next((study / "data").glob("sub-*/ses-*")))
     assert found.differences == []
     assert found.followed == ["viscosity: 4 of 4 levels follow from the answers"]

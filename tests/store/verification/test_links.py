@@ -17,10 +17,10 @@ from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.output_files import write_files
 from study_app.store.sessions.open_session import Place, SessionStore
-from study_app.store.sessions.recovery import rebuild
+from study_app.store.sessions.recovery import rebuild_session
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_session import doubts
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_session import session_discrepancies
+from study_app.store.verification.verify_study import verify_study
 from study_app.store.withdrawals import withdraw
 from tests.faults.support.killer import forked
 from tests.platforms import needs_fork
@@ -92,8 +92,8 @@ def test_an_endless_device_is_never_read(tmp_path: Path, finished: SessionStore,
         resource.setrlimit(resource.RLIMIT_DATA, (2**32, 2**32))
         study = StudyFolder(tmp_path / "study")
         try:
-            found = [str(one) for of in study.sessions() for one in doubts(Place(study, of, "brackish"))]
-            said.write_text("\n".join([*found, *map(str, verify(study.path).errors)]))
+            found = [str(one) for of in study.sessions() for one in session_discrepancies(Place(study, of, "brackish"))]
+            said.write_text("\n".join([*found, *map(str, verify_study(study.path).errors)]))
         except StudyError as error:
             said.write_text(str(error))
 
@@ -127,9 +127,9 @@ def test_a_name_that_is_no_text_is_reported_and_searched(tmp_path: Path, finishe
     study, name = tmp_path / "study", os.fsdecode(b"P007\xff.csv")
     for folder in (study, finished.folder.path):
         (folder / name).write_bytes(b"")
-    assert name in [Path(one.place).name for one in verify(study).errors]
+    assert name in [Path(one.place).name for one in verify_study(study).errors]
     finished.folder.checksums.unlink()
-    rebuild(finished.folder.path)
-    assert name not in [Path(one.place).name for one in verify(study).errors]
+    rebuild_session(finished.folder.path)
+    assert name not in [Path(one.place).name for one in verify_study(study).errors]
     left = withdraw(study, "P007", by="AB", reason="asked").left
     assert left == (f"{study / name} still names P007",)

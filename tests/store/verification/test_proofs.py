@@ -18,8 +18,8 @@ from study_app.errors import StoreError
 from study_app.store import workstation
 from study_app.store.folders import StudyFolder
 from study_app.store.verification import time_stamps
-from study_app.store.verification.proofs import leave, proof_text, read_proof
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.proofs import proof_text, read_proof, write_proof
+from study_app.store.verification.verify_study import verify_study
 from tests.store.verification.played_studies import proved
 from tests.strangers import ends_with_each
 from tests.studies import once
@@ -33,7 +33,7 @@ P001 = "data/sub-P001/ses-01"
 def study(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = once(tmp_path_factory, "proved", lambda folder: proved(folder / "demo"))
     shutil.copytree(made, tmp_path / "proved")
-    assert verify(tmp_path / "proved" / "demo").errors == ()
+    assert verify_study(tmp_path / "proved" / "demo").errors == ()
     return tmp_path / "proved" / "demo"
 
 
@@ -80,16 +80,16 @@ def test_lines_of_records_are_compared_and_a_withdrawal_that_was_asked_for_adds_
     assert lines == [P001, P001.replace("1/", "2/"), *names]
     typed = study.parent / "typed.txt"
     typed.write_text(kept.read_text().upper())
-    assert verify(study, kept).errors == verify(study, typed).errors == ()
+    assert verify_study(study, kept).errors == verify_study(study, typed).errors == ()
     (study / "blinding" / "reveals.jsonl").write_bytes(b"")
-    assert "reveals.jsonl: lacks what" in "\n".join(map(str, verify(study, kept).errors))
+    assert "reveals.jsonl: lacks what" in "\n".join(map(str, verify_study(study, kept).errors))
     words = ("withdraw", str(study), "--participant", "P002", "--by", "AK", "--reason", "asked")
     said = CliRunner().invoke(commands, words).stdout.splitlines()
-    told = "\n".join(map(str, verify(study, kept).errors))
+    told = "\n".join(map(str, verify_study(study, kept).errors))
     line = said[-1].partition(":  ")[2]
     assert f"the withdrawal of P002 is not in {kept}: if P002 asked for it, add the line: {line}" in told
     kept.write_text(f"{kept.read_text()}{line}\n")
-    assert "P002" not in "\n".join(map(str, verify(study, kept).errors))
+    assert "P002" not in "\n".join(map(str, verify_study(study, kept).errors))
 
 
 def test_a_misread_line_is_named(study: Path) -> None:
@@ -98,26 +98,26 @@ def test_a_misread_line_is_named(study: Path) -> None:
     other = ("b" if first[2] != "b" else "c").join((first[:2], first[3:]))
     kept.write_text("\n".join([other, *rest]))
     with pytest.raises(StoreError, match=r"kept.txt, line 1 was misread: its last two characters are of another line"):
-        verify(study, kept)
+        verify_study(study, kept)
 
 
 def test_a_signature_tells_a_changed_copy_and_another_key(study: Path, key_store: Path) -> None:
     kept = study.parent / "signed.txt"
     done = CliRunner().invoke(commands, ["proof", str(study), "--sign", "--to", str(kept)])
     assert (done.exit_code, done.stdout.strip()) == (0, str(kept)), done.output
-    found = verify(study, kept)
+    found = verify_study(study, kept)
     assert found.errors == ()
     assert f"{kept} is signed with the key of this computer" in "\n".join(map(str, found.warnings))
     whole = kept.read_text()
     kept.write_text("".join(whole.splitlines(keepends=True)[1:]))
     with pytest.raises(StoreError, match="is not what was signed: it was changed"):
-        verify(study, kept)
+        verify_study(study, kept)
     key_store.unlink()
     kept.write_text(whole)
     assert "compare it with your key" in "\n".join(read_proof(kept).told)
     proof_text(StudyFolder(study), sign=True)
     with pytest.raises(StoreError, match=r"signed with another key .* than this computer's: it was replaced"):
-        verify(study, kept)
+        verify_study(study, kept)
 
 
 @pytest.mark.parametrize("forged", ["aaaa-aaaa-aaaa-aa withdrawals.jsonl/sub-P002", "P003", "# a comment"])
@@ -128,7 +128,7 @@ def test_a_line_below_a_signature_is_refused(study: Path, key_store: Path, forge
     with kept.open("a") as file:
         file.write(f"\n{forged}\n")
     with pytest.raises(StoreError, match=rf"signed.txt, line {lines + 2} is below the signature or stamp"):
-        verify(study, kept)
+        verify_study(study, kept)
 
 
 def wait_for_proofs() -> None:
@@ -189,28 +189,28 @@ def test_a_stamp_tells_when_the_study_was_so_and_leaves_by_itself(
     done = CliRunner().invoke(commands, [*words, "--sign"])
     assert done.exit_code == 0, done.output
     said: list[str] = []
-    leave(StudyFolder(study), said.append)
+    write_proof(StudyFolder(study), said.append)
     wait_for_proofs()
     kept = outside / "demo-proof.txt"
     assert said == [f"the proof of the study is in {kept}"]
-    found = verify(study, kept)
+    found = verify_study(study, kept)
     assert found.errors == ()
     assert re.search(r"was stamped at 20\d\d-", "\n".join(map(str, found.warnings)))
     whole = kept.read_text()
     kept.write_text("".join(line for line in whole.splitlines(keepends=True)[1:] if not line.startswith("signature")))
     with pytest.raises(StoreError, match=r"is not what was stamped, or by another server .*: it was changed"):
-        verify(study, kept)
-    workstation.save(workstation.load().model_copy(update={"stamp_root": None}))
+        verify_study(study, kept)
+    workstation.save_settings(workstation.load_settings().model_copy(update={"stamp_root": None}))
     kept.write_text(whole)
     with pytest.raises(StoreError, match=r"is stamped: name the server's root certificate"):
-        verify(study, kept)
+        verify_study(study, kept)
 
 
 def test_a_server_that_gives_no_stamp_is_named_and_the_program_goes_on(study: Path, tmp_path: Path) -> None:
     pytest.importorskip("rfc3161_client", reason="the optional extra proofs is not installed")
-    workstation.save(workstation.MachineSettings(proofs=str(tmp_path), stamps="http://127.0.0.1:9"))
+    workstation.save_settings(workstation.MachineSettings(proofs=str(tmp_path), stamps="http://127.0.0.1:9"))
     said: list[str] = []
-    leave(StudyFolder(study), said.append)
+    write_proof(StudyFolder(study), said.append)
     wait_for_proofs()
     (line,) = said
     assert re.search(r"proof.txt: http://127.0.0.1:9 gave no time stamp \(.*refused.*\): try again later", line)
@@ -246,7 +246,7 @@ def test_an_answer_that_grants_no_stamp_is_refused_at_once(
         threading.Thread(target=serving.serve_forever).start()
         port = serving.server_address[1]
         with pytest.raises(StoreError) as refused:
-            time_stamps.stamped("a line\n", f"http://127.0.0.1:{port}/")
+            time_stamps.request_stamp("a line\n", f"http://127.0.0.1:{port}/")
         serving.shutdown()
     assert re.match(rf"http://127.0.0.1:{port}/ gave no time stamp \(.*{reason}", str(refused.value))
 
@@ -254,12 +254,12 @@ def test_an_answer_that_grants_no_stamp_is_refused_at_once(
 def test_a_message_shows_no_login_of_a_server() -> None:
     pytest.importorskip("rfc3161_client", reason="the optional extra proofs is not installed")
     with pytest.raises(StoreError, match=r"^http://127.0.0.1:9/tsr gave no time stamp"):
-        time_stamps.stamped("a line\n", "http://lab:secret@127.0.0.1:9/tsr")
+        time_stamps.request_stamp("a line\n", "http://lab:secret@127.0.0.1:9/tsr")
 
 
 def test_a_stamp_of_another_request_is_refused(study: Path, server: str, monkeypatch: pytest.MonkeyPatch) -> None:
     client = pytest.importorskip("rfc3161_client", reason="the optional extra proofs is not installed")
-    old = base64.b64decode(time_stamps.stamped("a line\n", server).split()[1])
+    old = base64.b64decode(time_stamps.request_stamp("a line\n", server).split()[1])
     request = client.TimestampRequestBuilder().data(b"a line\n").build()
     with pytest.raises(ValueError, match="answers another request"):
         time_stamps.check_granted(old, request)
@@ -274,7 +274,7 @@ def test_no_other_program_in_place_of_a_server_of_stamps_is_waited_for(monkeypat
 
     def client(port: int) -> str:
         with pytest.raises(StoreError) as refused:
-            time_stamps.stamped("a line\n", f"http://127.0.0.1:{port}/")
+            time_stamps.request_stamp("a line\n", f"http://127.0.0.1:{port}/")
         return str(refused.value)
 
     said = ends_with_each(client)

@@ -18,7 +18,7 @@ from study_app.store.columns import TABLES
 from study_app.store.csv_files import csv_bytes, read_table
 from study_app.store.journals import journal_events
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.faults.support import short
 from tests.platforms import needs_fork
 from tests.store.conftest import Start
@@ -35,9 +35,9 @@ def test_a_table_of_an_earlier_version_is_compared_in_the_columns_it_has(study: 
     earlier = csv_bytes(held, read_table(path.read_bytes(), held))
     assert earlier.startswith(TRIALS_HEADER.encode() + b"\n")
     path.write_bytes(earlier)
-    assert [line for line in told(verify(study)).splitlines() if "its checksum differs" not in line] == []
+    assert [line for line in told(verify_study(study)).splitlines() if "its checksum differs" not in line] == []
     path.write_bytes(earlier.replace(b"complete", b"timeout", 1))
-    assert "differs from the journal, from line" in told(verify(study))
+    assert "differs from the journal, from line" in told(verify_study(study))
 
 
 def test_a_condition_that_is_told_is_found_but_not_repeated(study: Path, tmp_path: Path, start: Start) -> None:
@@ -46,13 +46,13 @@ def test_a_condition_that_is_told_is_found_but_not_repeated(study: Path, tmp_pat
     store.append(journal_events.Note(kind="note", text="density 1013.7, I think"))
     store.append(journal_events.Note(kind="note", text="137 seconds"))
     store.finish("completed")
-    found = [line for line in warned(verify(study)).splitlines() if "reveals a condition" in line]
+    found = [line for line in warned(verify_study(study)).splitlines() if "reveals a condition" in line]
     place = "data/sub-P009/ses-01/journal.jsonl"
     assert [line.split(", line ")[1][0] for line in found] == ["2", "3"]
     assert all(place in line for line in found)
-    assert "mildew" not in warned(verify(study))
+    assert "mildew" not in warned(verify_study(study))
     blinding.reveal(study, "AB", "done")
-    assert "reveals a condition" not in warned(verify(study))
+    assert "reveals a condition" not in warned(verify_study(study))
 
 
 def test_a_receipt_without_a_protocol_makes_no_word_of_the_study_a_telltale(study: Path) -> None:
@@ -61,19 +61,19 @@ def test_a_receipt_without_a_protocol_makes_no_word_of_the_study_a_telltale(stud
     content = json.loads(base64.b64decode(key.read_bytes()))
     content["tables"]["liquids"]["Settings"] = content["tables"]["liquids"].pop("mildew")
     key.write_bytes(base64.encodebytes(json.dumps(content).encode()))
-    assert "reveals a condition" not in warned(verify(study))
+    assert "reveals a condition" not in warned(verify_study(study))
     for participant in ("P007", "P008"):
         path = study / "data" / f"sub-{participant}" / "ses-01" / "receipt.json"
         receipt.write(path, {name: value for name, value in receipt.read(path).items() if name != "protocol"})
-        assert "lacks protocol" in told(verify(study))
-        assert "reveals a condition" not in warned(verify(study))
+        assert "lacks protocol" in told(verify_study(study))
+        assert "reveals a condition" not in warned(verify_study(study))
 
 
 def test_two_files_under_one_version_are_named(study: Path) -> None:
-    assert "different study files" not in warned(verify(study))
+    assert "different study files" not in warned(verify_study(study))
     path = study / P007 / "receipt.json"
     receipt.write(path, {**receipt.read(path), "protocol_hash": "ab" * 32})
-    assert "version 1.0 ran 2 different study files" in warned(verify(study))
+    assert "version 1.0 ran 2 different study files" in warned(verify_study(study))
 
 
 def test_nothing_of_the_key_is_shown(study: Path) -> None:
@@ -83,7 +83,7 @@ def test_nothing_of_the_key_is_shown(study: Path) -> None:
         if path.is_file() and path.name != "key.sealed":
             path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     try:
-        findings = verify(study)
+        findings = verify_study(study)
     except StoreError as error:
         shown = str(error)
     else:
@@ -97,14 +97,14 @@ def test_a_description_of_an_earlier_version_is_a_warning_and_a_column_it_never_
     variables = [it for it in content["variableMeasured"] if it["name"] != "withheld_share"]
     variables[0] = variables[0] | {"description": "In other words.", "valuePattern": "(.*)"}
     path.write_text(json.dumps(content | {"variableMeasured": variables}))
-    findings = verify(study)
+    findings = verify_study(study)
     assert not any(error.place == path.name for error in findings.errors)
     assert "describes the columns as an earlier version of the program did" in warned(findings)
     at = next(index for index, it in enumerate(variables) if "minValue" in it and "unitText" in it)
     for change in ({"minValue": -5}, {"maxValue": 7}, {"unitText": "mile"}, {"@type": "y"}, None):
         changed = variables[1:] if change is None else [*variables[:at], variables[at] | change, *variables[at + 1 :]]
         path.write_text(json.dumps(content | {"variableMeasured": changed}))
-        assert "differs from what this version writes" in told(verify(study))
+        assert "differs from what this version writes" in told(verify_study(study))
 
 
 def test_a_column_that_earlier_versions_did_not_write_cannot_be_taken_from_a_table_of_today(study: Path) -> None:
@@ -113,7 +113,7 @@ def test_a_column_that_earlier_versions_did_not_write_cannot_be_taken_from_a_tab
     rows = list(csv.reader(path.read_text(encoding="utf-8").splitlines()))
     at = rows[0].index("loop_delay_changes")
     path.write_text("".join(f"{','.join([*row[:at], *row[at + 1 :]])}\n" for row in rows), encoding="utf-8")
-    assert f"{path.name}: has changed since the session ended" in told(verify(study))
+    assert f"{path.name}: has changed since the session ended" in told(verify_study(study))
 
 
 ENOUGH = 1  # looks
@@ -134,7 +134,7 @@ def look_beside(study: Path, *programs: tuple[Callable[..., None], tuple[Any, ..
     errors: list[str] = []
     while any(program.is_alive() for program in started):
         if (study / "dataset_description.json").exists():
-            findings = verify(study)
+            findings = verify_study(study)
             looks += 1
             running += findings.running > 0
             if running >= ENOUGH:
@@ -149,4 +149,4 @@ def test_a_rehearsal_with_recordings_beside_it_is_never_called_unsound(tmp_path:
     _, running, errors = look_beside(tmp_path / "study", (rehearse_short, (short.write(tmp_path),)))
     assert errors == []
     assert running > 0
-    assert verify(tmp_path / "study").sound
+    assert verify_study(tmp_path / "study").is_sound

@@ -9,7 +9,7 @@ from study_app.protocol.model import Protocol
 from study_app.store import receipt
 from study_app.store.journals import journal_events
 from study_app.store.sessions import recovery
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from tests.journal_lines import event_of
 from tests.store.conftest import SOURCE, Start
 from tests.store.verification.played_studies import NAMES, P007, told, warned
@@ -37,9 +37,9 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Start) -> None:
     (study / "data" / "sub-P010" / "ses-01").mkdir(parents=True)
     open_one = start("P011")
     (study / P007 / "crash.txt").touch()
-    assert "crash" not in warned(verify(study))
+    assert "crash" not in warned(verify_study(study))
     (study / P007 / "crash.txt").write_text("Fatal Python error: Segmentation fault")
-    findings = verify(study)
+    findings = verify_study(study)
     open_one.close()
     for sentence in (
         "sub-P009/ses-01: is unfinished: resume it, or leave it unfinished",
@@ -67,12 +67,12 @@ def test_what_a_running_session_is_just_recording_is_not_said_to_be_left(study: 
     (store.folder.recordings / ".trial-002.parquet.0123abcd.tmp").touch()
     (store.folder.recordings / "trial-001.parquet").write_bytes(b"PAR1")
     place = "data/sub-P009/ses-01"
-    running = [line for line in warned(verify(study)).splitlines() if place in line]
+    running = [line for line in warned(verify_study(study)).splitlines() if place in line]
     assert [line for line in running if "differs from the journal" not in line] == [
         (f"{place}: is open in another program")
     ]
     store.close()
-    left = warned(verify(study))
+    left = warned(verify_study(study))
     assert ".trial-002.parquet.0123abcd.tmp: is an incomplete file" in left
     assert "trial-001.parquet: is in no line of the journal; resuming the session adds it" in left
     assert "recordings: trial 1, attempt 1 has none, and the journal gives no reason" in left
@@ -87,12 +87,12 @@ def test_tables_of_a_session_that_has_not_ended_may_be_behind_its_journal(
     with start("P000") as store:
         store.append(journal_events.TrialStarted(trial=1, attempt=1, **told_of))
         store.append(event_of("trial_ended", trial=1, attempt=1, outcome="complete", **summary))
-    findings = verify(study)
+    findings = verify_study(study)
     assert findings.errors == ()
     for path in (PARTICIPANTS, "sub-P000/ses-01/subject-P000_session-01_task-brackish_description-trials_data.csv"):
         assert f"{path}: differs from the journal, from line 2 on; rebuild renews it" in warned(findings)
     Files(study).replace(PARTICIPANTS, "withdrawn", "completed")
-    assert f"{PARTICIPANTS}: differs from the journal" in told(verify(study))
+    assert f"{PARTICIPANTS}: differs from the journal" in told(verify_study(study))
 
 
 def test_every_change_to_the_receipt_of_a_session_that_has_not_ended_is_an_error(
@@ -100,10 +100,10 @@ def test_every_change_to_the_receipt_of_a_session_that_has_not_ended_is_an_error
 ) -> None:
     start("P009").close()
     path = study / "data/sub-P009/ses-01/receipt.json"
-    recovery.reopen(
+    recovery.reopen_store(
         path.parent, protocol, SOURCE, operator="AB", device={"name": "mouse", "rate_hz": 9}, screens={}
     ).close()
-    assert told(verify(study)) == ""
+    assert told(verify_study(study)) == ""
     held = receipt.read(path)
     (again,) = held["resumed"]
     changes = [{name: value | {"rate_hz": 5}} for name, value in held.items() if isinstance(value, dict)]
@@ -111,6 +111,6 @@ def test_every_change_to_the_receipt_of_a_session_that_has_not_ended_is_an_error
     changes += [{"resumed": [again | {"device": {"name": "mouse"}}]}, {"resumed": [again | {"at": [3]}]}, {"new": 1}]
     for change in changes:
         receipt.write(path, held | change)
-        assert "sub-P009/ses-01/receipt.json: " in told(verify(study)), change
+        assert "sub-P009/ses-01/receipt.json: " in told(verify_study(study)), change
     receipt.write(path, held | {"resumed": []})  # so does a program leave it that is killed while it resumes
-    assert "sub-P009/ses-01/receipt.json: lacks what the session was resumed with" in warned(verify(study))
+    assert "sub-P009/ses-01/receipt.json: lacks what the session was resumed with" in warned(verify_study(study))

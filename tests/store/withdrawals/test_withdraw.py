@@ -18,12 +18,12 @@ from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.store.checksums import checked_line
 from study_app.store.exclusions import exclude, include
-from study_app.store.folder_lock import open_alone
+from study_app.store.folder_lock import lock_folder
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.begin import used_ids
-from study_app.store.sites.merge import merge
+from study_app.store.sites.merge import merge_sites
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from study_app.store.withdrawals import Withdrawn, proof_of_withdrawal, tombstones, withdraw
 from tests.faults.support.killer import die, forked
 from tests.platforms import needs_fork
@@ -98,8 +98,8 @@ def test_no_byte_of_the_person_remains_and_the_study_is_sound(study: Path, resul
         assert PERSON.encode() not in content, path
         assert PERSON not in str(path)
         assert not [word for word in own if word in content], path
-    assert verify(study, copy).sound
-    assert "participant P002 withdrew at 2026-11-22T09:30:00+00:00" in "\n".join(map(str, verify(study).warnings))
+    assert verify_study(study, copy).is_sound
+    assert "participant P002 withdrew at 2026-11-22T09:30:00+00:00" in "\n".join(map(str, verify_study(study).warnings))
     (page,) = [path for path in report(study, results.parent / "again") if path.name == "report.html"]
     assert "1 participant withdrew; their data were erased." in page.read_text(encoding="utf-8")
 
@@ -133,12 +133,12 @@ def test_a_killed_withdrawal_is_reported_and_finished_by_the_same_command(
     with monkeypatch.context() as patched:
         patched.setattr(shutil, "rmtree", half)
         assert forked(lambda: erase(study)) == -signal.SIGKILL
-    wrong = verify(study)
+    wrong = verify_study(study)
     assert "was interrupted: run liquid-study withdraw again" in "\n".join(map(str, wrong.errors))
     done = erase(study, by="BM", reason="again")
     assert done.folders == (study,)
     assert tombstones(StudyFolder(study))[PERSON].by == "AK"
-    assert verify(study).sound
+    assert verify_study(study).is_sound
     again = erase(study)
     assert (again.folders, again.outputs) == ((), ())
 
@@ -173,14 +173,14 @@ def test_a_link_and_a_pipe_are_named_before_anything_is_written(study: Path, tmp
     pipe = person / "ses-01" / "notes"
     os.mkfifo(pipe)
     before = {path: path.read_bytes() for path in study.rglob("*") if path.is_file()}
-    for act in (lambda: erase(study), lambda: merge({"A": study}, tmp_path / "pooled")):
+    for act in (lambda: erase(study), lambda: merge_sites({"A": study}, tmp_path / "pooled")):
         with pytest.raises(StoreError, match=f"^{pipe} is neither a file nor a folder: remove it$"):
             act()
     with pytest.raises(StoreError, match=f"^{pipe} is not a folder: give a study's folder"):
         erase(pipe)
     pipe.unlink()
     pipe.symlink_to(tmp_path)
-    for act in (lambda: erase(study), lambda: merge({"A": study}, tmp_path / "pooled")):
+    for act in (lambda: erase(study), lambda: merge_sites({"A": study}, tmp_path / "pooled")):
         with pytest.raises(StoreError, match=f"^{pipe} is a link to {tmp_path}: replace the link by what it leads to$"):
             act()
     pipe.unlink()
@@ -194,7 +194,7 @@ def test_a_link_and_a_pipe_are_named_before_anything_is_written(study: Path, tmp
 
 
 def test_a_running_session_is_not_erased(study: Path) -> None:
-    opening = open_alone(study / "data" / f"sub-{PERSON}" / "ses-01")
+    opening = lock_folder(study / "data" / f"sub-{PERSON}" / "ses-01")
     before = contents(study)
     with pytest.raises(StoreError, match="is open in another program"):
         erase(study)

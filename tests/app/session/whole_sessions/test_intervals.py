@@ -10,7 +10,7 @@ from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import ChoicePage, EndPage, FeedbackPage, TaskPage
 from study_app.session.replay import replay
-from study_app.store.verification.reproduction import reproduced
+from study_app.store.verification.reproduction import reproduce_session
 from tests.app.people import Person, attended, events, rows, window
 from tests.compiled import needs_servo
 from tests.protocol.trials.level_studies import BLOCK, HEAD
@@ -151,5 +151,5 @@ def test_levels_are_set_by_keys_alone(tmp_path: Path) -> None:
     assert [row["response"] for row in rows(results, "responses")] == ["2", "2"]
     assert [line["interval"] for line in counted if line["event"] == "interval_ended"] == [1, 2, 1, 2]
     session = next((results / "data").glob("sub-*/ses-*"))
-    assert reproduced(session).differences == []
+    assert reproduce_session(session).differences == []
     assert replay(session).differences == ()

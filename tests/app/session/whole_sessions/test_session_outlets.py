@@ -8,7 +8,7 @@ import pytest
 from study_app.gui.operator.window import OperatorWindow
 from study_app.outlets.markers import CODES
 from study_app.store import workstation
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from study_app.store.workstation import MachineSettings
 from tests.app.people import Person, attended, events, receipt_of, window
 from tests.compiled import needs_servo
@@ -39,7 +39,7 @@ def port():
 @pytest.mark.nightly
 def test_events_are_bytes_and_the_receipt_has_their_table(short_demo, results, port):
     ours, name = port
-    workstation.save(MachineSettings(lsl_markers=True, lsl_samples="single-blind", triggers=f"serial:{name}"))
+    workstation.save_settings(MachineSettings(lsl_markers=True, lsl_samples="single-blind", triggers=f"serial:{name}"))
     code, lines = attended(short_demo, results)
     assert code == 0
     came = [byte for byte in os.read(ours, 65536) if byte]
@@ -48,7 +48,7 @@ def test_events_are_bytes_and_the_receipt_has_their_table(short_demo, results, p
     assert came == [CODES[one["event"]] for one in lines_written if one["event"] in CODES]
     assert {CODES[event] for event in ("trial_started", "trial_ended", "responses", "session_ended")} < set(came)
     assert "outlet_lost" not in {one["event"] for one in lines_written}
-    assert verify(results).sound
+    assert verify_study(results).is_sound
     outlets = receipt_of(results)["outlets"]
     assert set(outlets) == {"LSL markers", "Serial port"}
     assert outlets["Serial port"]["codes"] == dict(CODES)
@@ -61,7 +61,7 @@ def test_events_are_bytes_and_the_receipt_has_their_table(short_demo, results, p
 
 def test_a_port_that_is_unplugged_stops_no_session_and_is_said_once(short_demo, results, port):
     ours, name = port
-    workstation.save(MachineSettings(triggers=f"serial:{name}"))
+    workstation.save_settings(MachineSettings(triggers=f"serial:{name}"))
     shown: list[tuple[str, ...]] = []
 
     class Unplugger(Person):
@@ -84,4 +84,4 @@ def test_a_port_that_is_unplugged_stops_no_session_and_is_said_once(short_demo, 
     assert lost[0][1].startswith(f"serial:{name} failed")
     assert any(text.startswith(f"Serial port: serial:{name} failed") for (text,) in shown[1:])
     assert sum(one["event"] == "responses" for one in lines_written) == 4
-    assert verify(results).sound
+    assert verify_study(results).is_sound

@@ -22,7 +22,7 @@ from study_app.store.blinded.blinding import read_key
 from study_app.store.journals.journal_events import CAUSE_WITHHELD
 from study_app.store.recordings import read_frames
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from study_app.store.workstation import MachineSettings
 from study_app.video import sources
 from tests.app.people import Person, attended, events, receipt_of, rows, window
@@ -65,7 +65,7 @@ def test_footage_is_shown_recorded_and_sealed(study: Path, run: Any, results: Pa
     texts = [path for path in results.rglob("*") if path.is_file() and path.suffix not in {".parquet", ".sealed"}]
     assert not [path for path in texts if NAME.encode() in path.read_bytes()]
     key = read_key(results)
-    assert not verify(results).errors
+    assert not verify_study(results).errors
     unblind(results, by="AK", reason="a test")
     shown = {row["trial"]: row["video_frames"] for row in rows(results, "trials")}
     thick = {row["trial"] for row in rows(results, "trials") if key.condition(row["block"], row["code"]) == "thick"}
@@ -93,7 +93,7 @@ def test_footage_that_cannot_be_read_is_refused_and_nothing_is_created(study: Pa
 
 def test_a_camera_that_is_not_there_is_refused(study: Path, run: Any, results: Path) -> None:
     study.write_text(study.read_text().replace(f'view = "{NAME}"', 'view = "camera"'))
-    workstation.save(MachineSettings(camera="tcp://127.0.0.1:9"))
+    workstation.save_settings(MachineSettings(camera="tcp://127.0.0.1:9"))
     with pytest.raises(
         SessionError, match=r"video: the camera tcp://127\.0\.0\.1:9 cannot be used: Connection refused"
     ):

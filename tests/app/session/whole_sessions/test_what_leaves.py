@@ -24,11 +24,11 @@ from study_app.session.pages import EndPage, QuestionnairePage, TaskPage
 from study_app.store import workstation
 from study_app.store.exclusions import exclude, include
 from study_app.store.folders import StudyFolder
-from study_app.store.program_log import keep_log, log_file
+from study_app.store.program_log import log_file, start_log
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.support import write_support
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify
+from study_app.store.verification.verify_study import verify_study
 from study_app.store.withdrawals import Tombstone, add_tombstone
 from study_app.store.workstation import MachineSettings
 from tests.app.people import Person, attended, window
@@ -153,8 +153,8 @@ def test_what_was_typed_leaves_only_where_it_must(
         workspace=place.format("workspace"),
         stamp_root=place.format("stamp_root"),
     )
-    workstation.save(told)
-    keep_log()
+    workstation.save_settings(told)
+    start_log()
     collected, attach = Collector(), SessionStore.attach
     monkeypatch.setattr(SessionStore, "attach", lambda store, _outlets: attach(store, collected))
     code, lines = attended(short_demo, results, Talker(), operator="zq_person")
@@ -174,7 +174,7 @@ def test_what_was_typed_leaves_only_where_it_must(
     told = told.model_copy(update={**later, "stamps": "https://zq_stamps", "proofs": place.format("proofs")})
     typed = {name for name, value in told if isinstance(value, str) and name not in ("theme", "lsl_samples")}
     assert all("zq_" in getattr(told, name) for name in typed), typed
-    workstation.save(told)
+    workstation.save_settings(told)
     out = tmp_path / "out"
     for name in ("support", "log", "receipt", "list", "markers"):
         (out / name).mkdir(parents=True)
@@ -191,4 +191,4 @@ def test_what_was_typed_leaves_only_where_it_must(
         shutil.copy(path, out / name)
     (out / "markers" / "markers.txt").write_text("\n".join(map(str, collected.markers)))
     assert {path.name: needles_in(path) for path in out.iterdir()} == LEAVES
-    assert verify(results).errors == ()
+    assert verify_study(results).errors == ()

@@ -144,7 +144,7 @@ def test_what_cannot_begin_leaves_nothing_behind(short_demo, results, monkeypatc
 
 @pytest.mark.nightly
 def test_the_receipt_says_what_is_set_for_the_machine_and_words_are_as_large_as_it_asks(short_demo, results):
-    workstation.save(MachineSettings(viewing_distance_mm=1200, screen_width_mm=150))
+    workstation.save_settings(MachineSettings(viewing_distance_mm=1200, screen_width_mm=150))
     scales = []
     code, _ = attended(short_demo, results, Person(once=lambda participant: scales.append(participant.text_scale)))
     assert code == 0
@@ -209,7 +209,7 @@ def test_the_preflight_is_told_before_anything_is_created(short_demo, results):
 
 
 def test_a_failing_preflight_refuses_the_session(short_demo, results, monkeypatch):
-    monkeypatch.setattr("study_app.session.preflight_measurements.probe", lambda _folder: 1_000)
+    monkeypatch.setattr("study_app.session.preflight_measurements.probe_free_bytes", lambda _folder: 1_000)
     with pytest.raises(SessionError, match="free space: 0 MB free"):
         app.run(short_demo, participant="P001", windowed=True, results=results)
     assert not results.exists()
