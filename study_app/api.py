@@ -114,8 +114,8 @@ def simulate_force(
         t_s, position_m = (np.asarray(values, np.float64) for values in motion)
         return offline.simulate(chosen, motions.Motion(t_s, position_m))
     if str(motion) in motions.NAMES or not (Path(motion).suffix or Path(motion).exists()):
-        return offline.simulate(chosen, motions.path(str(motion), rate_hz=chosen.rate_hz))
-    return offline.simulate(chosen, motions.read(Path(motion)))
+        return offline.simulate(chosen, motions.programmed_motion(str(motion), rate_hz=chosen.rate_hz))
+    return offline.simulate(chosen, motions.read_motion(Path(motion)))
 
 
 def simulate_study(

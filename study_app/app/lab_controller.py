@@ -33,7 +33,7 @@ from study_app.gui.widgets.background import Background, delayed
 from study_app.haptics.model.effects import NAMED
 from study_app.haptics.model.scene import Scene
 from study_app.lab.ab_comparison import Setting, Side, Workbench
-from study_app.lab.presets import Choice, liquids_at_hand, liquids_of, preset_text, save, spoken
+from study_app.lab.presets import Choice, available_liquids, displayed_name, liquids_of, preset_text, save_preset
 from study_app.lab.programmed_paths import TITLES
 
 if TYPE_CHECKING:
@@ -244,7 +244,7 @@ class LabSaving(QObject):
         """
         found = liquids_of(str(path))
         self.liquids = (*(it for it in self.liquids if it not in found), *found)
-        self.said = f"Opened {path.name}: {', '.join(spoken(it.liquid) for it in found)}"
+        self.said = f"Opened {path.name}: {', '.join(displayed_name(it.liquid) for it in found)}"
         return found[0]
 
     def wait(self, patience_s: float = PATIENCE_S) -> None:
@@ -257,8 +257,8 @@ class LabSaving(QObject):
         if before is not None:
             before.join()
         try:
-            save(path, preset_text(setting))
-            found: object = f"Saved as {path.name} in {path.parent}", liquids_at_hand(saved=at_hand)
+            save_preset(path, preset_text(setting))
+            found: object = f"Saved as {path.name} in {path.parent}", available_liquids(saved=at_hand)
         except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             found = error
         self._done.emit(found)
@@ -312,7 +312,7 @@ class LabController(QObject):
         self._entered = False
         self._prices = Prices(make_appraiser)
         self._opening = LabOpening(open_live, options)
-        self._saving = LabSaving(liquids_at_hand() if liquids is None else liquids)
+        self._saving = LabSaving(available_liquids() if liquids is None else liquids)
         self.chance = chance if chance is not None else random.SystemRandom()
         self._said = ""
         self.uncaught = UncaughtExceptions(self._handle_uncaught)
@@ -523,7 +523,7 @@ class LabController(QObject):
         self.trouble = "No device is open"
 
     def _choose(self, side: Side, choice: Choice) -> None:
-        self._try(lambda: self.bench.choose(side, spoken(choice.liquid), choice.scene), "")
+        self._try(lambda: self.bench.choose(side, displayed_name(choice.liquid), choice.scene), "")
 
     def _try(self, edit: Callable[[], Workbench], name: str) -> None:
         """Make an edit, or keep why it was refused, for its parameter."""

@@ -88,17 +88,17 @@ def doctor(name: str, faults: tuple[str, ...], to: Path | None, device_options: 
     participant IDs, answers or liquids.
     """
     click.echo(_PREPARING)  # what is imported and compiled next takes long the first time
-    from study_app.devices.doctor import lines
+    from study_app.devices.doctor import report_lines
     from study_app.devices.registry import check_options, doctor_of
 
     check_options(name, device_options)
     found = doctor_of(name).examine(name, options=device_options, faults=faults, progress=click.echo)
-    for line in lines(found):
+    for line in report_lines(found):
         click.echo(line)
     if to is not None:
         from study_app.store.support import write_support
 
-        write_support(to, "\n".join(lines(found)).strip() + "\n")
+        write_support(to, "\n".join(report_lines(found)).strip() + "\n")
         click.echo(f"Written: {to}")
     end_if(not found.well)
 
@@ -127,7 +127,11 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
         grip = calibration.Grip(device, virtual=emulator is not None)
         weight_n = (grams or 0.0) / 1000 * calibration.GRAVITY_MPS2
         ask = Terminal(sys.stdin.fileno()).ask if emulator is None else _ask_emulator(emulator, weight_n)
-        notes = calibration.pull(grip, ask) if grams is None else calibration.hang(grip, weight_n, ask)
+        notes = (
+            calibration.measure_with_scale(grip, ask)
+            if grams is None
+            else calibration.measure_with_weight(grip, weight_n, ask)
+        )
         serial = device.describe()["serial"]
     found = calibration.fit(measures, notes.counts, notes.forces_n, notes.units)
     for line in _calibrated(found, notes):
@@ -136,7 +140,7 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
         unexplained = f"More than {calibration.MOST_RESIDUAL_N} N is unexplained"
         click.echo(f"{unexplained}, so nothing was saved. Repeat the calibration.")
         end_if(True)
-    click.echo(f"Saved in {calibration.save(serial or '', found)}.")
+    click.echo(f"Saved in {calibration.save_calibration(serial or '', found)}.")
 
 
 @devices.command(cls=TakesDeviceOptions)
@@ -164,7 +168,7 @@ def bench(name: str, to: Path | None, device_options: dict[str, str | Path]) -> 
             f"device '{name}' has no force to measure: see 'liquid-study devices list' for those that have"
         )
     click.echo(_PREPARING)
-    from study_app.devices.bench.procedure import asks_hand, run_bench
+    from study_app.devices.bench.procedure import ask_simulated_hand, run_bench
     from study_app.devices.registry import open_device
     from study_app.haptics.runtime.clocks.clock import SystemClock, VirtualClock
 
@@ -174,7 +178,7 @@ def bench(name: str, to: Path | None, device_options: dict[str, str | Path]) -> 
         simulated = descriptor.moves_by_itself
         found = run_bench(
             device,
-            asks_hand(device, click.echo) if simulated else _ask_operator(Terminal(sys.stdin.fileno())),
+            ask_simulated_hand(device, click.echo) if simulated else _ask_operator(Terminal(sys.stdin.fileno())),
             progress=click.echo,
             clock=VirtualClock() if simulated else SystemClock(),
         )
@@ -188,7 +192,7 @@ def _ask_operator(terminal: Terminal) -> AskOperator:
 
 def _keep_bench(found: Found, folder: Path, *, simulated: bool) -> None:
     """Write the report, and keep the numbers in this machine's settings where the device is a real one."""
-    from study_app.devices.bench.procedure import as_json, as_markdown, kept
+    from study_app.devices.bench.procedure import as_json, as_markdown, workstation_results
     from study_app.store import workstation
     from study_app.store.atomic import write_file
 
@@ -204,7 +208,7 @@ def _keep_bench(found: Found, folder: Path, *, simulated: bool) -> None:
         click.echo("Nothing was kept for receipts: mass, damping and friction do not explain how the handle moved.")
         end_if(True)
     report = str((folder / "bench.md").resolve())
-    bench = workstation.DeviceBench.model_validate({**kept(found, day), "report": report})
+    bench = workstation.DeviceBench.model_validate({**workstation_results(found, day), "report": report})
     workstation.save_settings(workstation.load_or_default()[0].with_bench(bench))
     click.echo("Saved in this machine's settings: receipts of later sessions record it, and Devices shows it.")
 
@@ -232,11 +236,12 @@ def _falcon(name: str, firmware: Path | None, grams: float | None) -> tuple[Falc
 
 
 def _calibrated(found: Calibration, notes: Notes) -> list[str]:
-    from study_app.devices.falcon.calibration import UNCALIBRATED_UNITS_PER_NM, left_over
+    from study_app.devices.falcon.calibration import UNCALIBRATED_UNITS_PER_NM, residual_forces
 
     lines = ["", "rest  load [N]  unexplained x, y, z [N]"]
     for number, (load, left) in enumerate(
-        zip(-notes.forces_n[:, 1], left_over(found, notes.counts, notes.forces_n, notes.units), strict=True), start=1
+        zip(-notes.forces_n[:, 1], residual_forces(found, notes.counts, notes.forces_n, notes.units), strict=True),
+        start=1,
     ):
         lines.append(f"{number:>4}  {load:>8.2f}  {left[0]:+.3f} {left[1]:+.3f} {left[2]:+.3f}")
     share = found.units_per_nm / UNCALIBRATED_UNITS_PER_NM

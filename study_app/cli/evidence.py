@@ -154,7 +154,11 @@ def motion_along(path: str, scene: Scene) -> Motion:
     if path == DEFAULT_PATH:
         return stir(scene.scale, scene.rate_hz)
     programmed = path in motion.NAMES or not (Path(path).suffix or Path(path).exists())
-    return motion.path(path, rate_hz=scene.rate_hz) if programmed else at_rate(motion.read(Path(path)), scene.rate_hz)
+    return (
+        motion.programmed_motion(path, rate_hz=scene.rate_hz)
+        if programmed
+        else at_rate(motion.read_motion(Path(path)), scene.rate_hz)
+    )
 
 
 @click.command()

@@ -128,7 +128,7 @@ def identify(
         if isinstance(read, measurements.FlowCurve):
             found = fit_curve(chosen, liquid, fitted, read)
         else:
-            motion = measurements.centred(read.motion) if velocity == "centred" else read.motion
+            motion = measurements.with_centred_velocity(read.motion) if velocity == "centred" else read.motion
             found = fit(chosen, liquid, fitted, motion, read.force_n)
-    click.echo(identified.text(found))
-    echo_files(identified.write(found, to, measured) if to is not None else ())
+    click.echo(identified.report_text(found))
+    echo_files(identified.write_fit(found, to, measured) if to is not None else ())

@@ -70,12 +70,12 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
         from study_app.session.simulated.paced_levels import undelivered_levels
         from study_app.session.simulated.predicted_delivery import predicted_delivery
         from study_app.store import workstation
-        from study_app.video.sources import missing_here
+        from study_app.video.sources import missing_on_computer
 
         study = load.load(protocol, delay_ticks=delay_ticks)
         camera = workstation.load_or_default()[0].camera
         file = find(protocol)
-        missing = missing_here(study, file.parent, camera, time.monotonic_ns)
+        missing = missing_on_computer(study, file.parent, camera, time.monotonic_ns)
         click.echo(describe.describe(study, delay_ticks, workstation.device_without_force()))
         document, _ = load.read_document(load.source_bytes(protocol), protocol)
         for sentence in (*undelivered_levels(study), *describe_untranslated(document, lists_places=True)):

@@ -31,7 +31,7 @@ DHD_LIBRARY: Final = DeviceOption(
 )
 
 
-def _felt_and_emulated(
+def _real_and_emulated_descriptors(
     name: str,
     title: str,
     driver: str,
@@ -77,7 +77,7 @@ def _felt_and_emulated(
 
 
 DEVICES: Final = (
-    *_felt_and_emulated(
+    *_real_and_emulated_descriptors(
         "falcon",
         "Novint Falcon",
         "falcon.device:FalconDevice",
@@ -88,7 +88,7 @@ DEVICES: Final = (
         options=(FIRMWARE,),
         emulated_options=(BY_COMMAND,),
     ),
-    *_felt_and_emulated(
+    *_real_and_emulated_descriptors(
         "force-dimension",
         "Force Dimension",
         "force_dimension.device:ForceDimensionDevice",
@@ -98,7 +98,7 @@ DEVICES: Final = (
         "simulated hand; the Force Dimension driver with emulated library functions; needs no C compiler",
         options=(DHD_LIBRARY,),
     ),
-    *_felt_and_emulated(
+    *_real_and_emulated_descriptors(
         "inverse3",
         "Haply Inverse3",
         "inverse3.device:Inverse3Device",

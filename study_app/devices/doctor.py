@@ -73,26 +73,26 @@ class Report:
         return NOTHING_WRONG
 
 
-def lines(report: Report) -> list[str]:
+def report_lines(report: Report) -> list[str]:
     """Return a report as text of 100 columns; commands to paste are on one line."""
     lines = ["", *(f"seen: {observation}" for observation in report.seen), ""]
     for finding in report.in_order:
         word = "FOUND" if finding.state == "found" else finding.state
         lines.append(f"{finding.number:>2}  {word:<13}  {finding.words}")
         if finding.state == "found":
-            lines.append(_indented(f"cause: {finding.cause}", 19))
-            lines.append(_indented(f"cure: {finding.cure}", 19))
-            lines.append(_indented(f"known by: {finding.known_by}", 19))
+            lines.append(_indent_text(f"cause: {finding.cause}", 19))
+            lines.append(_indent_text(f"cure: {finding.cure}", 19))
+            lines.append(_indent_text(f"known by: {finding.known_by}", 19))
             if finding.paste:
                 lines += ["", finding.paste, ""]  # in one line, to be copied
     lines.append("")
     if report.failure is not None:
-        lines.append(_indented(report.failure, 0))
-    lines.append(_indented(report.conclusion, 0))
+        lines.append(_indent_text(report.failure, 0))
+    lines.append(_indent_text(report.conclusion, 0))
     return lines
 
 
-def _indented(text: str, by: int) -> str:
+def _indent_text(text: str, by: int) -> str:
     space = " " * by
     return fill(text, WIDTH, initial_indent=space, subsequent_indent=space, break_long_words=False)
 

@@ -41,11 +41,11 @@ def start_examination(
 
 def carry_out(examination: Examination, send: Send, _stop: Stop) -> Report:
     """Examine a device, and return the report."""
-    signal.signal(signal.SIGTERM, _leave)
+    signal.signal(signal.SIGTERM, _exit_on_signal)
     name, options, faults = examination.name, examination.options, examination.faults
     return doctor_of(name).examine(name, options=options, faults=faults, progress=send)
 
 
-def _leave(_number: int, _frame: object) -> NoReturn:
+def _exit_on_signal(_number: int, _frame: object) -> NoReturn:
     """Exit by an exception through every ``with`` block, which closes the device."""
     sys.exit(0)

@@ -113,7 +113,7 @@ class Guard:
             return
         child.stdin.close()
         self._left = child
-        threading.Thread(target=_see_off, args=(child, self.listener), name="guard", daemon=True).start()
+        threading.Thread(target=_dismiss_child, args=(child, self.listener), name="guard", daemon=True).start()
 
     def recall(self) -> None:
         """End the process that `leave` left behind: the program has opened the device again, with another guard.
@@ -155,7 +155,7 @@ class Guard:
             self.release()
 
 
-def _see_off(child: subprocess.Popen[bytes], listener: threading.Thread | None) -> None:
+def _dismiss_child(child: subprocess.Popen[bytes], listener: threading.Thread | None) -> None:
     child.wait()
     if listener is not None:
         listener.join()
@@ -168,7 +168,7 @@ def _close(child: subprocess.Popen[bytes]) -> None:
             stream.close()
 
 
-def watch(name: str, ends_force: str, *arguments: str) -> int:
+def watch_program(name: str, ends_force: str, *arguments: str) -> int:
     """Wait for the end of the standard input; without ``WORD`` in it, end the device's force. Return an exit code."""
     for number in ENDING_SIGNALS:
         signal.signal(number, signal.SIG_IGN)  # it ends when the program has ended
@@ -191,4 +191,4 @@ def watch(name: str, ends_force: str, *arguments: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(watch(*sys.argv[1:]))
+    sys.exit(watch_program(*sys.argv[1:]))

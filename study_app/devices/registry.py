@@ -128,7 +128,7 @@ def check_options(name: str, options: Iterable[str]) -> None:
 
 def backends() -> list[Backend]:
     """Return the results of all devices' probes, the default device first, then those that could not be loaded."""
-    probed = [backend for device in all_devices() for backend in _probed(device)]
+    probed = [backend for device in all_devices() for backend in _probe_device(device)]
     return probed + [
         Backend(
             f"{plug_in.name} ({plug_in.package})",
@@ -142,7 +142,7 @@ def backends() -> list[Backend]:
     ]
 
 
-def _probed(device: DeviceDescriptor) -> list[Backend]:
+def _probe_device(device: DeviceDescriptor) -> list[Backend]:
     try:
         return list(device.probe())
     except Exception as error:  # noqa: BLE001 - shown: one device must not hide the others

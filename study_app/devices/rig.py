@@ -150,7 +150,7 @@ def open_rig(
         options=settings.options,
     )
     try:
-        _check_wanted(name, cancelled)
+        _check_not_cancelled(name, cancelled)
         rig = Rig(device, Servo(device, clock=clock, rate_hz=settings.rate_hz, elements=settings.elements))
         if clock is None or clock.runs:
             _open.add(rig)
@@ -161,6 +161,6 @@ def open_rig(
     return rig
 
 
-def _check_wanted(name: str, cancelled: Callable[[], bool] | None) -> None:
+def _check_not_cancelled(name: str, cancelled: Callable[[], bool] | None) -> None:
     if cancelled is not None and cancelled():
         raise DeviceError(f"opening the device '{name}' was cancelled")

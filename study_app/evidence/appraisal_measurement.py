@@ -11,8 +11,8 @@ from study_app.evidence.appraisal import Costs, DeliveryQuestion, EffectCost, Er
 from study_app.evidence.cost import measure
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, Dynamics
 from study_app.haptics.model.effects import NAMED
-from study_app.haptics.model.gate import calls_for, resolve
-from study_app.haptics.model.motion import Motion, path
+from study_app.haptics.model.gate import effect_verdicts, resolve
+from study_app.haptics.model.motion import Motion, programmed_motion
 from study_app.haptics.model.scene import Effect, Everywhere, Knee, Scene
 from study_app.haptics.runtime.offline import samples_along, simulate
 from study_app.protocol.trials.tasks import Stroke
@@ -40,7 +40,7 @@ def costs(scene: Scene, *, batches: int = BATCHES) -> Costs:
     found = measure(scene, batches=batches)
     liquid = resolve(scene).liquids[0]
     asked = scene.liquids[0].effects != "auto"
-    bounds_n = {verdict.effect: verdict.bound_n for verdict in calls_for(scene)}
+    bounds_n = {verdict.effect: verdict.bound_n for verdict in effect_verdicts(scene)}
     rows = []
     for effect in NAMED:
         ns = found.effects_ns.get((liquid.id, effect))
@@ -62,7 +62,7 @@ def errors(scene: Scene) -> Errors:
     wake: float | None = None
     force_n: float | None = None
     if kept:
-        found = [_difference(compared, path(name, rate_hz=scene.rate_hz, **how)) for name, how in _MOTIONS]
+        found = [_difference(compared, programmed_motion(name, rate_hz=scene.rate_hz, **how)) for name, how in _MOTIONS]
         force_n = max(newtons for _, newtons in found)
         wake = max(share for share, _ in found) if "wake" in kept else None
     left_out = tuple(effect for effect in liquid.effects if effect not in kept)

@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from study_app.haptics.kernels.compiled import kernel, workings
+from study_app.haptics.kernels.compiled import evidence_kernel, kernel
 from study_app.haptics.kernels.vector import copy, distance, norm
 from study_app.haptics.model import laws
 from study_app.haptics.model.effects.non_newtonian import STIFFNESS_NPM
@@ -145,7 +145,7 @@ def wakes(
     return wake_mps, size_mps
 
 
-@workings
+@evidence_kernel
 def _wakes(
     wake: Any, elements: Any, h_mps: Any, position_m: Any, interval_ns: Any, wake_mps: Any, size_mps: Any
 ) -> None:
@@ -247,7 +247,7 @@ def _add(sums: Any, row: int, value: float) -> None:
     sums[row, 0] = total
 
 
-@workings
+@evidence_kernel
 def local_wakes(
     h_mps: Any,
     position_m: Any,
@@ -309,7 +309,7 @@ class Constants(NamedTuple):
 CONSTANTS: Final = Constants(c_m=0.268, c_y=0.756, c_z=3.15, c_s=0.972, beta=2.96, r_0=11.0)
 
 
-@workings
+@evidence_kernel
 def over_stokes(reynolds: float) -> float:
     """Return φ, the steady drag as a multiple of Stokes drag."""
     if reynolds == 0:
@@ -334,7 +334,7 @@ def unsteady_n(
     return -stokes_nspm * (w_mps + beyond_w) - added_kg * acceleration_mps2
 
 
-@workings
+@evidence_kernel
 def late_mps(
     w_mps: Floats, acceleration_mps2: Floats, interval_s: Floats, diameter_m: float, nu_m2ps: float, of: Constants
 ) -> Floats:
@@ -386,7 +386,7 @@ def non_newtonian_n(scene: Scene, w_mps: Floats, interval_s: Floats, *, slack_m:
         if (yield_n := laws.yield_n(law, diameter_m)) > 0:
             per_m = STIFFNESS_NPM / scene.scale / yield_n
             held = _strains(w_mps, interval_s, per_m, slack_m)
-    parts_n = [laws.even_n(law, liquid.density_kg_m3, diameter_m, float(speed)) for speed in speeds_mps]
+    parts_n = [laws.steady_force_n(law, liquid.density_kg_m3, diameter_m, float(speed)) for speed in speeds_mps]
     held_n, viscous_n = np.array(parts_n).T
     directions = met_mps / np.maximum(speeds_mps, math.ulp(0.0))[:, np.newaxis]
     force_n: Floats = -(held_n[:, np.newaxis] * held + viscous_n[:, np.newaxis] * directions)
@@ -402,7 +402,7 @@ def _relaxed(w_mps: Floats, interval_s: Floats, relaxation_s: float) -> Floats:
     return v
 
 
-@workings
+@evidence_kernel
 def _strains(w_mps: Any, interval_s: Any, per_m: float, slack_m: float) -> Any:
     """Return s/s_y (n, 3) of ds = dp − |dp| s/s_y, with |dp| counted beyond the slack."""
     strains = np.zeros(w_mps.shape)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from study_app.errors import StudyError
 from study_app.haptics.model.effect import Value
 from study_app.haptics.model.scene import Scene
-from study_app.lab.parameters import changed, sections, the_liquid, value_of
+from study_app.lab.parameters import sections, the_liquid, value_of, with_parameter
 
 Floats: TypeAlias = NDArray[np.float64]
 
@@ -111,7 +111,7 @@ class Workbench:
         key = (self.presented, name)
         goes_on = self.held == key
         it = self.in_hand
-        edited = replace(it, scene=changed(it.scene, name, value))
+        edited = replace(it, scene=with_parameter(it.scene, name, value))
         if edited == it:
             return replace(self, held=key if held and goes_on else None)
         return self._edited(self.presented, edited, held=key if held else None, goes_on=goes_on)
@@ -130,7 +130,7 @@ class Workbench:
 
     def copy_to_other(self) -> Workbench:
         self._refuse_blind("copied")
-        return self._edited(other(self.presented), self.in_hand)
+        return self._edited(other_side(self.presented), self.in_hand)
 
     def undo(self) -> Workbench:
         """Return a copy with the last edit undone; the same if there is none."""
@@ -147,14 +147,14 @@ class Workbench:
         return replace(self, a=a, b=b, past=(*self.past, (self.a, self.b)), future=future, held=None)
 
     def switch(self) -> Workbench:
-        return replace(self, presented=other(self.presented), held=None)
+        return replace(self, presented=other_side(self.presented), held=None)
 
     def blinded(self, chance: Random) -> Workbench:
         """Return a blind copy: setting 1 and the presented setting are drawn at random."""
         if self.blind:
             return self
         drawn = [chance.random() < _SWITCHES_BY_CHANCE for _ in range(2)]
-        first, presented = (other("A") if it else "A" for it in drawn)
+        first, presented = (other_side("A") if it else "A" for it in drawn)
         return replace(self, blind=True, first=first, presented=presented, held=None)
 
     def revealed(self) -> Workbench:
@@ -173,6 +173,6 @@ class Workbench:
             raise StudyError(f"no setting can be {what} during a blind comparison: end it first")
 
 
-def other(side: Side) -> Side:
+def other_side(side: Side) -> Side:
     """Return the other side."""
     return "B" if side == "A" else "A"

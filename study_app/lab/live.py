@@ -21,8 +21,8 @@ from study_app.devices.rig import Rig, RigSettings, open_rig
 from study_app.haptics.model.layout import LIMITER_NORM, LIMITER_SLEW, LIMITERS, SAMPLE, records
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import slew_limit_n
-from study_app.lab.ab_comparison import Side, Workbench, other
-from study_app.lab.programmed_paths import led_to, programme
+from study_app.lab.ab_comparison import Side, Workbench, other_side
+from study_app.lab.programmed_paths import lead_to_path, programmed_path
 from study_app.lab.shadow import Shadow, Tail, Trace
 from study_app.protocol.streams import stream
 
@@ -134,7 +134,7 @@ class Live:
         goes_on = self._due is None and before is not None and before.presented == bench.presented and not anew
         if goes_on and before is not None and before.in_hand.scene == bench.in_hand.scene:
             self.servo.check()
-            side = other(bench.presented)
+            side = other_side(bench.presented)
             self.workbench = bench
             for shadow in (self.shadow, *([self._ghost.shadow] if self._ghost is not None else ())):
                 shadow.set_other(side, self._presentable(bench.setting(side).scene))
@@ -285,12 +285,12 @@ class Live:
 
     def _programme(self, name: str) -> Motion:
         scene = Scene() if self.workbench is None else self.workbench.in_hand.scene
-        return programme(name, scene, self.device.workspace_m)
+        return programmed_path(name, scene, self.device.workspace_m)
 
     def _lead(self) -> None:
         """Move the hand along the path, from its present place."""
         assert self.path is not None and self.hand is not None  # noqa: S101, PT018 - called for a path and a hand
-        motion = led_to(self._programme(self.path), self.hand.aim_m)
+        motion = lead_to_path(self._programme(self.path), self.hand.aim_m)
         self.hand.follow(motion.t_s, motion.position_m)
 
 
@@ -299,7 +299,7 @@ class _Ghost:
 
     def __init__(self, motion: Motion, rate_hz: float, limit_n: float, now_ns: int) -> None:
         self.shadow = Shadow(Scene(rate_hz=rate_hz), ELEMENTS, limit_n, alone=True)
-        self._motion = led_to(motion, motion.position_m[-1])
+        self._motion = lead_to_path(motion, motion.position_m[-1])
         self._period_ns = round(1e9 / rate_hz)
         self._started_ns = self._next_ns = now_ns
         self._serial = 0

@@ -5,7 +5,7 @@ define the lab's range [choice]. A preset's value beyond it extends it. Names ar
 ``haptics.model.overrides`` takes them; ``.x``, ``.y``, ``.z`` after a name mean a component, ``effects.NAME`` one
 effect.
 
-`changed` sets one parameter of a scene by its name, and returns a new scene, or raises an error of one line.
+`with_parameter` sets one parameter of a scene by its name, and returns a new scene, or raises an error of one line.
 
 Unlike ``haptics.model.overrides`` it supports vector components, single effects, and the default values of a table that
 the liquid does not have yet.
@@ -106,7 +106,7 @@ def value_of(scene: Scene, name: str) -> Value:
         if not field:
             return AUTO if liquid.effects == "auto" else ON
         return ON if field in resolve(scene).liquids[0].effects else OFF
-    value = read(resolve(scene) if place in NAMED and NAMED[place].choose is not None else scene, name)
+    value = read_value(resolve(scene) if place in NAMED and NAMED[place].choose is not None else scene, name)
     if value is None and place in NAMED and field in NAMED[place].open_values:
         return NAMED[place].open_values[field](scene)
     if value is None and place == "motion":
@@ -114,7 +114,7 @@ def value_of(scene: Scene, name: str) -> Value:
     return value if value is None or isinstance(value, str) else float(value)
 
 
-def read(scene: Scene, name: str) -> Any:
+def read_value(scene: Scene, name: str) -> Any:
     """Return the value of ``table.field`` or of its component in a scene; None if unset."""
     liquid = the_liquid(scene)
     place, field, *axis = name.split(".")
@@ -219,7 +219,7 @@ _KINDS: Final = ("kind", "law")
 """Fields that determine which other fields a table has."""
 
 
-def changed(scene: Scene, name: str, value: Value) -> Scene:
+def with_parameter(scene: Scene, name: str, value: Value) -> Scene:
     """Return the scene with one parameter (``lab.parameters``) set.
 
     Raises
@@ -228,30 +228,30 @@ def changed(scene: Scene, name: str, value: Value) -> Scene:
         The scene has no such parameter, or the value is not permitted.
     """
     it = parameter(scene, name)
-    value = _checked(it, value)
+    value = _check_value(it, value)
     if name == "effects":
-        return override_all(scene, {"effects": AUTO} if value == AUTO else _named(scene))
+        return override_all(scene, {"effects": AUTO} if value == AUTO else _chosen_by_gate(scene))
     if name.startswith("effects."):
         return _with_effect(scene, name.partition(".")[2], on=value == ON)
     place, field, *axis = name.split(".")
     if axis:
-        whole = list(read(scene, f"{place}.{field}"))
+        whole = list(read_value(scene, f"{place}.{field}"))
         whole[AXES.index(axis[0])] = value
         return override_all(scene, {f"{place}.{field}": tuple(whole)})
     chosen = place in NAMED and NAMED[place].choose is not None
-    by_hand = _named(scene) if chosen else {}  # the gate would choose another law
+    by_hand = _chosen_by_gate(scene) if chosen else {}  # the gate would choose another law
     if field in _KINDS and (place == "region" or place in NAMED):
-        if value == read(scene, name):
+        if value == read_value(scene, name):
             return scene
-        return override_all(scene, by_hand | {f"liquid.{place}": _begun(scene, place, str(value))})
-    if read(scene, name) is None and value == value_of(scene, name):  # an unset value, unchanged
+        return override_all(scene, by_hand | {f"liquid.{place}": _initial_table(scene, place, str(value))})
+    if read_value(scene, name) is None and value == value_of(scene, name):  # an unset value, unchanged
         return scene
     taken = resolve(scene).liquids[0].effects
     replaced = (it.name for it in EFFECTS if place == "liquid" and field in it.replaces and it.name not in taken)
     return override_all(scene, by_hand | {f"liquid.{effect}": None for effect in replaced} | {name: value})
 
 
-def _checked(it: Parameter, value: Value) -> Value:
+def _check_value(it: Parameter, value: Value) -> Value:
     if it.choices:
         if value not in {choice for choice, _ in it.choices}:
             choices = ", ".join(repr(choice) for choice, _ in it.choices)
@@ -278,9 +278,9 @@ def _with_effect(scene: Scene, effect: str, *, on: bool) -> Scene:
                 wanted -= {it.name for it in EFFECTS if name in it.excludes or it.name in NAMED[name].excludes}
     wanted -= set() if on else {effect}
     wanted -= {it.name for it in EFFECTS if it.through and not set(it.through) & wanted}
-    values = _named(scene) | {"effects": tuple(it for it in NAMED if it in wanted)}
+    values = _chosen_by_gate(scene) | {"effects": tuple(it for it in NAMED if it in wanted)}
     if on and NAMED[effect].model is not None and getattr(liquid, effect) is None:
-        values[f"liquid.{effect}"] = _begun(scene, effect, "")
+        values[f"liquid.{effect}"] = _initial_table(scene, effect, "")
     if on:
         values |= {f"liquid.{name}": None for name in NAMED[effect].replaces}
     try:
@@ -290,14 +290,14 @@ def _with_effect(scene: Scene, effect: str, *, on: bool) -> Scene:
         raise StudyError(f"{label} cannot be turned {'on' if on else 'off'}: {reason}") from error
 
 
-def _named(scene: Scene) -> dict[str, object]:
+def _chosen_by_gate(scene: Scene) -> dict[str, object]:
     """Return effects and tables as the gate chooses them, by name."""
     taken = resolve(scene).liquids[0]
     tables = {f"liquid.{it.name}": getattr(taken, it.name).model_dump() for it in EFFECTS if it.choose is not None}
     return {"effects": taken.effects, **tables}
 
 
-def _begun(scene: Scene, place: str, kind: str) -> dict[str, Any]:
+def _initial_table(scene: Scene, place: str, kind: str) -> dict[str, Any]:
     """Return the initial table of a region or an effect: around the middle of the hand's reach, as large as that."""
     centre_m, reach_m = scene.origin_m, scene.scale * _HALF_HAND_M
     if place in NAMED:

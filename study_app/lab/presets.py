@@ -40,10 +40,10 @@ class Choice:
         If its file has the default "ewma", the lab uses "kalman", also in presets saved there.
         """
         scene = for_new_file(self.scene)
-        return Setting(spoken(self.liquid), scene, scene)
+        return Setting(displayed_name(self.liquid), scene, scene)
 
 
-def liquids_at_hand(folders: tuple[Path, ...] | None = None, saved: tuple[str, ...] = ()) -> tuple[Choice, ...]:
+def available_liquids(folders: tuple[Path, ...] | None = None, saved: tuple[str, ...] = ()) -> tuple[Choice, ...]:
     """Return every liquid of the shipped protocols, of the files in ``folders``, and of those ``saved``.
 
     ``folders`` is by default the workspace's ``protocols``.
@@ -67,7 +67,7 @@ def liquids_of(source: str) -> tuple[Choice, ...]:
         Every problem of the file.
     """
     return tuple(
-        Choice(source=source, liquid=name, title=f"{spoken(name)} ({Path(source).stem})")
+        Choice(source=source, liquid=name, title=f"{displayed_name(name)} ({Path(source).stem})")
         for name in load_scenes(source)
     )
 
@@ -81,7 +81,7 @@ def preset_text(setting: Setting) -> str:
     return scene_text(setting.scene, said=said)
 
 
-def save(path: Path, text: str) -> None:
+def save_preset(path: Path, text: str) -> None:
     """Write a preset atomically.
 
     Raises
@@ -92,7 +92,7 @@ def save(path: Path, text: str) -> None:
     write_file(path, text.encode())
 
 
-def spoken(liquid_id: str) -> str:
+def displayed_name(liquid_id: str) -> str:
     """Return the displayed name of a liquid."""
     name = liquid_id.replace("_", " ")
     return name[:1].upper() + name[1:]

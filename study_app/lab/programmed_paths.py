@@ -5,7 +5,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.errors import StudyError
-from study_app.haptics.model.motion import RADIUS_M, Motion, path
+from study_app.haptics.model.motion import RADIUS_M, Motion, programmed_motion
 from study_app.haptics.model.scene import Scene
 
 Vector = tuple[float, float, float]
@@ -27,7 +27,7 @@ _RATE_HZ: Final = 1000.0
 _HALF_TURN: Final = 0.7071  # angle of a leg to either side of the path
 
 
-def programme(name: str, scene: Scene, half_m: Vector) -> Motion:
+def programmed_path(name: str, scene: Scene, half_m: Vector) -> Motion:
     """Return a path in the hand frame, about the middle of a workspace of these half extents [m].
 
     Its speed is that of the figures in the scene, 1 m/s; its size is theirs, reduced to fit.
@@ -49,7 +49,7 @@ def programme(name: str, scene: Scene, half_m: Vector) -> Motion:
         "zigzag": {"leg_s": min(2 * x_m / (_LEGS * _HALF_TURN), 2 * z_m / _HALF_TURN), "legs": _LEGS},
         "reach": {"distance_m": min(0.6, 2 * x_m)},
     }
-    course = path(name, rate_hz=_RATE_HZ, **sized[name])
+    course = programmed_motion(name, rate_hz=_RATE_HZ, **sized[name])
     way_m = course.position_m
     if name == "zigzag":  # from left to right instead of away, since a workspace is widest there
         way_m = way_m[:, [2, 1, 0]] * [-1.0, 1.0, 1.0]
@@ -57,7 +57,7 @@ def programme(name: str, scene: Scene, half_m: Vector) -> Motion:
     return Motion(course.t_s, places_m / scene.scale)
 
 
-def led_to(motion: Motion, from_m: Any) -> Motion:
+def lead_to_path(motion: Motion, from_m: Any) -> Motion:
     """Return a motion that begins at the hand, (3,) [m], with a smooth path to its first place."""
     way_m = motion.position_m[0] - np.asarray(from_m, np.float64)
     lasts_s = max(float(np.linalg.norm(way_m)) / APPROACH_MPS, SHORTEST_APPROACH_S)

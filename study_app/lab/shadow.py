@@ -20,7 +20,7 @@ from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.offline import new_wake_places, recompute_sample
 from study_app.haptics.runtime.pack import adjust_into, pack, pack_into
-from study_app.lab.ab_comparison import Side, other
+from study_app.lab.ab_comparison import Side, other_side
 
 Floats: TypeAlias = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ def tail_of(trail: Any, places: Any, elements: int) -> Tail:
     numbers, samples = numbers[moving], samples[moving]
     breaks = np.ones(len(samples), bool)
     breaks[1:] = samples.segment[1:] != samples.segment[:-1]
-    kept = _thinned(breaks)
+    kept = _rows_to_draw(breaks)
     ages = (left - 1 - numbers[kept]) / max(elements - 1, 1)
     return Tail(
         positions_m=np.array(samples.hand_m[kept], np.float64).reshape(-1, 3),
@@ -65,7 +65,7 @@ def tail_of(trail: Any, places: Any, elements: int) -> Tail:
     )
 
 
-def _thinned(breaks: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _rows_to_draw(breaks: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Return the rows to draw: evenly spaced ones, the newest, and starts of segments if they fit."""
     count = len(breaks)
     if count <= MOST_POINTS:
@@ -185,13 +185,13 @@ class Shadow:
         if presented is None:  # rest: the servo ends, or presents nothing
             return
         self._expected = {number: it for number, it in self._expected.items() if number > serial}
-        shown, hidden = self._sides[presented.side], self._sides[other(presented.side)]
+        shown, hidden = self._sides[presented.side], self._sides[other_side(presented.side)]
         if self._side != presented.side:
             shown.safety, hidden.safety = (hidden.safety, hidden.safety.copy())  # the servo's own setting follows
         goes_on = all(it.goes_on for it in missed)
         (shown.go_on if goes_on else shown.begin)(presented.scenes[presented.side])
-        if hidden.scene != presented.scenes[other(presented.side)]:
-            hidden.begin(presented.scenes[other(presented.side)])
+        if hidden.scene != presented.scenes[other_side(presented.side)]:
+            hidden.begin(presented.scenes[other_side(presented.side)])
         self._side = presented.side
 
     def _follow(self, samples: Any) -> None:

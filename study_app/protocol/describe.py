@@ -8,9 +8,9 @@ from itertools import product
 
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
 from study_app.haptics.model.gate import describe_gate, resolve
-from study_app.haptics.model.overrides import override
+from study_app.haptics.model.overrides import override_value
 from study_app.haptics.model.scene import Scene
-from study_app.haptics.model.slope_limits import slope_limit, steady
+from study_app.haptics.model.slope_limits import slope_limit, steady_force
 from study_app.number_text import counted
 from study_app.protocol.groups import sessions_differ
 from study_app.protocol.model import Block, Condition, Limits, Protocol
@@ -228,9 +228,9 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
         pace_mps = task.fastest_stroke(protocol.device.workspace_m).speed_mps
         scene = protocol.scene_for(condition_of(protocol, stimulus))
         values = (*standards, *compared)
-        scenes = [scene] if stimulus.vary in OF_LINK else [override(scene, stimulus.vary, one) for one in values]
-        felt_n = [steady(one, pace_mps).drag_n for one in scenes]
-        fast_n = max(steady(one, FASTER * pace_mps).drag_n for one in scenes[-len(compared) :])
+        scenes = [scene] if stimulus.vary in OF_LINK else [override_value(scene, stimulus.vary, one) for one in values]
+        felt_n = [steady_force(one, pace_mps).drag_n for one in scenes]
+        fast_n = max(steady_force(one, FASTER * pace_mps).drag_n for one in scenes[-len(compared) :])
         yield (
             "Force at the pace",
             f"{min(felt_n):.1f} to {max(felt_n):.1f} N at {pace_mps:.3g} m/s, at most {fast_n:.1f} N at {FASTER:g} "

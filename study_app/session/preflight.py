@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from study_app.devices.registry import descriptor_of
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, UNKNOWN, Dynamics
-from study_app.haptics.model.slope_limits import refuses
+from study_app.haptics.model.slope_limits import refusal_reason
 from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
 from study_app.number_text import counted
 from study_app.outlets.session_outlets import OutletStatus
@@ -165,22 +165,26 @@ class Check:
         return f"{self.verdict:<8} {self.name:<15} {self.said}"
 
 
-def checks(facts: Measurements, protocol: Protocol) -> tuple[Check, ...]:
+def preflight_checks(facts: Measurements, protocol: Protocol) -> tuple[Check, ...]:
     """Return the results of the pre-flight for a session of ``protocol`` with the measured ``facts``."""
-    return tuple(check for of in (_servo, _levels, _surroundings, _outlets, _costs) for check in of(facts, protocol))
+    return tuple(
+        check
+        for of in (_servo_checks, _level_check, _screen_and_disk_checks, _outlet_checks, _cost_checks)
+        for check in of(facts, protocol)
+    )
 
 
-def refused(checks: Iterable[Check]) -> str:
+def refusal_reasons(checks: Iterable[Check]) -> str:
     """Return the reasons why the session cannot begin in one line; "" if it can."""
     return "; ".join(f"{check.name.lower()}: {check.advice}" for check in checks if check.verdict == "failure")
 
 
-def _warned(name: str, value: str, about: str, advice: str, *, well: bool, share: float | None = None) -> Check:
+def _warning_unless(name: str, value: str, about: str, advice: str, *, well: bool, share: float | None = None) -> Check:
     """Return a check whose verdict is "ok" if ``well``, else a warning with advice."""
     return Check(name, "ok" if well else "warning", value, about=about, advice="" if well else advice, share=share)
 
 
-def _servo(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
+def _servo_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     """Yield the checks of the device's response, its force delay and the servo's rate."""
     share = f"{100 * facts.fresh_share:.0f} %"
     about = f"{facts.device}, a new sample on {share} of ticks"
@@ -197,15 +201,17 @@ def _servo(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
             about += " when it was opened; it measured more since"
     well = facts.dynamics.delay_s is None or facts.delay_ticks <= ASSUMED_TICKS
     advice = "Forces are limited more strictly: connect the device without a hub."
-    yield _warned("Loop delay", counted(facts.delay_ticks, "tick"), about, advice, well=well)
+    yield _warning_unless("Loop delay", counted(facts.delay_ticks, "tick"), about, advice, well=well)
 
     value, about = f"{facts.timing.rate_hz:.1f} Hz", f"requested: {requested_hz:g} Hz"
     error = abs(facts.timing.rate_hz / requested_hz - 1)
-    refusal = refuses(requested_hz) or (f"{value}, {about}: close other programs" if error > RATE_FAILURE else None)
+    refusal = refusal_reason(requested_hz) or (
+        f"{value}, {about}: close other programs" if error > RATE_FAILURE else None
+    )
     if refusal is not None:
         yield Check("Servo rate", "failure", value, about=about, advice=refusal)
     else:
-        yield _warned("Servo rate", value, about, "Close other programs.", well=error <= RATE_WARNING)
+        yield _warning_unless("Servo rate", value, about, "Close other programs.", well=error <= RATE_WARNING)
 
     limits = protocol.limits
     late_ms, gap_ms = facts.timing.lateness_p99_s * 1e3, facts.timing.worst_gap_s * 1e3
@@ -215,7 +221,7 @@ def _servo(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         f"{facts.timing.overruns} overruns"
     )
     advice = "Trials would be invalid: close other programs."
-    yield _warned("Servo lateness", f"{late_ms:.2f} ms", about, advice, well=worst <= 1, share=worst)
+    yield _warning_unless("Servo lateness", f"{late_ms:.2f} ms", about, advice, well=worst <= 1, share=worst)
 
     grant = facts.grant  # other processes delay a thread of normal priority
     memory = {None: "", True: ", memory locked", False: ", memory not locked"}[grant.locked]
@@ -224,7 +230,7 @@ def _servo(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     yield Check("Priority", verdict, grant.level, about=f"{grant.how}{memory}", advice=f"{advice}." if advice else "")
 
 
-def _levels(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
+def _level_check(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     """Yield the check whether the highest damping can be delivered with the device's delay."""
     blocks = [block for block in protocol.blocks_in_order if block.stimulus is not None]
     highest_nspm = max((highest_damping(protocol, block) for block in blocks), default=0.0)
@@ -237,19 +243,21 @@ def _levels(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     yield Check("Levels", "ok" if beyond is None else "failure", value, about=about, advice=advice)
 
 
-def _surroundings(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
+def _screen_and_disk_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     """Yield the checks of screen, disk, key and videos."""
     limit_ms, screen = protocol.limits.delay_error_ms, facts.screen
     seen_ms = (facts.sample_age_s + 1 / max(screen.refresh_hz, 1.0)) * 1e3  # the age of a sample plus one frame
     about, advice = f"beyond the requested delay, limit {limit_ms:g} ms", "use a screen with a higher refresh rate."
     share = seen_ms / limit_ms
     advice = f"Trials would be invalid: {advice}"
-    yield _warned("Visual delay", f"up to {seen_ms:.1f} ms", about, advice, well=seen_ms <= limit_ms, share=share)
+    yield _warning_unless(
+        "Visual delay", f"up to {seen_ms:.1f} ms", about, advice, well=seen_ms <= limit_ms, share=share
+    )
 
     value, about = f"{screen.refresh_hz:.1f} Hz, {100 * screen.scaling:.0f} %", "refresh rate and scaling of the "
     advice = "Set the participant's screen to 100 % scaling and at least 50 Hz."
     well = screen.refresh_hz >= LEAST_REFRESH_HZ and screen.scaling == 1
-    yield _warned("Screen", value, f"{about}participant's screen", advice, well=well)
+    yield _warning_unless("Screen", value, f"{about}participant's screen", advice, well=well)
 
     if facts.probe_s is None:
         yield Check(
@@ -257,7 +265,7 @@ def _surroundings(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         )
     else:
         value, well = f"{facts.probe_s * 1e3:.1f} ms", facts.probe_s <= SLOW_PROBE_S
-        yield _warned("Results folder", value, "time to write a file", "Use a local disk.", well=well)
+        yield _warning_unless("Results folder", value, "time to write a file", "Use a local disk.", well=well)
 
     rates = SAMPLE_BYTES * protocol.device.rate_hz, FRAMES_BYTES_PER_S  # while measures are sealed
     planned = recordings_of(protocol) if facts.recordings else ()
@@ -284,7 +292,7 @@ def _surroundings(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         yield Check("Video", "failure" if fault else "ok", value, about=facts.video.about, advice=fault)
 
 
-def _outlets(facts: Measurements, _protocol: Protocol) -> Iterator[Check]:
+def _outlet_checks(facts: Measurements, _protocol: Protocol) -> Iterator[Check]:
     """Yield the check of each outlet: its listeners, its failure, or that a double-blind study disables it."""
     for outlet in facts.outlets:
         if outlet.withheld:
@@ -307,7 +315,7 @@ def _outlets(facts: Measurements, _protocol: Protocol) -> Iterator[Check]:
             yield Check(outlet.title, "ok", "ready" if outlet.listens is None else "listener", about=about)
 
 
-def _costs(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
+def _cost_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     """Yield the checks of computing time, unknown properties of the device, withheld force, and the row of a square."""
     if facts.tick_s is not None:
         share = facts.tick_s * protocol.device.rate_hz
@@ -316,7 +324,7 @@ def _costs(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
             f"most expensive scene: {100 * share:.2g} % of each tick",
         )
         advice, well = "Remove an effect from the scene.", share <= MOST_OF_A_TICK
-        yield _warned("Cost of the scenes", value, about, advice, well=well, share=share)
+        yield _warning_unless("Cost of the scenes", value, about, advice, well=well, share=share)
 
     if facts.velocity_errors and facts.dynamics.unknown and descriptor_of(facts.device).kind == "felt":
         now, known = (100 * error for error in facts.velocity_errors)
@@ -326,7 +334,7 @@ def _costs(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         why = f"{'although' if well else 'because'} the device's {listed} {'are' if len(missing) > 1 else 'is'} unknown"
         value = f"{now:.2g} %" if well else f"{now:.2g} % instead of {known:.2g} %"
         advice = f"Measure the device: liquid-study devices bench {facts.device}."
-        yield _warned("Velocity", value, f"error at 2 Hz, {why}", advice, well=well)
+        yield _warning_unless("Velocity", value, f"error at 2 Hz, {why}", advice, well=well)
 
     if facts.withheld:
         limit_percent, most_percent = protocol.limits.withheld_percent, 100 * max(facts.withheld.values())
@@ -335,14 +343,14 @@ def _costs(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
             about += ": " + ", ".join(f"{name} {100 * of:.1f} %" for name, of in sorted(facts.withheld.items()))
         share, value = most_percent / limit_percent, f"at most {most_percent:.1f} %"
         advice = "Trials with such strokes would be invalid."
-        yield _warned("Force withheld", value, about, advice, well=most_percent <= limit_percent, share=share)
+        yield _warning_unless("Force withheld", value, about, advice, well=most_percent <= limit_percent, share=share)
 
     if facts.delivery is not None and facts.delivery.asked + facts.delivery.judged:
         lost = facts.delivery.missing + facts.delivery.out
         value = f"{lost} of {counted(facts.delivery.asked + facts.delivery.judged, 'trial')} beyond the limit"
         about = f"predicted for a delay of {counted(facts.delay_ticks, 'tick')}"
         advice = "; ".join(facts.delivery.sentences)
-        yield _warned("Trials delivered", value if lost else "all", about, f"{advice}.", well=not lost)
+        yield _warning_unless("Trials delivered", value if lost else "all", about, f"{advice}.", well=not lost)
 
     if facts.ran_otherwise:
         about = f"version {protocol.study.version} ran from another file with {facts.ran_otherwise}"

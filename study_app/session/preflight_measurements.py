@@ -32,7 +32,7 @@ class MeasuredServo(ServoPort, Protocol):
     def delay_ticks(self) -> int: ...  # noqa: D102
 
 
-def measure(
+def measure_servo_and_disk(
     servo: MeasuredServo,
     results: Path,
     *,

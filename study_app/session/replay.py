@@ -100,7 +100,7 @@ def as_one_scene(samples: Any, steps: Sequence[Step]) -> Any:
     return out
 
 
-def places_of(samples: Any, steps: Sequence[Step]) -> list[tuple[int, Scene]]:
+def step_starts(samples: Any, steps: Sequence[Step]) -> list[tuple[int, Scene]]:
     """Return the index of the first sample (n,) of each step with its scene, without steps that have no sample."""
     begins = ((np.flatnonzero(samples.scene >= step.serial), step.scene) for step in steps)
     return [(int(at[0]), scene) for at, scene in begins if at.size]
@@ -117,7 +117,7 @@ def interval_samples(samples: Any, duration_s: float) -> Any:
     return own[own["time_ns"] <= until_ns]
 
 
-def delivered_again(
+def recompute_delivered(
     protocol: Protocol,
     presented: Stimulated,
     started: events.TrialStarted,
@@ -135,20 +135,20 @@ def delivered_again(
     return delivered_values(protocol, presented, protocol.tasks[block.task], own, adjusted=adjusted)
 
 
-def error_again(scene: Scene, rate_hz: float, samples: Any, ended: Mapping[str, Any]) -> float | None:
+def recompute_force_error(scene: Scene, rate_hz: float, samples: Any, ended: Mapping[str, Any]) -> float | None:
     """Recompute the force error of a trial or interval from its recording and the opened line on its end."""
     own = judged_fields(interval_samples(samples, ended["duration_s"]))
     return delivered_error(own, rate_hz, scene.fade_s, partial(law_along, scene))
 
 
-def different(recomputed: Mapping[str, float | None], ended: Mapping[str, Any]) -> Iterator[str]:
+def differing_columns(recomputed: Mapping[str, float | None], ended: Mapping[str, Any]) -> Iterator[str]:
     """Yield the columns in which the journal differs from the recomputed values; none if it lacks them."""
     for name, value in recomputed.items():
-        if name in ended and not _same(value, ended[name]):
+        if name in ended and not _is_same(value, ended[name]):
             yield name
 
 
-def _same(value: float | None, other: float | None) -> bool:
+def _is_same(value: float | None, other: float | None) -> bool:
     if value is None or other is None:
         return value is other
     return bool(np.isclose(value, other, rtol=TOLERANCE, atol=TOLERANCE))
@@ -209,13 +209,13 @@ def replay(session_folder: Path) -> Replayed:
     if key.hash != kept["key_hash"]:
         raise StoreError(f"{study.key} is not the key that {session.path} ran under: restore it from a copy")
     lines = open_events(journal.read(session.journal), key)
-    protocol, devices, (drawn_from, participant) = _ran(session.receipt, kept, key, lines)
-    _again(records(SAMPLE, 0), Scene(), devices[None], None)  # loads the compiled code outside of the measured time
+    protocol, devices, (drawn_from, participant) = _recorded_setup(session.receipt, kept, key, lines)
+    _recompute_forces(records(SAMPLE, 0), Scene(), devices[None], None)  # loads the compiled code before the timing
     replayed = Replayed()
     ends = {line.which: line for line in lines if isinstance(line, events.TrialEnded | events.IntervalEnded)}
     before: _Before | None = None
     resumed_at: str | None = None
-    for started, which, line, resumed in _presented(lines):
+    for started, which, line, resumed in _recorded_presentations(lines):
         if resumed != resumed_at:  # the servo was restarted: nothing continues from the previous recording
             before, resumed_at = None, resumed
         if resumed not in devices:
@@ -237,22 +237,22 @@ def replay(session_folder: Path) -> Replayed:
         start = time.perf_counter()
         samples = as_one_scene(recorded, steps)
         try:
-            before = _again(samples, scene, devices[resumed], before, places_of(recorded, steps))
+            before = _recompute_forces(samples, scene, devices[resumed], before, step_starts(recorded, steps))
         except StudyError as refused:
             before = None
             replayed.uncompared += (f"{name}: not recomputable: {refused}",)
             continue
-        _compare(replayed, name, samples, before, checks)
-        if (ended := ends.get(which)) is not None and _until_gap(samples.tick) == len(samples):
+        _compare_recording(replayed, name, samples, before, checks)
+        if (ended := ends.get(which)) is not None and _samples_before_gap(samples.tick) == len(samples):
             again: dict[str, float | None] = {}
             measured = ended.others
             if interval is not None:
                 presented = presented_by(protocol, key.codes, started.fields()).intervals[interval - 1]
-                again |= delivered_again(protocol, presented, started, interval, samples, measured).columns
+                again |= recompute_delivered(protocol, presented, started, interval, samples, measured).columns
             if measured.get("delivered_error") is not None and ended.outcome != "interrupted":
-                again["delivered_error"] = error_again(scene, protocol.device.rate_hz, samples, measured)
+                again["delivered_error"] = recompute_force_error(scene, protocol.device.rate_hz, samples, measured)
             replayed.differences += tuple(
-                f"{name}: the column {column} differs" for column in different(again, measured)
+                f"{name}: the column {column} differs" for column in differing_columns(again, measured)
             )
         replayed.computed_s += time.perf_counter() - start
     replayed.took_s = time.perf_counter() - began
@@ -282,7 +282,7 @@ class _Before:
     knows_its_start: bool = True
 
 
-def _again(
+def _recompute_forces(
     samples: Any, scene: Scene, device: _Device, before: _Before | None, steps: Sequence[tuple[int, Scene]] = ()
 ) -> _Before:
     """Recompute the forces of ``samples`` in a copy; their own scene is that of the last sample.
@@ -295,7 +295,7 @@ def _again(
     rest = pack(scene.model_copy(update={"liquids": (), "fade_s": FADE_S}), dynamics=dynamics, rules=rules)
     model = pack(scene, dynamics=dynamics, rules=rules)
     first = 0
-    shared = _shared(before, out)
+    shared = _shared_samples(before, out)
     if before is not None and shared is not None:
         first = shared
         _copy_forces(before.samples[len(before.samples) - first :], out[:first])
@@ -305,14 +305,14 @@ def _again(
         )
     safety = new_safety(limit_n)
     if len(out) and out.tick[0] != 0:
-        _assume(safety[0], out)
+        _set_safety_state(safety[0], out)
         first = 1
     knows_its_start = not out.force_n[out.scene != serial].any()
     _run_steps((rest, rest, model), (0, serial), safety[0], out, first, steps, device)
     return _Before(serial=serial, model=model, safety=safety, samples=out, knows_its_start=knows_its_start)
 
 
-def _shared(before: _Before | None, out: Any) -> int | None:
+def _shared_samples(before: _Before | None, out: Any) -> int | None:
     """Return the number of samples shared with the previous recording; None if this one does not continue it."""
     if before is None or len(out) == 0 or len(before.samples) == 0:
         return None
@@ -325,7 +325,7 @@ def _copy_forces(known: Any, out: Any) -> None:
         out[name] = known[name]
 
 
-def _assume(safety: Any, out: Any) -> None:
+def _set_safety_state(safety: Any, out: Any) -> None:
     """Set the state of the safety layer to the first of the samples ``out``, which is recorded exactly.
 
     Of a fade under way nothing but its length counts, since nothing is felt before the trial's own scene, which begins
@@ -358,7 +358,7 @@ def _run_steps(
     recompute_scenes(*models, *serials, safety, out, first)
 
 
-def _compare(replayed: Replayed, name: str, samples: Any, again: _Before, checks: recordings.Checks) -> None:
+def _compare_recording(replayed: Replayed, name: str, samples: Any, again: _Before, checks: recordings.Checks) -> None:
     """Compare one recording's checks with those of the recomputed forces."""
     if len(samples) == 0:
         replayed.uncompared += (f"{name}: holds no sample",)
@@ -368,22 +368,22 @@ def _compare(replayed: Replayed, name: str, samples: Any, again: _Before, checks
         return
     replayed.recordings += 1
     replayed.lasted_s += float(samples.time_ns[-1] - samples.time_ns[0]) * 1e-9
-    whole = _until_gap(samples.tick)
+    whole = _samples_before_gap(samples.tick)
     if whole < len(samples):
         lost_s = whole / checks.rows
         replayed.uncompared += (f"{name}: samples are missing after {lost_s:.1f} s; what follows was not compared",)
     replayed.seconds += sum(
         min((second + 1) * checks.rows, len(samples)) <= whole for second in range(len(checks.device_force))
     )
-    differing = _other_sums(checks, again.samples) | _other_columns(checks, samples, again.samples)
+    differing = _differing_sums(checks, again.samples) | _differing_columns(checks, samples, again.samples)
     for what, differ in differing.items():
         seconds = [second for second in differ if min((second + 1) * checks.rows, len(samples)) <= whole]
         if seconds:
             lasted = len(checks.device_force)
-            replayed.differences += (f"{name}: the {what} differs in {_listed(seconds)} of {lasted} seconds",)
+            replayed.differences += (f"{name}: the {what} differs in {_list_seconds(seconds)} of {lasted} seconds",)
 
 
-def _other_sums(checks: recordings.Checks, again: Any) -> dict[str, list[int]]:
+def _differing_sums(checks: recordings.Checks, again: Any) -> dict[str, list[int]]:
     """Return, for each kind of force, the seconds whose exact forces have another CRC."""
     seconds_of = {}
     for what, kept, forces in (
@@ -397,7 +397,7 @@ def _other_sums(checks: recordings.Checks, again: Any) -> dict[str, list[int]]:
     return seconds_of
 
 
-def _other_columns(checks: recordings.Checks, samples: Any, again: Any) -> dict[str, list[int]]:
+def _differing_columns(checks: recordings.Checks, samples: Any, again: Any) -> dict[str, list[int]]:
     """Return, for each column, the seconds in which recorded and recomputed values differ by more than rounding.
 
     Of the samples before the trial's own scene nothing but the forces is known.
@@ -416,19 +416,19 @@ def _other_columns(checks: recordings.Checks, samples: Any, again: Any) -> dict[
     return seconds_of
 
 
-def _until_gap(ticks: NDArray[np.int64]) -> int:
+def _samples_before_gap(ticks: NDArray[np.int64]) -> int:
     """Return the number of samples before the first missing one."""
     gaps = np.flatnonzero(np.diff(ticks) != 1)
     return int(gaps[0]) + 1 if gaps.size else len(ticks)
 
 
-def _listed(seconds: list[int]) -> str:
+def _list_seconds(seconds: list[int]) -> str:
     shown = ", ".join(map(str, seconds[:NAMED_SECONDS]))
     more = f" … ({len(seconds)} in all)" if len(seconds) > NAMED_SECONDS else ""
     return f"second {shown}{more}"
 
 
-def _presented(
+def _recorded_presentations(
     lines: Sequence[events.Event],
 ) -> Iterator[tuple[events.TrialStarted, events.Which, events.Recorded | events.RecordingLost | None, str | None]]:
     """Yield the start of each trial or interval with an expected recording, its numbers, and the recording's event.
@@ -452,7 +452,7 @@ def _presented(
             yield started, line.which, ends.get(line.which), resumed_at
 
 
-def _ran(
+def _recorded_setup(
     path: Path, kept: Mapping[str, Any], key: blinding.Key, lines: Sequence[events.Event]
 ) -> tuple[Protocol, dict[str | None, _Device], tuple[int, str]]:
     """Return protocol, devices, and seed with participant of a session from its receipt ``kept`` at ``path``.

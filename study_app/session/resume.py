@@ -56,7 +56,7 @@ def resume_at(
     step = reached = _next_step(protocol, schedule, progress)
     heard = () if key is None else trial_results(protocol, open_events(lines, key))
     if protocol.study.resume == "block" and not exactly:
-        within = _within(schedule.steps, step)
+        within = _trial_around(schedule.steps, step)
         if within is not None:  # back to the first trial of its block
             step = next(
                 index
@@ -122,7 +122,7 @@ def _next_step(protocol: Protocol, schedule: Schedule, progress: Progress) -> in
     return progress.step + 1 if number is not None and progress.task_done and not asks else progress.step
 
 
-def _within(steps: tuple[Step, ...], step: int) -> Trial | None:
+def _trial_around(steps: tuple[Step, ...], step: int) -> Trial | None:
     """Return a trial of the block that contains ``step`` (a trial, or a break between trials); None elsewhere."""
     here, before, after = (steps[at] if 0 <= at < len(steps) else None for at in (step, step - 1, step + 1))
     if isinstance(here, Trial):

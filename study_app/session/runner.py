@@ -32,8 +32,8 @@ from study_app.session.resume import FIRST, Start
 from study_app.session.tasks import Outcome, TankView, TaskView
 from study_app.session.transitions import events
 from study_app.session.transitions.state import FINAL, Phase, SessionState, Stall
-from study_app.session.transitions.table import advance, open_session
-from study_app.session.trial import Recording, RunningTrial, ball_is_back, resting_view
+from study_app.session.transitions.table import advance, initial_state
+from study_app.session.trial import Recording, RunningTrial, is_ball_at_start, resting_view
 from study_app.store.delivered import broken_interval_limits, broken_limits, delivered_values
 from study_app.store.journals.journal_events import TargetReached
 
@@ -59,7 +59,7 @@ class Runner:
     ) -> None:
         self._protocol = protocol
         self._ports = ports
-        self._state = open_session(protocol, schedule, key, language, start, secret)
+        self._state = initial_state(protocol, schedule, key, language, start, secret)
         self._reader = ports.servo.telemetry.reader()
         self._recording = Recording(ports.recorder, ports.servo.rate_hz)
         self._running: RunningTrial | None = None
@@ -121,7 +121,7 @@ class Runner:
         try:
             while self._waiting:
                 try:
-                    self._take(self._waiting.popleft())
+                    self._apply_event(self._waiting.popleft())
                 except SessionError as error:
                     refused = refused or error
         finally:
@@ -137,7 +137,7 @@ class Runner:
             if self._ports.settled():
                 (finish, at_s), self._ending = self._ending, None
                 self._carry_out_all((finish,), at_s)
-                self._tell()
+                self._notify_listeners()
             return
         now_s = self._ports.clock()
         still_s, self._polled_s = now_s - self._polled_s, now_s
@@ -151,22 +151,22 @@ class Runner:
         if fault is not None and self._state.phase not in {Phase.TROUBLE, *FINAL}:
             self.post(events.Broke(self._ports.clock(), fault, "device"))
         if len(samples) and self._state.phase is not Phase.OPENING:
-            for event in self._buttons.events(samples, self._page_since_ns, self._ports.clock(), self._where):
+            for event in self._buttons.events(samples, self._page_since_ns, self._ports.clock(), self._button_state):
                 self.post(event)
-            self._follow(samples)
+            self._follow_samples(samples)
         running = self._running
         if running is None and still_s > STOOD_STILL_S and self._state.phase not in {Phase.OPENING, *FINAL}:
             self.post(events.Note(now_s, "note", f"the program stood still for {still_s:.1f} s"))
         if running is not None and running.frozen:
             self.post(events.PauseRequested(self._ports.clock(), "program"))
         elif running is not None and (outcome := running.outcome()) is not None:
-            self.post(self._done(running, outcome))
+            self.post(self._task_done(running, outcome))
         elif self._state.phase in {Phase.RESTING, Phase.FEEDBACK} and now_s >= (self._state.until_s or 0.0):
             rest = self.view(self._ports.servo.now_ns())
-            if rest is None or ball_is_back(rest, self._state.task):
+            if rest is None or is_ball_at_start(rest, self._state.task):
                 self.post(events.TimeUp(now_s))
 
-    def _where(self) -> tuple[SessionState, bool]:
+    def _button_state(self) -> tuple[SessionState, bool]:
         return self._state, self._running is not None and self._running.adjustable
 
     def view(self, now_ns: int) -> TankView | None:
@@ -189,11 +189,11 @@ class Runner:
         except StudyError as error:
             self._fail(error)
 
-    def _take(self, event: events.Event) -> None:
-        if isinstance(event, events.Stepped) and not self._where()[1]:
+    def _apply_event(self, event: events.Event) -> None:
+        if isinstance(event, events.Stepped) and not self._button_state()[1]:
             return  # an interval can be adjusted only from its first frame until its end
         if isinstance(event, events.WriteRetried | events.EndRequested) and self._state.stall is not None:
-            self._write_again(self._state.stall)
+            self._retry_writes(self._state.stall)
             if isinstance(event, events.WriteRetried):
                 return
         stall = self._state.stall
@@ -204,13 +204,13 @@ class Runner:
             self._cause = ""
             self._recording.forget()
         if self._carry_out_all(commands, event.at_s):
-            self._tell()
+            self._notify_listeners()
         if isinstance(event, events.EndRequested) and stall is not None:
             raise StoreError(
                 f"{stall.reason}; the session's end is not written either: resume it later, or end it then"
             )
 
-    def _write_again(self, stall: Stall) -> None:
+    def _retry_writes(self, stall: Stall) -> None:
         """Retry the pending writes; continue the session if they succeed."""
         waiting = tuple(self._waiting)
         self._state, commands = advance(self._state, events.WriteRetried(stall.at_s))
@@ -218,9 +218,9 @@ class Runner:
         broke = [event for event in self._waiting if isinstance(event, events.Broke) and event not in waiting]
         self._waiting = deque((*waiting, *broke))  # events of a page that is covered again at once are sent again later
         if done:
-            self._take(events.WriteCompleted(self._ports.clock()))
+            self._apply_event(events.WriteCompleted(self._ports.clock()))
 
-    def _tell(self) -> None:
+    def _notify_listeners(self) -> None:
         for listener in self._listeners:
             listener(self._state)
 
@@ -234,7 +234,7 @@ class Runner:
                 self._carry_out(command, at_s)
             except StoreError as error:
                 self._retry_s = self._ports.clock() + RETRY_S
-                self._take(events.WriteFailed(at_s, str(error), tuple(commands[index:])))
+                self._apply_event(events.WriteFailed(at_s, str(error), tuple(commands[index:])))
                 return False
             except StudyError as error:
                 self._fail(error)
@@ -268,7 +268,7 @@ class Runner:
             case events.WriteTables():
                 journal.write_tables()
             case events.StartTrial():
-                self._running = self._prepared(command)
+                self._running = self._prepare_trial(command)
             case events.Adjust(presented, delay_s, stepped):
                 other = None if presented.vary == DELAY else scene_of(self._protocol, presented)
                 scene = None if self._running is None else self._running.adjust(other, delay_s)
@@ -279,7 +279,7 @@ class Runner:
             case events.Finish(status, reason):
                 journal.finish(status, reason)
 
-    def _prepared(self, command: events.StartTrial) -> RunningTrial:
+    def _prepare_trial(self, command: events.StartTrial) -> RunningTrial:
         schedule = self._state.plan.schedule
         condition = self._protocol.conditions[command.presented.condition]
         seed = link_seed(schedule.seed, schedule.participant, command.trial, command.attempt, command.interval)
@@ -296,7 +296,7 @@ class Runner:
             videos=any(condition.shows_video for condition in self._protocol.conditions.values()),
         )
 
-    def _done(self, running: RunningTrial, outcome: Outcome) -> events.TaskDone:
+    def _task_done(self, running: RunningTrial, outcome: Outcome) -> events.TaskDone:
         """Return the event of a completed task; for an interval, with delivered values and broken limits."""
         summary, limits, command = running.summary(), self._protocol.limits, running.command
         reasons: tuple[str, ...] = ()
@@ -310,7 +310,7 @@ class Runner:
             )
         return events.TaskDone(self._ports.clock(), outcome, summary, reasons)
 
-    def _follow(self, samples: Any) -> None:
+    def _follow_samples(self, samples: Any) -> None:
         if (running := self._running) is None:
             return
         self._carry_out_all(

@@ -98,7 +98,7 @@ class NewSession:
         return f"Participant {self.participant}{group}  ·  session {self.session}  ·  seed {self.seed}{kind}"
 
 
-def resumed(
+def resumed_choices(
     session_folder: Path,
     *,
     protocol: str | None = None,
@@ -199,7 +199,7 @@ class Ready:
         return () if self.outlets is None else self.outlets.statuses()
 
 
-def check(chosen: NewSession, study: Protocol) -> None:
+def check_choices(chosen: NewSession, study: Protocol) -> None:
     """Raise an error for a session that cannot begin, before any window opens; change nothing."""
     check_options(chosen.device, chosen.device_options)
     if chosen.language not in study.study.languages:
@@ -220,7 +220,7 @@ def check(chosen: NewSession, study: Protocol) -> None:
     check_conditions(folder.path, study)
 
 
-def videos_of(chosen: NewSession, study: Protocol, camera: str, rig: Rig) -> Videos | None:
+def unopened_videos(chosen: NewSession, study: Protocol, camera: str, rig: Rig) -> Videos | None:
     """Return the unopened videos of a study, None if it shows none. ``camera`` is that of this computer."""
     if not any(condition.shows_video for condition in study.conditions.values()):
         return None
@@ -228,17 +228,17 @@ def videos_of(chosen: NewSession, study: Protocol, camera: str, rig: Rig) -> Vid
     return Videos(study, folder, camera, rig.servo.now_ns)
 
 
-def measured(
+def measure_rig(
     rig: Rig, chosen: NewSession, videos: Videos | None = None, *, sleep: Callable[[float], object] = time.sleep
 ) -> Measurements:
     """Return the measurements for the pre-flight except the screen's; a ``sleep`` that does not wait shortens them.
 
     ``videos`` that are not open yet, or failed, are opened.
     """
-    from study_app.session.preflight_measurements import measure  # noqa: PLC0415 - the compiler: only once it is needed
+    from study_app.session.preflight_measurements import measure_servo_and_disk  # noqa: PLC0415 - the compiler: only once it is needed
 
     looked = None if videos is None else videos.open()
-    facts = measure(
+    facts = measure_servo_and_disk(
         rig.servo,
         chosen.results,
         device=rig.device.name,
@@ -250,10 +250,12 @@ def measured(
     )
     document, _ = read_document(chosen.read_source(), chosen.source)
     untranslated = untranslated_on_pages(document)
-    return replace(facts, video=looked, ran_otherwise=ran_otherwise(chosen), untranslated=untranslated)
+    return replace(
+        facts, video=looked, ran_otherwise=participant_with_other_contents(chosen), untranslated=untranslated
+    )
 
 
-def ran_otherwise(chosen: NewSession) -> str:
+def participant_with_other_contents(chosen: NewSession) -> str:
     """Return a participant whose session ran the same version with other contents of the file; "" if there is none."""
     if chosen.resumes is not None:
         return ""
@@ -286,7 +288,7 @@ def open_store(
     """Claim a new session on the disk or open the resumed one; ``outlets`` get the markers of its events."""
     here: dict[str, Any] = {
         "operator": chosen.operator,
-        "device": with_bench(rig.described),
+        "device": with_bench_measurements(rig.described),
         "screens": screens,
         "motors_masked": None if masking is None else masking.entry,
         "outlets": None if outlets is None else outlets.described,
@@ -313,7 +315,7 @@ def open_store(
     return store
 
 
-def with_bench(described: Mapping[str, Any]) -> dict[str, Any]:
+def with_bench_measurements(described: Mapping[str, Any]) -> dict[str, Any]:
     """Return the receipt's entry of a device, with the measurements of ``devices bench`` on this computer, if any."""
     bench = workstation.load_or_default()[0].bench_of(described)
     return {**described} if bench is None else {**described, "bench": bench.entry}

@@ -66,7 +66,7 @@ class TargetReached:
 
 
 class Tracker:
-    """Track one task through the samples of its trial; `track` makes the right tracker.
+    """Track one task through the samples of its trial; `new_tracker` makes the right tracker.
 
     ``outcome`` and ``end_ns`` (time of the sample that ended the task) are None while it goes on.
     """
@@ -228,7 +228,7 @@ class ReachTracker(Tracker):
         return TargetReached(lit, (time_ns - (self._start_ns or 0)) / _NS)
 
 
-def track(task: Task) -> Tracker:
+def new_tracker(task: Task) -> Tracker:
     """Return a tracker at the beginning of ``task``."""
     made: Tracker = resolve_name(task.tracker)(task)
     return made

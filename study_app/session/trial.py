@@ -18,7 +18,7 @@ from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.telemetry import timing
 from study_app.protocol.trials.tasks import AnyTask
 from study_app.session.ports import RecorderPort, ServoPort
-from study_app.session.tasks import Outcome, TankView, TargetReached, TaskView, track
+from study_app.session.tasks import Outcome, TankView, TargetReached, TaskView, new_tracker
 from study_app.session.transitions.events import StartTrial
 from study_app.store.delivered import JUDGED, delivered_error, judged_fields
 from study_app.video.frames import VideoFrame, VideoSource, VideoStatistics
@@ -198,7 +198,7 @@ class RunningTrial:
         self._recording = recording
         self._serial: int | None = None
         self._dropped_before = 0
-        self._tracker = track(command.task)
+        self._tracker = new_tracker(command.task)
         self._frames = FrameStatistics(late_s=late_s, due_ns=servo.now_ns(), paints=paints, videos=videos)
 
     @property
@@ -321,7 +321,7 @@ def resting_view(servo: ServoPort, task: AnyTask, now_ns: int) -> TankView:
     )
 
 
-def ball_is_back(view: TankView, task: AnyTask) -> bool:
+def is_ball_at_start(view: TankView, task: AnyTask) -> bool:
     """Return whether the ball is at the start of the task's next interval; True for tasks without a fixed start."""
     if task.start_m is None:
         return True

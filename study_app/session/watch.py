@@ -21,7 +21,7 @@ from study_app.protocol.orders.schedule import Trial
 from study_app.protocol.tracks import design_of
 from study_app.protocol.trials.tasks import Task
 from study_app.session.pages import Interval, TaskPage
-from study_app.session.tasks import TankView, Tracker, track
+from study_app.session.tasks import TankView, Tracker, new_tracker
 from study_app.session.transitions.page_builder import task_page
 from study_app.store import receipt
 from study_app.store.blinded.blinding import (
@@ -111,14 +111,14 @@ class Watched:
         return np.arange(self.begins_s, self.ends_s, _ASSUMED_FRAME_S)
 
 
-def motion_hidden(start: events.SessionStarted, key: Key | None) -> str:
+def reason_motion_is_hidden(start: events.SessionStarted, key: Key | None) -> str:
     """Return the reason why a session's motion cannot be shown, or ""; ``key`` is the study's, None while sealed."""
     device = DEVICES.get(start.device or "")
     seen = device is not None and not device.motion_shows_force
     return "" if seen or key is not None else MOTION_HIDDEN
 
 
-def watched(session_folder: Path, trial: int, attempt: int = 1, interval: int = 1) -> Watched:
+def read_watched(session_folder: Path, trial: int, attempt: int = 1, interval: int = 1) -> Watched:
     """Read an attempt at a trial, or its interval with this number.
 
     Raises
@@ -145,24 +145,24 @@ def watched(session_folder: Path, trial: int, attempt: int = 1, interval: int = 
         raise StoreError(f"{named} has no recording ({why}): choose another trial")
     secret = None if shown is None else shown.nonce
     recorded = recordings.read_samples(session.path / stored.recording, secret)
-    if why := motion_hidden(events.start_of(lines), shown):
+    if why := reason_motion_is_hidden(events.start_of(lines), shown):
         raise StoreError(why.rstrip("."))
     begins = [line for line in own if isinstance(line, _BEGINS)][started.has_intervals :]
     at = next(number for number, line in enumerate(begins) if line.which == which)
     ended = next((line for line in own if isinstance(line, _ENDS) and line.which == which), None)
-    samples, times_s = _timed(recorded, own, last=at + 1 == len(begins))
+    samples, times_s = _timed_samples(recorded, own, last=at + 1 == len(begins))
     if not len(samples):
         raise StoreError(f"the recording of {named} holds no sample: choose another trial")
     page = _page(study, session.receipt, lines, started, which[-1])
     lasted_s = None if ended is None else ended.others.get("duration_s")
-    tracker = track(page.task)
+    tracker = new_tracker(page.task)
     tracker.feed(samples[(times_s >= 0) & (times_s <= (np.inf if lasted_s is None else lasted_s))])
     until_s = begins[at + 1].t_s if at + 1 < len(begins) else np.inf
     watched_task = Watched(
         page=page,
         language=progress_of(lines).language,
         blinded=shown is None,
-        presented=_presented(started, which[-1], shown),
+        presented=_presented_condition(started, which[-1], shown),
         intervals=len(begins) if started.has_intervals else 0,
         samples=samples,
         times_s=times_s,
@@ -189,7 +189,7 @@ _BEGINS: Final = events.TrialStarted | events.IntervalStarted
 _ENDS: Final = events.TrialEnded | events.IntervalEnded
 
 
-def _timed(recorded: Any, own: Sequence[events.Event], *, last: bool) -> tuple[Any, NDArray[np.float64]]:
+def _timed_samples(recorded: Any, own: Sequence[events.Event], *, last: bool) -> tuple[Any, NDArray[np.float64]]:
     """Return the valid samples, with their times since the first one of the task's scene [s].
 
     An adjustment, of the ``last`` interval, changes the scene's number from its first step on.
@@ -209,7 +209,7 @@ def _marks(own: Sequence[events.Event], begun: events.Event, ended: Any, until_s
     """
     gap_ms = (ended.others.get("first_frame_gap_ms") if ended is not None else None) or 0.0
     for line in own:
-        if begun.n < line.n and line.t_s < until_s and (told := _told(line)) is not None:
+        if begun.n < line.n and line.t_s < until_s and (told := _mark_text(line)) is not None:
             at_s = line.t_s - begun.t_s - gap_ms * 1e-3
             if isinstance(line, events.TargetReached) and line.t_task_s is not None:
                 at_s = line.t_task_s
@@ -224,7 +224,7 @@ def _target_marks(ended: events.EndOfTask | None, task: Task) -> Iterator[Mark]:
         yield Mark(at_s, "target", f"target {number % len(task.targets_m) + 1} reached")
 
 
-def _told(line: events.Event) -> tuple[Kind, str] | None:
+def _mark_text(line: events.Event) -> tuple[Kind, str] | None:
     """Return kind and text of the mark for a journal event, or None."""
     match line:
         case events.TargetReached():
@@ -267,7 +267,7 @@ def _page(
     return replace(page, interval=Interval(interval, of, resting=False, announced=""))
 
 
-def _presented(started: events.TrialStarted, interval: int | None, key: Key | None) -> str:
+def _presented_condition(started: events.TrialStarted, interval: int | None, key: Key | None) -> str:
     if key is None or interval is None:
         return "" if key is None else key.condition(started.block, started.code)
     return {"S": "standard", "C": "comparison"}.get((started.arrangement or "")[interval - 1], "")

@@ -31,7 +31,7 @@ class Pixels(NamedTuple):
     content: Any
 
 
-def installed() -> bool:
+def is_installed() -> bool:
     """Return whether PyAV is installed."""
     return find_spec("av") is not None
 
@@ -47,7 +47,7 @@ def open_video(source: str, *, kind: str | None = None, timeout: Any = None, **o
         container = av.open(source, format=kind, options=options, timeout=timeout)
     except (FFmpegError, OSError, ValueError) as error:
         refused = "format_whitelist" in options and getattr(error, "errno", None) == errno.EINVAL
-        raise VideoError("its format is not accepted" if refused else reason(error)) from error
+        raise VideoError("its format is not accepted" if refused else failure_reason(error)) from error
     if not container.streams.video:
         container.close()
         raise VideoError("it holds no video")
@@ -58,7 +58,7 @@ def open_video(source: str, *, kind: str | None = None, timeout: Any = None, **o
     return container
 
 
-def reason(error: Exception) -> str:
+def failure_reason(error: Exception) -> str:
     """Return the reason why a video cannot be read, as reported by the system or FFmpeg."""
     if type(error).__name__ == "ExitError":  # FFmpeg: "Immediate exit requested", after its time limit
         return "no data came in time"

@@ -6,7 +6,7 @@ from typing import Any, Protocol
 from study_app.errors import VideoError
 
 
-def stopped(why: str) -> VideoError:
+def stopped_error(why: str) -> VideoError:
     """Return the error of a source that fails in a trial, without its name, which would reveal the condition."""
     return VideoError(f"a video of the study stopped ({why}): check camera and files")
 

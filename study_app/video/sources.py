@@ -30,13 +30,13 @@ from study_app.video.decoding import (
     OF_FILE,
     SECOND_NS,
     Scaler,
-    installed,
+    failure_reason,
+    is_installed,
     make_less_urgent,
     open_video,
     period_ns,
-    reason,
 )
-from study_app.video.frames import VideoFrame, stopped
+from study_app.video.frames import VideoFrame, stopped_error
 
 LIVE: Final = {"fflags": "nobuffer", "flags": "low_delay", "probesize": "65536", "analyzeduration": "0"}
 OF_DEVICE: Final = {"video_size": "1280x720", "framerate": "30"}
@@ -127,7 +127,7 @@ class Camera:
         if not failure and self._stalls:
             failure = f"no picture for {STALLS_S:g} s"
         if failure:
-            raise stopped(failure)
+            raise stopped_error(failure)
         return next((frame for frame in reversed(held) if frame.due_ns <= moment_ns), None)
 
     def close(self) -> None:
@@ -140,7 +140,7 @@ class Camera:
             self._read()
             failure = "it ended"
         except Exception as error:  # noqa: BLE001 - FFmpeg's errors have no common base but this
-            failure = reason(error)
+            failure = failure_reason(error)
         with self._changed:
             self._failure = failure
             self._changed.notify_all()
@@ -239,8 +239,8 @@ class Footage:
                 self.size = (stream.width, stream.height)
         except Exception as error:
             raise VideoError(
-                f"{path} cannot be shown: {reason(error)}; give a video file that plays: MP4, MOV, Matroska, WebM, "
-                "AVI, MPEG or Ogg"
+                f"{path} cannot be shown: {failure_reason(error)}; give a video file that plays: MP4, MOV, Matroska, "
+                "WebM, AVI, MPEG or Ogg"
             ) from error
         self._scaler = Scaler()
         self._changed = threading.Condition()
@@ -292,7 +292,7 @@ class Footage:
             if len(self._frames) <= AHEAD // 2:  # rarely: the decoder competes with painting for the interpreter lock
                 self._changed.notify_all()
             if self._failure and not self._frames:
-                raise stopped(self._failure)
+                raise stopped_error(self._failure)
             shown = self._shown
         return None if shown is None else replace(shown, due_ns=began_ns + shown.due_ns)
 
@@ -313,7 +313,7 @@ class Footage:
                             break
         except Exception as error:  # noqa: BLE001 - FFmpeg's errors have no common base but this
             with self._changed:
-                self._failure = reason(error)
+                self._failure = failure_reason(error)
 
     def _decoded(self, container: Any, play: int) -> Iterator[VideoFrame]:
         """Yield the frames in a loop from the beginning; overdue ones except the first are not scaled."""
@@ -470,7 +470,7 @@ class Videos:
             yield f"footage, {counted(count, 'file')}"
 
 
-def missing_here(protocol: Protocol, folder: Path, camera: str, now_ns: Callable[[], int]) -> str:
+def missing_on_computer(protocol: Protocol, folder: Path, camera: str, now_ns: Callable[[], int]) -> str:
     """Return the reason why this computer cannot show the study's videos, or "".
 
     Raises
@@ -479,7 +479,7 @@ def missing_here(protocol: Protocol, folder: Path, camera: str, now_ns: Callable
         Footage cannot be shown on any computer; one line gives the reason.
     """
     views = {condition.view for condition in protocol.conditions.values() if condition.shows_video}
-    if views and not installed():
+    if views and not is_installed():
         return f"a video {EXTRA}"
     for view in sorted(views - {CAMERA}):
         Footage(folder / view).close()

@@ -6,7 +6,7 @@ from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
 from typing import Final, Generic, TypeVar
 
-from study_app.workers.server import CONTEXT, Crashed, Refused, serve
+from study_app.workers.server import CONTEXT, Crashed, Refused, serve_orders
 
 PATIENCE_S: Final = 3.0
 """Time after which a process that was asked to end is killed [s]."""
@@ -38,7 +38,7 @@ class WorkerClient(Generic[Order, Answer]):
         far_orders, self._orders = CONTEXT.Pipe(duplex=False)
         self._answers, far_answers = CONTEXT.Pipe(duplex=False)
         self.process: BaseProcess = CONTEXT.Process(
-            target=serve,
+            target=serve_orders,
             args=(far_orders, far_answers, task),
             kwargs={"background": background},
             name=name,

@@ -100,7 +100,7 @@ def compute_in_one_thread() -> None:
         os.environ.setdefault(name, "1")
 
 
-def serve(orders: Connection, answers: Connection, task: str, *, background: bool) -> None:
+def serve_orders(orders: Connection, answers: Connection, task: str, *, background: bool) -> None:
     """Carry out orders (number, order) until the client has ended; answers are (number, answer, last)."""
     ignore_interrupts()
     if background:

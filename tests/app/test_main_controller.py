@@ -62,7 +62,7 @@ def test_a_device_that_opens_after_all_is_let_go_of_before_the_end(
         return machine
 
     monkeypatch.setattr(live_session, "open_rig", open_slowly)
-    monkeypatch.setattr(live_session, "measured", lambda *_words, **_named: None)
+    monkeypatch.setattr(live_session, "measure_rig", lambda *_words, **_named: None)
     visit.window.place("home").session_asked.emit(CHOSEN)
     assert opening.wait(10)
     assert visit.live is not None

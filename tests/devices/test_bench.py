@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.devices.bench import measurements, procedure
-from study_app.devices.bench.procedure import as_json, as_markdown, kept
+from study_app.devices.bench.procedure import as_json, as_markdown, workstation_results
 from study_app.devices.driver import dynamics_of
 from study_app.devices.registry import descriptor_of, open_device
 from study_app.errors import DeviceError, DeviceLost
@@ -25,11 +25,11 @@ pytestmark = [needs_servo, pytest.mark.slow]
 
 
 def bench(device, ask=None, durations=QUICK):
-    from study_app.devices.bench.procedure import asks_hand, run_bench
+    from study_app.devices.bench.procedure import ask_simulated_hand, run_bench
     from study_app.haptics.runtime.clocks.clock import VirtualClock
 
     said = []
-    hand = asks_hand(device, said.append)
+    hand = ask_simulated_hand(device, said.append)
     return run_bench(
         device, ask(hand) if ask else hand, progress=said.append, durations=durations, clock=VirtualClock()
     )
@@ -88,7 +88,7 @@ def test_report_and_settings_hold_what_was_found(found_of, tmp_path, monkeypatch
     assert document["motions"][0]["mass_kg"] == found.motions[0].mass_kg
     assert document["device"]["serial"] == "EMULATED"
     assert str(tmp_path) not in text
-    own = workstation.DeviceBench.model_validate(kept(found, "2026-11-21"))
+    own = workstation.DeviceBench.model_validate(workstation_results(found, "2026-11-21"))
     workstation.save_settings(workstation.DEFAULTS.with_bench(own).with_bench(own))
     settings = workstation.load_settings()
     assert len(settings.benches) == 1
@@ -97,10 +97,10 @@ def test_report_and_settings_hold_what_was_found(found_of, tmp_path, monkeypatch
     assert kept_of == Dynamics(delay_s=1e-3, count_m=own.count_m, mass_kg=min(own.mass_kg))
     assert dynamics_of(None, 1e-5, None, name="falcon-emulated", serial="ANOTHER").unknown == ("delay_s", "mass_kg")
     assert settings.bench_of({"name": "falcon-emulated", "serial": "ANOTHER"}) is None
-    from study_app.session.start import with_bench
+    from study_app.session.start import with_bench_measurements
 
-    assert with_bench(found.device)["bench"]["mass_kg"] == pytest.approx([0.2] * 3, rel=0.01)
-    assert "bench" not in with_bench({"name": "mouse"})
+    assert with_bench_measurements(found.device)["bench"]["mass_kg"] == pytest.approx([0.2] * 3, rel=0.01)
+    assert "bench" not in with_bench_measurements({"name": "mouse"})
 
 
 @pytest.mark.variants(2)
@@ -240,7 +240,7 @@ def test_handle_that_is_held_is_reported_and_not_kept(tmp_path, monkeypatch):
         return lambda kind, _words: lambda: {"damping": None, "scale": "no"}.get(kind, "")
 
     monkeypatch.setattr(procedure, "Durations", lambda: QUICK)
-    monkeypatch.setattr(procedure, "asks_hand", never_lets_go)
+    monkeypatch.setattr(procedure, "ask_simulated_hand", never_lets_go)
     real = replace(descriptor_of("scripted"), kind="felt")
     monkeypatch.setattr("study_app.devices.registry.descriptor_of", lambda _name: real)
     done = liquid_study("devices", "bench", "scripted", "--to", str(tmp_path / "report"))

@@ -17,7 +17,7 @@ if numba.config.DISABLE_JIT:
 from study_app.cli import commands
 from study_app.cli.devices import Terminal, _ask_operator
 from study_app.devices.emulators.falcon_emulator import Emulator
-from study_app.devices.falcon.calibration import calibration_file, load
+from study_app.devices.falcon.calibration import calibration_file, load_calibration
 from study_app.devices.falcon.failures import FAILURES, UDEV_RULE
 from study_app.devices.registry import list_devices
 
@@ -121,8 +121,8 @@ class TestCalibrate:
         file = calibration_file("EMULATED-WEIGHED")
         assert str(file) in told.output
         assert json.loads(file.read_text())["poses"] == 20
-        assert load("EMULATED-WEIGHED").units_per_nm == pytest.approx(6616, rel=0.01)
-        assert load("EMULATED") is None  # rehearsals do not use it
+        assert load_calibration("EMULATED-WEIGHED").units_per_nm == pytest.approx(6616, rel=0.01)
+        assert load_calibration("EMULATED") is None  # rehearsals do not use it
 
     @pytest.mark.usefixtures("falcon_socket")
     @pytest.mark.skipif(os.name == "nt", reason="no Unix sockets")

@@ -204,7 +204,7 @@ def test_a_cable_pulled_in_a_trial_keeps_the_data_marks_the_trial_and_lets_it_go
     (session,) = folder.sessions()
     rows = rows_of(session.table("demo", "trials"))
     assert [(row["trial"], row["outcome"]) for row in rows] == [("1", "complete"), ("2", "interrupted")]
-    rehearsal.resume(session.path)  # a new Falcon is opened, and homed
+    rehearsal.resume_rehearsal(session.path)  # a new Falcon is opened, and homed
     rows = rows_of(session.table("demo", "trials"))
     assert [(row["trial"], row["attempt"], row["outcome"]) for row in rows[:3]] == [
         ("1", "1", "complete"),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.devices.doctor import Report, lines
+from study_app.devices.doctor import Report, report_lines
 from study_app.devices.falcon.failures import failures_on
 from study_app.devices.registry import all_devices
 from tests.compiled import needs_servo
@@ -26,9 +26,9 @@ def test_what_can_go_wrong_with_a_falcon(pytestconfig: pytest.Config) -> None:
         table = failures_on(platform)
         ids = [mode.id for mode in table.modes]
         reports = [Report((), table.findings({mode}, table.before(mode)), table.sentence(mode)) for mode in ids]
-        told += [f"{platform}: {' '.join(ids)}", *(line for one in reports[::4] for line in lines(one))]
+        told += [f"{platform}: {' '.join(ids)}", *(line for one in reports[::4] for line in report_lines(one))]
         assert pickle.loads(pickle.dumps(reports)) == reports  # noqa: S301 - of the worker
-        told += lines(Report(("a Falcon",), table.findings(ids, ids), None))
+        told += report_lines(Report(("a Falcon",), table.findings(ids, ids), None))
     compare(GOLDEN / "falcon_failures.txt", told, pytestconfig)
 
 

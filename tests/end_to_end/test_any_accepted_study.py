@@ -15,7 +15,7 @@ from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.resume import REHEARSED_SCREENS, resume_at
 from study_app.session.simulated.answers_only import DEVICE, Answering, Kept, SimulatedTime, rehearse_answers
 from study_app.session.simulated.rehearsal import ConditionFeatures
-from study_app.session.transitions.table import open_session
+from study_app.session.transitions.table import initial_state
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
@@ -61,7 +61,7 @@ def run(study: Protocol, store: SessionStore, kept: Kept, felt: ConditionFeature
     own = session_protocol(store.place.study_folder, store.as_recorded(study), begun.participant, begun.session)
     schedule = build_schedule(own, begun.participant, begun.seed)
     start = resume_at(own, schedule, store.lines, store.key)
-    state = open_session(own, schedule, store.key.codes, begun.language, start, store.key.nonce)
+    state = initial_state(own, schedule, store.key.codes, begun.language, start, store.key.nonce)
     Answering(study, state, kept, passed, lambda block, condition: felt[block, condition]).run()
 
 

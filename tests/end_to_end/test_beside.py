@@ -17,7 +17,7 @@ from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.source.files import source_bytes
 from study_app.session.resume import REHEARSED_SCREENS
 from study_app.session.simulated.answers_only import DEVICE, Answering, SimulatedTime
-from study_app.session.transitions.table import open_session
+from study_app.session.transitions.table import initial_state
 from study_app.store.journals.journal import SessionClock
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.verify_study import verify_study
@@ -59,7 +59,7 @@ def test_a_report_beside_a_running_session_is_of_the_sessions_that_ended_and_dis
     who = {"seed": 3, "device": DEVICE, "screens": REHEARSED_SCREENS, "simulated": True}
     with begun(results, "P003", clock=SessionClock(passed.ns), **who) as store:
         kept, schedule = Stepwise(store), build_schedule(study, "P003", 3)
-        state = open_session(study, schedule, store.key.codes, "en", secret=store.key.nonce)
+        state = initial_state(study, schedule, store.key.codes, "en", secret=store.key.nonce)
         answering = Answering(study, state, kept, passed, lambda block, condition: features[block, condition])
         session = threading.Thread(target=answering.run)
         session.start()

@@ -41,7 +41,7 @@ from study_app.session.transitions.events import (
     TaskDone,
 )
 from study_app.session.transitions.state import FINAL
-from study_app.session.transitions.table import advance, open_session
+from study_app.session.transitions.table import advance, initial_state
 from study_app.store.progress import Progress
 from tests.end_to_end.real_windows import Program, wait_for
 from tests.journal_lines import event_of
@@ -114,7 +114,7 @@ class Pages:
         self.schedule = build_schedule(protocol, started["participant"], started["seed"])
         key = draw_key(protocol, stream(1, "key").random)  # codes are all that pages show
         shown = without_force(protocol) if started["device"] == "mouse" else protocol
-        self._state = open_session(shown, self.schedule, key, started["language"])
+        self._state = initial_state(shown, self.schedule, key, started["language"])
         self.protocol: Protocol = protocol
         self.page: Page | None = None
         self.take(Begin(0.0))

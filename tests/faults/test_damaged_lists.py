@@ -106,7 +106,7 @@ KINDS: dict[str, tuple[Callable[[Path], Path], str, Callable[[Path], object]]] =
     "calibration": (
         lambda _: calibration.calibration_file("1"),
         json.dumps(asdict(calibration.Calibration(geometry="libnifalcon", units_per_nm=6616.0))),
-        lambda _: calibration.load("1"),
+        lambda _: calibration.load_calibration("1"),
     ),
 }
 

@@ -11,7 +11,7 @@ from PySide6.QtTest import QTest
 from study_app.errors import DeviceError, DeviceNotFound
 from study_app.gui.home.startup_window import OpeningWindow
 from study_app.protocol.load import load
-from study_app.session.start import NewSession, check, study_results
+from study_app.session.start import NewSession, check_choices, study_results
 
 CHOSEN = NewSession(
     source="demo",
@@ -45,10 +45,10 @@ def test_firmware_is_for_falcons_alone(tmp_path):
     study = load("demo")
     chosen = replace(CHOSEN, results=tmp_path, device_options={"firmware": tmp_path / "file.bin"})
     with pytest.raises(DeviceError, match="device 'mouse' takes no firmware; only these do: Novint Falcon,"):
-        check(chosen, study)
-    check(replace(chosen, device="falcon"), study)
+        check_choices(chosen, study)
+    check_choices(replace(chosen, device="falcon"), study)
     with pytest.raises(DeviceNotFound, match="'falcon-socket:/run/f' was removed: choose falcon-emulated, or falcon"):
-        check(replace(chosen, device="falcon-socket:/run/f"), study)
+        check_choices(replace(chosen, device="falcon-socket:/run/f"), study)
 
 
 @pytest.fixture

@@ -32,7 +32,7 @@ from study_app.gui.widgets.main_view import Place
 from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.load import load
-from study_app.session.preflight import Measurements, Screen, checks
+from study_app.session.preflight import Measurements, Screen, preflight_checks
 from study_app.store.workstation import DEFAULTS, MachineSettings
 from tests.gui.home.home_window import open_home
 from tests.gui.lab.sample import still_view
@@ -138,7 +138,7 @@ def checked(
 ) -> PreflightView:
     protocol = load("rek2024")
     rows = (*goes_on, *planned_rows(protocol, datetime(2026, 3, 2, 14, 20), error_n, **more))
-    return PreflightView("rek2024", "Participant P007", facts, checks(facts, protocol), rows, busy=busy)
+    return PreflightView("rek2024", "Participant P007", facts, preflight_checks(facts, protocol), rows, busy=busy)
 
 
 def preflight(

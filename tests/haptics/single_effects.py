@@ -10,7 +10,7 @@ from study_app.haptics.model.estimators import ESTIMATORS, Given
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Body, Cylinder, Liquid, MotionBox, Scene
 from study_app.haptics.runtime.offline import simulate
-from study_app.lab.parameters import changed
+from study_app.lab.parameters import with_parameter
 from tests.haptics.scenes import UNBENT, vectors
 
 NAMES = [effect.name for effect in EFFECTS]
@@ -35,7 +35,7 @@ EMPTY = Scene(
 
 def in_lab(name: str) -> Scene:
     """Return the scene after the effect is switched on in the lab."""
-    return changed(EMPTY, f"effects.{name}", "on")
+    return with_parameter(EMPTY, f"effects.{name}", "on")
 
 
 def given(scene: Scene) -> Scene:
@@ -63,7 +63,9 @@ def all_forces(ticks: int) -> Any:
     """Return what is computed with each effect and with each estimator, (effects + estimators, ticks, 3)."""
     motion = wandering(ticks)
     places = Motion(motion.t_s, motion.position_m)
-    estimated = [vectors(simulate(changed(EMPTY, "velocity.kind", it), places), "velocity") for it in ESTIMATOR_NAMES]
+    estimated = [
+        vectors(simulate(with_parameter(EMPTY, "velocity.kind", it), places), "velocity") for it in ESTIMATOR_NAMES
+    ]
     return np.array([*(force_n(given(in_lab(name)), motion) for name in NAMES), *estimated])
 
 

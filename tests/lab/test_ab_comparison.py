@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.errors import StudyError
-from study_app.lab.ab_comparison import Setting, Side, Workbench, other
+from study_app.lab.ab_comparison import Setting, Side, Workbench, other_side
 from study_app.protocol.load import load_scenes
 
 SCENES = load_scenes("rek2024")
@@ -88,7 +88,7 @@ def test_while_blind_nothing_can_be_edited_and_switching_goes_on() -> None:
             what()
     assert blind.undo() == blind
     assert blind.changed_names("A") == ()
-    assert blind.switch().presented == other(blind.presented)
+    assert blind.switch().presented == other_side(blind.presented)
     assert blind.blinded(Random(2)) == blind  # noqa: S311 - a test draws
     revealed = blind.revealed()
     assert revealed.shown_name("A") == "Water, edited"

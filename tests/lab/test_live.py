@@ -14,7 +14,7 @@ from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_FADE
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.lab.live import Live, open_live
-from study_app.lab.programmed_paths import REACHED, TITLES, led_to, programme
+from study_app.lab.programmed_paths import REACHED, TITLES, lead_to_path, programmed_path
 from tests.lab.benches import SCENES, bench, live_with, run, scripted
 
 
@@ -205,13 +205,13 @@ def test_programmed_paths_fit_the_workspace_and_the_hand_goes_along_them(name: s
     live = live_with(scripted())
     live.feel(bench("water", "water"))
     run(live, 60)
-    motion = programme(name, SCENES["water"], live.device.workspace_m)
+    motion = programmed_path(name, SCENES["water"], live.device.workspace_m)
     for axis, half_m in enumerate(live.device.workspace_m):
         assert np.abs(motion.position_m[:, axis]).max() <= REACHED * half_m + 1e-9
     steps_mps = np.linalg.norm(np.diff(motion.position_m, axis=0), axis=1) * 1000
     assert steps_mps.max() < 0.15 + 0.01
     live.play(name)
-    whole = led_to(motion, live.hand.aim_m)  # type: ignore[union-attr]
+    whole = lead_to_path(motion, live.hand.aim_m)  # type: ignore[union-attr]
     lasts = round(whole.t_s[-1] * 1000)
     run(live, lasts)
     places_m = live.servo.telemetry.ring.position_m[60 : 60 + lasts]

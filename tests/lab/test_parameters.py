@@ -9,7 +9,7 @@ from study_app.haptics.model.effects.current import Channel
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.estimators import Given
 from study_app.haptics.model.scene import Liquid, Scene
-from study_app.lab.parameters import changed, parameter, sections, value_of
+from study_app.lab.parameters import parameter, sections, value_of, with_parameter
 from study_app.protocol.load import load_scenes
 from study_app.protocol.source.files import shipped
 
@@ -29,21 +29,21 @@ def test_every_value_of_a_preset_can_be_set_again(name: str) -> None:
         value = value_of(scene, it.name)
         if value is None or it.name == "drag.law" or it.name.startswith(("effects", "motion.")):
             continue
-        assert value_of(changed(scene, it.name, value), it.name) == value
-        assert changed(scene, it.name, value) == scene, it.name
+        assert value_of(with_parameter(scene, it.name, value), it.name) == value
+        assert with_parameter(scene, it.name, value) == scene, it.name
 
 
 def test_a_number_out_of_range_is_refused_in_the_units_that_are_shown() -> None:
     with pytest.raises(StudyError, match=r"Breaking span must be 0 mm to 500 mm, not 700 mm"):
-        changed(SCENES["rek2024/water"], "wake.breaking_span_m", 0.7)
+        with_parameter(SCENES["rek2024/water"], "wake.breaking_span_m", 0.7)
     with pytest.raises(StudyError, match="Density must be a number, not nan"):
-        changed(SCENES["rek2024/water"], "liquid.density_kg_m3", float("nan"))
+        with_parameter(SCENES["rek2024/water"], "liquid.density_kg_m3", float("nan"))
     with pytest.raises(StudyError, match="Density must be a number, not 'thick'"):
-        changed(SCENES["rek2024/water"], "liquid.density_kg_m3", "thick")
+        with_parameter(SCENES["rek2024/water"], "liquid.density_kg_m3", "thick")
 
 
 def test_a_preset_beyond_the_labs_range_widens_it() -> None:
-    scene = changed(SCENES["rek2024/water"], "wake.scaling", 1e5)
+    scene = with_parameter(SCENES["rek2024/water"], "wake.scaling", 1e5)
     liquid = scene.liquids[0]
     assert liquid.wake is not None
     wide = scene.model_copy(
@@ -55,42 +55,42 @@ def test_a_preset_beyond_the_labs_range_widens_it() -> None:
 
 def test_smoothing_left_open_follows_from_the_estimator() -> None:
     scene = SCENES["physical_liquids/glycerin"]
-    kalman = changed(scene, "velocity.kind", "kalman")
+    kalman = with_parameter(scene, "velocity.kind", "kalman")
     for name, usual_s in (("added_mass.filter_s", 0.025), ("history.smoothing_s", 0.01)):
         assert value_of(scene, name) == usual_s
         assert value_of(kalman, name) == parameter(kalman, name).default == 0.015
-        said = changed(kalman, name, 0.02)
+        said = with_parameter(kalman, name, 0.02)
         assert (value_of(said, name), parameter(said, name).default) == (0.02, 0.015)
 
 
 def test_another_current_or_region_begins_as_large_as_the_hand_reaches() -> None:
-    scene = changed(changed(SCENES["rek2024/water"], "effects.current", "on"), "current.kind", "channel")
+    scene = with_parameter(with_parameter(SCENES["rek2024/water"], "effects.current", "on"), "current.kind", "channel")
     assert scene.liquids[0].current == Channel(width_m=1.0, peak_mps=0.5)
-    boxed = changed(SCENES["rek2024/water"], "region.kind", "box")
+    boxed = with_parameter(SCENES["rek2024/water"], "region.kind", "box")
     assert value_of(boxed, "region.size_m.y") == pytest.approx(1.0)
-    assert value_of(changed(boxed, "effects.surface", "on"), "effects.surface") == "on"
+    assert value_of(with_parameter(boxed, "effects.surface", "on"), "effects.surface") == "on"
 
 
 def test_effects_bring_what_they_cannot_do_without() -> None:
     scene = Scene(liquids=(Liquid(id="thin", density_kg_m3=1000.0, effects=()),))
-    with_wake = changed(scene, "effects.wake", "on")
+    with_wake = with_parameter(scene, "effects.wake", "on")
     assert with_wake.liquids[0].effects == ("drag", "wake")
-    local = changed(with_wake, "effects.local_wake", "on")
+    local = with_parameter(with_wake, "effects.local_wake", "on")
     assert local.liquids[0].effects == ("drag", "local_wake")
-    assert changed(local, "effects.drag", "off").liquids[0].effects == ()
+    assert with_parameter(local, "effects.drag", "off").liquids[0].effects == ()
 
 
 def test_effects_by_hand_begin_as_the_gate_chose_them() -> None:
     honey = SCENES["physical_liquids/honey"]
-    by_hand = changed(honey, "effects", "on").liquids[0]
+    by_hand = with_parameter(honey, "effects", "on").liquids[0]
     assert by_hand.effects == ("drag", "buoyancy", "added_mass", "history")
     assert by_hand.drag.law == "schiller-naumann"
     assert value_of(honey, "drag.law") == "schiller-naumann"
-    lawful = changed(honey, "drag.law", "brown-lawler")
+    lawful = with_parameter(honey, "drag.law", "brown-lawler")
     assert value_of(lawful, "drag.law") == "brown-lawler"
     assert value_of(lawful, "effects") == "on"
-    assert changed(honey, "effects.history", "off").liquids[0].effects == ("drag", "buoyancy", "added_mass")
-    assert changed(honey, "effects.non_newtonian", "on").liquids[0].viscosity_pa_s is None
+    assert with_parameter(honey, "effects.history", "off").liquids[0].effects == ("drag", "buoyancy", "added_mass")
+    assert with_parameter(honey, "effects.non_newtonian", "on").liquids[0].viscosity_pa_s is None
 
 
 def test_the_lab_takes_one_liquid_and_no_given_velocity() -> None:
@@ -104,10 +104,10 @@ def test_the_lab_takes_one_liquid_and_no_given_velocity() -> None:
 def test_a_linear_damper_has_its_damping_as_a_parameter() -> None:
     honey = SCENES["physical_liquids/honey"]
     assert "drag.damping_nspm" not in {it.name for section in sections(honey) for it in section.parameters}
-    damper = changed(honey, "drag.law", "linear")
+    damper = with_parameter(honey, "drag.law", "linear")
     assert damper.liquids[0].drag == Drag(law="linear", damping_nspm=8)
     found = parameter(damper, "drag.damping_nspm")
     assert (found.least, found.most, found.unit) == (0.01, 200, "N·s/m")
-    heavier = changed(damper, "drag.damping_nspm", 20.0)
+    heavier = with_parameter(damper, "drag.damping_nspm", 20.0)
     assert value_of(heavier, "drag.damping_nspm") == 20
-    assert changed(heavier, "drag.law", "constant").liquids[0].drag == Drag()
+    assert with_parameter(heavier, "drag.law", "constant").liquids[0].drag == Drag()

@@ -9,8 +9,8 @@ from study_app.cli import commands
 from study_app.haptics.model.estimators import Ewma, Kalman
 from study_app.haptics.model.scene import Scene
 from study_app.lab.ab_comparison import Setting
-from study_app.lab.parameters import changed
-from study_app.lab.presets import Choice, liquids_at_hand, preset_text, save
+from study_app.lab.parameters import with_parameter
+from study_app.lab.presets import Choice, available_liquids, preset_text, save_preset
 from study_app.protocol.load import load_scene, load_scenes
 from study_app.protocol.source.files import shipped
 
@@ -34,7 +34,7 @@ EDITS = (
 
 def edited(scene: Scene) -> Scene:
     for name, value in EDITS:
-        scene = changed(scene, name, value)
+        scene = with_parameter(scene, name, value)
     return scene
 
 
@@ -46,7 +46,7 @@ def test_a_preset_reads_back_as_it_was_and_check_takes_it(source: str, edit: boo
     for name, origin in load_scenes(source).items():
         setting = Setting(name, origin, edited(origin) if edit else origin)
         path = tmp_path / f"{name}.toml"
-        save(path, preset_text(setting))
+        save_preset(path, preset_text(setting))
         assert load_scene(path, name) == setting.scene
         result = CliRunner().invoke(commands, ["check", str(path)])
         assert result.exit_code == 0, result.output
@@ -55,9 +55,9 @@ def test_a_preset_reads_back_as_it_was_and_check_takes_it(source: str, edit: boo
 @pytest.mark.slow
 def test_the_shipped_liquids_are_at_hand_with_those_of_a_folder_and_without_broken_files(tmp_path: Path) -> None:
     origin = load_scene("rek2024", "honey")
-    save(tmp_path / "mine.toml", preset_text(Setting("Honey", origin, origin)))
+    save_preset(tmp_path / "mine.toml", preset_text(Setting("Honey", origin, origin)))
     (tmp_path / "broken.toml").write_text("format = ")
-    at_hand = liquids_at_hand((tmp_path,))
+    at_hand = available_liquids((tmp_path,))
     assert Choice(source="rek2024", liquid="light_oil", title="Light oil (rek2024)") in at_hand
     assert Choice(source=str(tmp_path / "mine.toml"), liquid="honey", title="Honey (mine)") in at_hand
     assert {it.source for it in at_hand} == {*shipped(), str(tmp_path / "mine.toml")}

@@ -11,7 +11,7 @@ from study_app.haptics.model.estimators import Kalman
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.scene import Scene
 from study_app.lab.ab_comparison import Setting, Workbench
-from study_app.lab.parameters import changed
+from study_app.lab.parameters import with_parameter
 from study_app.lab.shadow import Shadow
 from tests.haptics.scenes import EVERYTHING
 from tests.lab.benches import SCENES, bench, live_with, run, scripted
@@ -60,7 +60,7 @@ def test_the_other_sides_kalman_filter_knows_the_force_that_was_sent() -> None:
     device.state.handle.mass_kg = 0.05
     live = live_with(device)
     thin = SCENES["water"].model_copy(update={"velocity": Kalman()})
-    thick = changed(thin, "liquid.density_kg_m3", 4000.0)
+    thick = with_parameter(thin, "liquid.density_kg_m3", 4000.0)
     live.feel(Workbench(Setting("thin", thin, thin), Setting("thick", thick, thick)))
     live.play("reach")
     run(live, 1500)
@@ -74,7 +74,7 @@ def test_the_other_sides_kalman_filter_knows_the_force_that_was_sent() -> None:
 
 def test_the_other_side_is_what_it_would_be_were_it_felt() -> None:
     beside = live_with(scripted())
-    quiet = changed(SCENES["water"], "liquid.density_kg_m3", 1.0)
+    quiet = with_parameter(SCENES["water"], "liquid.density_kg_m3", 1.0)
     beside.feel(Workbench(Setting("hardly there", quiet, quiet), bench().b))
     beside.play("reverse")
     run(beside, 2000)
@@ -120,7 +120,7 @@ def test_a_tail_is_the_path_that_was_left_and_breaks_where_it_turns() -> None:
 
 
 def test_a_tail_forgets_what_falls_off_it() -> None:
-    scene = changed(SCENES["water"], "wake.length", 100.0)
+    scene = with_parameter(SCENES["water"], "wake.length", 100.0)
     shadow = Shadow(Scene(), 2000, 8.0, alone=True)
     shadow.expect(1, "A", scene, SCENES["honey"])
     samples = records(SAMPLE, 400)

@@ -12,9 +12,9 @@ from study_app.errors import Problem, ProtocolError
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.estimators import Ewma, Kalman, Raw
 from study_app.haptics.model.gate import describe_gate, resolve
-from study_app.haptics.model.overrides import override, value_of
+from study_app.haptics.model.overrides import override_value, value_of
 from study_app.haptics.model.scene import Liquid, Scene
-from study_app.haptics.model.slope_limits import steady
+from study_app.haptics.model.slope_limits import steady_force
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, load_scene, parse
 from study_app.protocol.orders.schedule import build_schedule
@@ -160,8 +160,8 @@ def written(path: Path, text: str) -> Path:
 def test_a_damper_in_format_2_needs_no_density(tmp_path: Path) -> None:
     scene = load_scene(written(tmp_path / "damper.toml", f"format = 2\n{DAMPER}"), "damper")
     assert scene.liquids[0].drag == Drag(law="linear", damping_nspm=12)
-    assert value_of(override(scene, "damping_nspm", "20"), "damping_nspm") == 20
-    assert steady(scene).force_n == pytest.approx(1.2)
+    assert value_of(override_value(scene, "damping_nspm", "20"), "damping_nspm") == 20
+    assert steady_force(scene).force_n == pytest.approx(1.2)
 
 
 @pytest.mark.parametrize(("number", "velocity"), [(1, Ewma()), (2, Kalman())])
@@ -222,7 +222,7 @@ def test_the_fade_belongs_to_format_2(tmp_path: Path) -> None:
     scene = load_scene(written(tmp_path / "water.toml", f"format = 2\n{text}"), "water")
     assert scene.fade_s == 0.3
     assert load_scene(written(tmp_path / "again.toml", scene_text(scene)), "water") == scene
-    assert "fade_s" not in scene_text(override(scene, "fade_s", 0.05))
+    assert "fade_s" not in scene_text(override_value(scene, "fade_s", 0.05))
 
 
 @pytest.mark.parametrize("content", [b"x = 1\n" * 300_000, b"# a comment\n" * 100_000, b"a." * 600_000 + b"a = 1"])

@@ -7,7 +7,7 @@ from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.resume import FIRST, Start
 from study_app.session.transitions.events import Begin, Chosen, Continue, Finish, Submitted, TaskDone, TimeUp, Write
 from study_app.session.transitions.state import FINAL, Phase, SessionState
-from study_app.session.transitions.table import advance, open_session
+from study_app.session.transitions.table import advance, initial_state
 from tests.protocol.trials.level_studies import BLOCK, HEAD, SECRET, key_of, study
 
 PRACTICE = """
@@ -50,7 +50,7 @@ def opened(one: Protocol | None = None, *, start: Start = FIRST, secret: bytes =
     """Return a session before its first event."""
     one = protocol() if one is None else one
     key = key_of(one, secret)
-    return open_session(one, build_schedule(one, "P001", 1), key.codes, "en", start, key.secret)
+    return initial_state(one, build_schedule(one, "P001", 1), key.codes, "en", start, key.secret)
 
 
 def answer_of(state: SessionState, right: bool = True) -> str:

@@ -13,7 +13,7 @@ from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.session.preflight import Measurements, Screen
 from study_app.session.transitions.events import Begin, Chosen, Continue, ItemShown, Submitted, TaskDone
 from study_app.session.transitions.state import Phase, SessionState
-from study_app.session.transitions.table import advance, open_session
+from study_app.session.transitions.table import advance, initial_state
 from tests.protocol.edited_studies import text_of
 
 WELL = Measurements(
@@ -43,7 +43,7 @@ def protocol() -> Protocol:
 def opened(seed: int = 1) -> SessionState:
     """Return a session before its first event."""
     study = protocol()
-    return open_session(study, build_schedule(study, "P001", seed), draw_key(study, stream(seed, "key").random), "en")
+    return initial_state(study, build_schedule(study, "P001", seed), draw_key(study, stream(seed, "key").random), "en")
 
 
 def next_event(state: SessionState, at_s: float) -> Any:

@@ -20,10 +20,10 @@ from study_app.protocol.warnings.study_warnings import liquid_warnings
 from study_app.session.pages import TaskPage
 from study_app.session.replay import replay
 from study_app.session.simulated import rehearsal
-from study_app.session.start import resumed
-from study_app.session.transitions.page_builder import page
+from study_app.session.start import resumed_choices
+from study_app.session.transitions.page_builder import build_page
 from study_app.session.transitions.state import Phase
-from study_app.session.transitions.table import open_session
+from study_app.session.transitions.table import initial_state
 from study_app.store.blinded.blinding import open_or_draw_key, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.open_session import SessionStore
@@ -160,8 +160,8 @@ def test_a_ball_of_its_own_is_drawn_as_large_as_it_is_and_warned_of_where_it_tel
     drawn = {}
     for index, step in enumerate(schedule.steps):
         if isinstance(step, Trial):
-            state = replace(open_session(protocol, schedule, codes, "en"), index=index, phase=Phase.TASK)
-            shown = page(state)
+            state = replace(initial_state(protocol, schedule, codes, "en"), index=index, phase=Phase.TASK)
+            shown = build_page(state)
             assert isinstance(shown, TaskPage)
             drawn[codes[step.block][step.code]] = shown.body_radius_m
     assert drawn == pytest.approx({"thin": 0.0034, "thick": 0.002, "prompt": 0.0034, "late": 0.0034})
@@ -202,10 +202,10 @@ def test_an_interrupted_session_goes_on_with_the_sealed_liquid(
     session = StudyFolder(tmp_path / "results").session("P001", 1).path
     syrup = tmp_path / "liquids" / "syrup.toml"
     syrup.unlink() if becomes is None else syrup.write_text(becomes)
-    chosen = resumed(session, protocol=str(study))
+    chosen = resumed_choices(session, protocol=str(study))
     assert chosen.read_protocol().liquids["thick"].density_kg_m3 == 1387.25
-    assert resumed(session, candidates=["demo", str(study)]).source == str(study)
-    rehearsal.resume(session, protocol=str(study))
+    assert resumed_choices(session, candidates=["demo", str(study)]).source == str(study)
+    rehearsal.resume_rehearsal(session, protocol=str(study))
     assert replay(session).proved
     if becomes is not None:
         with pytest.raises(StoreError, match="other conditions"):

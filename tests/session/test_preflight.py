@@ -18,9 +18,9 @@ from study_app.protocol.load import load, parse, protocol_hash, read_document, s
 from study_app.protocol.model import Protocol
 from study_app.protocol.warnings.untranslated import untranslated_on_pages
 from study_app.session import preflight_measurements
-from study_app.session.preflight import Measurements, PredictedDelivery, Screen, checks, refused
-from study_app.session.preflight_measurements import measure
-from study_app.session.start import NewSession, ran_otherwise
+from study_app.session.preflight import Measurements, PredictedDelivery, Screen, preflight_checks, refusal_reasons
+from study_app.session.preflight_measurements import measure_servo_and_disk
+from study_app.session.start import NewSession, participant_with_other_contents
 from study_app.store import receipt
 from study_app.store.folders import StudyFolder
 from tests.compiled import needs_servo
@@ -106,20 +106,20 @@ FACTS: tuple[tuple[str, dict[str, Any]], ...] = (
 def test_both_sides_of_each_limit(pytestconfig: pytest.Config) -> None:
     known, lines = studies(), list[str]()
     for name, study in known.items():
-        lines += [f"== {name}", *(f"{check} {check.share}" for check in checks(small.WELL, study))]
+        lines += [f"== {name}", *(f"{check} {check.share}" for check in preflight_checks(small.WELL, study))]
     for name, changed in FACTS:
-        found = checks(replace(small.WELL, **changed), known[name])
-        usual = {str(check) for check in checks(small.WELL, known[name])}
+        found = preflight_checks(replace(small.WELL, **changed), known[name])
+        usual = {str(check) for check in preflight_checks(small.WELL, known[name])}
         lines.append(f"== {name} {changed}")
         lines += [f"{check} {check.share} {check.entry}" for check in found if str(check) not in usual]
-        lines.append(f"refused: {refused(found)}")
+        lines.append(f"refused: {refusal_reasons(found)}")
     compare(Path(__file__).parent / "golden" / "preflight.txt", lines, pytestconfig)
 
 
 @pytest.mark.parametrize(("study", "needed"), [("rek2024", 209), ("thickness", 124)])
 def test_a_session_needs_what_its_sealed_recordings_take(study: str, needed: int) -> None:
     """A trial of 3 s is sealed into the room of 4 s, whatever its page and its questions take."""
-    (room,) = [check for check in checks(small.WELL, load(study)) if check.name == "Free space"]
+    (room,) = [check for check in preflight_checks(small.WELL, load(study)) if check.name == "Free space"]
     assert room.about == f"a session needs about {needed} MB"
 
 
@@ -142,8 +142,8 @@ def test_another_file_of_the_same_version_is_a_warning(tmp_path: Path, recorded:
         screen=None,
         results=tmp_path,
     )
-    assert ran_otherwise(chosen) == who
-    found = checks(replace(small.WELL, ran_otherwise=who), study)
+    assert participant_with_other_contents(chosen) == who
+    found = preflight_checks(replace(small.WELL, ran_otherwise=who), study)
     assert [check.verdict for check in found if check.name == "Study file"] == ["warning"] * bool(who)
 
 
@@ -154,14 +154,14 @@ def test_pages_in_two_languages_are_a_warning(language: str, told: str) -> None:
     assert "languages = " not in text
     document = read_document(text.replace("[study]", f'[study]\nlanguages = ["{language}"]').encode(), "")[0]
     facts = replace(small.WELL, untranslated=untranslated_on_pages(document))
-    warned = [check.said for check in checks(facts, load("delayjnd")) if check.name == "Translation"]
+    warned = [check.said for check in preflight_checks(facts, load("delayjnd")) if check.name == "Translation"]
     assert [sentence.split("; Pages")[0] for sentence in warned] == ([told] if told else [])
 
 
 def measured(results: Path) -> Measurements:
     device = ScriptedDevice()
     with device, Servo(device, clock=VirtualClock(), elements=10) as servo:
-        return measure(
+        return measure_servo_and_disk(
             servo,
             results,
             device="scripted",
@@ -187,7 +187,7 @@ def test_servo_and_disk_are_measured_and_nothing_is_left(tmp_path: Path) -> None
     assert facts.probe_s is not None and 0 < facts.probe_s < 60  # noqa: PT018
     assert facts.free_bytes is not None
     assert list(tmp_path.iterdir()) == []
-    assert refused(checks(facts, small.protocol())) == ""
+    assert refusal_reasons(preflight_checks(facts, small.protocol())) == ""
 
 
 @needs_servo
@@ -199,4 +199,4 @@ def test_a_disk_that_takes_nothing_is_a_failure_with_its_reason(
 
     monkeypatch.setattr(preflight_measurements, "probe_free_bytes", full)
     facts = measured(tmp_path)
-    assert "the disk is full" in refused(checks(facts, small.protocol()))
+    assert "the disk is full" in refusal_reasons(preflight_checks(facts, small.protocol()))

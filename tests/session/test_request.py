@@ -8,7 +8,7 @@ from study_app import app
 from study_app.app.session import live_session
 from study_app.errors import StoreError
 from study_app.protocol.source.files import source_bytes
-from study_app.session.start import NewSession, resumed
+from study_app.session.start import NewSession, resumed_choices
 from study_app.store.sessions.open_session import SessionStore
 from tests import studies
 
@@ -31,7 +31,7 @@ def test_a_session_that_can_go_on_is_chosen_as_it_was_begun(begun: SessionStore,
     begun.close()
     assert app.resume(begun.folder.path, operator="BB") == 0
     (chosen,) = windows
-    assert chosen == resumed(begun.folder.path, operator="BB")
+    assert chosen == resumed_choices(begun.folder.path, operator="BB")
     assert (chosen.participant, chosen.session, chosen.seed, chosen.device) == ("P001", 1, 5, "mouse")
     assert (chosen.source, chosen.results, chosen.resumes) == ("demo", begun.place.study_folder.path, begun.folder.path)
 

@@ -18,10 +18,10 @@ from study_app.protocol.orders.schedule import Schedule, build_schedule
 from study_app.protocol.source.files import protocol_hash, source_bytes
 from study_app.session.pages import PausePage
 from study_app.session.resume import REHEARSED_SCREENS, begun_schedule, find_protocol, is_rehearsal, resume_at
-from study_app.session.start import NewSession, check, open_store, resumed
+from study_app.session.start import NewSession, check_choices, open_store, resumed_choices
 from study_app.session.transitions.events import Begin, ResumeRequested, ShowPage, StartTrial, Write
 from study_app.session.transitions.state import Phase
-from study_app.session.transitions.table import advance, open_session
+from study_app.session.transitions.table import advance, initial_state
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import start_of
 from study_app.store.sessions.open_session import SessionStore
@@ -46,7 +46,7 @@ def study(resume: str, *, breaks: bool = False) -> Protocol:
 def walked(protocol: Protocol, lines: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], list[str]]:
     """Resume after these lines and walk to the end; return the lines written and what was presented."""
     schedule, key = build_schedule(protocol, "P001", 1), small.opened().plan.key
-    state = open_session(protocol, schedule, key, "en", resume_at(protocol, schedule, map(event_from, lines)))
+    state = initial_state(protocol, schedule, key, "en", resume_at(protocol, schedule, map(event_from, lines)))
     written, presented = [], []
     event: Any = Begin(100.0)
     while True:
@@ -186,7 +186,7 @@ def run_one(path: Path, participant: str, row_of: str | None) -> tuple[Protocol,
     source = path.read_bytes()
     protocol = parse(source, str(path))
     chosen = chosen_for(path, participant, row_of)
-    check(chosen, protocol)
+    check_choices(chosen, protocol)
     return protocol, open_store(chosen, protocol, source, RIG, {})
 
 
@@ -215,7 +215,7 @@ def test_receipt_keeps_the_row_and_reproduce_uses_it(square: Path, row_of: str, 
 def test_resumed_session_keeps_the_row(square: Path) -> None:
     protocol, store = run_one(square, "P025", "P002")
     store.close()
-    chosen = resumed(store.folder.path, protocol=str(square))
+    chosen = resumed_choices(store.folder.path, protocol=str(square))
     assert (chosen.participant, chosen.row_of) == ("P025", "P002")
     planned = build_schedule(protocol, "P025", SEED, 2)
     assert begun_schedule(protocol, start_of(journal.read(store.folder.journal)), store.key) == planned
@@ -226,7 +226,7 @@ def test_session_without_a_row_of_another_has_no_such_key(square: Path) -> None:
     _, store = run_one(square, "P025", None)
     store.close()
     assert "row_of" not in json.loads(store.folder.receipt.read_text())
-    assert resumed(store.folder.path, protocol=str(square)).row_of is None
+    assert resumed_choices(store.folder.path, protocol=str(square)).row_of is None
 
 
 @pytest.mark.parametrize(
@@ -240,7 +240,7 @@ def test_session_without_a_row_of_another_has_no_such_key(square: Path) -> None:
 def test_row_that_decides_nothing_is_refused(square: Path, source: str, row_of: str, message: str) -> None:
     text = source_bytes("demo") if source == "demo" else square.read_bytes()
     with pytest.raises(SessionError, match=message):
-        check(chosen_for(square, "P025", row_of), parse(text, "file.toml"))
+        check_choices(chosen_for(square, "P025", row_of), parse(text, "file.toml"))
 
 
 def test_run_takes_the_row_of_a_participant(square: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from study_app.protocol.model import Reach
 from study_app.protocol.trials.tasks import Explore, Follow
-from study_app.session.tasks import track
+from study_app.session.tasks import new_tracker
 from tests.golden import compare
 from tests.session.small import samples
 from tests.transcripts import acts, played, value_of
@@ -42,7 +42,7 @@ class Played:
     """A task that is followed, and a command for whatever happens to it."""
 
     def __init__(self, task: Any) -> None:
-        self.tracker = track(task)
+        self.tracker = new_tracker(task)
 
     def stay(self, begin: float, end: float, place: Any) -> Iterator[str]:
         """Let samples of 1 kHz come, at a place from one time [s] until just before another."""
@@ -106,7 +106,7 @@ def test_however_the_samples_are_cut_the_result_is_that_of_one_at_a_time(
     task = reach(dwell_s=dwell_s, count=count, timeout_s=0.3)
     places = [place for length, place in visits for _ in range(length)]
     rows = samples(np.arange(len(places)) / 1000 + 7, places)
-    tracker, found, first = track(task), [], 0
+    tracker, found, first = new_tracker(task), [], 0
     for cut in [*cuts, len(rows)]:
         found += tracker.feed(rows[first : first + cut])
         first += cut

@@ -101,7 +101,7 @@ def outputs(study: str, to: Path) -> Iterator[str]:
     for place in unfinished:
         again = shutil.copytree(RELEASES / study, to / "resumed")
         session = again / place.relative_to(folder)
-        rehearsal.resume(session, protocol=RELEASES / f"{study}.toml")
+        rehearsal.resume_rehearsal(session, protocol=RELEASES / f"{study}.toml")
         list(run("unblind", again, "--by", "AB", "--reason", "a test"))
         for path in sorted(session.glob("*.csv")):
             yield from (f"resume: {line}" for line in columns(path, OF_THE_CLOCK))

@@ -96,7 +96,7 @@ def test_an_unfinished_session_is_resumed_to_its_end(tmp_path: Path) -> None:
     folder = StudyFolder(Path(shutil.copytree(RELEASES / "0.2" / "demo", tmp_path / "demo")))
     session = folder.session("P002", 1)
     before = session.journal.read_bytes()
-    rehearsal.resume(session.path, protocol=RELEASES / "0.2" / "demo.toml")
+    rehearsal.resume_rehearsal(session.path, protocol=RELEASES / "0.2" / "demo.toml")
     assert session.journal.read_bytes().startswith(before)
     assert raw(journal.read(session.journal))[-1]["status"] == "completed"
     assert verify_study(folder.path).errors == ()
@@ -134,7 +134,7 @@ def test_it_verifies_with_a_note(study: Path) -> None:
 def test_it_is_resumed_with_a_chain_that_covers_the_lines_before(study: Path) -> None:
     folder = StudyFolder(study).session("P002", 1)
     before = folder.journal.read_bytes()
-    rehearsal.resume(folder.path, protocol=HELD / "rek2024.toml")
+    rehearsal.resume_rehearsal(folder.path, protocol=HELD / "rek2024.toml")
     assert folder.journal.read_bytes().startswith(before)
     lines = raw(journal.read(folder.journal))
     assert lines[-1]["status"] == "completed"

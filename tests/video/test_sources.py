@@ -21,7 +21,7 @@ from study_app.session.transitions.events import Broke, broken
 from study_app.store import workstation
 from study_app.store.workstation import MachineSettings
 from study_app.video import sources
-from study_app.video.frames import VideoFrame, VideoStatistics, stopped
+from study_app.video.frames import VideoFrame, VideoStatistics, stopped_error
 from study_app.video.sources import NOT_SHOWN, Camera, Videos, without_login
 from tests.video.clips import write_clip
 
@@ -166,7 +166,7 @@ def test_check_notes_what_keeps_this_machine_from_showing_the_camera(
 
     workstation.save_settings(MachineSettings(camera="tcp://127.0.0.1:9"))
     if not installed:
-        monkeypatch.setattr(sources, "installed", lambda: False)
+        monkeypatch.setattr(sources, "is_installed", lambda: False)
     checked = CliRunner().invoke(commands, ["check", str(camera_study)])
     assert checked.exit_code == 0, checked.output
     assert "Statements" in checked.output
@@ -233,7 +233,7 @@ def test_the_row_of_a_trial_counts_frames_that_were_late_or_lost_and_says_their_
 
 
 def test_a_video_that_stops_can_be_reconnected() -> None:
-    error = stopped("it ended")
+    error = stopped_error("it ended")
     assert isinstance(error, VideoError)
     assert broken(1.0, error) == Broke(1.0, str(error), "device")
 

@@ -41,7 +41,7 @@ from study_app.session.pages import Page, TaskPage
 from study_app.session.ports import JournalPort, Ports
 from study_app.session.resume import FIRST, Start, begun_schedule, resume_at
 from study_app.session.runner import Runner
-from study_app.session.simulated.observers import Hand, hand_for, rest
+from study_app.session.simulated.observers import Hand, hand_behaviour, rest_hand
 from study_app.session.transitions.events import (
     Begin,
     Continue,
@@ -750,9 +750,9 @@ def _hands(hand: HandOrders, chosen: NewSession, clock: Callable[[], float]) -> 
         if not isinstance(page, TaskPage):
             hand.rest()
         elif page.interval is None or not page.interval.resting:
-            return hand_for(page.task, hand, draw, clock())
+            return hand_behaviour(page.task, hand, draw, clock())
         else:
-            rest(page.task, hand, returns=True)
+            rest_hand(page.task, hand, returns=True)
         return None
 
     return hand_on

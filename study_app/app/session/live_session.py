@@ -34,19 +34,19 @@ from study_app.gui.kit.devices import described, screen_number, settings_here, t
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.widgets.background import Background
 from study_app.protocol.load import load, parse
-from study_app.session.preflight import checks, refused
+from study_app.session.preflight import preflight_checks, refusal_reasons
 from study_app.session.resume import is_rehearsal
 from study_app.session.start import (
     NewSession,
     Ready,
-    check,
+    check_choices,
     draw_seed,
-    measured,
+    measure_rig,
     open_outlets,
     open_store,
-    resumed,
+    resumed_choices,
     study_results,
-    videos_of,
+    unopened_videos,
 )
 from study_app.store import receipt
 from study_app.store.folders import locate_session
@@ -170,13 +170,13 @@ class LiveSession(QObject):
             from study_app.haptics.kernels.compiled import following_compilation  # noqa: PLC0415 - the compiler: only in this thread
 
             study = self.chosen.read_protocol()
-            check(self.chosen, study)
+            check_choices(self.chosen, study)
             settings = study_settings(study, self.chosen.tremor(), self.chosen.device_options)
             with following_compilation(self._compiled.emit):
                 rig = open_rig(self.chosen.device, settings, progress=self._said.emit, cancelled=lambda: self._closed)
                 outlets = None if self.chosen.played else open_outlets(self.settings, rig.servo, study.study.blinding)
-                videos = videos_of(self.chosen, study, self.settings.camera, rig)
-                facts = measured(rig, self.chosen, videos, sleep=self._ending.wait)
+                videos = unopened_videos(self.chosen, study, self.settings.camera, rig)
+                facts = measure_rig(rig, self.chosen, videos, sleep=self._ending.wait)
                 made = Ready(rig, facts, outlets=outlets, videos=videos)
             if not self._closed:
                 gc.freeze()  # the windows' thread need not look through all that was loaded here
@@ -249,11 +249,11 @@ class LiveSession(QObject):
         shown_on, operated_on = self.screens()
         shares_screen, rate_hz = shown_on is operated_on, shown_on.refreshRate()
         text_scale = text_scale_on(self.settings, shown_on)
-        found = checks(made.facts_with(rate_hz, shown_on.devicePixelRatio()), protocol)
+        found = preflight_checks(made.facts_with(rate_hz, shown_on.devicePixelRatio()), protocol)
         if self._progress is not None:
             for one in found:
                 self._progress(str(one))
-        if reason := refused(found):
+        if reason := refusal_reasons(found):
             raise SessionError(f"the session did not start: {reason}")
         screens = described(self.settings, shown_on, operated_on)
         yield
@@ -473,7 +473,7 @@ def run(
         row_of=row_of,
         group=group,
     )
-    check(chosen, study)
+    check_choices(chosen, study)
     if Path(protocol).is_file():
         with suppress(StoreError):  # a session does not depend on it
             remember_protocol(Path(protocol))
@@ -512,9 +512,9 @@ def resume(
     if is_rehearsal(receipt.read(session.receipt)):
         from study_app.session.simulated import rehearsal  # noqa: PLC0415 - the compiler: only once it is needed
 
-        rehearsal.resume(folder, protocol=protocol)
+        rehearsal.resume_rehearsal(folder, protocol=protocol)
         return 0
-    chosen = resumed(
+    chosen = resumed_choices(
         folder,
         protocol=protocol,
         operator=operator,
@@ -523,7 +523,7 @@ def resume(
         screen=screen,
         device_options=device_options,
     )
-    check(chosen, chosen.read_protocol())
+    check_choices(chosen, chosen.read_protocol())
     return run_session(chosen, progress)
 
 

@@ -30,8 +30,8 @@ from study_app.devices.registry import descriptor_of, title_of
 from study_app.errors import StoreError, StudyError
 from study_app.gui.kit.devices import device_choices, settings_here
 from study_app.gui.widgets.background import Background
-from study_app.session.simulated.answers_only import begin_at
-from study_app.session.start import NewSession, resumed
+from study_app.session.simulated.answers_only import begin_session_at_step
+from study_app.session.start import NewSession, resumed_choices
 from study_app.session.transitions.events import EndRequested, ForceStopped, ResumeRequested
 from study_app.session.transitions.page_builder import PARTICIPANT
 from study_app.session.transitions.state import Phase, SessionState
@@ -340,9 +340,13 @@ def _prepared(pilot: _Pilot) -> tuple[_Pilot, NewSession | StudyError]:
     )
     try:
         write_file(file, found.source, waits=False)
-        session = begin_at(pilot.folder / "results" / study.name, found.protocol, found.source, start, found.step)
+        session = begin_session_at_step(
+            pilot.folder / "results" / study.name, found.protocol, found.source, start, found.step
+        )
         options = descriptor_of(pilot.device).window_values(settings_here()[0].device_options)
-        choices = resumed(session, protocol=str(file), device=pilot.device, windowed=True, device_options=options)
+        choices = resumed_choices(
+            session, protocol=str(file), device=pilot.device, windowed=True, device_options=options
+        )
         return pilot, replace(choices, played=True, footage=found.folder)
     except StudyError as error:
         return pilot, error

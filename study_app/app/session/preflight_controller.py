@@ -30,9 +30,9 @@ from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.tasks import Stroke
-from study_app.session.preflight import Check, Measurements, PredictedDelivery, Screen, checks
+from study_app.session.preflight import Check, Measurements, PredictedDelivery, Screen, preflight_checks
 from study_app.session.resume import begun_schedule
-from study_app.session.start import NewSession, Ready, measured
+from study_app.session.start import NewSession, Ready, measure_rig
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.blinded.blinding import read_key
 from study_app.store.folders import StudyFolder, locate_session
@@ -192,7 +192,7 @@ class Preflight(QObject):
         error_n, now = self.appraisal.error_n, datetime.now().astimezone()
         asked_error = error_n is not None or not self.appraisal.over
         planned = planned_rows(self._protocol, now, error_n, asked_error=asked_error)
-        found, rows = checks(facts, self._protocol), (*self._goes_on, *planned)
+        found, rows = preflight_checks(facts, self._protocol), (*self._goes_on, *planned)
         self.window.show_view(
             PreflightView(self._protocol.study.name, self._who, facts, found, rows, busy=self.measuring.busy)
         )
@@ -218,7 +218,7 @@ class Preflight(QObject):
         """Measure anew, in a thread of its own: it looks at the servo for two seconds."""
         if not self.measuring.busy:
             ready, sleep = self._ready, self._ending.wait
-            self.measuring.run(lambda: measured(ready.rig, self._chosen, ready.videos, sleep=sleep))
+            self.measuring.run(lambda: measure_rig(ready.rig, self._chosen, ready.videos, sleep=sleep))
             self._show()
 
     def _take(self, found: Measurements) -> None:
@@ -306,13 +306,13 @@ class ComputerCheck(QObject):
         from study_app.devices.rig import open_rig, study_settings  # noqa: PLC0415
         from study_app.haptics.kernels.compiled import CACHE, following_compilation  # noqa: PLC0415
         from study_app.protocol.load import load  # noqa: PLC0415
-        from study_app.session.preflight_measurements import measure  # noqa: PLC0415
+        from study_app.session.preflight_measurements import measure_servo_and_disk  # noqa: PLC0415
 
         study = load(STUDY)
         with following_compilation(self._compiled.emit) as counter:
             rig = open_rig("scripted", study_settings(study, Random(1)))  # noqa: S311 - a simulated tremor
             try:
-                facts = measure(
+                facts = measure_servo_and_disk(
                     rig.servo,
                     self._results,
                     device=rig.device.name,

@@ -33,7 +33,7 @@ from study_app.gui.theme.themed import name_bars
 from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import Elided, figures
-from study_app.haptics.model.slope_limits import HAND_MPS, steady
+from study_app.haptics.model.slope_limits import HAND_MPS, steady_force
 from study_app.number_text import typed_numbers
 from study_app.protocol.source.document import Path
 
@@ -70,7 +70,7 @@ def _line(study: Study, name: Any) -> ConditionLine:
     protocol = valid.protocol if valid.forces else None
     if protocol is None or liquid is None or name not in protocol.conditions:
         return ConditionLine(liquid, ", ".join(words), UNKNOWN)
-    found = steady(protocol.scene_for(str(name)))
+    found = steady_force(protocol.scene_for(str(name)))
     return ConditionLine(liquid, ", ".join(words), f"{found.force_n:.2f} N", found.limit is not None)
 
 

@@ -32,7 +32,7 @@ from study_app.designer.measures.simulation import (
 )
 from study_app.designer.measures.study_facts import Facts, copied_texts, revealing, valid_part
 from study_app.designer.problems import ProblemRow
-from study_app.haptics.model.slope_limits import HAND_MPS, steady
+from study_app.haptics.model.slope_limits import HAND_MPS, steady_force
 from study_app.number_text import capitalised, counted, duration, duration_figure, duration_range
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
@@ -357,7 +357,7 @@ def force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[s
     limit_n = protocol.device.force_limit_n
     lines = []
     for name in names:
-        it = steady(protocol.scene_of(name), HAND_MPS)
+        it = steady_force(protocol.scene_of(name), HAND_MPS)
         verdict: Verdict = ("ok", "check", "not clipped")
         if it.limit is not None:  # in the colour of the limit
             verdict = ("warn" if it.limit == "norm" else "bad", "warning", f"clipped by the {LIMIT_NAMES[it.limit]}")

@@ -13,7 +13,7 @@ from study_app.designer.document.fields import alternatives, initial, is_localis
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_edits import Set, Unset, meaning
 from study_app.designer.document.toml_text import Refused
-from study_app.haptics.model.slope_limits import HAND_MPS, steady
+from study_app.haptics.model.slope_limits import HAND_MPS, steady_force
 from study_app.protocol.json_schema import schema
 from study_app.protocol.load import examined
 from study_app.protocol.model import Protocol
@@ -295,7 +295,7 @@ def facts(study: Study) -> Facts:
         warnings=translate,
     )
     if valid.forces:
-        forces_n = {name: steady(protocol.scene_of(name), HAND_MPS).force_n for name in protocol.liquids}
+        forces_n = {name: steady_force(protocol.scene_of(name), HAND_MPS).force_n for name in protocol.liquids}
         known = replace(known, forces_n=forces_n)
     if not valid.whole:
         return known

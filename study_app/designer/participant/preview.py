@@ -78,7 +78,13 @@ from study_app.session.pages import DesignPage, Page, QuestionnairePage, TaskPag
 from study_app.session.simulated.observers import ProgrammedBall
 from study_app.session.tasks import TankView
 from study_app.session.transitions.events import Chosen, Continue, LanguageChosen, Retracted, Submitted
-from study_app.session.transitions.page_builder import Moment, moments, preview, previewed_page, tested_condition
+from study_app.session.transitions.page_builder import (
+    Moment,
+    pages_of_step,
+    presented_condition,
+    preview,
+    previewed_page,
+)
 
 FRAME_MS: Final = 33
 RING: Final = 2
@@ -491,7 +497,7 @@ class ParticipantPreview(Card):
     def _go_on(self) -> None:
         if (found := self._found) is None:
             return
-        pages = moments(found.shown, found.index)
+        pages = pages_of_step(found.shown, found.index)
         at = pages.index(self._moment) if self._moment in pages else 0
         if at + 1 < len(pages):
             self.show_moment(pages[at + 1])
@@ -583,13 +589,13 @@ class ParticipantPreview(Card):
             self.show_view(ParticipantView(note=f"The page cannot be shown: {problem}"))
             return
         shown, index = found.shown, found.index
-        pages = moments(shown, index)
+        pages = pages_of_step(shown, index)
         if self._moment not in pages:
             of_side = [moment for moment in pages if (moment.kind == "tank") == (self._side == "tank")]
             self._moment = (of_side or list(pages))[0]
         page = previewed_page(shown, index, self._moment, self._language, self._answers.get(self._page_key, NO_ANSWERS))
         if isinstance(page, TaskPage):
-            self._place_ball(page, tested_condition(shown, index))
+            self._place_ball(page, presented_condition(shown, index))
         now = shown.schedule.steps[index]
         step = step_words(shown, now, shown.protocol.study.languages[0])
         if found.session and found.session != STANDALONE:

@@ -174,10 +174,10 @@ def _read(context: int, now_ns: int, reading: int) -> int:
         return answer
     out = c_functions.reading_at(reading)
     if answer == c_functions.READ_NEW and _is_usable(bench, out.position_m, now_ns):
-        _see(bench, out.position_m, now_ns)
+        _track_position(bench, out.position_m, now_ns)
     else:
         bench.silent += 1
-    _judge(bench, out.buttons)
+    _judge_end(bench, out.buttons)
     _excite(bench, elapsed_s)
     bench.pending = 1
     return answer
@@ -204,7 +204,7 @@ def _is_usable(bench: Any, position_m: Any, now_ns: int) -> bool:
 
 
 @kernel
-def _see(bench: Any, position_m: Any, now_ns: int) -> None:
+def _track_position(bench: Any, position_m: Any, now_ns: int) -> None:
     interval_s = (now_ns - bench.new_ns) * 1e-9
     weight = 1.0 - (1.0 - EWMA) ** (interval_s * 1e3)
     for axis in range(3):
@@ -220,7 +220,7 @@ def _see(bench: Any, position_m: Any, now_ns: int) -> None:
 
 
 @kernel
-def _judge(bench: Any, buttons: int) -> None:
+def _judge_end(bench: Any, buttons: int) -> None:
     if bench.ended != RUNNING or bench.armed == 0:
         return
     if buttons & BUTTON_STOP:
@@ -245,12 +245,12 @@ def _excite(bench: Any, elapsed_s: float) -> None:
     bench.damper_nspm = min(bench.damper_nspm + bench.rise_nspm_per_s * elapsed_s, bench.most_nspm)
     shaken_n2 = 0.0
     for axis in range(3):
-        bench.aim_m[axis] += _within(bench.centre_m[axis] - bench.aim_m[axis], PACE_MPS * elapsed_s)
+        bench.aim_m[axis] += _clamp(bench.centre_m[axis] - bench.aim_m[axis], PACE_MPS * elapsed_s)
         off_m = bench.aim_m[axis] - bench.position_m[axis]
         spring_n = bench.stiffness_npm * off_m
         bench.bias_n[axis] += bench.integral_per_s * elapsed_s * spring_n
-        bench.bias_n[axis] = _within(bench.bias_n[axis], 0.5 * bench.limit_n)
-        bench.pushed_n[axis] += _within(bench.push_n[axis] - bench.pushed_n[axis], PUSH_NPS * elapsed_s)
+        bench.bias_n[axis] = _clamp(bench.bias_n[axis], 0.5 * bench.limit_n)
+        bench.pushed_n[axis] += _clamp(bench.push_n[axis] - bench.pushed_n[axis], PUSH_NPS * elapsed_s)
         damper_n = -bench.damper_nspm * bench.velocity_mps[axis]
         bench.slow_n[axis] += elapsed_s / (elapsed_s + SLOW_S) * (damper_n - bench.slow_n[axis])
         shaken_n2 += (damper_n - bench.slow_n[axis]) ** 2
@@ -272,7 +272,7 @@ def _excite(bench: Any, elapsed_s: float) -> None:
 
 
 @kernel
-def _within(value: float, most: float) -> float:
+def _clamp(value: float, most: float) -> float:
     return min(max(value, -most), most)
 
 

@@ -110,7 +110,7 @@ def noise(samples: Any) -> Noise:
     Standard deviation and range of each axis about a straight line [µm], standard deviation of the EWMA velocity
     (weight 0.1) over three axes [mm/s], and the handle's displacement from first to last [µm].
     """
-    t_s, position_m = _new(samples)
+    t_s, position_m = _new_positions(samples)
     line = np.column_stack([np.ones_like(t_s), t_s - t_s.mean()])
     left_m = position_m - line @ np.linalg.lstsq(line, position_m, rcond=None)[0]
     velocity_mps, smooth_mps = np.diff(position_m, axis=0) / np.diff(t_s)[:, None], np.zeros(3)
@@ -135,7 +135,7 @@ def motion_under_force(stretches: Sequence[Any], axis: int, rate_hz: float) -> M
     distinguishes friction from delay: the phase lag of friction falls with the speed, that of a delay does not.
     """
     step_s = 1.0 / rate_hz
-    prepared = [_prepared(samples, axis, step_s) for samples in stretches]
+    prepared = [_prepare_segment(samples, axis, step_s) for samples in stretches]
     orthogonal, triangle = np.linalg.qr(np.concatenate([system.terms for system in prepared]))
 
     def force_n(delay_s: float) -> Floats:
@@ -170,7 +170,7 @@ def count_um(stretches: Sequence[Any], axis: int) -> float:
     """
     noises_m: list[Floats] = []
     for samples in stretches:
-        t_s, position_m = _new(samples)
+        t_s, position_m = _new_positions(samples)
         if len(t_s) <= DIFFERENCE:
             continue
         steps_s, x_m = np.diff(t_s), position_m[:, axis]
@@ -201,8 +201,8 @@ class _Prepared(NamedTuple):
         return force_n[reach : len(force_n) - reach]
 
 
-def _prepared(samples: Any, axis: int, step_s: float) -> _Prepared:
-    t_s, position_m = _new(samples)
+def _prepare_segment(samples: Any, axis: int, step_s: float) -> _Prepared:
+    t_s, position_m = _new_positions(samples)
     grid_s = np.arange(t_s[0], t_s[-1], step_s)
     x_m = np.interp(grid_s, t_s, position_m[:, axis])
     kernels = _gaussians(step_s)
@@ -230,7 +230,7 @@ def gain_of(sent_n: Sequence[float], shown_g: Sequence[float]) -> Gain:
     )
 
 
-def _new(samples: Any) -> tuple[Floats, Floats]:
+def _new_positions(samples: Any) -> tuple[Floats, Floats]:
     """Return times [s] and positions (n, 3) [m] of the new samples that the servo accepted."""
     new = samples[(samples.fresh == 1) & (samples.limiters & LIMITER_GLITCH == 0)]
     return (new.time_ns - samples.time_ns[0]) * 1e-9, np.array(new.position_m)

@@ -139,18 +139,20 @@ def run_bench(
     """
     lasts = durations or Durations()
     with Stand(device, clock) as stand:
-        _wait(stand, ask("let-go", "Let go of the handle and keep clear of it until the scale is asked for."))
+        _wait_for_answer(
+            stand, ask("let-go", "Let go of the handle and keep clear of it until the scale is asked for.")
+        )
         progress(f"At rest, without force: {lasts.rest_s:g} s.")
         samples, _ = stand.run(lasts.rest_s)
         regular, still = regularity(samples, RATE_HZ), noise(samples)
-        motions = tuple(_motion(stand, axis, lasts, progress) for axis in range(3))
-        damping = tuple(_damping(stand, axis, lasts, ask, progress) for axis in range(3))
-        gain = _gain(stand, lasts, ask, progress)
+        motions = tuple(_measure_motion(stand, axis, lasts, progress) for axis in range(3))
+        damping = tuple(_measure_damping(stand, axis, lasts, ask, progress) for axis in range(3))
+        gain = _measure_gain(stand, lasts, ask, progress)
         stand.rest()
         return Found(device.describe(), regular, still, motions, gain, damping, stand.overruns)
 
 
-def _held(**more: Any) -> Excitation:
+def _hold_excitation(**more: Any) -> Excitation:
     return Excitation(
         **{
             "stiffness_npm": SPRING_NPM,
@@ -162,30 +164,32 @@ def _held(**more: Any) -> Excitation:
     )
 
 
-def _motion(stand: Stand, axis: int, lasts: Durations, progress: Callable[[str], object]) -> Motion:
+def _measure_motion(stand: Stand, axis: int, lasts: Durations, progress: Callable[[str], object]) -> Motion:
     """Bring the handle to the middle, move it by a chirp, and fit its response."""
-    stand.excite(_held())
+    stand.excite(_hold_excitation())
     stand.run(lasts.come_s)
     most_n = min(WAVE_N, stand.limit_n / 2)
     progress(f"Mass and friction along {AXES[axis]}: {lasts.wave_s:g} s of up to {most_n:.1f} N.")
     sweep = (TO_HZ - FROM_HZ) / (lasts.wave_s / 2)
     stretches = []
     for wave_n in (most_n, WEAKER * most_n):
-        stand.excite(_held(integral_per_s=0.0, axis=axis, wave_n=wave_n, from_hz=FROM_HZ, hz_per_s=sweep))
+        stand.excite(_hold_excitation(integral_per_s=0.0, axis=axis, wave_n=wave_n, from_hz=FROM_HZ, hz_per_s=sweep))
         samples, _ = stand.run(lasts.wave_s / 2)
         stretches.append(samples)
     stand.rest()
     return motion_under_force(stretches, axis, RATE_HZ)
 
 
-def _damping(stand: Stand, axis: int, lasts: Durations, ask: Ask, progress: Callable[[str], object]) -> StableDamping:
+def _measure_damping(
+    stand: Stand, axis: int, lasts: Durations, ask: Ask, progress: Callable[[str], object]
+) -> StableDamping:
     """Move the handle back and forth while the damper grows, until it oscillates, is stopped or is greatest."""
-    stand.excite(_held())
+    stand.excite(_hold_excitation())
     stand.run(lasts.come_s)
     progress(f"Stable damping along {AXES[axis]}: up to {MOST_NSPM:g} N·s/m in {lasts.damping_s:g} s.")
     answered = ask("damping", "It ends when the handle oscillates; press Enter to end it earlier.")
     stand.excite(
-        _held(
+        _hold_excitation(
             integral_per_s=0.0,
             axis=axis,
             wave_n=min(DRAW_N, stand.limit_n / 4),
@@ -206,12 +210,12 @@ def _damping(stand: Stand, axis: int, lasts: Durations, ask: Ask, progress: Call
     return StableDamping(reached, "oscillation")
 
 
-def _gain(stand: Stand, lasts: Durations, ask: Ask, progress: Callable[[str], object]) -> Gain | None:
+def _measure_gain(stand: Stand, lasts: Durations, ask: Ask, progress: Callable[[str], object]) -> Gain | None:
     """Push down on a scale, and ask for its reading."""
     request = (
         "Rest the handle on a kitchen scale, near the middle of its range, and set the scale to zero; none: type 'no'."
     )
-    if _wait(stand, ask("scale", request)).lower().startswith("n"):
+    if _wait_for_answer(stand, ask("scale", request)).lower().startswith("n"):
         progress("Force against a scale: left out.")
         return None
     sent_n, shown_g = [], []
@@ -220,14 +224,14 @@ def _gain(stand: Stand, lasts: Durations, ask: Ask, progress: Callable[[str], ob
             continue
         stand.excite(Excitation(push_n=(0.0, -level_n, 0.0), reach_m=SLIP_M))
         samples, _ = stand.run(lasts.push_s)
-        answer = _wait(stand, ask("grams", f"{level_n:g} N downward: what does the scale show, in grams?"))
+        answer = _wait_for_answer(stand, ask("grams", f"{level_n:g} N downward: what does the scale show, in grams?"))
         shown_g.append(_grams(answer))
         sent_n.append(-float(samples.device_force_n[-len(samples) // 4 :, 1].mean()))
     stand.rest()
     return gain_of(sent_n, shown_g)
 
 
-def _wait(stand: Stand, answered: Callable[[], str | None]) -> str:
+def _wait_for_answer(stand: Stand, answered: Callable[[], str | None]) -> str:
     _, answer = stand.run(_PATIENCE_S, answered=answered)
     if answer is None:
         raise DeviceError(f"nothing was answered for {_PATIENCE_S:g} s, so the bench was ended; the force is zero")
@@ -253,7 +257,7 @@ def as_json(results: Found, day: str) -> str:
         "system": _system(),
         **asdict(results),
     }
-    return json.dumps(_plain(document), indent=2, ensure_ascii=False) + "\n"
+    return json.dumps(_plain_json(document), indent=2, ensure_ascii=False) + "\n"
 
 
 def as_markdown(results: Found, day: str) -> str:
@@ -261,7 +265,7 @@ def as_markdown(results: Found, day: str) -> str:
     return "\n".join(_lines(results, day)) + "\n"
 
 
-def kept(results: Found, day: str) -> dict[str, Any]:
+def workstation_results(results: Found, day: str) -> dict[str, Any]:
     """Return the results of a bench for this machine's settings (`store.workstation.DeviceBench`)."""
     own = ("mass_kg", "damping_nspm", "friction_n", "delay_ms")
     return {
@@ -319,7 +323,7 @@ def _lines(results: Found, day: str) -> Iterator[str]:
         f"{gain.residual_n:.3f} N; {gain.readings} readings."
     )
     yield from ("", "## What the device reports", "", "```json")
-    yield json.dumps(_plain(results.device), indent=2, ensure_ascii=False)
+    yield json.dumps(_plain_json(results.device), indent=2, ensure_ascii=False)
     yield "```"
 
 
@@ -331,20 +335,20 @@ def _system() -> str:
     return f"{platform.system()} {platform.release()}, {platform.machine()}, Python {platform.python_version()}"
 
 
-def _plain(value: Any) -> Any:
+def _plain_json(value: Any) -> Any:
     """Return a value with replacements for types unknown to JSON: numpy's numbers, NaN."""
     if isinstance(value, dict):
-        return {str(name): _plain(entry) for name, entry in value.items()}
+        return {str(name): _plain_json(entry) for name, entry in value.items()}
     if hasattr(value, "_asdict"):
-        return _plain(value._asdict())
+        return _plain_json(value._asdict())
     if isinstance(value, list | tuple):
-        return [_plain(entry) for entry in value]
+        return [_plain_json(entry) for entry in value]
     if hasattr(value, "item"):
         value = value.item()
     return None if isinstance(value, float) and value != value else value  # noqa: PLR0124 - NaN
 
 
-def asks_hand(device: Any, progress: Callable[[str], object]) -> Ask:
+def ask_simulated_hand(device: Any, progress: Callable[[str], object]) -> Ask:
     """Return the function that asks the hand of a simulated device: it releases the handle, or acts as the scale.
 
     The hand is the device's ``hand``, or the device itself: with ``held`` and the motors' ``force_n``.

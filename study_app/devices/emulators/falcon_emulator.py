@@ -402,7 +402,7 @@ class Emulator(HandOrders):
 
     def take(self, fault: str) -> None:
         """Set a fault in the notation of the command line: ``drop=0.01``, ``frozen`` or ``power-off``."""
-        if falcon_processor.spelt(fault.strip()) == falcon_processor.POWER_OFF:
+        if falcon_processor.fault_spelling(fault.strip()) == falcon_processor.POWER_OFF:
             self.power(False)
         else:
             self.faults.take(fault)

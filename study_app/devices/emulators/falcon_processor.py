@@ -75,7 +75,7 @@ def draw(faults: Any) -> float:
 
 
 @kernel
-def strikes(faults: Any, kind: int) -> bool:
+def is_struck(faults: Any, kind: int) -> bool:
     """Draw whether this fault occurs now."""
     if faults.due[kind] > 0:
         faults.due[kind] -= 1
@@ -144,25 +144,31 @@ class Faults:
         try:
             chance = float(value)
         except ValueError:
-            known = ", ".join((*(f"{spelt(known)}=CHANCE" for known in CHANCES), *map(spelt, SWITCHES), POWER_OFF))
+            known = ", ".join(
+                (*(f"{fault_spelling(known)}=CHANCE" for known in CHANCES), *map(fault_spelling, SWITCHES), POWER_OFF)
+            )
             raise DeviceError(f"fault '{word}' is not known; choose of: {known}") from None
         self.chance(name, chance)
 
 
-def spelt(name: str) -> str:
+def fault_spelling(name: str) -> str:
     """Return a fault's name in the notation of command line and messages."""
     return name.replace("_", "-")
 
 
 def _place(name: str) -> int:
     if name not in CHANCES:
-        raise DeviceError(f"fault '{name}' does not come by chance; choose one of: {', '.join(map(spelt, CHANCES))}")
+        raise DeviceError(
+            f"fault '{name}' does not come by chance; choose one of: {', '.join(map(fault_spelling, CHANCES))}"
+        )
     return CHANCES.index(name)
 
 
 def _switch(name: str) -> str:
     if name not in SWITCHES:
-        raise DeviceError(f"fault '{name}' cannot be switched on; choose one of: {', '.join(map(spelt, SWITCHES))}")
+        raise DeviceError(
+            f"fault '{name}' cannot be switched on; choose one of: {', '.join(map(fault_spelling, SWITCHES))}"
+        )
     return name
 
 
@@ -210,13 +216,13 @@ def load(loader: Any, bridge: Any, faults: Any, value: int, divisor: int, at_ns:
         if divisor == constants.BAUD_9600:
             _hear_ping(loader, bridge, faults, value, at_ns)
         elif divisor == constants.BAUD_142857 and value == constants.AUTOBAUD[0]:
-            if strikes(faults, ECHO_PREFIX):
+            if is_struck(faults, ECHO_PREFIX):
                 answer(bridge, _PREFIX, at_ns + _ECHO_NS, divisor)
             answer(bridge, value, at_ns + _ECHO_NS, divisor)
             loader.state = LOADING
     elif loader.state == LOADING:
         if divisor == constants.BAUD_142857:
-            echoed = value ^ 0x10 if strikes(faults, ECHO) else value
+            echoed = value ^ 0x10 if is_struck(faults, ECHO) else value
             answer(bridge, echoed, at_ns + _ECHO_NS, divisor)
             _take(loader, value)
         else:
@@ -239,7 +245,7 @@ def _hear_ping(loader: Any, bridge: Any, faults: Any, value: int, at_ns: int) ->
         answer(bridge, 0, at_ns + _PONG_NS, constants.BAUD_9600)
     for k in range(len(_PONG)):
         answer(bridge, _PONG[k], at_ns + _PONG_NS, constants.BAUD_9600)
-    if strikes(faults, GLUED):
+    if is_struck(faults, GLUED):
         for k in range(len(_GLUED_BYTES)):
             answer(bridge, _GLUED_BYTES[k], at_ns + _PONG_NS, constants.BAUD_9600)
     loader.state = PINGED
@@ -323,7 +329,7 @@ def receive_byte(e: Any, value: int, divisor: int, at_ns: int) -> None:
             _skip(run)
         return
     run.held = 0
-    if strikes(e.faults, STALL):
+    if is_struck(e.faults, STALL):
         run.stalled_ns = at_ns + e.faults.stall_ns
         return
     _obey(e, at_ns)
@@ -402,14 +408,14 @@ def _reply(e: Any, at_ns: int) -> None:
     if not faults.frozen:
         for arm in range(3):
             run.shown[arm] = count(e.arms, arm) - run.origin[arm]
-    if strikes(faults, DROP):
+    if is_struck(faults, DROP):
         return
-    length = constants.PACKET - 2 if strikes(faults, TRUNCATE) else constants.PACKET
-    wrong = int(draw(faults) * length) if strikes(faults, CORRUPT) else -1
+    length = constants.PACKET - 2 if is_struck(faults, TRUNCATE) else constants.PACKET
+    wrong = int(draw(faults) * length) if is_struck(faults, CORRUPT) else -1
     since_ns = at_ns + ANSWER_NS
-    if strikes(faults, DELAY):
+    if is_struck(faults, DELAY):
         since_ns += faults.delay_ns
-    times = 2 if strikes(faults, DUPLICATE) else 1
+    times = 2 if is_struck(faults, DUPLICATE) else 1
     for _ in range(times):
         for k in range(length):
             value = _byte_of_reply(e, k)

@@ -64,7 +64,7 @@ class Firmware:
     name: str | None
 
 
-def check(data: bytes) -> Firmware:
+def check_firmware(data: bytes) -> Firmware:
     """Check and parse the firmware in ``data``."""
     _refuse_other_files(data)
     _refuse_wrong_header(data)
@@ -249,7 +249,7 @@ def _round_trip_s(transport: Transport) -> float:
     return PROBE_S
 
 
-def boot(
+def boot_falcon(
     transport: Transport, firmware: bytes, *, attempts: int = ATTEMPTS, progress: Callable[[str], object] | None = None
 ) -> Firmware:
     """Load ``firmware`` and check that it runs; return its description.
@@ -261,10 +261,10 @@ def boot(
     attempts : their greatest number
     progress : receives a line about each failed attempt
     """
-    image = check(firmware)
+    image = check_firmware(firmware)
     for attempt in range(1, attempts + 1):
         try:
-            _attempt(transport, firmware)
+            _attempt_boot(transport, firmware)
         except _Ended as ended:
             if attempt == attempts:
                 raise BootFailure(ended.step, attempt, ended.reason) from None
@@ -277,9 +277,9 @@ def boot(
     return image
 
 
-def _attempt(transport: Transport, firmware: bytes) -> None:
+def _attempt_boot(transport: Transport, firmware: bytes) -> None:
     _ping(transport)
-    _time(transport)
+    _send_autobaud(transport)
     _upload(transport, firmware)
     configure(transport)
     if not is_running(transport):
@@ -305,7 +305,7 @@ def _ping(transport: Transport) -> None:
     raise _Ended("ping", f"its boot loader {heard}")
 
 
-def _time(transport: Transport) -> None:
+def _send_autobaud(transport: Transport) -> None:
     """Send an 'A', from whose bits the loader determines the speed of the upload."""
     transport.control(constants.REQUEST_MODEM, constants.DTR_LOW)
     transport.control(constants.REQUEST_BAUD, constants.BAUD_142857)

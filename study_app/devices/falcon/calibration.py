@@ -121,7 +121,7 @@ def fit(
     )
 
 
-def left_over(calibration: Calibration, poses: Any, forces_n: Any, units: Any) -> Any:
+def residual_forces(calibration: Calibration, poses: Any, forces_n: Any, units: Any) -> Any:
     """Return the residual forces (n, 3) [N] of ``calibration``; arguments as for `fit`."""
     counts, pulled_n, held = (np.asarray(given, np.float64) for given in (poses, forces_n, units))
     return _solve(mechanics.geometry_named(calibration.geometry), calibration.arm_offset_rad, counts, pulled_n, held)[
@@ -153,7 +153,7 @@ def calibration_file(serial: str) -> Path:
     return user_folder() / f"falcon-{name or 'unnamed'}.json"
 
 
-def save(serial: str, calibration: Calibration) -> Path:
+def save_calibration(serial: str, calibration: Calibration) -> Path:
     """Store the calibration of the Falcon with this serial number; return its path.
 
     Raises
@@ -175,7 +175,7 @@ def save(serial: str, calibration: Calibration) -> Path:
     return file
 
 
-def load(serial: str) -> Calibration | None:
+def load_calibration(serial: str) -> Calibration | None:
     """Return the calibration of the Falcon with this serial number, or None."""
     file = calibration_file(serial)
     try:
@@ -185,13 +185,13 @@ def load(serial: str) -> Calibration | None:
     except FileNotFoundError:
         return None
     except (OSError, ValueError, TypeError, RecursionError) as error:
-        raise _unusable(file) from error
+        raise _unusable_file(file) from error
     if not whole:
-        raise _unusable(file)
+        raise _unusable_file(file)
     return calibration
 
 
-def _unusable(file: Path) -> DeviceError:
+def _unusable_file(file: Path) -> DeviceError:
     return DeviceError(f"the Falcon's calibration in {file} cannot be used: delete the file, or calibrate again")
 
 
@@ -332,7 +332,7 @@ class Grip:
         return counts / _WEIGHED_TICKS, units / _WEIGHED_TICKS
 
 
-def hang(grip: Grip, weight_n: float, ask: Ask) -> Notes:
+def measure_with_weight(grip: Grip, weight_n: float, ask: Ask) -> Notes:
     """Measure without load at all places, then with a weight of ``weight_n`` newtons; return the measurements."""
     if not LEAST_N <= weight_n <= MOST_N:
         raise DeviceError(
@@ -341,16 +341,16 @@ def hang(grip: Grip, weight_n: float, ask: Ask) -> Notes:
         )
     notes: list[tuple[Any, float, Any]] = []
     grip.wait(ask("let-go", "Let go of the grip; it will hold itself and move slowly. Keep clear of it."))
-    notes += _round(grip, 0.0)
+    notes += _measure_round(grip, 0.0)
     grip.wait(
         ask("hang", f"Hang the weight of {1000 * weight_n / GRAVITY_MPS2:.0f} g on the grip, and let it hang still.")
     )
-    notes += _round(grip, weight_n)
+    notes += _measure_round(grip, weight_n)
     grip.wait(ask("take-off", "Take the weight off and hold the grip: its motors are turned off now."))
-    return _noted(notes)
+    return _as_notes(notes)
 
 
-def _round(grip: Grip, load_n: float) -> list[tuple[Any, float, Any]]:
+def _measure_round(grip: Grip, load_n: float) -> list[tuple[Any, float, Any]]:
     notes = []
     for place in PLACES_M:
         for side in (1.0, -1.0):
@@ -361,7 +361,7 @@ def _round(grip: Grip, load_n: float) -> list[tuple[Any, float, Any]]:
     return notes
 
 
-def pull(grip: Grip, ask: Ask) -> Notes:
+def measure_with_scale(grip: Grip, ask: Ask) -> Notes:
     """Measure without load and then with an operator's pull on a scale, at each place; return the measurements."""
     notes: list[tuple[Any, float, Any]] = []
     grip.wait(ask("let-go", "Let go of the grip; it will hold itself and move slowly. Keep clear of it."))
@@ -377,7 +377,7 @@ def pull(grip: Grip, ask: Ask) -> Notes:
         notes.append((counts, _read_scale(grip, ask), units))
         grip.wait(ask("let-go", "Take the scale off, and let go."))
     grip.wait(ask("take-off", "Hold the grip: its motors are turned off now."))
-    return _noted(notes)
+    return _as_notes(notes)
 
 
 def _read_scale(grip: Grip, ask: Ask) -> float:
@@ -394,7 +394,7 @@ def _read_scale(grip: Grip, ask: Ask) -> float:
         question = f"'{reading}' is not a reading of the scale in grams, above 0 and up to 600. What did it show?"
 
 
-def _noted(notes: list[tuple[Any, float, Any]]) -> Notes:
+def _as_notes(notes: list[tuple[Any, float, Any]]) -> Notes:
     counts, loads_n, units = zip(*notes, strict=True)
     forces_n = np.zeros((len(notes), 3))
     forces_n[:, 1] = -np.array(loads_n)

@@ -17,7 +17,7 @@ from study_app.devices.falcon.bulk import BulkCalls
 from study_app.devices.falcon.constants import ERROR_NO_DEVICE
 from study_app.devices.falcon.failures import FAILURES, LONGEST_ROUND_TRIP_S, MOST_BROKEN, usb_failure
 from study_app.devices.falcon.replies import ALL_HOMED
-from study_app.devices.falcon.transport import Transport, end_torque, open_transport, quiet
+from study_app.devices.falcon.transport import Transport, end_torque, open_transport, send_zero_torque
 from study_app.errors import DeviceError
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import new_command, new_reading
@@ -93,7 +93,7 @@ class FalconDevice(FramedDevice):
         serial = connection.serial
         facts: dict[str, Any] = {"serial": serial, "firmware": self._run_firmware(connection)}
         round_trip_s, event_character = boot.choose_event_character(connection)
-        used = calibration.load(serial) if serial else None
+        used = calibration.load_calibration(serial) if serial else None
         geometry = self._geometry if used is None else mechanics.geometry_named(used.geometry)
         gain = calibration.UNCALIBRATED_UNITS_PER_NM if used is None else used.units_per_nm
         mechanism = mechanics.new_mechanism(geometry, gain, 0.0 if used is None else used.arm_offset_rad)
@@ -117,7 +117,7 @@ class FalconDevice(FramedDevice):
         gone = falcon.ended == exchange.BRIDGE_LOST
         pushing = gone and bool(falcon.units.any())
         used, falcon.handle = bool(falcon.handle), 0
-        quieted = not used or quiet(connection) > 0
+        quieted = not used or send_zero_torque(connection) > 0
         if quieted:
             falcon.sent_n = 0.0
         return "leave" if pushing else "stand_down" if quieted or gone else "release"
@@ -198,10 +198,10 @@ class FalconDevice(FramedDevice):
             data = Path(self._firmware).read_bytes()
         except OSError as error:
             raise FAILURES.failure("firmware-file", f"{self._firmware} cannot be read: {error.strerror}") from error
-        image = boot.check(data)
+        image = boot.check_firmware(data)
         unknown = f"SHA-256 {image.sha256[:16]}…, which is none of those that are known to work"
         self._progress(f"Loading the Falcon's firmware, {image.name or unknown}.")
-        return boot.boot(transport, data, progress=self._progress).sha256
+        return boot.boot_falcon(transport, data, progress=self._progress).sha256
 
     def _home(self, transport: Transport) -> None:
         """Run ticks without force until all arms are homed and the grip was pulled out once more."""

@@ -36,7 +36,7 @@ LONGEST_TICK_S: Final = 4e-3
 
 
 @kernel
-def push(falcon: Any) -> None:
+def set_motor_units(falcon: Any) -> None:
     """Convert ``force_n``, limited by the gate, into motor ``units``.
 
     ``held_n`` is then the force of the motors until the next command, where the grip is now, and ``sent_n`` the force
@@ -49,7 +49,7 @@ def push(falcon: Any) -> None:
 
 
 @kernel
-def may_wait(falcon: Any) -> bool:
+def can_wait(falcon: Any) -> bool:
     """Return whether the motors may keep their force for a tick: it is close to the requested force, which is not 0."""
     near: bool = square_distance(falcon.sent_n, falcon.held_n) <= MOST_WAITING_N * MOST_WAITING_N
     return near and (square(falcon.sent_n) > 0.0 or square(falcon.held_n) == 0.0)
@@ -329,8 +329,8 @@ def _send_force(falcon: Any, context: int, force_n: Any) -> int:
 def _send_packet(falcon: Any, context: int) -> None:
     """Send ``force_n`` or, to measure the delay, keep the motors' force; ``sent_n`` is the force actually sent."""
     before = falcon.units[0], falcon.units[1], falcon.units[2]
-    push(falcon)
-    waits = falcon.testing > 0 and may_wait(falcon)
+    set_motor_units(falcon)
+    waits = falcon.testing > 0 and can_wait(falcon)
     if falcon.testing > 0 and not waits:
         replies.give_up_measurement(falcon)
     replies.pack(falcon.units, _lights(falcon), falcon.packet)

@@ -193,7 +193,7 @@ def update_delay(falcon: Any, packets: int, gap: bool) -> bool:
         _measure_delay(falcon, packets)
     elif packets > 0:  # no reply gives no information about pending ones
         _look_for_change(falcon)
-    return bool(falcon.delay <= MOST_DELAY and _few_owed(falcon))
+    return bool(falcon.delay <= MOST_DELAY and _has_few_owed(falcon))
 
 
 @kernel
@@ -202,14 +202,14 @@ def _look_for_change(falcon: Any) -> None:
     more, less = falcon.owed > falcon.delay - 1, falcon.owed < falcon.delay - 1
     falcon.astray = falcon.astray + 1 if more or less else max(falcon.astray - 1, 0)
     due = falcon.unsure != 0 or falcon.delay > MOST_DELAY or falcon.astray >= (SLOWER_READS if more else FASTER_READS)
-    if (due and falcon.retest == 0) or (not _few_owed(falcon) and falcon.delay <= MOST_DELAY):
+    if (due and falcon.retest == 0) or (not _has_few_owed(falcon) and falcon.delay <= MOST_DELAY):
         falcon.testing = 1
     if more and falcon.astray >= GIVEN_UP_READS:  # the force changes too much for a measurement
         _adopt_delay(falcon, falcon.owed + 1)
 
 
 @kernel
-def _few_owed(falcon: Any) -> bool:
+def _has_few_owed(falcon: Any) -> bool:
     """Return whether few enough replies are owed beyond the delay that any received one is recent."""
     return bool(falcon.owed < falcon.delay + MOST_OWED)
 

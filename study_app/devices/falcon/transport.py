@@ -86,7 +86,7 @@ def open_transport(name: str = "") -> Transport:
             raise failure from None
 
 
-def quiet(transport: Transport) -> int:
+def send_zero_torque(transport: Transport) -> int:
     """Send ``PACKETS`` packets of zero torque; return the number sent.
 
     They keep the homing flag, and the bridge's settings are unchanged, so that the Falcon stays loaded and homed.
@@ -104,7 +104,7 @@ def end_torque(name: str) -> None:
     """Open the bridge ``name`` and send packets of zero torque; called by the guard."""
     transport = open_transport(name)
     try:
-        if not quiet(transport):
+        if not send_zero_torque(transport):
             raise DeviceError("it takes no packet")
     finally:
         transport.close()

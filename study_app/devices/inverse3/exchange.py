@@ -225,9 +225,9 @@ def _take_state(device: Any, begin: int, end: int) -> int:
         device.answered += 1
     else:
         device.unasked += 1
-    if _denied(device.scan, wire.READY) or _denied(device.scan, wire.POWER):
+    if _is_zero(device.scan, wire.READY) or _is_zero(device.scan, wire.POWER):
         return NOT_READY
-    if _denied(device.scan, wire.CALIBRATED):
+    if _is_zero(device.scan, wire.CALIBRATED):
         return UNCALIBRATED
     buttons = 0
     if device.scan.known >> wire.BUTTON & 1 and device.scan.value[wire.BUTTON] != 0.0:
@@ -240,7 +240,7 @@ def _take_state(device: Any, begin: int, end: int) -> int:
 
 
 @kernel
-def _denied(scanned: Any, place: int) -> bool:
+def _is_zero(scanned: Any, place: int) -> bool:
     return bool(scanned.known >> place & 1 and scanned.value[place] == 0.0)
 
 

@@ -75,12 +75,12 @@ def _command(device_id: str, **further: Any) -> dict[str, Any]:
     }
 
 
-def recorded(config: Mapping[str, Any]) -> dict[str, Any]:
+def receipt_settings(config: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings of a configuration that change the force, for the receipt."""
     return {key: config[key] for key in RECORDED if key in config}
 
 
-def differing(config: Mapping[str, Any], required: Mapping[str, Any]) -> list[str]:
+def differing_settings(config: Mapping[str, Any], required: Mapping[str, Any]) -> list[str]:
     """Return a text for each setting that is not as required; numbers are compared as floats."""
     return list(_differing("", config, required))
 
@@ -208,9 +208,9 @@ def open_session(messages: Messages, link: Link, wanted_id: str = "") -> Session
     entry = find_device(messages.ask(full_state_request(device_id)), device_id, inventory=False)
     in_force = entry.get("config")
     snapshot = config if in_force is None else in_force
-    wrong = differing(snapshot, DEVICE_GLOBAL)
+    wrong = differing_settings(snapshot, DEVICE_GLOBAL)
     if in_force is not None:
-        wrong += differing(in_force, SESSION_SCOPED)
+        wrong += differing_settings(in_force, SESSION_SCOPED)
     if wrong:
         raise FAILURES.failure("settings", "; ".join(wrong))
     round_trip_s = _measure(messages, link, device_id)
@@ -220,8 +220,8 @@ def open_session(messages: Messages, link: Link, wanted_id: str = "") -> Session
         "device_info": config.get("device_info"),
         "firmware": config.get("extended_firmware_version"),
         "service_settings": {
-            "found": recorded(config),
-            "in_force": recorded(snapshot),
+            "found": receipt_settings(config),
+            "in_force": receipt_settings(snapshot),
             "confirmed": in_force is not None,
         },
         "round_trip_ms": round(1000 * round_trip_s, 3),

@@ -138,7 +138,7 @@ CAN: Final = "force as commanded by the Inverse Service 3.5 or later (Haply Hub)
 
 def probe(host: str = "127.0.0.1", ports: tuple[int, ...] = PORTS) -> Backend:
     """Return the state of the service at ``host`` with its devices (docs.haply.co 3.4.x, "HTTP", GET /devices)."""
-    answer = ask(host, "/devices", ports)
+    answer = get_json(host, "/devices", ports)
     by = "Inverse Service"
     if not isinstance(answer, dict):
         return Backend("inverse3", by, state=NOT_AVAILABLE, can=CAN, why=FAILURES.sentence("no-service"))
@@ -159,7 +159,7 @@ def force_scale(host: str, ports: tuple[int, ...] = PORTS) -> Any:
 
     Documented: "Filters" 3.5.x (the key), "Settings Reference" 3.5.x (GET /settings/KEY).
     """
-    return ask(host, "/settings/devices/force_scale", ports)
+    return get_json(host, "/settings/devices/force_scale", ports)
 
 
 def check_force_scale(answer: Any) -> float:
@@ -177,7 +177,7 @@ def check_force_scale(answer: Any) -> float:
     return 1.0
 
 
-def ask(host: str, path: str, ports: tuple[int, ...] = PORTS) -> Any:
+def get_json(host: str, path: str, ports: tuple[int, ...] = PORTS) -> Any:
     """Return the service's JSON answer to a GET request; None if no port answers within `ANSWER_S`.
 
     The connection uses no proxy of the system: the service is in the local network.

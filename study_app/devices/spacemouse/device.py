@@ -19,11 +19,11 @@ from study_app.devices.spacemouse.hid import (
     Buttons,
     Displacement,
     Model,
-    choose,
+    choose_interface,
     find_space_mice,
     load_hid,
-    opened,
-    parse,
+    open_interface,
+    parse_report,
     program_buttons,
     velocity_mps,
 )
@@ -74,8 +74,8 @@ class SpaceMouseDevice(PointedDevice):
             return
         self.close()
         hid = self._hid if self._hid is not None else load_hid()
-        self._model, path = choose(find_space_mice(hid))
-        self._open_hid = opened(hid, self._model, path)
+        self._model, path = choose_interface(find_space_mice(hid))
+        self._open_hid = open_interface(hid, self._model, path)
         self._light(on=True)
         self.point_to(*self.aim_m)
         self.release()
@@ -112,7 +112,7 @@ class SpaceMouseDevice(PointedDevice):
         now_s = heard_s = self._now_s()
         while not self._ending.is_set():
             try:
-                said = parse(bytes(self._open_hid.read(_REPORT_BYTES, _WAIT_MS)))
+                said = parse_report(bytes(self._open_hid.read(_REPORT_BYTES, _WAIT_MS)))
             except (OSError, ValueError):
                 self.unplug()
                 return

@@ -77,7 +77,7 @@ class Buttons:
     held: int
 
 
-def parse(report: bytes) -> Displacement | Buttons | None:
+def parse_report(report: bytes) -> Displacement | Buttons | None:
     """Return the displacement or buttons in ``report``; None for other or truncated reports."""
     if not report:
         return None
@@ -152,7 +152,7 @@ def find_space_mice(hid: Any) -> list[tuple[Model, dict[str, Any]]]:
     return [(model, interface) for model, interface in listed if model is not None]
 
 
-def choose(interfaces: list[tuple[Model, dict[str, Any]]]) -> tuple[Model, bytes]:
+def choose_interface(interfaces: list[tuple[Model, dict[str, Any]]]) -> tuple[Model, bytes]:
     """Return the first interface that reports motion; an interface without usage information counts as such."""
     if not interfaces:
         raise DeviceNotFound(
@@ -167,7 +167,7 @@ def choose(interfaces: list[tuple[Model, dict[str, Any]]]) -> tuple[Model, bytes
     raise DeviceError(f"the {interfaces[0][0].name} {_NO_MOTION_INTERFACE}")
 
 
-def opened(hid: Any, model: Model, path: bytes) -> Any:
+def open_interface(hid: Any, model: Model, path: bytes) -> Any:
     """Open hidapi's device at this path; raise ``DeviceError`` with the remedy on this system."""
     device = hid.device()
     try:

@@ -31,7 +31,7 @@ from study_app.haptics.model.scene import Effect, Ewma, Given, Liquid, Scene
 from study_app.haptics.runtime.offline import ModelAlong, simulate
 from study_app.lab.identify.fit import fit
 from study_app.lab.identify.measured_force import along_a_line
-from study_app.lab.identify.parameters import find
+from study_app.lab.identify.parameters import find_parameters
 
 RATE_HZ: Final = 1000.0
 LAW: Final = "brown-lawler"
@@ -367,7 +367,7 @@ _HEADINGS: Final = (
 
 
 def _row(it: Fitted) -> tuple[str, ...]:
-    ranges = find(scene_of(it.model, it.case), it.case.liquid_id, it.model.free) if it.model.free else ()
+    ranges = find_parameters(scene_of(it.model, it.case), it.case.liquid_id, it.model.free) if it.model.free else ()
     within = {one.name for one in ranges if one.least * (1 + EDGE) < it.values[one.name] < one.most * (1 - EDGE)}
     fitted = ", ".join(f"{name} {value:.3g}{'' if name in within else '*'}" for name, value in it.values.items())
     return (

@@ -39,7 +39,7 @@ from study_app.evidence.stability.verdict import REASONS, Verdict, judge
 from study_app.evidence.table import Evidence, Table, plot_files, run
 from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.haptics.model.scene import Ewma
-from study_app.haptics.model.slope_limits import slope_limit, table
+from study_app.haptics.model.slope_limits import slope_limit, slope_limit_table
 from study_app.store.csv_files import csv_text_of
 
 HEIGHT_PT: Final = 256.0
@@ -394,7 +394,7 @@ def limits(executor: Executor, progress: Callable[[int, int], object], file: str
     """
     lines = len(measured_estimators()) * len(PERIODS_S) * len(DELAYS[1:])
     rows = []
-    shipped = (entry for entry in table() if entry.estimator == "line")
+    shipped = (entry for entry in slope_limit_table() if entry.estimator == "line")
     for name, value, period_s, delay, (drag, inertia) in itertools.chain(measure_limits(executor=executor), shipped):
         parameter = "" if value is None else f"{value:g}"
         rows.append((name, parameter, f"{period_s * 1e3:g}", delay, f"{drag:g}", f"{inertia:g}"))

@@ -28,8 +28,8 @@ from study_app.analysis.levels.tracks import tracks
 from study_app.analysis.planning.power_curves import interval as wilson_interval
 from study_app.analysis.statistics.outcome import student_interval
 from study_app.evidence.table import Evidence, Table, run
-from study_app.haptics.model.overrides import override
-from study_app.haptics.model.slope_limits import steady
+from study_app.haptics.model.overrides import override_value
+from study_app.haptics.model.slope_limits import steady_force
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.simulated import OBSERVER, Observer, as_requested, simulate_study
@@ -342,7 +342,7 @@ def known_value(name: str, protocol: Protocol) -> Known:
         if design_of(protocol, block).reply == "number" and stimulus.vary not in DELAYS and isinstance(task, Follow):
             scene = protocol.scene_for(condition_of(protocol, stimulus))
             fastest_mps = task.fastest_stroke(protocol.device.workspace_m).speed_mps
-            of_levels = [override(scene, stimulus.vary, level) for level in _levels(protocol, block)]
+            of_levels = [override_value(scene, stimulus.vary, level) for level in _levels(protocol, block)]
             return KnownExponent(name, protocol, block, tuple(_resistance(it, fastest_mps) for it in of_levels))
     for block in blocks:
         standards = standards_of(protocol, block)
@@ -362,7 +362,7 @@ def _levels(protocol: Protocol, block: Block) -> list[float]:
 def _resistance(scene: Any, fastest_mps: float) -> float:
     """Return mean force over RMS speed [N·s/m] in a sinusoidal motion with this peak speed."""
     speeds = [fastest_mps * math.sin(math.pi * (point + 0.5) / POINTS) for point in range(POINTS)]
-    mean_n = sum(steady(scene, speed).drag_n for speed in speeds) / POINTS
+    mean_n = sum(steady_force(scene, speed).drag_n for speed in speeds) / POINTS
     return mean_n / (fastest_mps / math.sqrt(2))
 
 

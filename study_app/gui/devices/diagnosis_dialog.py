@@ -8,7 +8,7 @@ from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QFontDatabase, QGuiApplication
 from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QPlainTextEdit, QProgressBar, QWidget
 
-from study_app.devices.doctor import Report, lines
+from study_app.devices.doctor import Report, report_lines
 from study_app.devices.doctor_worker import ExaminationClient, start_examination
 from study_app.devices.registry import descriptor_of, title_of
 from study_app.errors import StoreError
@@ -170,7 +170,7 @@ class DiagnosisDialog(QDialog):
         self.copy.show_action("check", "Copied")
 
     def _written(self) -> str:
-        return "" if self.report is None else "\n".join(lines(self.report)).strip() + "\n"
+        return "" if self.report is None else "\n".join(report_lines(self.report)).strip() + "\n"
 
     def _ask_where(self) -> None:
         dialog = QFileDialog(self, "Save a zip file for support", NAME, "Zip files (*.zip)")

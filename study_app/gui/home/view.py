@@ -49,7 +49,7 @@ from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.main_view import Place
-from study_app.session.start import resumed
+from study_app.session.start import resumed_choices
 from study_app.store.workstation import DEFAULTS, MachineSettings
 from study_app.workspace import workspace
 
@@ -302,7 +302,7 @@ class HomePlace(Place):
         """Ask to go on with a session as it was begun, on the screens there are now."""
         try:
             names = [screen.name for screen in screens_shown()]
-            chosen = resumed(
+            chosen = resumed_choices(
                 session.folder,
                 protocol=session.source,
                 windowed=len(names) == 1,

@@ -17,7 +17,7 @@ from study_app.gui.widgets.controls import ActionButton, Cap, Choice, CompactSto
 from study_app.gui.widgets.labels import Clamped, label, set_property
 from study_app.gui.widgets.numbers import NumberField, Range, Slider, read_number, write_number
 from study_app.haptics.model.effect import Parameter, Value
-from study_app.lab.ab_comparison import Setting, Side, other
+from study_app.lab.ab_comparison import Setting, Side, other_side
 from study_app.lab.parameters import OFF, ON, Section, sections
 from study_app.number_text import readings_of, unclear_number
 
@@ -584,7 +584,7 @@ class FormPanel(Card):
         index = self.liquid.findText(bench.in_hand.name)
         self.liquid.setCurrentIndex(index)
         self.liquid.setPlaceholderText(bench.in_hand.name)
-        words = f"Copy to {other(bench.presented)}"
+        words = f"Copy to {other_side(bench.presented)}"
         self.copy.show_action("copy", words)
 
     def _show_form(self, setting: Setting, *, forget: bool) -> None:

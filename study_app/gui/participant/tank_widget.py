@@ -47,7 +47,7 @@ from study_app.gui.theme.theme import TANK
 from study_app.gui.widgets.accessible import say
 from study_app.protocol.wording.languages import Words
 from study_app.session.pages import TaskPage
-from study_app.session.tasks import TankView, track
+from study_app.session.tasks import TankView, new_tracker
 
 # Where the tank lies in the window, in shares of it.
 AREA = (0.075, 0.122, 0.85, 0.712)
@@ -154,7 +154,7 @@ class TankWidget(QWidget):
         if self.controls is not None:
             self.controls.turn_to(page)
         if self.view is not None:  # the ball stays where it is until the next view
-            self.view = replace(self.view, task=track(page.task).now(), ball_hidden=False)
+            self.view = replace(self.view, task=new_tracker(page.task).now(), ball_hidden=False)
         self._unpainted = False
         self.video.show(None)
         self.things = self._frame()

@@ -27,7 +27,16 @@ from study_app.protocol.describe import spread
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import Schedule, Trial
-from study_app.session.preflight import LOUDEST_DB, MEANS, QUIETEST_DB, USUAL_DB, Check, Masking, Measurements, checks
+from study_app.session.preflight import (
+    LOUDEST_DB,
+    MEANS,
+    QUIETEST_DB,
+    USUAL_DB,
+    Check,
+    Masking,
+    Measurements,
+    preflight_checks,
+)
 from study_app.session.resume import resume_at
 from study_app.store.journals.journal_events import Event
 from study_app.store.progress import progress_of
@@ -129,7 +138,7 @@ def computer_checks(
     ``facts`` were measured with the simulated hand, for which ``compiled`` functions had to be compiled; the protocol's
     limits apply; ``cache`` is the folder of compiled code, None where nothing can be stored.
     """
-    of_servo = {check.name: check for check in checks(facts, protocol)}
+    of_servo = {check.name: check for check in preflight_checks(facts, protocol)}
     found = [of_servo[name] for name in OF_THE_COMPUTER]
     return (*found, _devices(devices), _compiled(cache, compiled))
 

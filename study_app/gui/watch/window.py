@@ -34,7 +34,7 @@ from study_app.gui.widgets.live_plots import STROKE, Floats, Plot, draw_quickly,
 from study_app.gui.widgets.numbers import MARGIN, Range, Slider
 from study_app.protocol.wording.languages import words
 from study_app.session.tasks import TankView
-from study_app.session.watch import Kind, Watched, watched
+from study_app.session.watch import Kind, Watched, read_watched
 from study_app.store.atomic import write_file
 from study_app.video.encoding import VideoWriter
 
@@ -299,7 +299,7 @@ class WatchWindow(Themed, QDialog):
 
     def _read(self, interval: int) -> None:
         self.pause()
-        self._reader.run(partial(watched, self._folder, self._trial, self._attempt, interval))
+        self._reader.run(partial(read_watched, self._folder, self._trial, self._attempt, interval))
 
     def _show(self, shown: Watched | Exception) -> None:
         if self.stage is not None:

@@ -331,7 +331,7 @@ def part(function: F) -> F:
     return _compiled(function, **_NO_MEMORY, forceinline=True)
 
 
-def workings(function: F) -> F:
+def evidence_kernel(function: F) -> F:
     """Compile ``function`` for evidence, not for the servo: like `kernel`, but it may allocate arrays."""
     return _compiled(function)
 

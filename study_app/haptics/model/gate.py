@@ -66,14 +66,16 @@ class Extremes:
     def relative_mps(self) -> float:
         """The greatest speed of the body, after the knee, relative to any flow that may be selected."""
         flow_mps = sum(it.speed_mps for it in _flows(self.liquid, called_for=True))
-        return met_mps(self.scene, self.liquid, self.scene.motion_in(self.liquid).speed_mps or 0.0) + flow_mps
+        return (
+            effective_speed_mps(self.scene, self.liquid, self.scene.motion_in(self.liquid).speed_mps or 0.0) + flow_mps
+        )
 
     @cached_property
     def speed_mps(self) -> float:
         """The greatest speed of the body in the liquid, after the knee; 0 if it is never in it."""
         if self._is_outside:
             return 0.0
-        return met_mps(self.scene, self.liquid, self.scene.motion_in(self.liquid).speed_mps or 0.0)
+        return effective_speed_mps(self.scene, self.liquid, self.scene.motion_in(self.liquid).speed_mps or 0.0)
 
     @cached_property
     def acceleration_mps2(self) -> float:
@@ -170,12 +172,12 @@ def submerged(depth_m: float, radius_m: float) -> float:
     return h * h * (3 * radius_m - h) / (4 * radius_m**3)
 
 
-def met_mps(scene: Scene, liquid: Liquid, speed_mps: float) -> float:
+def effective_speed_mps(scene: Scene, liquid: Liquid, speed_mps: float) -> float:
     """Return the speed [m/s] that a liquid's effects use: after the knee, except for a damper."""
-    return speed_mps if liquid.drag.law == "linear" else lowered_mps(speed_mps, scene.knee)
+    return speed_mps if liquid.drag.law == "linear" else speed_after_knee_mps(speed_mps, scene.knee)
 
 
-def lowered_mps(speed_mps: float, knee: Knee) -> float:
+def speed_after_knee_mps(speed_mps: float, knee: Knee) -> float:
     """Return a speed after the knee [m/s], which the effects use."""
     excess_mps = speed_mps - knee.threshold_mps
     if excess_mps <= 0 or knee.law == "none":
@@ -197,7 +199,7 @@ class Verdict(NamedTuple):
     why: str
 
 
-def calls_for(scene: Scene) -> tuple[Verdict, ...]:
+def effect_verdicts(scene: Scene) -> tuple[Verdict, ...]:
     """Return the verdict on every effect that the scene's liquids have parameters for, liquid by liquid."""
     return tuple(verdict for liquid in scene.liquids for verdict in _verdicts(scene, liquid))
 
@@ -228,9 +230,13 @@ def _budget_n(scene: Scene, total_n: float) -> float:
 
 def _verdicts(scene: Scene, liquid: Liquid) -> tuple[Verdict, ...]:
     bound_of = bounds(scene, liquid)
-    barred = _barred(scene, liquid, bound_of)
+    barred = _barred_effects(scene, liquid, bound_of)
     total_n = sum(bound_n for effect, bound_n in bound_of.items() if effect not in barred)
-    judged = _chosen(scene, liquid, bound_of, barred, total_n) if liquid.effects == "auto" else _named(liquid, bound_of)
+    judged = (
+        _chosen_verdicts(scene, liquid, bound_of, barred, total_n)
+        if liquid.effects == "auto"
+        else _named_verdicts(liquid, bound_of)
+    )
     return tuple(
         Verdict(
             liquid=liquid.id,
@@ -246,7 +252,7 @@ def _verdicts(scene: Scene, liquid: Liquid) -> tuple[Verdict, ...]:
     )
 
 
-def _barred(scene: Scene, liquid: Liquid, bound_of: Mapping[Effect, float]) -> dict[Effect, str]:
+def _barred_effects(scene: Scene, liquid: Liquid, bound_of: Mapping[Effect, float]) -> dict[Effect, str]:
     """Return the effects that cannot be chosen, with reasons."""
     if liquid.effects != "auto":
         rivals = {it.name: it.excludes for it in EFFECTS if it.excludes and it.name in bound_of}
@@ -262,7 +268,7 @@ def _barred(scene: Scene, liquid: Liquid, bound_of: Mapping[Effect, float]) -> d
     return barred | dict.fromkeys(NEVER_BY_ITSELF, "not determined by density and viscosity: name it to use it")
 
 
-def _named(liquid: Liquid, bound_of: Mapping[Effect, float]) -> dict[Effect, tuple[bool, str]]:
+def _named_verdicts(liquid: Liquid, bound_of: Mapping[Effect, float]) -> dict[Effect, tuple[bool, str]]:
     """Return the verdicts on effects that the file names."""
     judged: dict[Effect, tuple[bool, str]] = dict.fromkeys(bound_of, (False, "not named"))
     for name in bound_of:
@@ -272,7 +278,7 @@ def _named(liquid: Liquid, bound_of: Mapping[Effect, float]) -> dict[Effect, tup
     return judged
 
 
-def _chosen(
+def _chosen_verdicts(
     scene: Scene, liquid: Liquid, bound_of: Mapping[Effect, float], barred: Mapping[Effect, str], total_n: float
 ) -> dict[Effect, tuple[bool, str]]:
     """Omit the smallest effects while their sum stays within the target."""
@@ -283,7 +289,7 @@ def _chosen(
         with_it_n = left_out_n + bound_of[effect]
         if with_it_n <= budget_n:
             left_out_n = with_it_n
-            judged[effect] = False, _left_out(bound_of[effect], left_out_n, budget_n)
+            judged[effect] = False, _omission_reason(bound_of[effect], left_out_n, budget_n)
         else:
             judged[effect] = True, f"without it {with_it_n:.3g} N would be missing, more than {budget_n:.3g} N"
     for name in [name for name, (taken, _) in judged.items() if taken and NAMED[name].through]:
@@ -300,7 +306,7 @@ def _chosen(
     return judged
 
 
-def _left_out(bound_n: float, left_out_n: float, budget_n: float) -> str:
+def _omission_reason(bound_n: float, left_out_n: float, budget_n: float) -> str:
     if bound_n == 0.0:
         return "does nothing here"
     return f"{left_out_n:.3g} N omitted in total, within {budget_n:.3g} N"

@@ -262,7 +262,7 @@ def inertial_factor(force_n: float, speed_mps: float, inertia_kg_m: float) -> fl
     return finite_reynolds(inertia_kg_m * speed_mps * speed_mps / force_n) if force_n > 0.0 else 1.0
 
 
-def even_n(
+def steady_force_n(
     rheology: Any, density_kg_m3: float, diameter_m: float, speed_mps: float, steepest_nspm: float = math.inf
 ) -> tuple[float, float]:
     """Return the force [N] on a sphere in uniform motion: that of the yield stress, and the viscous part."""

@@ -54,7 +54,7 @@ class Motion:
             raise StudyError(f"time must increase, but does not at row {int(np.argmin(np.diff(self.t_s) > 0)) + 2}")
 
 
-def read(path: Path) -> Motion:
+def read_motion(path: Path) -> Motion:
     """Read ``t_s,x_m,y_m,z_m`` and perhaps ``vx_mps,vy_mps,vz_mps`` (scene frame) from a CSV file.
 
     Raises
@@ -130,7 +130,7 @@ SPEED_MPS = 1.0
 RADIUS_M = 0.265  # three circles at 1 m/s take 5 s: 5000 elements at 1 kHz, the tail of the thesis' figures
 
 
-def path(name: str, *, rate_hz: float = 1000.0, **parameters: float) -> Motion:
+def programmed_motion(name: str, *, rate_hz: float = 1000.0, **parameters: float) -> Motion:
     """Return the programmed motion called ``name``, one of `NAMES`; ``parameters`` are those of its function.
 
     Raises

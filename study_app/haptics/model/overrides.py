@@ -21,7 +21,7 @@ _OF_THE_SCENE = ("body", "velocity", "knee", "accuracy", "motion")
 _FIXED = {"id", "liquids", "link"}
 
 
-def override(scene: Scene, name: str, value: object) -> Scene:
+def override_value(scene: Scene, name: str, value: object) -> Scene:
     """Return ``scene`` with the one parameter called ``name`` set to ``value``; see `override_all`."""
     return override_all(scene, {name: value})
 
@@ -44,7 +44,7 @@ def override_all(scene: Scene, values: Mapping[str, object]) -> Scene:
     tree = _tree(scene)
     for name, value in values.items():
         for table, field in _places(_tables(tree), name):
-            _set(table, field, value)
+            _set_field(table, field, value)
     try:
         return Scene.model_validate(tree)
     except ValidationError as error:
@@ -125,16 +125,16 @@ def _places(tables: Tables, name: str) -> list[tuple[dict[str, Any], str]]:
     raise StudyError(f"this scene has no parameter {_shown(name)!r}: {meant}it has {', '.join(known)}")
 
 
-def _set(table: dict[str, Any], field: str, value: object) -> None:
+def _set_field(table: dict[str, Any], field: str, value: object) -> None:
     """Set one field; a table of another kind begins with the defaults of that kind."""
     if isinstance(value, str):
-        value = _read(value, table[field], field)
+        value = _parse_value(value, table[field], field)
     if field == "kind" and value != table[field]:
         table.clear()
     table[field] = value
 
 
-def _read(text: str, present: object, field: str) -> object:
+def _parse_value(text: str, present: object, field: str) -> object:
     """Return the value of a text that the field's type alone does not determine."""
     if text.startswith("{"):
         try:

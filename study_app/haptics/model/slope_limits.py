@@ -14,10 +14,10 @@ from study_app.errors import StudyError
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.effects.drag import resistance_n
 from study_app.haptics.model.effects.non_newtonian import VISCOUS_SHARE, steady_n
-from study_app.haptics.model.effects.unsteady_drag import LATE_SHARE, even_n
+from study_app.haptics.model.effects.unsteady_drag import LATE_SHARE, steady_force_n
 from study_app.haptics.model.estimators import LINES, NAMED, DeviceVelocity
 from study_app.haptics.model.force_rules import CURRENT, ForceRules
-from study_app.haptics.model.gate import met_mps, resolve
+from study_app.haptics.model.gate import effective_speed_mps, resolve
 from study_app.haptics.model.scene import Ewma, Given, Kalman, Scene, Velocity, Withdrawn
 
 SLOWEST_HZ: Final = 500.0
@@ -85,7 +85,7 @@ def damping_limits(period_s: float, delay_ticks: int, velocity: Velocity | Devic
             f"no stable force is known for {1 / period_s:g} ticks per second with {delay_ticks} ticks of delay: "
             "run at 250 Hz or more, with a delay of 4 ticks at most"
         )
-    beyond = min(1.0, period_s / min(entry.period_s for entry in table()))
+    beyond = min(1.0, period_s / min(entry.period_s for entry in slope_limit_table()))
     return DampingLimits(
         drag_nspm=beyond * min(it.drag_nspm for it in limits),
         inertia_nspm=beyond * min(it.inertia_nspm for it in limits),
@@ -140,7 +140,7 @@ def _rows(velocity: Velocity | DeviceVelocity, period_s: float) -> tuple[tuple[s
 
 def _neighbours(row: tuple[str, float | None], period_s: float, delay_ticks: int) -> list[DampingLimits]:
     """Return the limits of an estimator at the next longer delay, at the next slower and the next faster rate."""
-    known = [it for it in table() if (it.estimator, it.parameter) == row and it.delay_ticks >= delay_ticks]
+    known = [it for it in slope_limit_table() if (it.estimator, it.parameter) == row and it.delay_ticks >= delay_ticks]
     delay_ticks = min((entry.delay_ticks for entry in known), default=0)
     periods_s = {entry.period_s for entry in known}
     slower_s = [known_s for known_s in periods_s if known_s >= period_s * (1 - _SAME)]
@@ -152,7 +152,7 @@ def _neighbours(row: tuple[str, float | None], period_s: float, delay_ticks: int
 
 
 @cache
-def table() -> tuple[Entry, ...]:
+def slope_limit_table() -> tuple[Entry, ...]:
     """Return the shipped table."""
     with (resources.files("study_app.haptics.model") / "slope_limits.csv").open(encoding="utf-8") as file:
         return tuple(
@@ -167,7 +167,7 @@ def table() -> tuple[Entry, ...]:
         )
 
 
-def refuses(rate_hz: float) -> str | None:
+def refusal_reason(rate_hz: float) -> str | None:
     """Return the reason why a servo of this rate must not run a participant, in a sentence, or None."""
     if rate_hz >= SLOWEST_HZ:
         return None
@@ -185,7 +185,7 @@ class Steady(NamedTuple):
     limit: Literal["slope", "norm"] | None
 
 
-def steady(scene: Scene, hand_mps: float = HAND_MPS) -> Steady:
+def steady_force(scene: Scene, hand_mps: float = HAND_MPS) -> Steady:
     """Return the force on a hand in uniform motion at ``hand_mps`` through the scene's liquid at rest.
 
     Only drag, after the safety layer: without wake, acceleration and buoyancy. The scene has one liquid; the loop one
@@ -194,7 +194,7 @@ def steady(scene: Scene, hand_mps: float = HAND_MPS) -> Steady:
     (liquid,) = resolve(scene).liquids
     if not {"drag", "unsteady_drag", "non_newtonian"} & set(liquid.effects):
         return Steady(0.0, 0.0, None)
-    speed_mps = met_mps(scene, liquid, scene.scale * hand_mps)
+    speed_mps = effective_speed_mps(scene, liquid, scene.scale * hand_mps)
     slope_n = slope_limit(1 / scene.rate_hz, 1, scene.velocity) * speed_mps / scene.scale
     if "drag" in liquid.effects:
         drag_n = resistance_n(scene, liquid, speed_mps, liquid.drag.law)
@@ -204,7 +204,7 @@ def steady(scene: Scene, hand_mps: float = HAND_MPS) -> Steady:
         held_n, viscous_n = steady_n(scene, liquid, speed_mps, slope_n / speed_mps if speed_mps > 0 else math.inf)
         stable_n = held_n + min(viscous_n, slope_n * (VISCOUS_SHARE if held_n > 0 else 1.0))
     else:
-        drag_n, stokes_n = even_n(scene, liquid, speed_mps)
+        drag_n, stokes_n = steady_force_n(scene, liquid, speed_mps)
         most_late_n = LATE_SHARE * math.sqrt(2) * max(slope_n - stokes_n, 0.0)  # ball and wake have the same speed
         stable_n = drag_n if drag_n - stokes_n <= most_late_n else min(stokes_n, slope_n) + most_late_n
     force_n = min(stable_n, scene.force_limit_n)

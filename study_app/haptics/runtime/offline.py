@@ -30,7 +30,7 @@ from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
 from study_app.haptics.model.effects import local_wake, wake
 from study_app.haptics.model.estimators import DEVICE, GIVEN
 from study_app.haptics.model.layout import LIMITER_SATURATED, LIMITER_STOP, SAMPLE, STATUS_DEVICE_LOST, Record, records
-from study_app.haptics.model.motion import Floats, Motion, read
+from study_app.haptics.model.motion import Floats, Motion, read_motion
 from study_app.haptics.model.scene import Given, Scene
 from study_app.haptics.model.slope_limits import handle_limits
 from study_app.haptics.runtime.pack import pack
@@ -72,7 +72,7 @@ def simulate(scene: Scene, path: Motion | str | os.PathLike[str]) -> Table:
     >>> print(f"{np.abs(table.device_fx_n).max():.2f} N")
     0.12 N
     """
-    motion = path if isinstance(path, Motion) else read(Path(path))
+    motion = path if isinstance(path, Motion) else read_motion(Path(path))
     return _table(motion.t_s, samples_along(scene, motion))
 
 

@@ -196,12 +196,12 @@ def pack_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> No
 
 
 def adjust_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN, rules: ForceRules = CURRENT) -> None:
-    """Write the parameters of a scene like the one in memory of `pack` (`built_alike`) into it; keep its state."""
+    """Write the parameters of a scene like the one in memory of `pack` (`is_built_alike`) into it; keep its state."""
     scene = _for_device(scene, dynamics)
     _fill_constants(model, scene, _by_delay(scene, dynamics, rules), dynamics, rules)
 
 
-def built_alike(scene: Scene, other: Scene) -> bool:
+def is_built_alike(scene: Scene, other: Scene) -> bool:
     """Return whether one scene's state is valid in the other: only parameters differ on which no state depends.
 
     Rows, effects, laws, kinds and the mapping of the hand into the scene must be equal. The state of some effects

@@ -13,7 +13,7 @@ from study_app.haptics.model.layout import STATUS_DEVICE_LOST, STATUS_NON_FINITE
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.clocks.clock import Clock, SystemClock
 from study_app.haptics.runtime.clocks.grants import Grant
-from study_app.haptics.runtime.pack import built_alike, elements_needed, takes_device_velocity
+from study_app.haptics.runtime.pack import elements_needed, is_built_alike, takes_device_velocity
 from study_app.haptics.runtime.telemetry import Telemetry
 from study_app.haptics.runtime.thread import LoopThread
 
@@ -118,7 +118,7 @@ class Servo:
         Raises
         ------
         StudyError
-            The scene is not built like the active one (``pack.built_alike``), or cannot be loaded.
+            The scene is not built like the active one (``pack.is_built_alike``), or cannot be loaded.
         ServoFault, DeviceLost
             The servo has stopped itself.
         """
@@ -128,7 +128,7 @@ class Servo:
 
     def may_adjust(self, scene: Scene) -> bool:
         """Return whether `adjust` accepts a scene now."""
-        return not self._rests and built_alike(self._scene, scene)
+        return not self._rests and is_built_alike(self._scene, scene)
 
     def _present(self, scene: Scene, *, goes_on: bool) -> int:
         if scene.rate_hz != self.rate_hz:

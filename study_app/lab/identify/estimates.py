@@ -61,14 +61,14 @@ def estimate(problem: Problem, liquid_id: str, names: Sequence[str], size: float
     """
     z, ended = solve(problem)
     residual, slopes = -problem.misfit(z).reshape(-1, problem.columns), problem.slopes_of_u(z)
-    acts = _acts(problem.u(z), slopes, problem, size)
-    half, correlation = _spread(slopes, acts, residual, problem.following(residual))
-    values, pairs = problem.values(z), _alike(correlation, problem.alike)
-    intervals = [_ends(it, u, by) for it, u, by in zip(problem.parameters, problem.u(z), half, strict=True)]
+    acts = _affects_measurement(problem.u(z), slopes, problem, size)
+    half, correlation = _interval_spread(slopes, acts, residual, problem.following(residual))
+    values, pairs = problem.values(z), _indistinguishable_pairs(correlation, problem.alike)
+    intervals = [_interval_of(it, u, by) for it, u, by in zip(problem.parameters, problem.u(z), half, strict=True)]
     warnings = (
         *(["the search stopped before it converged: choose closer initial values with --set"] if not ended else []),
-        *_of_the_parameters(problem, z, acts, half, {k for pair in pairs for k in pair}),
-        *_of_pairs(problem, names, pairs, correlation),
+        *_parameter_warnings(problem, z, acts, half, {k for pair in pairs for k in pair}),
+        *_pair_warnings(problem, names, pairs, correlation),
     )
     return z, {
         "scene": problem.scene(z),
@@ -85,7 +85,7 @@ def estimate(problem: Problem, liquid_id: str, names: Sequence[str], size: float
     }
 
 
-def _acts(u: Floats, slopes: Floats, problem: Problem, size: float) -> NDArray[np.bool_]:
+def _affects_measurement(u: Floats, slopes: Floats, problem: Problem, size: float) -> NDArray[np.bool_]:
     """Return which parameters affect the measured quantity, (p,)."""
     spans = [
         1.0 if coordinate(it).relative is False else max(abs(at), 0.01)
@@ -95,7 +95,9 @@ def _acts(u: Floats, slopes: Floats, problem: Problem, size: float) -> NDArray[n
     return strengths > _NO_EFFECT * size
 
 
-def _spread(slopes: Floats, acts: NDArray[np.bool_], residual: Floats, following: float) -> tuple[Floats, Floats]:
+def _interval_spread(
+    slopes: Floats, acts: NDArray[np.bool_], residual: Floats, following: float
+) -> tuple[Floats, Floats]:
     """Return the half widths (p,) of the intervals in u, and the correlation (p, p) of the estimates."""
     count = len(acts)
     half, correlation = np.full(count, math.inf), np.full((count, count), math.nan)
@@ -115,7 +117,7 @@ def _spread(slopes: Floats, acts: NDArray[np.bool_], residual: Floats, following
     return half, correlation
 
 
-def _ends(it: Parameter, u: float, half: float) -> tuple[float, float]:
+def _interval_of(it: Parameter, u: float, half: float) -> tuple[float, float]:
     """Return the interval of a parameter's value, within what is permitted."""
     least, most = u_range(it)
     ends = [coordinate(it).to_value(end) for end in (max(u - half, least), min(u + half, most))]
@@ -123,13 +125,13 @@ def _ends(it: Parameter, u: float, half: float) -> tuple[float, float]:
     return float(lower), float(upper)
 
 
-def _alike(correlation: Floats, limit: float) -> list[tuple[int, int]]:
+def _indistinguishable_pairs(correlation: Floats, limit: float) -> list[tuple[int, int]]:
     """Return the index pairs of parameters that cannot be distinguished."""
     count = len(correlation)
     return [(j, k) for k in range(count) for j in range(k) if abs(correlation[j, k]) > limit]
 
 
-def _of_pairs(
+def _pair_warnings(
     problem: Problem, names: Sequence[str], pairs: Sequence[tuple[int, int]], correlation: Floats
 ) -> Iterator[str]:
     """Yield a sentence for every two parameters that cannot be distinguished."""
@@ -141,7 +143,7 @@ def _of_pairs(
         )
 
 
-def _of_the_parameters(
+def _parameter_warnings(
     problem: Problem, z: Floats, acts: NDArray[np.bool_], half: Floats, paired: Collection[int]
 ) -> Iterator[str]:
     """Yield warnings about unreliable single parameters."""
@@ -152,8 +154,8 @@ def _of_the_parameters(
             yield f"{it.name} does not change the {problem.compared}: {it.value:g} is its initial value"
         elif z[k] - problem.least[k] < near or problem.most[k] - z[k] < near:
             yield (
-                f"{it.name} ended at the edge of its range, {values[k]:.6g}{_edge(problem, k, z)}: the best value "
-                "may lie beyond, and the intervals ignore the edge"
+                f"{it.name} ended at the edge of its range, {values[k]:.6g}{_edge_reason(problem, k, z)}: the best "
+                "value may lie beyond, and the intervals ignore the edge"
             )
         elif k not in paired and half[k] > (
             math.log(VAGUE) if coordinate(it).relative is False else abs(problem.u(z)[k]) / VAGUE
@@ -161,7 +163,7 @@ def _of_the_parameters(
             yield f"{it.name} is hardly determined by {problem.varied}: see its interval"
 
 
-def _edge(problem: Problem, k: int, z: Floats) -> str:
+def _edge_reason(problem: Problem, k: int, z: Floats) -> str:
     """Return the reason for the end of a range that is not determined by the model alone, or ""."""
     it = problem.parameters[k]
     if it.field in NO_LESS_THAN and z[k] - problem.least[k] < problem.most[k] - z[k]:

@@ -20,7 +20,7 @@ from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Scene
 from study_app.lab.identify.estimates import Estimates, estimate
 from study_app.lab.identify.measured_force import FlowCurve, Measured, vectors_x
-from study_app.lab.identify.parameters import Parameter, find
+from study_app.lab.identify.parameters import Parameter, find_parameters
 from study_app.lab.identify.search import ForceProblem, Problem
 
 FOLLOWING: Final = 0.1
@@ -76,15 +76,15 @@ def fit(scene: Scene, liquid_id: str, names: Sequence[str], motion: Motion, forc
     """
     measured = Measured(motion, vectors_x(force_n) if force_n.ndim == 1 else force_n)
     scene = resolve(scene)
-    problem = ForceProblem(scene, liquid_id, find(scene, liquid_id, names), measured)
+    problem = ForceProblem(scene, liquid_id, find_parameters(scene, liquid_id, names), measured)
     z, fields = estimate(problem, liquid_id, names, float(np.linalg.norm(measured.force_n)))
     fitted_n = problem.force_n(z)
     residual_n = (measured.force_n - fitted_n)[:, problem.axes]
-    fields["warnings"] += tuple(_of_the_residuals(residual_n, fields["following"], measured.force_n))
+    fields["warnings"] += tuple(_residual_warnings(residual_n, fields["following"], measured.force_n))
     return Fit(**fields, motion=motion, measured_n=measured.force_n, fitted_n=fitted_n, axes=problem.axes)
 
 
-def _of_the_residuals(residual_n: Floats, rho: float, force_n: Floats) -> Iterator[str]:
+def _residual_warnings(residual_n: Floats, rho: float, force_n: Floats) -> Iterator[str]:
     """Yield warnings of correlated residuals, which speak against the model: noise is uncorrelated."""
     if rho > max(FOLLOWING, CHANCE / math.sqrt(residual_n.size)):
         share = _rms(residual_n) / _rms(force_n)
@@ -133,7 +133,7 @@ def fit_curve(scene: Scene, liquid_id: str, names: Sequence[str], curve: FlowCur
         No such liquid or parameter, none of a flow curve, or too little was measured.
     """
     scene = resolve(scene)
-    parameters = find(scene, liquid_id, names)
+    parameters = find_parameters(scene, liquid_id, names)
     for it in parameters:
         if it.table != CURVE_TABLE:
             raise StudyError(f"{it.name} does not change a flow curve: fit parameters of the table {CURVE_TABLE}")
@@ -142,11 +142,11 @@ def fit_curve(scene: Scene, liquid_id: str, names: Sequence[str], curve: FlowCur
     ordered = curve.ordered()
     problem = _CurveProblem(scene, liquid_id, parameters, ordered)
     z, fields = estimate(problem, liquid_id, names, float(np.sqrt(len(curve.rate_per_s))))
-    fields["warnings"] += tuple(_of_branches(curve))
+    fields["warnings"] += tuple(_branch_warnings(curve))
     return CurveFit(**fields, curve=ordered, fitted_pa=problem.stress_pa(z))
 
 
-def _of_branches(curve: FlowCurve) -> Iterator[str]:
+def _branch_warnings(curve: FlowCurve) -> Iterator[str]:
     """Yield a warning if two branches of a flow curve differ more than the noise along them.
 
     The noise of their difference is estimated from its second differences along the shear rate.

@@ -145,7 +145,7 @@ def along_a_line(t_s: Floats, velocity_mps: Floats, force_n: Floats) -> Measured
     return Measured(Motion(t_s, vectors_x(way_m), velocity_mps=vectors_x(velocity_mps)), vectors_x(force_n))
 
 
-def centred(motion: Motion) -> Motion:
+def with_centred_velocity(motion: Motion) -> Motion:
     """Return the motion with velocities (n, 3): slopes of parabolas through the places 12.5 ms to both sides.
 
     A measured force depends on the motion itself, not on a device's filter: these velocities have no lag. A motion that

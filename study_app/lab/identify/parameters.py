@@ -39,7 +39,7 @@ class Parameter:
     whole: bool
 
 
-def find(scene: Scene, liquid_id: str, names: Sequence[str]) -> tuple[Parameter, ...]:
+def find_parameters(scene: Scene, liquid_id: str, names: Sequence[str]) -> tuple[Parameter, ...]:
     """Return the parameters called ``names``, of a scene whose liquids name their effects.
 
     A name is a field of the liquid, of the tables of its effects or of the body, such as ``drag_coefficient``; where
@@ -58,10 +58,10 @@ def find(scene: Scene, liquid_id: str, names: Sequence[str]) -> tuple[Parameter,
         for other in parameters[:k]:
             if (parameter.table, parameter.field) == (other.table, other.field):
                 raise StudyError(f"{other.name} and {parameter.name} are the same parameter: name it once")
-    return tuple(_narrowed(it, tables[it.table], parameters) for it in parameters)
+    return tuple(_narrow_range(it, tables[it.table], parameters) for it in parameters)
 
 
-def _narrowed(it: Parameter, table: BaseModel, fitted: Sequence[Parameter]) -> Parameter:
+def _narrow_range(it: Parameter, table: BaseModel, fitted: Sequence[Parameter]) -> Parameter:
     """Return a parameter with its range limited by the fixed fields of `NO_LESS_THAN`."""
     fields = {parameter.field for parameter in fitted if parameter.table == it.table}
     for greater, less in NO_LESS_THAN.items():
@@ -72,7 +72,7 @@ def _narrowed(it: Parameter, table: BaseModel, fitted: Sequence[Parameter]) -> P
     return it
 
 
-def replace(scene: Scene, liquid_id: str, parameters: Sequence[Parameter], values: Sequence[float]) -> Scene:
+def replace_values(scene: Scene, liquid_id: str, parameters: Sequence[Parameter], values: Sequence[float]) -> Scene:
     """Return the scene with new values; those of whole numbers are rounded."""
     tree = scene.model_dump()
     for parameter, value in zip(parameters, values, strict=True):
@@ -100,11 +100,11 @@ def _tables(scene: Scene, liquid: Liquid) -> Iterator[tuple[str, BaseModel]]:
     yield "liquid", liquid
     for effect in EFFECTS:
         if effect.model is not None and effect.name in liquid.effects:
-            yield effect.name, _closed(scene, effect, getattr(liquid, effect.name))
+            yield effect.name, _fill_open_values(scene, effect, getattr(liquid, effect.name))
     yield "body", scene.body
 
 
-def _closed(scene: Scene, effect: Effect, table: BaseModel) -> BaseModel:
+def _fill_open_values(scene: Scene, effect: Effect, table: BaseModel) -> BaseModel:
     """Return a table with unset parameters computed from the scene."""
     values = {name: of(scene) for name, of in effect.open_values.items() if getattr(table, name) is None}
     return table.model_copy(update=values)

@@ -19,7 +19,7 @@ COLUMNS: Final = ("t_s", *(f"{kind}_{axis}_n" for kind in ("measured", "fitted",
 CURVE_COLUMNS: Final[tuple[str, ...]] = (*FLOW_CURVE, "fitted_pa", "residual_pa")
 
 
-def text(estimates: Estimates) -> str:
+def report_text(estimates: Estimates) -> str:
     """Return the report: the parameters before and after with their intervals, the residual, and warnings."""
     rows = [
         ["parameter", "from", "fitted", f"{100 * CONFIDENCE:g} % interval"],
@@ -34,7 +34,7 @@ def text(estimates: Estimates) -> str:
     )
 
 
-def write(fit: Fit | CurveFit, to: Path, source: Path) -> tuple[Path, ...]:
+def write_fit(fit: Fit | CurveFit, to: Path, source: Path) -> tuple[Path, ...]:
     """Write preset (TOML), report (text), residuals (CSV) and figure into the folder ``to``; return the files.
 
     ``source`` is the file that was measured: the preset names it with its hash.
@@ -56,12 +56,12 @@ def write(fit: Fit | CurveFit, to: Path, source: Path) -> tuple[Path, ...]:
     table = csv_text_of([columns, *zip(*(column.tolist() for column in values), strict=True)])
     title = f"{fit.liquid_id}: measured and fitted {what}"
     drawn = {f"{name}.{kind}": style.file_bytes(figure, kind, title, style.PLOT_SETTINGS) for kind in style.FORMATS}
-    texts = {f"{fit.liquid_id}.toml": preset(fit, source), f"{name}.txt": f"{text(fit)}\n"}
+    texts = {f"{fit.liquid_id}.toml": preset_file_text(fit, source), f"{name}.txt": f"{report_text(fit)}\n"}
     contents = {file: said.encode() for file, said in texts.items()}
     return write_files(to, {**contents, f"{name}.csv": table.encode(), **drawn})
 
 
-def preset(estimates: Estimates, source: Path) -> str:
+def preset_file_text(estimates: Estimates, source: Path) -> str:
     """Return the fitted scene as a scene file, each fitted number with its interval in a comment.
 
     The fit takes velocities from the measured motion, never from an estimator; the file names that of new files.

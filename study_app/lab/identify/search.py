@@ -19,7 +19,7 @@ from study_app.haptics.model.motion import Floats
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.offline import simulate
 from study_app.lab.identify.measured_force import Measured, at_rate
-from study_app.lab.identify.parameters import NO_LESS_THAN, Parameter, replace
+from study_app.lab.identify.parameters import NO_LESS_THAN, Parameter, replace_values
 
 _LEAST_POSITIVE: Final = 1e-12
 _HIGHEST_EXPONENT: Final = 700.0
@@ -164,7 +164,7 @@ class Problem:
         return moved
 
     def scene(self, z: Floats) -> Scene:
-        return replace(self._scene, self._liquid_id, self.parameters, self.values(z))
+        return replace_values(self._scene, self._liquid_id, self.parameters, self.values(z))
 
     def _longest(self, values: Sequence[float], k: int) -> float:
         """Return the greatest whole length that the scaling permits."""
@@ -223,7 +223,7 @@ class ForceProblem(Problem):
         return misfit
 
     def _simulated(self, values: Sequence[float]) -> Floats:
-        table = simulate(replace(self._scene, self._liquid_id, self.parameters, values), self._motion)
+        table = simulate(replace_values(self._scene, self._liquid_id, self.parameters, values), self._motion)
         columns = (table.fx_n, table.fy_n, table.fz_n)
         if self._motion is self.measured.motion:
             return np.column_stack(columns)

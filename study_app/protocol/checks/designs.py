@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Any, Final
 
 from study_app.errors import StudyError
-from study_app.haptics.model.overrides import number_names, override
+from study_app.haptics.model.overrides import number_names, override_value
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import OF_LEVELS, Contrast, Protocol, Published
 from study_app.protocol.orders.block_orders import order_of
@@ -252,7 +252,7 @@ def _presented(protocol: Protocol, stimulus: Stimulus, value: float) -> str | No
     if stimulus.vary in OF_CONDITION:
         return None
     try:
-        override(protocol.scene_for(condition_of(protocol, stimulus)), stimulus.vary, value)
+        override_value(protocol.scene_for(condition_of(protocol, stimulus)), stimulus.vary, value)
     except StudyError as error:
         return str(error)
     return None
@@ -304,9 +304,9 @@ def _can_change(protocol: Protocol, condition: str, vary: str, values: list[floa
 
     Of a force that is late it cannot: the forces on the way are those of the delay before.
     """
-    from study_app.haptics.runtime.pack import built_alike  # noqa: PLC0415 - loads numpy
+    from study_app.haptics.runtime.pack import is_built_alike  # noqa: PLC0415 - loads numpy
 
     if vary in OF_LINK:
         return False
     scenes = [scene_of(protocol, Stimulated(condition, vary, value)) for value in values]
-    return all(built_alike(one, other) for one, other in pairwise(scenes))
+    return all(is_built_alike(one, other) for one, other in pairwise(scenes))

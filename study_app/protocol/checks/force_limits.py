@@ -16,9 +16,9 @@ from typing import Final
 
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
 from study_app.haptics.model.estimators import NAMED
-from study_app.haptics.model.overrides import override
+from study_app.haptics.model.overrides import override_value
 from study_app.haptics.model.scene import MOST_DELAY_MS, Scene, Velocity
-from study_app.haptics.model.slope_limits import slope_limit, steady
+from study_app.haptics.model.slope_limits import slope_limit, steady_force
 from study_app.number_text import counted
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol, Reach
@@ -131,7 +131,7 @@ def clipped(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> It
     place, stimulus = ("stimuli", str(blocks[0].stimulus), "levels"), stimulus_of(protocol, blocks[0])
     blocks = [block for block in blocks if isinstance(protocol.tasks[block.task], Follow)]
     found = [(block, scene) for block in blocks for *_, scene in ends(protocol, block) if len(scene.liquids) == 1]
-    if all(steady(scene, hand_mps_of(protocol, block)).limit is None for block, scene in found):
+    if all(steady_force(scene, hand_mps_of(protocol, block)).limit is None for block, scene in found):
         return
     condition = condition_of(protocol, stimulus)
     if stimulus.vary in OF_LINK:
@@ -151,7 +151,7 @@ def clipped(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> It
     by_force = [one for one in every if (one.asked_n or 0.0) > scene.force_limit_n and one not in by_loop]
     if by_force:
         most = max(by_force, key=lambda one: one.asked_n or 0.0)
-        strongest = override(scene, stimulus.vary, most.comparison)
+        strongest = override_value(scene, stimulus.vary, most.comparison)
         named = _named(list(every), by_force, _IS)
         yield from clipped_at_pace(protocol, every[most], strongest, named, place)
 
@@ -174,12 +174,12 @@ def clipped_unpaced(protocol: Protocol, blocks: Sequence[Block]) -> str | None:
     """
     task = blocks[0].task
     found = [scene for one in blocks for *_, scene in ends(protocol, one) if len(scene.liquids) == 1]
-    if isinstance(protocol.tasks[task], Follow) or all(steady(one, UNPACED_MPS).limit is None for one in found):
+    if isinstance(protocol.tasks[task], Follow) or all(steady_force(one, UNPACED_MPS).limit is None for one in found):
         return None
     every = list(_every(protocol, blocks))
     some = [one for one in every if one.clipped_by is not None]
     of = f" of {_listed(every, some)}" if some else ""  # a number of the condition changes no force
-    by_loop = any(steady(one, UNPACED_MPS).limit == "slope" for one in found)
+    by_loop = any(steady_force(one, UNPACED_MPS).limit == "slope" for one in found)
     limit = "by the slope limit" if by_loop else f"at {protocol.device.force_limit_n:g} N"
     return f"tasks.{task}: at {UNPACED_MPS:g} m/s the force{of} is clipped {limit}: such trials are repeated: {PACED}"
 
@@ -193,10 +193,12 @@ def clipped_at_pace(protocol: Protocol, block: Block, scene: Scene, what: str, p
     if not isinstance(task, Follow):
         return
     pace_mps = task.fastest_stroke((0.0, 0.0, 0.0)).speed_mps
-    if len(scene.liquids) != 1 or (drag_n := steady(scene, FASTER * pace_mps).drag_n) <= scene.force_limit_n:
+    if len(scene.liquids) != 1 or (drag_n := steady_force(scene, FASTER * pace_mps).drag_n) <= scene.force_limit_n:
         return
     pace = FASTER * pace_mps
-    beyond = bisect_left(range(10**6), True, key=lambda n: steady(scene, n * 1e-6 * pace).drag_n > scene.force_limit_n)
+    beyond = bisect_left(
+        range(10**6), True, key=lambda n: steady_force(scene, n * 1e-6 * pace).drag_n > scene.force_limit_n
+    )
     least = (beyond - 1) * 1e-6
     yield Fault(
         place,
@@ -318,7 +320,7 @@ def _returned(protocol: Protocol, block: Block, stroke: Stroke) -> Fault | None:
 
 def damping_nspm(scene: Scene, stroke: Stroke) -> float:
     """Return the damping of a scene's liquid at the greatest speed of a stroke, at the hand [N·s/m]."""
-    return steady(scene, stroke.speed_mps).drag_n / stroke.speed_mps
+    return steady_force(scene, stroke.speed_mps).drag_n / stroke.speed_mps
 
 
 def returned_j(damping: float, stroke: Stroke, delay_s: float) -> float:

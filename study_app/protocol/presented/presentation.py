@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from study_app.haptics.model.overrides import override
+from study_app.haptics.model.overrides import override_value
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Condition, Protocol
@@ -35,7 +35,7 @@ def scene_of(protocol: Protocol, presented: Stimulated, link_seed: int = 0) -> S
         scene = Scene.model_validate(scene.model_copy(update={"link": link}))
     if presented.vary is None or presented.vary in OF_CONDITION:
         return scene
-    return override(scene, presented.vary, presented.value)
+    return override_value(scene, presented.vary, presented.value)
 
 
 def presented_condition(protocol: Protocol, presented: Stimulated) -> Condition:

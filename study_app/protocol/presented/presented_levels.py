@@ -12,9 +12,9 @@ from typing import Final, Literal
 import numpy as np
 
 from study_app.errors import StudyError
-from study_app.haptics.model.overrides import override
+from study_app.haptics.model.overrides import override_value
 from study_app.haptics.model.scene import Scene
-from study_app.haptics.model.slope_limits import steady
+from study_app.haptics.model.slope_limits import steady_force
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.tracks import condition_of, method_of, standards_of, stimulus_of
@@ -130,8 +130,8 @@ def _level(stimulus: Stimulus, scene: Scene, hand_mps: float, standard: float | 
     comparison = stimulus.comparison(standard, level)
     if stimulus.vary in OF_CONDITION or len(scene.liquids) != 1:
         return Level(standard=standard, level=level, comparison=comparison)
-    varied = override(scene, stimulus.vary, comparison)
-    force = steady(varied, hand_mps)
+    varied = override_value(scene, stimulus.vary, comparison)
+    force = steady_force(varied, hand_mps)
     return Level(
         standard=standard,
         level=level,
@@ -155,11 +155,11 @@ def level_limits(protocol: Protocol, block: Block) -> LevelLimits | None:
     hand_mps = hand_mps_of(protocol, block)
 
     def beyond_force(value: float) -> bool:
-        return steady(override(scene, stimulus.vary, value), hand_mps).drag_n > scene.force_limit_n
+        return steady_force(override_value(scene, stimulus.vary, value), hand_mps).drag_n > scene.force_limit_n
 
     def beyond_loop(value: float) -> bool:
-        unlimited = override(scene, stimulus.vary, value).model_copy(update={"force_limit_n": math.inf})
-        return steady(unlimited, hand_mps).limit is not None
+        unlimited = override_value(scene, stimulus.vary, value).model_copy(update={"force_limit_n": math.inf})
+        return steady_force(unlimited, hand_mps).limit is not None
 
     return LevelLimits(force=_last(beyond_force, most), loop=_last(beyond_loop, most), hand_mps=hand_mps)
 
@@ -189,7 +189,7 @@ def clipping(protocol: Protocol, block: Block, limits: LevelLimits | None = None
         return None
     scenes = [scene for *_, scene in ends(protocol, block) if len(scene.liquids) == 1]
     hand_mps = hand_mps_of(protocol, block)
-    if all(steady(scene, hand_mps).limit is None for scene in scenes):
+    if all(steady_force(scene, hand_mps).limit is None for scene in scenes):
         return None
     limits = limits or level_limits(protocol, block)
     if limits is None or not limits.lowest:
@@ -214,7 +214,7 @@ def ends(protocol: Protocol, block: Block) -> Iterator[tuple[float | None, float
     for standard, level in product(standards_of(protocol, block), (max(asked), min(asked))):
         varied = scene
         if stimulus.vary not in OF_LINK:
-            varied = override(scene, stimulus.vary, stimulus.comparison(standard, level))
+            varied = override_value(scene, stimulus.vary, stimulus.comparison(standard, level))
         yield standard, level, varied
 
 

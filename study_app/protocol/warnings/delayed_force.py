@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from study_app.haptics.model.slope_limits import steady
+from study_app.haptics.model.slope_limits import steady_force
 from study_app.protocol.checks.consistency import numbers
 from study_app.protocol.checks.force_limits import LIMIT_J, damping_nspm, returned_j
 from study_app.protocol.checks.force_limits import longest_ms as longest_returned_ms
@@ -106,7 +106,7 @@ def _of_table(protocol: Protocol, name: str, liquid: str, delay_ms: float) -> st
     percent = float(np.interp(delay_ms, [it.delay_ms for it in rows], [it.withheld_percent for it in rows]))
     if percent <= WITHHELD_PERCENT:
         return None
-    force_n = steady(protocol.scene_for(name), STIRRED.speed_mps).drag_n
+    force_n = steady_force(protocol.scene_for(name), STIRRED.speed_mps).drag_n
     return (
         f"with {delay_ms:.3g} ms the passivity controller withholds about {percent:.0f} % of the force from a light "
         f"hand ({percent / 100 * force_n:.2g} of {force_n:.2g} N at {STIRRED.speed_mps:.2g} m/s): choose at most "

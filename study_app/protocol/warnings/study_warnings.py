@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from itertools import combinations, pairwise
 
 from study_app.haptics.model.effects.drag import REFERENCE, resistance_n
-from study_app.haptics.model.gate import met_mps
-from study_app.haptics.model.slope_limits import HAND_MPS, Steady, steady
+from study_app.haptics.model.gate import effective_speed_mps
+from study_app.haptics.model.slope_limits import HAND_MPS, Steady, steady_force
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.consistency import LEAST_N, force_n
 from study_app.protocol.checks.force_limits import PACED, clipped_unpaced, fastest_hz
@@ -53,7 +53,7 @@ def warnings(protocol: Protocol, *, simulates: bool = True, without_force: str =
 
 def liquid_warnings(protocol: Protocol) -> tuple[str, ...]:
     """Return what may be a mistake of the liquids, a sentence each."""
-    felt = {name: steady(protocol.scene_of(name)) for name in protocol.liquids}
+    felt = {name: steady_force(protocol.scene_of(name)) for name in protocol.liquids}
     return (
         *_alike(protocol, felt),
         *_clipped(felt),
@@ -102,7 +102,7 @@ def _ignoring_viscosity(protocol: Protocol, felt: dict[str, Steady]) -> Iterator
         (liquid,) = scene.liquids
         if liquid.viscosity_pa_s is None:
             continue
-        speed_mps = met_mps(scene, liquid, scene.scale * HAND_MPS)
+        speed_mps = effective_speed_mps(scene, liquid, scene.scale * HAND_MPS)
         named_n, true_n = (resistance_n(scene, liquid, speed_mps, law) for law in ("constant", REFERENCE))
         if "drag" in liquid.effects and liquid.drag.law == "constant":
             why, instead = "its constant drag coefficient ignores it", f'drag = {{ law = "{REFERENCE}" }}'

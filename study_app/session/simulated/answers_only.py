@@ -46,7 +46,7 @@ from study_app.session.transitions.events import (
 )
 from study_app.session.transitions.page_builder import preview
 from study_app.session.transitions.state import FINAL, SessionState
-from study_app.session.transitions.table import advance, open_session
+from study_app.session.transitions.table import advance, initial_state
 from study_app.store.blinded.allocation import simulated_groups
 from study_app.store.folders import StudyFolder, rehearsal_folder
 from study_app.store.journals.journal import SessionClock
@@ -111,20 +111,22 @@ def rehearse_answers(
     said_s = time.monotonic()
     with kept:
         for number, person in enumerate(people, start=1):
-            _answer(study, person, groups[person], kept, features)
+            _answer_session(study, person, groups[person], kept, features)
             if progress is not None and (time.monotonic() - said_s >= SAY_EVERY_S or number == participants):
                 said_s = time.monotonic()
                 progress(f"{person}: {number} of {participants} answered (simulated)")
     return folder
 
 
-def _answer(study: Protocol, who: str, group: str | None, kept: SimulatedStudy, features: ConditionFeatures) -> None:
+def _answer_session(
+    study: Protocol, who: str, group: str | None, kept: SimulatedStudy, features: ConditionFeatures
+) -> None:
     """Simulate the answers of one session; ``group`` is the participant's pre-existing group."""
     time_passed = SimulatedTime()
     store = kept.begin(who, SessionClock(time_passed.ns, datetime.now().astimezone()), group)
     own = store.protocol
     schedule = begun_schedule(own, start_of(store.lines), kept.key)
-    state = open_session(own, schedule, kept.key.codes, study.study.languages[0], secret=kept.key.nonce)
+    state = initial_state(own, schedule, kept.key.codes, study.study.languages[0], secret=kept.key.nonce)
     Answering(study, state, store, time_passed, lambda block, condition: features[block, condition]).run()
 
 
@@ -255,7 +257,7 @@ class Answering(SimulatedParticipant):
                 """What moves, measures or stops something has nothing to do here."""
 
 
-def begin_at(results: Path, study: Protocol, source: bytes, start: SessionStart, step: int) -> Path:
+def begin_session_at_step(results: Path, study: Protocol, source: bytes, start: SessionStart, step: int) -> Path:
     """Begin a simulated session in a new study folder, answer the steps before ``step``; return the session's folder.
 
     The session is unfinished; when resumed exactly, it continues at ``step`` or the next step that is due.
@@ -281,7 +283,7 @@ def begin_at(results: Path, study: Protocol, source: bytes, start: SessionStart,
         The folder cannot be written.
     """
     shown = preview(study, start.seed, start.participant)
-    state = open_session(shown.protocol, shown.schedule, shown.codes, start.language, secret=shown.secret)
+    state = initial_state(shown.protocol, shown.schedule, shown.codes, start.language, secret=shown.secret)
     lines, passed = _Lines(), SimulatedTime()
     answering = Answering(study, state, lines, passed, lambda _block, _condition: (NO_FEATURES,))
     lines.session = answering

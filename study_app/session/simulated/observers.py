@@ -22,7 +22,7 @@ from study_app.protocol.simulated import Rater, TrialFeatures, judgements
 from study_app.protocol.trials.tasks import Reach, Task
 from study_app.psychophysics.delivery import lag
 from study_app.session.pages import DesignPage, QuestionnairePage, TextPage
-from study_app.session.tasks import TankView, track
+from study_app.session.tasks import TankView, new_tracker
 from study_app.store.delivered import LONGEST_S
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -116,7 +116,7 @@ def exploration(draw: Draw, half_m: tuple[float, float, float], duration_s: floa
     while sum(map(len, pieces)) < duration_s * RATE_HZ:
         coming = coming or list(shuffle(FIGURES, draw))
         pieces += coming.pop()(draw, reach_m, pieces[-1][-1])
-        pieces.append(np.tile(pieces[-1][-1], (_rows(_between(draw, *REST_S)), 1)))
+        pieces.append(np.tile(pieces[-1][-1], (_rows(_draw_between(draw, *REST_S)), 1)))
     position_m = np.concatenate(pieces)
     return np.arange(len(position_m)) / RATE_HZ, position_m
 
@@ -128,9 +128,9 @@ def _strokes(along: int, aside: int, sides: tuple[int, ...]) -> Figure:
         ends_m = np.zeros((len(sides), 3))
         ends_m[:, along], ends_m[:, aside] = (
             np.array(sides) * reach_m[along],
-            _between(draw, -1, 1) * reach_m[aside] * 0.5,
+            _draw_between(draw, -1, 1) * reach_m[aside] * 0.5,
         )
-        return _through(draw, start_m, list(ends_m))
+        return _path_through(draw, start_m, list(ends_m))
 
     return figure
 
@@ -139,13 +139,13 @@ def _zigzag(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
     """Return the path of a crossing of the tank in legs that turn by about 90°."""
     across = np.linspace(-1, 1, 6) * reach_m[0]
     side = reach_m[2] * 0.5
-    return _through(draw, start_m, [np.array([x, 0.0, side * (1 - 2 * (i % 2))]) for i, x in enumerate(across)])
+    return _path_through(draw, start_m, [np.array([x, 0.0, side * (1 - 2 * (i % 2))]) for i, x in enumerate(across)])
 
 
 def _circles(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
     """Return the path of stirring: three circles about the middle, begun and ended at full speed."""
-    radius_m = min(reach_m[0], reach_m[2]) * _between(draw, 0.6, 1.0)
-    pace_mps = _between(draw, *PACE_MPS)
+    radius_m = min(reach_m[0], reach_m[2]) * _draw_between(draw, 0.6, 1.0)
+    pace_mps = _draw_between(draw, *PACE_MPS)
     first = np.array([radius_m, 0.0, 0.0])
     corners = np.empty(_CORNERS + 1, complex)
     corners[0] = 1.0
@@ -158,10 +158,10 @@ def _circles(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
     return [_stroke(start_m, first, pace_mps), radius_m * np.column_stack((x, np.zeros(rows), z))]
 
 
-def _through(draw: Draw, start_m: Floats, places_m: list[Floats]) -> list[Floats]:
+def _path_through(draw: Draw, start_m: Floats, places_m: list[Floats]) -> list[Floats]:
     """Return the path through places, each stroke with its own speed."""
     return [
-        _stroke(begin, end, _between(draw, *PACE_MPS))
+        _stroke(begin, end, _draw_between(draw, *PACE_MPS))
         for begin, end in zip([start_m, *places_m[:-1]], places_m, strict=True)
     ]
 
@@ -188,7 +188,7 @@ def _rows(duration_s: float) -> int:
     return max(1, round(duration_s * RATE_HZ))
 
 
-def _between(draw: Draw, low: float, high: float) -> float:
+def _draw_between(draw: Draw, low: float, high: float) -> float:
     return low + (high - low) * draw()
 
 
@@ -229,7 +229,7 @@ class Reacher:
             return False
         if lit != self._seen:
             self._seen = lit
-            self._move_s = now_s + _between(self._draw, *REACTION_S)
+            self._move_s = now_s + _draw_between(self._draw, *REACTION_S)
             self._outside_since_s = None
         elif self._move_s and now_s >= self._move_s:
             self._reach_for(lit)
@@ -249,7 +249,7 @@ class Reacher:
     def _reach_for(self, target: int) -> None:
         self._move_s = 0.0
         error_m = AIM_ERROR * self._task.radius_m
-        x, y, z = (place + error_m * _between(self._draw, -1, 1) for place in self._task.targets_m[target])
+        x, y, z = (place + error_m * _draw_between(self._draw, -1, 1) for place in self._task.targets_m[target])
         self._device.reach_to(x, y, z)
 
 
@@ -259,8 +259,10 @@ class Follower:
     def __init__(self, task: Task, device: HandOrders, draw: Draw, _now_s: float) -> None:
         t_s = np.arange(round(task.limit_s * FOLLOWED_HZ) + 1) / FOLLOWED_HZ
         error_m = AIM_ERROR * task.radius_m
-        path_m = _followed(task, t_s)
-        path_m += np.array([error_m * _between(draw, -1, 1) for _ in range(3)]) * np.minimum(t_s, 1.0)[:, np.newaxis]
+        path_m = _target_path(task, t_s)
+        path_m += (
+            np.array([error_m * _draw_between(draw, -1, 1) for _ in range(3)]) * np.minimum(t_s, 1.0)[:, np.newaxis]
+        )
         device.follow(t_s, path_m)
 
     def act(self, _now_s: float, _view: TankView) -> bool:
@@ -276,18 +278,18 @@ class Hand(Protocol):
         ...
 
 
-def hand_for(task: Task, device: HandOrders, draw: Draw, now_s: float) -> Hand:
+def hand_behaviour(task: Task, device: HandOrders, draw: Draw, now_s: float) -> Hand:
     """Return the behaviour for a task with a simulated hand, from ``now_s`` on [s]."""
     made: Hand = resolve_name(task.hand)(task, device, draw, now_s)
     return made
 
 
-def _followed(task: Task, times_s: Floats) -> Floats:
+def _target_path(task: Task, times_s: Floats) -> Floats:
     """Return the positions (n, 3) [m, hand frame] of the moving target at times (n,) [s]."""
     return np.array([task.target_m(float(time_s)) for time_s in times_s])
 
 
-def rest(task: Task, device: HandOrders, *, returns: bool) -> None:
+def rest_hand(task: Task, device: HandOrders, *, returns: bool) -> None:
     """Move a simulated hand after a task to the start of the next interval, if that is a fixed position.
 
     Otherwise it ``returns`` to the middle, where an exploration begins, or stays, and jumps there as the next trial
@@ -310,15 +312,15 @@ class Choice:
     after_s: float
 
 
-def filled_in(page: QuestionnairePage, features: TrialFeatures, person: Rater, draw: Draw) -> list[Choice]:
+def fill_in_page(page: QuestionnairePage, features: TrialFeatures, person: Rater, draw: Draw) -> list[Choice]:
     """Return the choices that answer a page, from the features of the trial."""
     judged = judgements([item.id for item in page.items], features, person, draw)
     answers = {item.id: item.simulated(judged[item.id], draw) for item in page.items}
     visible = shown(page.items, answers)
-    return choices([item for item in page.items if item.id in visible], answers, draw)
+    return answer_choices([item for item in page.items if item.id in visible], answers, draw)
 
 
-def choices(
+def answer_choices(
     items: Iterable[ItemView], answers: Mapping[str, Value], draw: Draw, *, changes_mind: bool = True
 ) -> list[Choice]:
     """Return the choices that give ``answers`` in order, sometimes with a neighbouring value first."""
@@ -326,12 +328,12 @@ def choices(
     for item in items:
         value = answers[item.id]
         if changes_mind and draw() < CHANGES_MIND and (nearby := item.nearby(value)) != value:
-            given.append(Choice(item.id, nearby, _between(draw, *ANSWER_S)))
-        given.append(Choice(item.id, value, _between(draw, *ANSWER_S)))
+            given.append(Choice(item.id, nearby, _draw_between(draw, *ANSWER_S)))
+        given.append(Choice(item.id, value, _draw_between(draw, *ANSWER_S)))
     return given
 
 
-def newly_shown(
+def newly_shown_questions(
     page: QuestionnairePage | DesignPage, answers: Mapping[str, Value], seen: Collection[str]
 ) -> tuple[str, ...]:
     """Return the questions of a page that appear because of the answers so far."""
@@ -363,7 +365,7 @@ class ProgrammedBall:
         self._times_ns = np.round(times_s * 1e9).astype(np.int64)
         samples = np.zeros(len(times_s), _SAMPLE)
         samples["time_ns"], samples["position_m"] = self._times_ns, self._positions_m
-        self._tracker = track(task)
+        self._tracker = new_tracker(task)
         self._tracker.feed(samples)
 
     def view(self, elapsed_s: float) -> TankView:
@@ -382,7 +384,7 @@ def task_path(
         return _reaches(task, duration_s)
     if task.paced:
         times_s = np.arange(0.0, duration_s, 1 / RATE_HZ)
-        return times_s, _followed(task, times_s)
+        return times_s, _target_path(task, times_s)
     x, y, z = (size / 2 for size in workspace_m)
     times_s, positions_m = exploration(stream(seed, "preview/hand").random, (x, y, z), duration_s)
     kept = times_s <= duration_s

@@ -17,7 +17,7 @@ from study_app.protocol.raters import REHEARSED
 from study_app.protocol.simulated import Comparison, Course, Observer, TrialFeatures, courses_of, observer_of, rater
 from study_app.protocol.tracks import design_of
 from study_app.session.pages import ChoicePage, DesignPage, Page, QuestionnairePage
-from study_app.session.simulated.observers import Choice, Draw, choices, filled_in, newly_shown
+from study_app.session.simulated.observers import Choice, Draw, answer_choices, fill_in_page, newly_shown_questions
 from study_app.session.transitions.events import Chosen, Event, ItemShown, Submitted
 
 LOOK_AT_SETTING_S: Final = 0.5
@@ -143,9 +143,11 @@ class SimulatedParticipant(ABC):
             given = self._judged(block, trial, draw)
             if isinstance(given, float):
                 given = plain_number(max(0.01, round(given, 2)))
-            return choices(page.items, {page.items[0].id: given}, draw, changes_mind=not isinstance(page, ChoicePage))
+            return answer_choices(
+                page.items, {page.items[0].id: given}, draw, changes_mind=not isinstance(page, ChoicePage)
+            )
         assert isinstance(page, QuestionnairePage)  # noqa: S101 - only designs have other pages
-        return filled_in(page, self._felt(trial), self._person, draw)
+        return fill_in_page(page, self._felt(trial), self._person, draw)
 
     def _judged(self, block: Block, trial: int, draw: Draw) -> str | int | float:
         """Return the answer to a trial of a block with a design; earlier ones of a resumed session are given again."""
@@ -167,7 +169,7 @@ class SimulatedParticipant(ABC):
         self, page: QuestionnairePage | DesignPage, answers: Mapping[str, Value], seen: Collection[str]
     ) -> tuple[str, ...]:
         """Notice the questions that appeared; return them."""
-        appeared = newly_shown(page, answers, seen)
+        appeared = newly_shown_questions(page, answers, seen)
         for item in appeared:
             self._post(ItemShown(self._seconds(), item))
         return appeared

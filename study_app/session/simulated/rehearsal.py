@@ -61,7 +61,15 @@ from study_app.session.resume import (
     source_to_resume,
 )
 from study_app.session.runner import Runner
-from study_app.session.simulated.observers import Choice, Draw, SensedTrial, choices, hand_for, reading_s, rest
+from study_app.session.simulated.observers import (
+    Choice,
+    Draw,
+    SensedTrial,
+    answer_choices,
+    hand_behaviour,
+    reading_s,
+    rest_hand,
+)
 from study_app.session.simulated.participant import LOOK_AT_SETTING_S, AdjustingObserver, SimulatedParticipant
 from study_app.session.tasks import TankView
 from study_app.session.transitions.events import Begin, Continue, Event, ResumeRequested, Stepped, Submitted
@@ -114,11 +122,11 @@ Where a level is set, the answer is by how many steps, above 0 towards more; 0 c
 """
 
 
-def _plain(value: Any) -> Any:
+def _plain_answer(value: Any) -> Any:
     """Return an answer as Python numbers and texts; a list or array becomes a tuple."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
-    return tuple(_plain(item) for item in value) if isinstance(value, list | tuple) else value
+    return tuple(_plain_answer(item) for item in value) if isinstance(value, list | tuple) else value
 
 
 class HeldSignals:
@@ -319,7 +327,7 @@ class RehearsedSession(SimulatedParticipant):
         senses = SensedTrial(scale=self._study.scene.scale, period_s=self._period_s)
         self._touch.read()
         self._next_frame_ns = self.rig.servo.now_ns()
-        hand = hand_for(page.task, arm, draw, self._now_s())
+        hand = hand_behaviour(page.task, arm, draw, self._now_s())
         setting = _Setting(self._adjusting(page.trial), self._study.scene.scale) if page.adjusts else None
         self.look(senses)  # the first frame, which begins the trial, is painted at once
         while page is self.page:
@@ -333,7 +341,7 @@ class RehearsedSession(SimulatedParticipant):
                 self._set(page, setting, view, samples)
             if wants_to_go_on and page is self.page:
                 self._post(Continue(self._now_s()))
-        rest(page.task, arm, returns=self._study.format > 1)  # rehearsals of format 1 keep their results
+        rest_hand(page.task, arm, returns=self._study.format > 1)  # rehearsals of format 1 keep their results
         earlier = () if interval is None or interval.number == 1 else self._features_of.get(page.trial, ())
         self._features_of[page.trial] = (*earlier, senses.features())
         if self._tell_features is not None:
@@ -391,12 +399,12 @@ class RehearsedSession(SimulatedParticipant):
         if given is None:
             return super()._answers_to(page)
         named = given if isinstance(given, Mapping) else {page.items[0].id: given}
-        answers = {item: _plain(value) for item, value in named.items()}
+        answers = {item: _plain_answer(value) for item, value in named.items()}
         if unknown := answers.keys() - {item.id for item in page.items}:
             possible = ", ".join(item.id for item in page.items)
             raise SessionError(f"{', '.join(map(repr, sorted(unknown)))} is not asked on this page: answer {possible}")
         visible = [item for item in page.items if item.id in shown(page.items, answers) and item.id in answers]
-        return choices(visible, answers, self._stream(page.stream), changes_mind=False)
+        return answer_choices(visible, answers, self._stream(page.stream), changes_mind=False)
 
     def _felt(self, trial: int | None) -> TrialFeatures:
         return NO_FEATURES if trial is None else {**self._features_of, **self._known}[trial][-1]
@@ -429,7 +437,7 @@ def condition_features(
     for number in range(1, people + 1):
         person = f"P{number:03d}"
         schedule = build_schedule(protocol, person, seed)
-        places = {trial.number: _presented(protocol, key, schedule, trial) for trial in schedule.trials}
+        places = {trial.number: _presented_conditions(protocol, key, schedule, trial) for trial in schedule.trials}
 
         def feel(
             trial: int, features: tuple[TrialFeatures, ...], places: Mapping[int, tuple[Where, ...]] = places
@@ -445,7 +453,7 @@ def condition_features(
     return {where: tuple(features) for where, features in by_condition.items()}
 
 
-def _presented(protocol: Protocol, key: LevelKey, schedule: Schedule, trial: Trial) -> tuple[Where, ...]:
+def _presented_conditions(protocol: Protocol, key: LevelKey, schedule: Schedule, trial: Trial) -> tuple[Where, ...]:
     """Return block and condition of each interval of a trial, none if it is passed over for any answers."""
     if protocol.blocks[trial.block].design is None:
         return ((trial.block, key.codes[trial.block][trial.code]),)
@@ -662,12 +670,12 @@ def open_session(
             rehearsed = RehearsedSession(
                 own, begun_schedule(own, start_of(store.lines), store.key), rig, store, observer=observer, answer=answer
             )
-            with _tables_of(store):
+            with _updated_tables(store):
                 yield rehearsed, store
 
 
 @contextmanager
-def _tables_of(store: SessionStore) -> Iterator[None]:
+def _updated_tables(store: SessionStore) -> Iterator[None]:
     """Update the tables of a session that is left before its end."""
     try:
         yield
@@ -677,7 +685,7 @@ def _tables_of(store: SessionStore) -> Iterator[None]:
                 store.write_tables()
 
 
-def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
+def resume_rehearsal(session_folder: Path, *, protocol: str | Path | None = None) -> None:
     """Resume an interrupted rehearsed session and run it to its last page; errors as in `reopen_session`."""
     with reopen_session(session_folder, protocol=protocol) as (rehearsal, _):
         rehearsal.run()
@@ -730,7 +738,7 @@ def reopen_session(
         with store:
             start = resume_at(own, schedule, lines, store.key)
             known = _features_of_whole_session(own, schedule, rig.device.name, store.key.codes, store.key.nonce)
-            with _tables_of(store):
+            with _updated_tables(store):
                 yield RehearsedSession(own, schedule, rig, store, start, known=known, answer=answer), store
 
 

@@ -41,18 +41,18 @@ from study_app.session.transitions.steps import (
     FADE_OUT_S,
     Commands,
     Result,
-    before_end,
-    break_off,
-    enter,
+    attempt_fields,
     enter_reached,
+    enter_step,
+    find_due_step,
+    interrupt_trial,
+    is_before_end,
     keep_setting,
     present_again,
-    reach,
-    rest,
-    show,
+    rest_before_interval,
+    show_page,
     start_interval,
     start_trial,
-    which,
 )
 from study_app.store.delivered import broken_trial_limits, delay_error_ms
 from study_app.store.journals import journal_events as journal
@@ -61,17 +61,17 @@ from study_app.store.journals.journal_events import CAUSE_WITHHELD
 STOPPABLE = {Phase.READING, Phase.TASK, Phase.RESTING, Phase.ANSWERING, Phase.FEEDBACK, Phase.PAUSED}
 
 
-def begin(state: SessionState, event: Begin) -> Result:
+def begin_session(state: SessionState, event: Begin) -> Result:
     """Go to the first step, or to that of a resumed session; a trial waits there, paused."""
     start = state.plan.start
-    reached, done = reach(replace(state, heard=start.heard), start.step, at_s=event.at_s)
+    reached, done = find_due_step(replace(state, heard=start.heard), start.step, at_s=event.at_s)
     if start == FIRST or reached.phase is Phase.ENDED or not isinstance(reached.step, Trial):
         return enter_reached(reached, done)
     waiting = replace(reached, phase=Phase.PAUSED, interrupted=Phase.TASK, attempt=reached.attempt - 1)
-    return waiting, (*done, Write(journal.Paused(by="program")), WriteTables(), show(waiting))
+    return waiting, (*done, Write(journal.Paused(by="program")), WriteTables(), show_page(waiting))
 
 
-def read_on(state: SessionState, event: Continue) -> Result:
+def continue_reading(state: SessionState, event: Continue) -> Result:
     """Leave a text page, but not before its least time."""
     if state.stays_until_s is not None and event.at_s < state.stays_until_s:
         return state, ()
@@ -80,7 +80,7 @@ def read_on(state: SessionState, event: Continue) -> Result:
     if agreed := text.kind == "consent":
         version = state.plan.protocol.study.version
         left = replace(left, text_sha256=consent_hash(state, text), study_version=version)
-    return enter(state, state.index + 1, (Write(left, waits=agreed),), at_s=event.at_s)
+    return enter_step(state, state.index + 1, (Write(left, waits=agreed),), at_s=event.at_s)
 
 
 def choose_language(state: SessionState, event: LanguageChosen) -> Result:
@@ -91,7 +91,7 @@ def choose_language(state: SessionState, event: LanguageChosen) -> Result:
         offered = f"choose {' or '.join(state.languages)}" if state.languages else "it is chosen before the consent"
         raise SessionError(f"language {event.language!r} cannot be chosen now: {offered}")
     chosen = replace(state, plan=replace(state.plan, language=event.language))
-    return chosen, (Write(journal.LanguageChosen(language=event.language)), WriteTables(), show(chosen))
+    return chosen, (Write(journal.LanguageChosen(language=event.language)), WriteTables(), show_page(chosen))
 
 
 def leave_task(state: SessionState, _event: Continue) -> Result:
@@ -99,7 +99,7 @@ def leave_task(state: SessionState, _event: Continue) -> Result:
     return state, () if state.adjusts else (LeaveTask(),)
 
 
-def step(state: SessionState, event: Stepped) -> Result:
+def adjust_level(state: SessionState, event: Stepped) -> Result:
     """Adjust the level within its range; do nothing outside of an adjustable interval."""
     setting, due = state.adjusting, state.due
     if setting is None or due is None:
@@ -108,7 +108,7 @@ def step(state: SessionState, event: Stepped) -> Result:
     presented = replace(due.intervals[state.interval - 1], value=setting.comparison(place))
     delay_s = delay_s_of(state.plan.protocol, presented)
     moved = replace(state, steps=state.steps + event.steps, place=place)
-    return moved, (Adjust(presented, delay_s, journal.Stepped(**which(state), steps=event.steps, scene=None)),)
+    return moved, (Adjust(presented, delay_s, journal.Stepped(**attempt_fields(state), steps=event.steps, scene=None)),)
 
 
 def confirm_setting(state: SessionState, _event: Submitted) -> Result:
@@ -134,49 +134,55 @@ def end_task(state: SessionState, event: TaskDone) -> Result:
         if (setting := state.adjusting) is not None:
             measures["setting"] = setting.level(state.place)
         ended = journal.IntervalEnded(
-            **which(state), interval=state.interval, outcome=event.outcome, invalid=reasons or None, others=measures
+            **attempt_fields(state),
+            interval=state.interval,
+            outcome=event.outcome,
+            invalid=reasons or None,
+            others=measures,
         )
         done = (*done, Write(ended))
         if reasons:
             return present_again(state, done, event.at_s)
         measures = {}  # measures are those of the intervals
         if state.interval < design.intervals:
-            return rest(replace(state, interval=state.interval + 1), done, event.at_s + FADE_OUT_S + design.pause_s)
-    done = (*done, Write(journal.TrialEnded(**which(state), outcome=event.outcome, others=measures)))
+            return rest_before_interval(
+                replace(state, interval=state.interval + 1), done, event.at_s + FADE_OUT_S + design.pause_s
+            )
+    done = (*done, Write(journal.TrialEnded(**attempt_fields(state), outcome=event.outcome, others=measures)))
     if state.adjusts:
         return keep_setting(state, done, event.at_s)
     if not state.asks:
-        return enter(state, state.index + 1, done, at_s=event.at_s)
+        return enter_step(state, state.index + 1, done, at_s=event.at_s)
     asking = replace(state, phase=Phase.ANSWERING, answers={})
-    return asking, (*done, WriteTables(), show(asking))
+    return asking, (*done, WriteTables(), show_page(asking))
 
 
 def end_rest(state: SessionState, event: TimeUp) -> Result:
     """Present the next interval after its rest."""
-    return (state, ()) if before_end(state, event.at_s) else start_interval(state, (), event.at_s)
+    return (state, ()) if is_before_end(state, event.at_s) else start_interval(state, (), event.at_s)
 
 
 def end_feedback(state: SessionState, event: TimeUp) -> Result:
     """Continue after the time of the feedback."""
-    return (state, ()) if before_end(state, event.at_s) else enter(state, state.index + 1, at_s=event.at_s)
+    return (state, ()) if is_before_end(state, event.at_s) else enter_step(state, state.index + 1, at_s=event.at_s)
 
 
-def pause(state: SessionState, event: PauseRequested) -> Result:
+def pause_session(state: SessionState, event: PauseRequested) -> Result:
     """Show the pause; the current attempt at a task ends."""
     held: Hold | None = "pause" if event.by == "operator" else None
     paused = replace(state, phase=Phase.PAUSED, interrupted=state.phase, held=held)
-    return paused, (*break_off(state), Write(journal.Paused(by=event.by)), WriteTables(), show(paused))
+    return paused, (*interrupt_trial(state), Write(journal.Paused(by=event.by)), WriteTables(), show_page(paused))
 
 
-def pause_again(state: SessionState, event: PauseRequested) -> Result:
+def take_over_pause(state: SessionState, event: PauseRequested) -> Result:
     """Convert the participant's pause to the operator's; otherwise do nothing."""
     if event.by != "operator" or state.held is not None:
         return state, ()
     paused = replace(state, held="pause")
-    return paused, (Write(journal.Paused(by=event.by)), WriteTables(), show(paused))
+    return paused, (Write(journal.Paused(by=event.by)), WriteTables(), show_page(paused))
 
 
-def resume(state: SessionState, event: ResumeRequested) -> Result:
+def resume_session(state: SessionState, event: ResumeRequested) -> Result:
     """Return to the interrupted phase and fade the force in if it was off; only the operator ends a held pause."""
     if state.held is not None and event.by != "operator":
         what = "the force was stopped" if state.held == "force" else "the operator paused the session"
@@ -188,8 +194,8 @@ def resume(state: SessionState, event: ResumeRequested) -> Result:
     if state.phase in {Phase.TASK, Phase.RESTING}:
         return start_trial(replace(state, attempt=state.attempt + 1), back, event.at_s)
     if state.phase is Phase.FEEDBACK:
-        return enter(state, state.index + 1, back, at_s=event.at_s)
-    return state, (*back, show(state))
+        return enter_step(state, state.index + 1, back, at_s=event.at_s)
+    return state, (*back, show_page(state))
 
 
 def stop_force(state: SessionState, event: ForceStopped) -> Result:
@@ -198,10 +204,10 @@ def stop_force(state: SessionState, event: ForceStopped) -> Result:
     held: Hold | None = state.held if event.by == "program" else "force"
     if state.phase is Phase.PAUSED:
         paused = replace(state, force_off=True, held=held)
-        return paused, (StopForce(), stopped, show(paused))
+        return paused, (StopForce(), stopped, show_page(paused))
     paused = replace(state, phase=Phase.PAUSED, interrupted=state.phase, force_off=True, held=held)
-    pausing = (Write(journal.Paused(by=event.by)), WriteTables(), show(paused))
-    return paused, (StopForce(), *break_off(state), stopped, *pausing)
+    pausing = (Write(journal.Paused(by=event.by)), WriteTables(), show_page(paused))
+    return paused, (StopForce(), *interrupt_trial(state), stopped, *pausing)
 
 
 def stop_force_again(state: SessionState, event: ForceStopped) -> Result:
@@ -214,26 +220,26 @@ def stop_force_after_end(state: SessionState, _event: ForceStopped) -> Result:
     return state, (StopForce(),)
 
 
-def repeat(state: SessionState, event: RepeatRequested) -> Result:
+def repeat_trial(state: SessionState, event: RepeatRequested) -> Result:
     """Present the trial again; the earlier attempt stays in the data."""
     if not event.reason.strip():
         raise SessionError("repeating a trial needs a reason: enter one")
     repeated = Write(journal.Repeat(trial=state.trial.number, reason=event.reason), waits=True)
-    return start_trial(replace(state, attempt=state.attempt + 1), (*break_off(state), repeated), event.at_s)
+    return start_trial(replace(state, attempt=state.attempt + 1), (*interrupt_trial(state), repeated), event.at_s)
 
 
-def note(state: SessionState, event: Note) -> Result:
+def write_note(state: SessionState, event: Note) -> Result:
     """Write the operator's note, waiting for the disk if it has a text."""
     written = Write(journal.Note(kind=event.kind, text=event.text), waits=event.kind == "note")
     return state, (written, WriteTables())
 
 
-def end(state: SessionState, event: EndRequested) -> Result:
+def end_session(state: SessionState, event: EndRequested) -> Result:
     """End the session early; after a failure without a withdrawal its status is broken."""
     broken = state.phase is Phase.TROUBLE and event.status == "aborted"
     ended = replace(state, phase=Phase.ENDED, interrupted=None)
     finish = Finish("broken" if broken else event.status, event.reason)
-    return ended, (*break_off(state), finish, show(ended))
+    return ended, (*interrupt_trial(state), finish, show_page(ended))
 
 
 def call_operator(state: SessionState, event: Broke) -> Result:
@@ -249,10 +255,10 @@ def call_operator(state: SessionState, event: Broke) -> Result:
     videos = any(condition.shows_video for condition in state.plan.protocol.conditions.values())
     what = CAUSE_WITHHELD if videos and event.by == "device" else event.what
     written = (Write(journal.Broke(what=what)), WriteTables())
-    return trouble, (StopForce(), *break_off(state), *written, show(trouble))
+    return trouble, (StopForce(), *interrupt_trial(state), *written, show_page(trouble))
 
 
-def reconnect(state: SessionState, event: Reconnected) -> Result:
+def reconnect_device(state: SessionState, event: Reconnected) -> Result:
     """Pause at zero force until the operator resumes; a trial that the failure interrupted is then presented again."""
     if not state.lost_device:
         raise SessionError("the session was not stopped by its device: end it now and resume it later")
@@ -263,24 +269,24 @@ def reconnect(state: SessionState, event: Reconnected) -> Result:
         Write(opened, waits=True),
         Write(journal.Paused(by="program")),
         WriteTables(),
-        show(paused),
+        show_page(paused),
     )
 
 
-def stall(state: SessionState, event: WriteFailed) -> Result:
+def stall_session(state: SessionState, event: WriteFailed) -> Result:
     """Stop the force and show a waiting page until the pending writes succeed."""
     first = Stall(event.reason, event.left, event.at_s, state.phase)
     again = first if state.stall is None else replace(first, before=state.stall.before, by=state.stall.by)
     stalled = replace(state, phase=Phase.STALLED, stall=again)
-    return stalled, (StopForce(), StopTrial(), Rest(), show(stalled))
+    return stalled, (StopForce(), StopTrial(), Rest(), show_page(stalled))
 
 
-def retry(state: SessionState, _event: WriteRetried) -> Result:
+def retry_writes(state: SessionState, _event: WriteRetried) -> Result:
     """Retry the pending commands in order, each once; success is a separate event."""
     return state, _stall(state).left
 
 
-def recover(state: SessionState, event: WriteCompleted) -> Result:
+def recover_from_stall(state: SessionState, event: WriteCompleted) -> Result:
     """Return to the interrupted phase, paused at zero force."""
     stalled = _stall(state)
     back = replace(state, phase=stalled.before, stall=None)
@@ -296,12 +302,12 @@ def stop_force_of_stalled(state: SessionState, event: ForceStopped) -> Result:
     return state, (StopForce(),)
 
 
-def end_unwritten(state: SessionState, _event: EndRequested) -> Result:
+def end_stalled_session(state: SessionState, _event: EndRequested) -> Result:
     """End without a line in the journal: the session stays unfinished, and pending writes are still tried."""
     if state.over:
         raise SessionError("the session is over: its last lines wait for the disk")
     ended = replace(state, stall=replace(_stall(state), before=Phase.ENDED))
-    return ended, (show(ended),)
+    return ended, (show_page(ended),)
 
 
 def _stall(state: SessionState) -> Stall:

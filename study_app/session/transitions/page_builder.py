@@ -28,12 +28,12 @@ SEED: Final = 1
 Kind: TypeAlias = Literal["text", "tank", "questions", "feedback"]
 
 
-def page(state: SessionState) -> pages.Page:
+def build_page(state: SessionState) -> pages.Page:
     """Return the page of any phase after the first page is shown."""
     match state.phase:
         case Phase.TASK | Phase.RESTING:
             made = replace(_task_page(state, state.trial), task=state.task, interval=_interval(state))
-            return made if state.phase is Phase.RESTING else _presenting(state, made)
+            return made if state.phase is Phase.RESTING else _with_presentation(state, made)
         case Phase.ANSWERING:
             return _answer_page(state)
         case Phase.FEEDBACK:
@@ -42,7 +42,7 @@ def page(state: SessionState) -> pages.Page:
             paused = _task_page(state, state.step) if isinstance(state.step, Trial) else None
             return pages.PausePage(force_off=state.force_off, held=state.held, coming=paused)
         case Phase.STALLED if state.stall is not None and state.over:
-            return page(replace(state, phase=state.stall.before, stall=None))
+            return build_page(replace(state, phase=state.stall.before, stall=None))
         case Phase.TROUBLE | Phase.STALLED:
             return pages.TroublePage(_words(state).trouble_title, _words(state).trouble_body)
         case Phase.COMPLETE:
@@ -77,7 +77,7 @@ def _text_page(state: SessionState) -> pages.TextPage:
         language=language,
         languages=state.languages,
         stays_until_s=state.stays_until_s,
-        coming=None if (trial := _coming(state)) is None else _task_page(state, trial),
+        coming=None if (trial := _coming_trial(state)) is None else _task_page(state, trial),
     )
 
 
@@ -105,7 +105,7 @@ def task_page(protocol: Protocol, language: str, trial: Trial, body: Body) -> pa
         task=task,
         workspace_m=protocol.device.workspace_m,
         body_radius_m=body.diameter_m / 2 / protocol.scene.scale,
-        progress=_among(protocol, trial, trial.label(protocol, language), trial.index),
+        progress=_progress_in_block(protocol, trial, trial.label(protocol, language), trial.index),
         question=protocol.text(questionnaire.intro, language) if set_by_hand and questionnaire is not None else "",
     )
 
@@ -117,7 +117,7 @@ def _drawn_condition(state: SessionState, trial: Trial) -> str:
     return protocol.conditions_in(trial.block)[0] if designed else state.plan.condition(trial)
 
 
-def _presenting(state: SessionState, made: pages.TaskPage) -> pages.TaskPage:
+def _with_presentation(state: SessionState, made: pages.TaskPage) -> pages.TaskPage:
     """Return a task page with the visible properties of the trial or interval."""
     named = _drawn_condition(state, state.trial)
     if state.due is not None:
@@ -197,7 +197,7 @@ def _label(state: SessionState, trial: Trial) -> str:
 
 
 def _progress(state: SessionState, trial: Trial) -> pages.Progress:
-    return _among(state.plan.protocol, trial, _label(state, trial), trial.index)
+    return _progress_in_block(state.plan.protocol, trial, _label(state, trial), trial.index)
 
 
 def _progress_between(state: SessionState) -> pages.Progress | None:
@@ -205,23 +205,23 @@ def _progress_between(state: SessionState) -> pages.Progress | None:
 
     None outside the parts, except for a break among trials of intervals, which names the last trial.
     """
-    steps, coming = state.plan.schedule.steps, _coming(state)
+    steps, coming = state.plan.schedule.steps, _coming_trial(state)
     done = next((step for step in reversed(steps[: state.index]) if isinstance(step, Trial)), None)
     if done is not None and (coming is None or state.plan.protocol.pages[state.page_id].kind == "break"):
         designed = state.plan.protocol.blocks[done.block].design is not None
         if designed and coming is not None:
-            return _among(state.plan.protocol, done, _label(state, done), done.index + 1)
-        return None if done.part is None else _among(state.plan.protocol, done, "", done.index + 1)
+            return _progress_in_block(state.plan.protocol, done, _label(state, done), done.index + 1)
+        return None if done.part is None else _progress_in_block(state.plan.protocol, done, "", done.index + 1)
     if coming is None or coming.part is None:
         return None
-    return _among(state.plan.protocol, coming, "", coming.index)
+    return _progress_in_block(state.plan.protocol, coming, "", coming.index)
 
 
-def _coming(state: SessionState) -> Trial | None:
+def _coming_trial(state: SessionState) -> Trial | None:
     return next((step for step in state.plan.schedule.steps[state.index + 1 :] if isinstance(step, Trial)), None)
 
 
-def _among(protocol: Protocol, trial: Trial, label: str, index: int) -> pages.Progress:
+def _progress_in_block(protocol: Protocol, trial: Trial, label: str, index: int) -> pages.Progress:
     """Return the progress of trial ``index`` in its block; a block with a criterion may end early."""
     at_most = protocol.blocks[trial.block].until is not None
     return pages.Progress(part=trial.part, parts=protocol.parts, label=label, index=index, of=trial.of, at_most=at_most)
@@ -262,7 +262,7 @@ class Moment:
     interval: int = 1
 
 
-def moments(shown: Preview, index: int) -> tuple[Moment, ...]:
+def pages_of_step(shown: Preview, index: int) -> tuple[Moment, ...]:
     """Return the pages of a step, in the order in which a session shows them."""
     step = shown.schedule.steps[index]
     if isinstance(step, PageStep):
@@ -292,9 +292,9 @@ def previewed_page(
         return pages.FeedbackPage(right=True)
     state = replace(_state(shown, index, language), interval=moment.interval)
     if moment.kind == "tank":
-        return page(replace(state, phase=Phase.TASK))
+        return build_page(replace(state, phase=Phase.TASK))
     if moment.kind == "text":
-        made = page(replace(state, phase=Phase.READING))
+        made = build_page(replace(state, phase=Phase.READING))
         return replace(made, coming=None) if isinstance(made, pages.TextPage) else made
     questions = {question.id: question for question in state.questions}
     kept = {
@@ -302,10 +302,10 @@ def previewed_page(
         for item, value in (answers or {}).items()
         if item in questions and questions[item].problem(value, state.context) is None
     }
-    return page(replace(state, phase=Phase.ANSWERING, answers=kept))
+    return build_page(replace(state, phase=Phase.ANSWERING, answers=kept))
 
 
-def tested_condition(shown: Preview, index: int) -> str | None:
+def presented_condition(shown: Preview, index: int) -> str | None:
     """Return the condition of a trial; None for other steps and for trials that vary a number."""
     step = shown.schedule.steps[index]
     if not isinstance(step, Trial):

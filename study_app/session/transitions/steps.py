@@ -44,13 +44,13 @@ FADE_OUT_S: Final = 0.05
 """Time in which the force fades to zero, after which a rest begins [s]."""
 
 
-def enter(state: SessionState, index: int, done: Commands = (), *, at_s: float) -> Result:
+def enter_step(state: SessionState, index: int, done: Commands = (), *, at_s: float) -> Result:
     """Go to the step at ``index``, or to the next that is not passed over; ``done`` ends the step before."""
-    reached, passed = reach(state, index, at_s=at_s)
+    reached, passed = find_due_step(state, index, at_s=at_s)
     return enter_reached(reached, (*done, *passed))
 
 
-def reach(state: SessionState, index: int, *, at_s: float) -> Result:
+def find_due_step(state: SessionState, index: int, *, at_s: float) -> Result:
     """Return the state at the first step from ``index`` on that is not passed over, with an event for each passed one.
 
     The phase is unchanged, or ENDED if a criterion that ends the session was missed.
@@ -66,7 +66,7 @@ def reach(state: SessionState, index: int, *, at_s: float) -> Result:
             reason = f"the criterion of block {missed.id} was not met"
             return state, (*passed, Finish("aborted", reason))
         due = state.plan.due(step, state.heard) if isinstance(step, Trial) and _block(state, step).design else None
-        skipped = _passed_over(state, before, step, due)
+        skipped = _passed_over_event(state, before, step, due)
         if skipped is None:
             break
         passed.append(Write(skipped))
@@ -81,10 +81,10 @@ def reach(state: SessionState, index: int, *, at_s: float) -> Result:
 def enter_reached(state: SessionState, done: Commands) -> Result:
     """Begin the current step after the commands ``done``."""
     if state.phase is Phase.ENDED:
-        return state, (*done, show(state))
+        return state, (*done, show_page(state))
     if state.step is None:
         state = replace(state, phase=Phase.COMPLETE)
-        return state, (*done, Finish("completed"), show(state))
+        return state, (*done, Finish("completed"), show_page(state))
     if isinstance(step := state.step, Trial):
         before = state.plan.schedule.steps[state.index - 1] if state.index else None
         follows = state.design is not None and isinstance(before, Trial) and before.block == step.block
@@ -93,9 +93,14 @@ def enter_reached(state: SessionState, done: Commands) -> Result:
         return start_trial(state, done, state.since_s, rest_until_s=rest_until_s)
     if isinstance(step, FormStep):
         state = replace(state, phase=Phase.ANSWERING)
-        return state, (*done, Write(journal.FormShown(form=step.form, after=step.after)), WriteTables(), show(state))
+        return state, (
+            *done,
+            Write(journal.FormShown(form=step.form, after=step.after)),
+            WriteTables(),
+            show_page(state),
+        )
     state = replace(state, phase=Phase.READING)
-    return state, (*done, Write(journal.PageShown(page=state.page_id)), WriteTables(), show(state))
+    return state, (*done, Write(journal.PageShown(page=state.page_id)), WriteTables(), show_page(state))
 
 
 def start_trial(state: SessionState, done: Commands, at_s: float, *, rest_until_s: float | None = None) -> Result:
@@ -106,16 +111,18 @@ def start_trial(state: SessionState, done: Commands, at_s: float, *, rest_until_
     if state.due is not None and state.design is not None:
         fields |= {name: getattr(state.due, name) for name in ("level", "standard", "catch")}
         fields["arrangement"] = arrangement_text(state.design, state.due.arrangement)
-    begun = (*done, Write(journal.TrialStarted(**which(state), **fields)), WriteTables())
-    return start_interval(state, begun, at_s) if rest_until_s is None else rest(state, begun, rest_until_s)
+    begun = (*done, Write(journal.TrialStarted(**attempt_fields(state), **fields)), WriteTables())
+    return (
+        start_interval(state, begun, at_s) if rest_until_s is None else rest_before_interval(state, begun, rest_until_s)
+    )
 
 
 def present_again(state: SessionState, done: Commands, at_s: float) -> Result:
     """Present an undelivered trial again if the study's limits permit another attempt; otherwise continue."""
-    done = (*done, Write(journal.TrialEnded(**which(state), outcome=UNDELIVERED)))
+    done = (*done, Write(journal.TrialEnded(**attempt_fields(state), outcome=UNDELIVERED)))
     state = replace(state, invalid=state.invalid + 1)
     if state.invalid >= (state.plan.protocol.limits.attempts or 1):
-        return enter(state, state.index + 1, done, at_s=at_s)
+        return enter_step(state, state.index + 1, done, at_s=at_s)
     again = replace(state, attempt=state.attempt + 1)
     return start_trial(again, done, at_s, rest_until_s=at_s + FADE_OUT_S + AGAIN_S)
 
@@ -128,7 +135,7 @@ def start_interval(state: SessionState, done: Commands, at_s: float) -> Result:
         presented = Stimulated(state.plan.condition(state.trial))
     else:
         presented = state.due.intervals[state.interval - 1]
-        done = (*done, Write(journal.IntervalStarted(**which(state), interval=state.interval)))
+        done = (*done, Write(journal.IntervalStarted(**attempt_fields(state), interval=state.interval)))
     if state.adjusts:
         item = state.items[0]
         state = replace(state, answers={item: Answer(onset_s=at_s)})
@@ -143,46 +150,46 @@ def start_interval(state: SessionState, done: Commands, at_s: float) -> Result:
         interval=None if state.due is None else state.interval,
         adjusts=state.adjusts,
     )
-    return state, (*done, start, show(state))
+    return state, (*done, start, show_page(state))
 
 
-def rest(state: SessionState, done: Commands, until_s: float) -> Result:
+def rest_before_interval(state: SessionState, done: Commands, until_s: float) -> Result:
     """Rest at zero force before the current interval."""
     state = replace(state, phase=Phase.RESTING, until_s=until_s)
-    return state, (*done, show(state))
+    return state, (*done, show_page(state))
 
 
-def before_end(state: SessionState, at_s: float) -> bool:
+def is_before_end(state: SessionState, at_s: float) -> bool:
     """Return whether the time of a rest or feedback is not over yet."""
     return state.until_s is not None and at_s < state.until_s
 
 
-def break_off(state: SessionState) -> Commands:
+def interrupt_trial(state: SessionState) -> Commands:
     """Interrupt the current trial, in its task or a rest, and write its measures so far."""
     if state.phase not in {Phase.TASK, Phase.RESTING}:
         return ()
-    ended = Write(journal.TrialEnded(**which(state), outcome="interrupted"), measured=state.due is None)
+    ended = Write(journal.TrialEnded(**attempt_fields(state), outcome="interrupted"), measured=state.due is None)
     if state.due is None or state.phase is Phase.RESTING:
         return (StopTrial(), Rest(), ended)
-    of_interval = journal.IntervalEnded(**which(state), interval=state.interval, outcome="interrupted")
+    of_interval = journal.IntervalEnded(**attempt_fields(state), interval=state.interval, outcome="interrupted")
     return (StopTrial(), Rest(), Write(of_interval, measured=True), ended)
 
 
-def which(state: SessionState) -> dict[str, Any]:
+def attempt_fields(state: SessionState) -> dict[str, Any]:
     """Return the event fields for trial, attempt and interval."""
     return {"trial": state.trial.number, "attempt": state.attempt}
 
 
-def show(state: SessionState) -> ShowPage:
+def show_page(state: SessionState) -> ShowPage:
     """Return the command that shows the current page."""
-    return ShowPage(page_builder.page(state))
+    return ShowPage(page_builder.build_page(state))
 
 
 def _block(state: SessionState, trial: Trial) -> Block:
     return state.plan.protocol.blocks[trial.block]
 
 
-def _passed_over(
+def _passed_over_event(
     state: SessionState, before: Step | None, step: Step | None, due: Presentation | None
 ) -> journal.PassedOver | None:
     """Return the event for a step that is passed over (a trial that is not due, or a break after one), else None."""
@@ -190,15 +197,15 @@ def _passed_over(
         block = _block(state, step)
         if block.design is None or due is not None:
             return None
-        return journal.PassedOver(trial=step.number, reason=_reason(state, block))
+        return journal.PassedOver(trial=step.number, reason=_undelivered_reason(state, block))
     if isinstance(step, PageStep) and isinstance(before, Trial):
         block = _block(state, before)
-        if block.design is not None and step.page_id == block.break_page and not _presented(state, before):
-            return journal.PassedOver(page=step.page_id, reason=_reason(state, block))
+        if block.design is not None and step.page_id == block.break_page and not _has_presented_trial(state, before):
+            return journal.PassedOver(page=step.page_id, reason=_undelivered_reason(state, block))
     return None
 
 
-def _presented(state: SessionState, last: Trial) -> bool:
+def _has_presented_trial(state: SessionState, last: Trial) -> bool:
     """Return whether a trial was answered or given up between the previous text page and trial ``last``."""
     steps = state.plan.schedule.steps
     answered = {*state.plan.start.presented, *(result.trial for result in state.heard)}
@@ -212,7 +219,7 @@ def _presented(state: SessionState, last: Trial) -> bool:
     return False
 
 
-def _reason(state: SessionState, block: Block) -> str:
+def _undelivered_reason(state: SessionState, block: Block) -> str:
     return "criterion_met" if criterion_met(block, state.plan.schedule, state.heard) else "track_ended"
 
 
@@ -234,27 +241,29 @@ def show_item(state: SessionState, event: ItemShown) -> Result:
     """Record when a question was shown."""
     _check_item(state, event.item)
     answer = state.answers.get(event.item, Answer()).shown(event.at_s)
-    written = Write(journal.ItemShown(**_page(state), item=event.item))
+    written = Write(journal.ItemShown(**_page_fields(state), item=event.item))
     return _with_answer(state, event.item, answer), (written,)
 
 
-def choose(state: SessionState, event: Chosen) -> Result:
+def record_choice(state: SessionState, event: Chosen) -> Result:
     """Record a choice; the last one counts. Answers to questions that it hides are removed."""
     _check_shown(state, event.item)
     if (problem := state.questionnaire.item(event.item).problem(event.value, state.context)) is not None:
         raise SessionError(problem)
     answer = state.answers.get(event.item, Answer()).chosen(event.at_s, event.value)
-    line = journal.Choice(**_page(state), item=event.item, kind=_kind(state, event.item), value=event.value)
+    line = journal.Choice(
+        **_page_fields(state), item=event.item, kind=_question_kind(state, event.item), value=event.value
+    )
     return _without_hidden(_with_answer(state, event.item, answer), (Write(line, waits=True),))
 
 
-def retract(state: SessionState, event: Retracted) -> Result:
+def retract_answer(state: SessionState, event: Retracted) -> Result:
     """Remove an answer, and the answers to questions that are hidden without it."""
     _check_shown(state, event.item)
-    return _without_hidden(*_removed(state, event.item))
+    return _without_hidden(*_remove_answer(state, event.item))
 
 
-def submit(state: SessionState, event: Submitted) -> Result:
+def submit_answers(state: SessionState, event: Submitted) -> Result:
     """Write the responses and continue, if every required question is answered."""
     shown = state.shown
     answers = {item: state.answers.get(item, Answer()) for item in state.items}
@@ -264,24 +273,24 @@ def submit(state: SessionState, event: Submitted) -> Result:
         listed = ", ".join(map(str, missing))
         raise SessionError(f"not every required statement is answered: answer {listed} first")
     items = tuple(
-        Response(item=item, number=number, kind=_kind(state, item), **asdict(answers[item]))
+        Response(item=item, number=number, kind=_question_kind(state, item), **asdict(answers[item]))
         for number, item in numbered
     )
     line: journal.Event = (
         journal.FormAnswered(form=state.step.form, after=state.step.after, items=items)
         if isinstance(state.step, FormStep)
-        else journal.Responses(**which(state), items=items)
+        else journal.Responses(**attempt_fields(state), items=items)
     )
     written = Write(line, waits=True)
     if state.due is not None:
         return _keep_result(state, written, event.at_s)
-    return enter(state, state.index + 1, (written,), at_s=event.at_s)
+    return enter_step(state, state.index + 1, (written,), at_s=event.at_s)
 
 
 def keep_setting(state: SessionState, done: Commands, at_s: float) -> Result:
     """Write the steps of a setting as the answer, and continue; ``done`` ends its interval."""
-    state, chosen = choose(state, Chosen(at_s, state.items[0], state.steps))
-    state, kept = submit(state, Submitted(at_s))
+    state, chosen = record_choice(state, Chosen(at_s, state.items[0], state.steps))
+    state, kept = submit_answers(state, Submitted(at_s))
     return state, (*done, *chosen, *kept)
 
 
@@ -294,21 +303,21 @@ def _keep_result(state: SessionState, written: Write, at_s: float) -> Result:
     heard = trial_result(protocol, block, trial.number, trial.code, due.level, due.arrangement, answer, catch=due.catch)
     state = replace(state, heard=(*state.heard, heard))
     if heard.correct is None or not design.shows_feedback(trial.phase == "practice"):
-        return enter(state, state.index + 1, (written,), at_s=at_s)
+        return enter_step(state, state.index + 1, (written,), at_s=at_s)
     shown = replace(state, phase=Phase.FEEDBACK, until_s=at_s + design.feedback_s)
-    return shown, (written, Write(journal.FeedbackShown(**which(shown))), show(shown))
+    return shown, (written, Write(journal.FeedbackShown(**attempt_fields(shown))), show_page(shown))
 
 
 def _with_answer(state: SessionState, item: str, answer: Answer) -> SessionState:
     return replace(state, answers={**state.answers, item: answer})
 
 
-def _page(state: SessionState) -> dict[str, Any]:
+def _page_fields(state: SessionState) -> dict[str, Any]:
     """Return the event fields for the page: those of a trial, or the form."""
     return {"form": state.step.form} if isinstance(state.step, FormStep) else {"trial": state.trial.number}
 
 
-def _kind(state: SessionState, item: str) -> str | None:
+def _question_kind(state: SessionState, item: str) -> str | None:
     """Return the kind of a question; format 1 has one kind and no such field."""
     return state.questionnaire.item(item).kind_id if state.plan.protocol.format > 1 else None
 
@@ -325,12 +334,12 @@ def _check_shown(state: SessionState, item: str) -> None:
         raise SessionError(f"item {item!r} is not shown: an earlier answer hides it")
 
 
-def _removed(state: SessionState, item: str) -> Result:
+def _remove_answer(state: SessionState, item: str) -> Result:
     """Remove an answer, if there is one."""
     answer = state.answers.get(item, Answer())
     if not answer.given:
         return state, ()
-    written = Write(journal.AnswerRemoved(**_page(state), item=item), waits=True)
+    written = Write(journal.AnswerRemoved(**_page_fields(state), item=item), waits=True)
     return _with_answer(state, item, answer.removed()), (written,)
 
 
@@ -338,6 +347,6 @@ def _without_hidden(state: SessionState, done: Commands) -> Result:
     """Remove the answers to questions that are no longer shown."""
     hidden = [item for item in state.items if item not in state.shown]
     for item in hidden:
-        state, written = _removed(state, item)
+        state, written = _remove_answer(state, item)
         done = (*done, *written)
     return state, done

@@ -64,24 +64,24 @@ OPEN = (Phase.OPENING, *RUNNING, Phase.PAUSED, Phase.TROUBLE)
 
 TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     # phase           event           what happens              next phase
-    (Phase.OPENING, Begin): moves.begin,  # → reading, task; paused before a trial of a session that goes on
-    (Phase.READING, Continue): moves.read_on,  # → reading, task, answering (a form), complete
+    (Phase.OPENING, Begin): moves.begin_session,  # → reading, task; paused before a trial of a session that goes on
+    (Phase.READING, Continue): moves.continue_reading,  # → reading, task, answering (a form), complete
     (Phase.READING, LanguageChosen): moves.choose_language,  # stays
     (Phase.TASK, Continue): moves.leave_task,  # stays until the task is done
-    (Phase.TASK, Stepped): moves.step,  # stays
+    (Phase.TASK, Stepped): moves.adjust_level,  # stays
     (Phase.TASK, Submitted): moves.confirm_setting,  # stays until the task is done
     (Phase.TASK, TaskDone): moves.end_task,  # → answering; resting; without questions or after a setting the next step
     # Trials of intervals: rests and feedback end by time alone.
     (Phase.RESTING, TimeUp): moves.end_rest,  # → task of the next interval
     (Phase.FEEDBACK, TimeUp): moves.end_feedback,  # → reading, task, resting, answering (a form), complete, ended
     (Phase.ANSWERING, ItemShown): steps.show_item,  # stays
-    (Phase.ANSWERING, Chosen): steps.choose,  # stays
-    (Phase.ANSWERING, Retracted): steps.retract,  # stays
-    (Phase.ANSWERING, Submitted): steps.submit,  # → reading, task, resting, feedback, complete, ended
+    (Phase.ANSWERING, Chosen): steps.record_choice,  # stays
+    (Phase.ANSWERING, Retracted): steps.retract_answer,  # stays
+    (Phase.ANSWERING, Submitted): steps.submit_answers,  # → reading, task, resting, feedback, complete, ended
     # Pausing: esc, the operator, or a force stop.
-    **{(phase, PauseRequested): moves.pause for phase in RUNNING},  # → paused; the attempt at a trial is over
-    (Phase.PAUSED, PauseRequested): moves.pause_again,  # stays
-    (Phase.PAUSED, ResumeRequested): moves.resume,  # → reading, answering; task, again; after feedback the next step
+    **{(phase, PauseRequested): moves.pause_session for phase in RUNNING},  # → paused; the attempt at a trial is over
+    (Phase.PAUSED, PauseRequested): moves.take_over_pause,  # stays
+    (Phase.PAUSED, ResumeRequested): moves.resume_session,  # → reading, answering; task, again; after feedback: next
     # The force: off at once, wherever we are.
     **{(phase, ForceStopped): moves.stop_force for phase in RUNNING},  # → paused; the attempt at a trial is over
     (Phase.PAUSED, ForceStopped): moves.stop_force,  # stays
@@ -90,22 +90,22 @@ TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     (Phase.ENDED, ForceStopped): moves.stop_force_after_end,  # stays
     # The operator.
     # A repeated trial: → task, again.
-    **{(phase, RepeatRequested): moves.repeat for phase in (Phase.TASK, Phase.RESTING, Phase.ANSWERING)},
-    **{(phase, Note): moves.note for phase in (*RUNNING, Phase.PAUSED, Phase.TROUBLE)},  # stays
-    **{(phase, EndRequested): moves.end for phase in OPEN},  # → ended
-    # What breaks.
+    **{(phase, RepeatRequested): moves.repeat_trial for phase in (Phase.TASK, Phase.RESTING, Phase.ANSWERING)},
+    **{(phase, Note): moves.write_note for phase in (*RUNNING, Phase.PAUSED, Phase.TROUBLE)},  # stays
+    **{(phase, EndRequested): moves.end_session for phase in OPEN},  # → ended
+    # Failures.
     **{(phase, Broke): moves.call_operator for phase in OPEN},  # → trouble
-    (Phase.TROUBLE, Reconnected): moves.reconnect,  # → paused, without force; only after a failure of the device
-    # The disk takes nothing: whatever else happens is refused until it does.
-    **{(phase, WriteFailed): moves.stall for phase in Phase},  # → stalled
-    (Phase.STALLED, WriteRetried): moves.retry,  # stays
-    (Phase.STALLED, WriteCompleted): moves.recover,  # → paused; what it was in trouble and at the end
+    (Phase.TROUBLE, Reconnected): moves.reconnect_device,  # → paused, without force; only after a failure of the device
+    # Writing fails: all other events are rejected until it succeeds.
+    **{(phase, WriteFailed): moves.stall_session for phase in Phase},  # → stalled
+    (Phase.STALLED, WriteRetried): moves.retry_writes,  # stays
+    (Phase.STALLED, WriteCompleted): moves.recover_from_stall,  # → paused; what it was in trouble and at the end
     (Phase.STALLED, ForceStopped): moves.stop_force_of_stalled,  # stays
-    (Phase.STALLED, EndRequested): moves.end_unwritten,  # stays, over
+    (Phase.STALLED, EndRequested): moves.end_stalled_session,  # stays, over
 }
 
 
-def open_session(
+def initial_state(
     protocol: Protocol,
     schedule: Schedule,
     key: Mapping[str, Mapping[str, str]],

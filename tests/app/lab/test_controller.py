@@ -12,7 +12,7 @@ import pytest
 from PySide6.QtWidgets import QMainWindow
 
 from study_app.app.lab_controller import LabController
-from study_app.lab.presets import save
+from study_app.lab.presets import save_preset
 from tests.app.lab.worlds import OPENS_MS, PATIENCE, SOON_MS, Prices, Stays, is_let_go
 from tests.compiled import needs_servo
 
@@ -179,10 +179,10 @@ def test_a_preset_is_on_the_disk_before_the_program_ends(
     def slowly(path: Path, text: str) -> None:
         if path.name == "one.toml":
             ended.wait(30.0)
-        save(path, text)
+        save_preset(path, text)
         written.append(path.name)
 
-    monkeypatch.setattr("study_app.app.lab_controller.save", slowly)
+    monkeypatch.setattr("study_app.app.lab_controller.save_preset", slowly)
     for name in ("one.toml", "two.toml"):
         visit.place.ask("save", tmp_path / name, visit.bench.a)
     assert not list(tmp_path.iterdir())

@@ -53,7 +53,7 @@ def stop(bridge: SessionBridge) -> None:
 def test_it_pauses_a_session_that_can_be_resumed(
     qtbot: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, window: str, act: Any, events: list[str]
 ) -> None:
-    monkeypatch.setattr(live_session, "checks", lambda *_: ())  # a busy computer would not pass them
+    monkeypatch.setattr(live_session, "preflight_checks", lambda *_: ())  # a busy computer would not pass them
     session = Disturbed(tmp_path / "results", window, act)
     session.open()
     qtbot.waitUntil(lambda: session.bridge is not None and session.bridge.participant.isVisible(), timeout=60_000)
@@ -85,7 +85,7 @@ class ScreensDeleted(LiveSession):
 def test_windows_deleted_while_a_session_opens_take_no_screen_from_it(
     qtbot: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(live_session, "checks", lambda *_: ())
+    monkeypatch.setattr(live_session, "preflight_checks", lambda *_: ())
     session = ScreensDeleted(replace(CHOSEN, results=tmp_path / "results"), LIGHT)
     session.open()
     qtbot.waitUntil(
@@ -109,7 +109,7 @@ class ScreenRemoved(LiveSession):
 def test_a_page_without_a_force_stop_does_not_cover_that_of_the_operator(
     qtbot: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(live_session, "checks", lambda *_: ())
+    monkeypatch.setattr(live_session, "preflight_checks", lambda *_: ())
     session = ScreenRemoved(replace(CHOSEN, results=tmp_path / "results"), LIGHT)
     with qtbot.waitSignal(session.over, timeout=60_000):
         session.open()

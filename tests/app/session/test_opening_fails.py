@@ -128,7 +128,7 @@ def test_no_window_stays_where_opening_or_starting_fails(
         raise RuntimeError("a bug")
 
     monkeypatch.setattr(part, step, fail)
-    monkeypatch.setattr(live_session, "checks", lambda *_: ())  # a busy computer would not pass them
+    monkeypatch.setattr(live_session, "preflight_checks", lambda *_: ())  # a busy computer would not pass them
     hook = sys.excepthook
     session = LiveSession(replace(CHOSEN, results=tmp_path / "results"), LIGHT)
     with qtbot.waitSignal(session.over, timeout=60_000):

@@ -131,7 +131,7 @@ def test_going_back_does_not_wait_for_what_is_being_measured(asked: Preflight, m
         waited.append(sleep(60.0))
         return FACTS
 
-    monkeypatch.setattr(preflight_controller, "measured", slow)
+    monkeypatch.setattr(preflight_controller, "measure_rig", slow)
     asked.window.again_asked.emit()
     measuring = asked.measuring
     assert measuring.busy
@@ -145,7 +145,7 @@ def test_a_window_that_is_gone_takes_no_screen_from_what_is_measured_again(
     asked: Preflight, monkeypatch: Any, qtbot: Any
 ) -> None:
     """PySide gives a screen up with the widget whose ``screen()`` returned it last."""
-    monkeypatch.setattr(preflight_controller, "measured", lambda *_words, **_named: FACTS)
+    monkeypatch.setattr(preflight_controller, "measure_rig", lambda *_words, **_named: FACTS)
     other = QWidget()
     other.screen()
     other.deleteLater()
@@ -158,7 +158,7 @@ def test_a_screen_that_is_removed_meanwhile_ends_the_question(asked: Preflight, 
     def none_left() -> Any:
         raise DisplayError("screen 2 cannot be used: there is 1 screen")
 
-    monkeypatch.setattr(preflight_controller, "measured", lambda *_words, **_named: FACTS)
+    monkeypatch.setattr(preflight_controller, "measure_rig", lambda *_words, **_named: FACTS)
     monkeypatch.setattr(asked, "_screen", none_left)
     with qtbot.waitSignal(asked.failed, timeout=3000) as told:
         pass
@@ -212,7 +212,7 @@ def test_strokes_are_asked_of_the_measured_device_and_again_when_its_delay_has_c
     first: Any = made.appraisal.appraiser
     assert first.devices == [Dynamics(delay_s=0.001, count_m=20e-6, mass_kg=0.3)]
     slower = replace(found, delay_ticks=3)
-    monkeypatch.setattr(preflight_controller, "measured", lambda *_words, **_named: slower)
+    monkeypatch.setattr(preflight_controller, "measure_rig", lambda *_words, **_named: slower)
     made.window.again_asked.emit()
     qtbot.waitUntil(lambda: not made.measuring.busy)
     again: Any = made.appraisal.appraiser
@@ -227,7 +227,7 @@ def test_a_mistake_in_measuring_does_not_leave_the_window_waiting(
     def broken(*_words: Any, **_named: Any) -> Measurements:
         raise ValueError("no samples")
 
-    monkeypatch.setattr(preflight_controller, "measured", broken)
+    monkeypatch.setattr(preflight_controller, "measure_rig", broken)
     with qtbot.waitSignal(asked.failed) as failed:
         asked.window.again_asked.emit()
     assert isinstance(failed.args[0], ValueError)

@@ -27,7 +27,7 @@ from unittest import mock
 from study_app.errors import StoreError, StudyError
 from study_app.protocol.load import load
 from study_app.protocol.source.files import shipped, source_bytes
-from study_app.session.simulated.rehearsal import open_session, resume
+from study_app.session.simulated.rehearsal import open_session, resume_rehearsal
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.progress import progress_of
@@ -82,7 +82,7 @@ def held(study: str, folder: Path, person: str, seed: int, fault: str, chance: r
     ):
         if fault == "two operators":
             with suppress(StoreError):
-                resume(store.folder.path)
+                resume_rehearsal(store.folder.path)
                 raise AssertionError("the session has two operators")
             with open_session(*words[:2], f"{person}B", results=folder, seed=seed, recordings=False):
                 pass  # another session in the same folder, which stays unfinished
@@ -101,7 +101,7 @@ def finish(session: SessionFolder, fault: str) -> int:
         if progress_of(journal.read(session.journal)).ended:
             return count
         with clock_moved(moved):
-            resume(session.path)
+            resume_rehearsal(session.path)
     raise AssertionError(f"{session.path} has no end")
 
 

@@ -13,7 +13,7 @@ from study_app.designer.templates import templates
 from study_app.errors import SessionError
 from study_app.protocol.source.files import shipped, shipped_file
 from study_app.protocol.warnings.untranslated import SAME_WORDS, check_translated, describe_untranslated
-from study_app.session.start import NewSession, check
+from study_app.session.start import NewSession, check_choices
 from study_app.workspace import workspace
 
 CODES = ("nl", "de", "fr", "ar")
@@ -156,8 +156,8 @@ def test_a_session_is_refused_before_anything_is_made_and_a_pilot_is_warned(tmp_
     )
     assert study.protocol is not None
     if pilot:
-        check(chosen, study.protocol)
+        check_choices(chosen, study.protocol)
     else:
         with pytest.raises(SessionError, match="9 texts on French pages are still in English"):
-            check(chosen, study.protocol)
+            check_choices(chosen, study.protocol)
     assert not (tmp_path / "results").exists()

@@ -13,7 +13,7 @@ from typing import Any
 from study_app.devices.falcon import constants
 from study_app.devices.falcon.constants import milliseconds
 from study_app.devices.falcon.failures import FalconLost, FalconNotFound, usb_failure
-from study_app.devices.falcon.transport import quiet
+from study_app.devices.falcon.transport import send_zero_torque
 from study_app.errors import DeviceError
 
 
@@ -165,7 +165,7 @@ def end_torque(path: str) -> None:
     """Do what the Falcon's guard does."""
     transport = ServedTransport(path)
     try:
-        if not quiet(transport):
+        if not send_zero_torque(transport):
             raise DeviceError("it takes no packet")
     finally:
         transport.close()

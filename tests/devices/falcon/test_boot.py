@@ -21,8 +21,8 @@ from study_app.devices.falcon.boot import (
     KNOWN,
     PINGS,
     PROBE_S,
-    boot,
-    check,
+    boot_falcon,
+    check_firmware,
     configure,
     is_running,
     measure_round_trip,
@@ -146,7 +146,7 @@ def test_loading_the_program(pytestconfig: pytest.Config) -> None:
         transport.opened = 0
         told.append(f"== {name}")
         try:
-            told.append(f"loaded {boot(transport, data, progress=told.append, attempts=attempts).size} bytes")
+            told.append(f"loaded {boot_falcon(transport, data, progress=told.append, attempts=attempts).size} bytes")
         except DeviceError as failure:
             told.append(f"{type(failure).__name__} {getattr(failure, 'step', '')}: {failure}")
         asked = " ".join(f"{request}:{value:#x}" for request, value in emulator.recorded[:40])
@@ -159,7 +159,7 @@ def test_a_bridge_that_is_taken_or_gone_between_attempts_ends_them(fault: str, k
     emulator, transport = falcon()
     emulator.power(False)
     with pytest.raises(DeviceError) as caught:
-        boot(transport, stream(), progress=lambda _line: emulator.faults.on(fault))
+        boot_falcon(transport, stream(), progress=lambda _line: emulator.faults.on(fault))
     assert getattr(caught.value, "kind", "") == kind
 
 
@@ -221,7 +221,7 @@ def test_what_a_file_of_firmware_is_said_to_be(pytestconfig: pytest.Config) -> N
     told = list[str]()
     for name, data in STREAMS.items():
         try:
-            found = check(data)
+            found = check_firmware(data)
         except DeviceError as failure:
             told.append(f"{name}: {failure}")
         else:
@@ -238,9 +238,9 @@ def test_no_bytes_make_it_fail_otherwise(data: bytes, at: int, byte: int) -> Non
     spoilt[at] = byte
     for candidate in (data, stream()[:22] + data, words(0x08AA) + data, bytes(spoilt)):
         try:
-            found = check(candidate)
+            found = check_firmware(candidate)
         except DeviceError:
             continue
         assert found.size == len(candidate)
-        assert (found.sha256 == check(stream()).sha256) == (candidate == stream())
+        assert (found.sha256 == check_firmware(stream()).sha256) == (candidate == stream())
         assert sum(2 * block.word_count + 6 for block in found.blocks) == len(candidate) - 24

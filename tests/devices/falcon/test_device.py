@@ -151,7 +151,7 @@ class TestForce:
             raise KeyboardInterrupt
 
         if interrupted == "quiet":
-            monkeypatch.setattr(driver, "quiet", lambda _: (_ for _ in ()).throw(KeyboardInterrupt))
+            monkeypatch.setattr(driver, "send_zero_torque", lambda _: (_ for _ in ()).throw(KeyboardInterrupt))
         else:
             monkeypatch.setattr(transport, "close", interrupt)
         with pytest.raises(KeyboardInterrupt):
@@ -162,7 +162,7 @@ class TestForce:
         assert ticks.after(1) == READ_LOST
 
     def test_a_calibration_of_this_one_is_used_and_told_and_does_not_outlive_it(self):
-        calibration.save(
+        calibration.save_calibration(
             "OWN", Calibration(geometry="zm-redux", units_per_nm=9000.0, arm_offset_rad=0.05, measured="2026-11-20")
         )
         emulator = still(geometry="zm-redux", serial="OWN", units_per_nm=9000.0, arm_offset_rad=(0.05, 0.05, 0.05))

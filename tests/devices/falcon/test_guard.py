@@ -11,8 +11,8 @@ if not hasattr(socket, "AF_UNIX"):
 
 from study_app.devices import guard as guarding
 from study_app.devices.falcon.constants import FLAG_HOMING, quiet_packet
-from study_app.devices.falcon.transport import PACKETS, quiet
-from study_app.devices.guard import PATIENCE_S, watch
+from study_app.devices.falcon.transport import PACKETS, send_zero_torque
+from study_app.devices.guard import PATIENCE_S, watch_program
 from study_app.errors import DeviceError
 from tests.devices.falcon.served import ServedTransport, Server
 
@@ -192,7 +192,7 @@ def test_a_falcon_that_has_gone_is_told_of(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(guarding.signal, "signal", lambda *_: None)
     with (tmp_path / "ended").open("w+") as ended_at_once:
         monkeypatch.setattr(guarding.sys, "stdin", ended_at_once)
-        assert watch("falcon", ENDS_TORQUE, str(tmp_path / "none")) == 2
+        assert watch_program("falcon", ENDS_TORQUE, str(tmp_path / "none")) == 2
     said = capsys.readouterr()
     assert said.out == "ready\n"
     assert said.err.startswith("the device 'falcon' may still push: ")
@@ -213,7 +213,7 @@ def test_a_packet_that_does_not_go_out_does_not_keep_the_others_back():
             self.pauses += 1
 
     stubborn = Stubborn()
-    assert quiet(stubborn) == PACKETS // 2
+    assert send_zero_torque(stubborn) == PACKETS // 2
     assert stubborn.tries == stubborn.pauses == PACKETS
     assert stubborn.sent == QUIET[: PACKETS // 2]
 

@@ -10,7 +10,15 @@ if numba.config.DISABLE_JIT:
 
 from study_app.devices.emulators.falcon import EmulatedFalcon
 from study_app.devices.emulators.falcon_emulator import Emulator
-from study_app.devices.falcon.calibration import GRAVITY_MPS2, PLACES_M, Grip, fit, hang, left_over, pull
+from study_app.devices.falcon.calibration import (
+    GRAVITY_MPS2,
+    PLACES_M,
+    Grip,
+    fit,
+    measure_with_scale,
+    measure_with_weight,
+    residual_forces,
+)
 from study_app.devices.falcon.mechanics import GEOMETRIES
 from study_app.errors import DeviceError
 
@@ -44,7 +52,7 @@ def helper(emulator, weight_n=WEIGHT_N, *, readings=None, lags=0):
 def weighed(emulator, weight_n=WEIGHT_N):
     ask, asked = helper(emulator, weight_n)
     with EmulatedFalcon(emulator=emulator) as device:
-        notes = hang(Grip(device, virtual=True), weight_n, ask)
+        notes = measure_with_weight(Grip(device, virtual=True), weight_n, ask)
     return notes, asked
 
 
@@ -62,7 +70,7 @@ class TestAWeight:
         assert math.degrees(found.arm_offset_rad) == pytest.approx(offset_deg, abs=0.3)
         assert found.own_weight_n == pytest.approx(0.0, abs=0.03)
         assert found.poses == 4 * len(PLACES_M)
-        left = left_over(found, notes.counts, notes.forces_n, notes.units)
+        left = residual_forces(found, notes.counts, notes.forces_n, notes.units)
         assert math.sqrt((left**2).sum() / len(left)) == pytest.approx(found.residual_n)
         assert np.abs(left).max() < 0.12  # 0.1 N of it is the friction of the emulated arms
 
@@ -70,7 +78,7 @@ class TestAWeight:
     def test_one_that_tells_nothing_or_is_too_heavy_is_refused(self, weight_n):
         emulator = emulated()
         with EmulatedFalcon(emulator=emulator) as device, pytest.raises(DeviceError, match="110 to 600 g"):
-            hang(Grip(device, virtual=True), weight_n, helper(emulator)[0])
+            measure_with_weight(Grip(device, virtual=True), weight_n, helper(emulator)[0])
 
 
 class TestAScale:
@@ -78,7 +86,7 @@ class TestAScale:
         emulator = emulated(units_per_nm=9000.0)
         ask, asked = helper(emulator, readings=repeat("400"), lags=5)
         with EmulatedFalcon(emulator=emulator) as device:
-            notes = pull(Grip(device, virtual=True), ask)
+            notes = measure_with_scale(Grip(device, virtual=True), ask)
         assert asked == ["let-go", *["pull", "reading", "let-go"] * len(PLACES_M), "take-off"]
         found = fit(GEOMETRIES["libnifalcon"], notes.counts, notes.forces_n, notes.units)
         assert found.units_per_nm == pytest.approx(9000, rel=0.04)
@@ -89,7 +97,9 @@ class TestAScale:
         ask, asked = helper(emulator, readings=chain(wrong, repeat("400")))
         words = []
         with EmulatedFalcon(emulator=emulator) as device:
-            notes = pull(Grip(device, virtual=True), lambda kind, said: words.append(said) or ask(kind, said))
+            notes = measure_with_scale(
+                Grip(device, virtual=True), lambda kind, said: words.append(said) or ask(kind, said)
+            )
         assert asked.count("reading") == len(wrong) + len(PLACES_M)
         assert [said for said in words if "not a reading of the scale" in said][1].startswith("'four' is")
         found = fit(GEOMETRIES["libnifalcon"], notes.counts, notes.forces_n, notes.units)

@@ -14,7 +14,7 @@ from study_app.devices.spacemouse.hid import (
     Buttons,
     Displacement,
     find_space_mice,
-    parse,
+    parse_report,
     program_buttons,
     velocity_mps,
 )
@@ -38,22 +38,26 @@ def opened(*reports, **options):
 
 class TestReports:
     def test_the_displacement_is_read_byte_by_byte(self):
-        assert parse(bytes([1, 0x5E, 0x01, 0xA2, 0xFE, 0x07, 0x00])) == Displacement(right=350, toward=-350, down=7)
-        assert parse(bytes([1, 0xFF, 0xFF, 0x00, 0x01, 0x00, 0x80])) == Displacement(right=-1, toward=256, down=-32768)
+        assert parse_report(bytes([1, 0x5E, 0x01, 0xA2, 0xFE, 0x07, 0x00])) == Displacement(
+            right=350, toward=-350, down=7
+        )
+        assert parse_report(bytes([1, 0xFF, 0xFF, 0x00, 0x01, 0x00, 0x80])) == Displacement(
+            right=-1, toward=256, down=-32768
+        )
 
     def test_buttons_are_bits_over_as_many_bytes_as_there_are(self):
-        assert parse(bytes([3, 0x02, 0x00])) == Buttons(0b10)
-        assert parse(bytes([3, 0, 0, 0x40, 0])) == Buttons(1 << 22)
+        assert parse_report(bytes([3, 0x02, 0x00])) == Buttons(0b10)
+        assert parse_report(bytes([3, 0, 0, 0x40, 0])) == Buttons(1 << 22)
 
     @pytest.mark.parametrize(
         "report", [b"", b"\x01", b"\x01\x00\x00\x00\x00\x00", b"\x03", b"\x02" + bytes(6), b"\x17abc"]
     )
     def test_rotation_half_reports_and_others_say_nothing(self, report):
-        assert parse(report) is None
+        assert parse_report(report) is None
 
     @given(st.binary(max_size=64))
     def test_no_bytes_upset_it(self, report):
-        said = parse(report)
+        said = parse_report(report)
         if isinstance(said, Displacement):
             assert all(abs(speed) <= FULL_SPEED_MPS for speed in velocity_mps(said))
 

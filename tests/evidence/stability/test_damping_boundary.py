@@ -7,7 +7,7 @@ import pytest
 
 from study_app.evidence.stability.damping_limits import boundary_nspm, measure_limits, passive_nspm
 from study_app.haptics.model.estimators import DeviceVelocity, Ewma, Kalman, Raw
-from study_app.haptics.model.slope_limits import damping_limits, table
+from study_app.haptics.model.slope_limits import damping_limits, slope_limit_table
 from tests.haptics.scenes import COMPILED
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
@@ -109,7 +109,7 @@ def test_what_is_proved_passive_is_stable(delay, friction_nspm):
 def test_the_shipped_table_is_the_one_that_is_measured(velocity):
     """The first lines of some estimators; the whole is remade by a command."""
     value = getattr(velocity, "alpha", None)
-    shipped = [it for it in table() if (it.estimator, it.parameter) == (velocity.kind, value)]
+    shipped = [it for it in slope_limit_table() if (it.estimator, it.parameter) == (velocity.kind, value)]
     assert len(shipped) == 16
     for one, measured in zip(shipped[:6], measure_limits([velocity]), strict=False):
         assert one[:4] == (

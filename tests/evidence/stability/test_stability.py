@@ -13,7 +13,7 @@ from study_app.evidence.stability import stability_report as stability
 from study_app.evidence.stability.case_groups import Group, groups, some, sweep
 from study_app.evidence.stability.stability_cases import Case, liquids, parse, scene_of
 from study_app.evidence.stability.verdict import judge
-from study_app.haptics.model.slope_limits import table
+from study_app.haptics.model.slope_limits import slope_limit_table
 from study_app.workers.executors import open_executor
 from tests.haptics.scenes import COMPILED
 
@@ -141,7 +141,9 @@ def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
 
 @compiled
 def test_the_table_of_limits_is_written_as_it_ships(monkeypatch, tmp_path):
-    monkeypatch.setattr(stability, "measure_limits", lambda **_: (it for it in table() if it.estimator != "line"))
+    monkeypatch.setattr(
+        stability, "measure_limits", lambda **_: (it for it in slope_limit_table() if it.estimator != "line")
+    )
     ran = command("--table", str(tmp_path / "limits.csv"))
     assert ran.exception is None
     whole = (resources.files("study_app.haptics.model") / "slope_limits.csv").read_bytes()

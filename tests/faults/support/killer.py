@@ -76,7 +76,7 @@ def going_on(protocol: str, folder: Path) -> Callable[[], object]:
     if has_ended(journal):
         return partial(rebuild_session, place)
     if journal.exists() and b"\n" in journal.read_bytes():
-        return partial(rehearsal.resume, place, protocol=protocol)
+        return partial(rehearsal.resume_rehearsal, place, protocol=protocol)
     return partial(session, protocol, folder)
 
 

@@ -15,7 +15,7 @@ from study_app.haptics.runtime.offline import new_wake_places, recompute_sample
 from study_app.haptics.runtime.pack import pack
 from study_app.lab.ab_comparison import Setting, Workbench
 from study_app.lab.live import LimiterCounts
-from study_app.lab.presets import spoken
+from study_app.lab.presets import displayed_name
 from study_app.lab.shadow import Shadow
 from study_app.protocol.load import load_scene
 
@@ -63,7 +63,7 @@ def felt_samples(scene: Scene, hand_m: Any) -> Any:
 def workbench(a: str = "water", b: str = "light_oil", **changes: float) -> Workbench:
     """Return a liquid, water edited by ``changes`` (of the wake), beside another."""
     scenes = {name: load_scene("rek2024", name) for name in (a, b)}
-    bench = Workbench(*(Setting(spoken(name), scene, scene) for name, scene in scenes.items()))
+    bench = Workbench(*(Setting(displayed_name(name), scene, scene) for name, scene in scenes.items()))
     if a != "water":
         return bench
     for name, value in (changes or {"scaling": 2600.0, "exponent": 0.6, "breaking_angle_deg": 40.0}).items():

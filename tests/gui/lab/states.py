@@ -14,7 +14,7 @@ from study_app.gui.lab.lab_state import Now
 from study_app.gui.theme.theme import DARK
 from study_app.gui.theme.themed import apply_theme
 from study_app.lab.ab_comparison import Setting, Workbench
-from study_app.lab.presets import spoken
+from study_app.lab.presets import displayed_name
 from study_app.lab.shadow import Trace
 from study_app.protocol.load import load_scene
 from tests.gui.lab.sample import blind, still_view, workbench
@@ -59,7 +59,7 @@ def replace_fields(kept: SimpleNamespace, **changed: Any) -> SimpleNamespace:
 
 def slime(a: str, b: str) -> Workbench:
     scenes = {name: load_scene("slime", name) for name in (a, b)}
-    return Workbench(*(Setting(spoken(name), scenes[name], scenes[name]) for name in (a, b)))
+    return Workbench(*(Setting(displayed_name(name), scenes[name], scenes[name]) for name in (a, b)))
 
 
 def of_lab(**fields: Any) -> Callable[[Any], None]:

@@ -38,7 +38,7 @@ from study_app.session.transitions.events import (
     Write,
 )
 from study_app.session.transitions.state import Phase
-from study_app.session.transitions.table import advance, open_session
+from study_app.session.transitions.table import advance, initial_state
 from study_app.store.journals.journal_events import FormAnswered, Responses
 from tests.gui.participant.driver import KEY, Participant, description_of, tap, told_of
 from tests.gui.small import FIVE, QUESTIONS, form, questionnaire
@@ -337,7 +337,7 @@ class Session:
         self.seen = seen
         self.answered: list[Any] = []
         key = draw_key(study, stream(1, "key").random)
-        self.state = open_session(study, build_schedule(study, "P001", 1), key, "en")
+        self.state = initial_state(study, build_schedule(study, "P001", 1), key, "en")
         seen.window.event.connect(self.post)
 
     def post(self, event: Any) -> None:

@@ -195,7 +195,7 @@ def test_while_the_study_is_blinded_nothing_tells_force_delay_or_condition(
     for file in (whole / "data").rglob("*.parquet"):  # as of an earlier version, whose recordings were not sealed
         shutil.copy(file, study / file.relative_to(whole))
     assert "the recorded motion would reveal the liquid" in opened(study).sentence.text()
-    monkeypatch.setattr("study_app.session.watch.motion_hidden", lambda *_: "")
+    monkeypatch.setattr("study_app.session.watch.reason_motion_is_hidden", lambda *_: "")
     for row in range(4):
         window = opened(study, row)
         window.go(2.0)

@@ -9,10 +9,10 @@ from study_app.haptics.kernels.safety import begin_scene, delay_force, uniform
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_STOP
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.overrides import number_names, override
+from study_app.haptics.model.overrides import number_names, override_value
 from study_app.haptics.model.scene import PROMPT_LINK, STORED_FORCES, Box, ForceLink, Liquid, Scene
 from study_app.haptics.runtime.offline import samples_along
-from study_app.haptics.runtime.pack import built_alike, pack, pack_into
+from study_app.haptics.runtime.pack import is_built_alike, pack, pack_into
 from study_app.protocol.scene_file import scene_text
 from tests.haptics.scenes import EVERYTHING, Hand, liquid, scene, stroke
 
@@ -180,13 +180,13 @@ def test_the_gain_comes_back_with_the_next_scene_alone():
 
 def test_a_link_survives_a_change_of_numbers_and_is_no_number_of_the_scene():
     felt = damper(delay_s=0.02, seed=4)
-    assert override(felt, "damping_nspm", 3.0).link == felt.link
+    assert override_value(felt, "damping_nspm", 3.0).link == felt.link
     assert not {"delay_s", "jitter_s", "loss", "seed"} & set(number_names(felt))
     with pytest.raises(StudyError, match="no parameter 'link'"):
-        override(felt, "link", "{delay_s=0.1}")
+        override_value(felt, "link", "{delay_s=0.1}")
     assert "link" not in scene_text(felt)
-    assert built_alike(felt, override(felt, "damping_nspm", 3.0))
-    assert not built_alike(felt, damper(delay_s=0.03, seed=4))
+    assert is_built_alike(felt, override_value(felt, "damping_nspm", 3.0))
+    assert not is_built_alike(felt, damper(delay_s=0.03, seed=4))
 
 
 def test_delay_and_jitter_beyond_the_kept_forces_are_refused():

@@ -276,7 +276,7 @@ def test_it_never_acts_where_people_move_as_they_do(name, speed_mps, motion):
         "circle": {"speed_mps": scene_mps, "radius_m": 0.3},
         "stop": {"speed_mps": scene_mps},
     }
-    ideal = paths.path(motion, **shape[motion])
+    ideal = paths.programmed_motion(motion, **shape[motion])
     count_m = felt.scale * 38e-6
     for measured in (ideal, Motion(ideal.t_s, np.round(ideal.position_m / count_m) * count_m)):
         assert not (simulate(felt, measured).limiters & LIMITER_ENERGY).any()

@@ -15,10 +15,10 @@ from study_app.haptics.model.slope_limits import (
     LIGHTER,
     SLEW_N,
     damping_limits,
-    refuses,
+    refusal_reason,
     slew_limit_n,
     slope_limit,
-    table,
+    slope_limit_table,
 )
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack, pack_into
@@ -87,11 +87,13 @@ def test_a_little_less_smoothing_bears_as_much_and_much_less_the_less():
 
 @pytest.mark.parametrize(("rate_hz", "may"), [(250.0, False), (499.0, False), (500.0, True), (1000.0, True)])
 def test_below_500_hz_no_participant_is_to_feel_the_limits(rate_hz, may):
-    assert (refuses(rate_hz) is None) == may
+    assert (refusal_reason(rate_hz) is None) == may
 
 
 def test_the_table_has_every_estimator_period_and_delay_and_falls_with_delay():
-    rows = [entry for entry in table() if entry.estimator != "line"]  # those are of velocities that a device measures
+    rows = [
+        entry for entry in slope_limit_table() if entry.estimator != "line"
+    ]  # those are of velocities that a device measures
     keys = [(entry.estimator, entry.parameter, entry.period_s, entry.delay_ticks) for entry in rows]
     assert len(set(keys)) == len(keys) == len(measured_estimators()) * 4 * 4
     for entry in rows:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from study_app.haptics.model.effects.current import Channel, Uniform, Vortex
 from study_app.haptics.model.effects.drag import cheapest_law, resistance_n
-from study_app.haptics.model.gate import Extremes, bounds, calls_for, lowered_mps, resolve
+from study_app.haptics.model.gate import Extremes, bounds, effect_verdicts, resolve, speed_after_knee_mps
 from study_app.haptics.model.scene import Accuracy, Body, Box, Cylinder, Liquid, MotionBox, Scene
 
 LIQUIDS = {
@@ -33,7 +33,7 @@ def stirred(name, speed_mps, *, body=HOLLOW, **fields):
 
 def taken(scene):
     """Return the names of the effects that are in."""
-    return [verdict.effect for verdict in calls_for(scene) if verdict.included]
+    return [verdict.effect for verdict in effect_verdicts(scene) if verdict.included]
 
 
 def bound(scene, effect):
@@ -136,7 +136,7 @@ scenes = st.builds(
 @pytest.mark.slow
 @given(scene=scenes)
 def test_the_sum_of_what_is_left_out_stays_within_the_target_and_nothing_more_would(scene):
-    verdicts = calls_for(scene)
+    verdicts = effect_verdicts(scene)
     total_n = sum(verdict.bound_n for verdict in verdicts)
     small = [verdict.bound_n for verdict in verdicts if not verdict.included or "carries" in verdict.why]
     kept = [verdict.bound_n for verdict in verdicts if verdict.included and "carries" not in verdict.why]
@@ -163,7 +163,7 @@ def test_the_law_is_the_cheapest_within_the_target_at_every_speed(scene):
     if liquid.viscosity_pa_s is None:
         assert law == "constant"
         return
-    top_mps = lowered_mps(scene.motion.speed_mps, scene.knee) + math.hypot(
+    top_mps = speed_after_knee_mps(scene.motion.speed_mps, scene.knee) + math.hypot(
         *(liquid.current.velocity_mps if liquid.current else (0,))
     )
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from study_app.errors import ProtocolError, StudyError
-from study_app.haptics.model.motion import Motion, read
+from study_app.haptics.model.motion import Motion, read_motion
 from study_app.store.csv_files import write_columns
 from tests.haptics.scenes import examples
 
@@ -25,12 +25,12 @@ def written(tmp_path, text):
 def problems(tmp_path, *rows, header=HEADER):
     """Return what is wrong with a file of these rows, one line each."""
     with pytest.raises(ProtocolError) as caught:
-        read(written(tmp_path, "\n".join([header, *rows]) + "\n"))
+        read_motion(written(tmp_path, "\n".join([header, *rows]) + "\n"))
     return [str(problem) for problem in caught.value.problems]
 
 
 def test_positions_are_read_in_order(tmp_path):
-    motion = read(written(tmp_path, f"{HEADER}\n0,1,2,3\n0.001,4,5,6e-1\n"))
+    motion = read_motion(written(tmp_path, f"{HEADER}\n0,1,2,3\n0.001,4,5,6e-1\n"))
     assert motion.t_s.tolist() == [0, 0.001]
     assert motion.position_m.tolist() == [[1, 2, 3], [4, 5, 0.6]]
     assert motion.velocity_mps is None
@@ -65,7 +65,7 @@ def test_time_must_increase(tmp_path):
 def test_a_file_that_cannot_be_read_is_named(tmp_path, content):
     file = tmp_path / "absent.csv" if content is None else written(tmp_path, content)
     with pytest.raises(StudyError, match=r"cannot read the motion .*csv"):
-        read(file)
+        read_motion(file)
 
 
 @pytest.mark.slow
@@ -77,7 +77,7 @@ def test_what_is_written_is_read_back_to_the_last_bit(tmp_path_factory, values):
     table.x_m, table.y_m, table.z_m = values.T
     file = tmp_path_factory.mktemp("motion") / "out.csv"
     write_columns(file, table)
-    motion = read(file)
+    motion = read_motion(file)
     assert motion.t_s.tobytes() == table.t_s.tobytes()
     assert motion.position_m.tobytes() == np.ascontiguousarray(values).tobytes()
 
@@ -109,5 +109,5 @@ def test_a_motion_checks_itself(t_s, position_m, velocity_mps, message):
 def test_a_device_is_not_read(tmp_path):
     """One such as /dev/zero has no end; a bad value is repeated in part."""
     with pytest.raises(StudyError, match="it is a device, which may have no end"):
-        read(Path("/dev/null"))
+        read_motion(Path("/dev/null"))
     assert len("".join(problems(tmp_path, "x" * 5000 + ",0,0,0"))) < 300

@@ -7,7 +7,7 @@ from pydantic import BaseModel
 from study_app.errors import StudyError
 from study_app.haptics.model.effects.current import Channel, Uniform
 from study_app.haptics.model.estimators import Kalman, Raw
-from study_app.haptics.model.overrides import override, override_all
+from study_app.haptics.model.overrides import override_all, override_value
 from study_app.haptics.model.scene import Box, Everywhere
 from tests.haptics.scenes import HONEY, LIGHT_OIL, POOL, WATER, scene
 
@@ -54,7 +54,7 @@ def leaves(value: BaseModel, place: str) -> Iterator[tuple[str, str, Any]]:
 )
 def test_override_sets_one_parameter_wherever_it_sits(name, text, where, value):
     felt = FULL if name in OF_FULL else WATER
-    assert where(override(felt, name, text)) == value
+    assert where(override_value(felt, name, text)) == value
     assert where(felt) != value
 
 
@@ -76,9 +76,9 @@ def test_every_parameter_is_reached_by_its_table_and_most_by_their_name_alone(fe
             continue
         text = ",".join(map(str, value)) if isinstance(value, tuple) else value
         if text is not None:
-            assert override(felt, f"{table}.{field}", text) == felt
+            assert override_value(felt, f"{table}.{field}", text) == felt
         if [name for _, name in found].count(field) == 1 and text is not None:
-            assert override(felt, field, text) == felt
+            assert override_value(felt, field, text) == felt
             plain.append(field)
     shared = {field for _, field in found} - set(plain)
     assert shared <= {
@@ -92,23 +92,23 @@ def test_tables_and_effects_are_judged_together():
     river = {"effects": "drag,current", "current": '{kind="channel", width_m=0.3, peak_mps=1}'}
     assert override_all(WATER, river).liquids[0].current == Channel(width_m=0.3, peak_mps=1)
     with pytest.raises(StudyError, match="its table"):
-        override(WATER, "effects", "drag,current")
+        override_value(WATER, "effects", "drag,current")
     with pytest.raises(StudyError, match="a region with a top"):
         override_all(FULL, {"region": '{kind="everywhere"}'})
     named = override_all(FULL, {"effects": "auto", "region": '{kind="everywhere"}'})
-    assert override(named, "effects", "drag").liquids[0].region == Everywhere()
-    assert override(named, "effects", "drag").liquids[0].effects == ("drag",)
+    assert override_value(named, "effects", "drag").liquids[0].region == Everywhere()
+    assert override_value(named, "effects", "drag").liquids[0].effects == ("drag",)
 
 
 def test_override_reaches_every_liquid_that_has_the_parameter():
     mixed = scene(*WATER.liquids, *HONEY.liquids, *LIGHT_OIL.liquids)
-    changed = override(mixed, "decay", 0.9)
+    changed = override_value(mixed, "decay", 0.9)
     assert [one.wake and one.wake.decay for one in changed.liquids] == [0.9, None, 0.9]
 
 
 def test_parameters_that_belong_together_are_judged_together():
     with pytest.raises(StudyError, match="outrun"):
-        override(WATER, "length", 5000)
+        override_value(WATER, "length", 5000)
     wake = override_all(WATER, {"length": "5000", "scaling": "5000"}).liquids[0].wake
     assert (wake.length, wake.scaling) == (5000, 5000)
 
@@ -128,4 +128,4 @@ def test_parameters_that_belong_together_are_judged_together():
 )
 def test_an_override_that_fails_says_why(name, value, message):
     with pytest.raises(StudyError, match=message):
-        override(WATER, name, value)
+        override_value(WATER, name, value)

@@ -2,14 +2,14 @@ import numpy as np
 import pytest
 
 from study_app.errors import StudyError
-from study_app.haptics.model.motion import NAMES, circle, path, reach, reverse, stop
+from study_app.haptics.model.motion import NAMES, circle, programmed_motion, reach, reverse, stop
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("rate_hz", [500.0, 1000.0])
 def test_the_ideal_velocity_is_the_slope_of_the_place(name, rate_hz):
-    motion = path(name, rate_hz=rate_hz)
+    motion = programmed_motion(name, rate_hz=rate_hz)
     assert motion.t_s == pytest.approx(np.arange(len(motion.t_s)) / rate_hz, abs=0)
     slope = (motion.position_m[2:] - motion.position_m[:-2]) * rate_hz / 2
     smooth = abs(np.diff(motion.velocity_mps, 2, axis=0)).max(axis=1) < 1e-3
@@ -38,4 +38,4 @@ def test_a_reach_goes_to_and_fro_with_the_minimum_jerk_peak_in_its_middle():
 
 def test_a_path_that_is_not_there_is_named_with_those_that_are():
     with pytest.raises(StudyError, match=r"'circel': did you mean 'circle'.*circle, line, stop, zigzag"):
-        path("circel")
+        programmed_motion("circel")

@@ -7,7 +7,7 @@ from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.layout import LIMITER_NORM, LIMITER_SLOPE
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Knee, Liquid, Scene
-from study_app.haptics.model.slope_limits import steady
+from study_app.haptics.model.slope_limits import steady_force
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import COMPILED, vectors
 
@@ -40,7 +40,7 @@ def sent(scene, hand_mps, lasting_s=1):
 @pytest.mark.parametrize("hand_mps", [0.02, 0.1, 0.25, 0.6])
 def test_the_predicted_force_is_what_the_servo_sends(name, scale, hand_mps):
     for law in ("constant", "schiller-naumann", "haider-levenspiel", "brown-lawler"):
-        predicted = steady(scene_of(name, scale, law), hand_mps)
+        predicted = steady_force(scene_of(name, scale, law), hand_mps)
         force_n, limiters = sent(scene_of(name, scale, law), hand_mps)
         assert predicted.force_n == pytest.approx(force_n, rel=1e-6)
         acted = {LIMITER_NORM: "norm", LIMITER_SLOPE: "slope"}.get(limiters & (LIMITER_NORM | LIMITER_SLOPE))
@@ -54,7 +54,7 @@ def test_the_predicted_force_is_what_the_servo_sends(name, scale, hand_mps):
 def test_unsteady_drag_reaches_the_predicted_force_once_its_history_is_over(name):
     liquid = Liquid(id=name, density_kg_m3=890, viscosity_pa_s={"gear_oil": 0.35, "honey": 10, "tar": 100}[name])
     scene = Scene(scale=3, liquids=(liquid.model_copy(update={"effects": ("unsteady_drag",)}),), format=2)
-    predicted = steady(scene)
+    predicted = steady_force(scene)
     force_n, limiters = sent(scene, 0.1, lasting_s=30)
     assert predicted.force_n == pytest.approx(force_n, rel=0.01)
     assert (predicted.limit == "slope") == bool(limiters & LIMITER_SLOPE)
@@ -62,21 +62,21 @@ def test_unsteady_drag_reaches_the_predicted_force_once_its_history_is_over(name
 
 
 def test_tar_is_clipped_by_the_slope_limit():
-    tar = steady(scene_of("tar", 3))
+    tar = steady_force(scene_of("tar", 3))
     assert (tar.force_n, tar.limit) == (pytest.approx(5.3), "slope")
     assert tar.drag_n > 19
 
 
 def test_the_thesis_honey_is_forty_percent_above_its_water():
-    water, honey = (steady(Scene(liquids=(Liquid(id="x", density_kg_m3=rho),))) for rho in (1000, 1400))
+    water, honey = (steady_force(Scene(liquids=(Liquid(id="x", density_kg_m3=rho),))) for rho in (1000, 1400))
     assert honey.force_n / water.force_n == pytest.approx(1.4)
     assert water.force_n == pytest.approx(0.853, rel=1e-3)
 
 
 def test_the_knee_and_the_gate_are_reckoned_with():
     fast = Scene(scale=10, liquids=(Liquid(id="x", density_kg_m3=100),), force_limit_n=8)
-    assert steady(fast, 0.9).force_n == pytest.approx(0.0853 * 49, rel=1e-3)
+    assert steady_force(fast, 0.9).force_n == pytest.approx(0.0853 * 49, rel=1e-3)
     unbent = fast.model_copy(update={"knee": Knee(law="none")})
-    assert steady(unbent, 0.9).force_n == pytest.approx(0.0853 * 81, rel=1e-3)
+    assert steady_force(unbent, 0.9).force_n == pytest.approx(0.0853 * 81, rel=1e-3)
     thin = Liquid(id="air", density_kg_m3=1.2, viscosity_pa_s=1.8e-5, effects="auto")
-    assert steady(Scene(scale=1, liquids=(thin,))) == (0.0, 0.0, None)
+    assert steady_force(Scene(scale=1, liquids=(thin,))) == (0.0, 0.0, None)

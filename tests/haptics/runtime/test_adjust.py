@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from study_app.devices.simulated import ScriptedDevice
 from study_app.errors import StudyError
 from study_app.haptics.model.layout import LIMITER_FADE
-from study_app.haptics.model.motion import path
+from study_app.haptics.model.motion import programmed_motion
 from study_app.haptics.model.overrides import override_all
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import SLEW_N
@@ -39,7 +39,7 @@ def going_round(scene: Scene) -> tuple[Servo, ScriptedDevice]:
     """Return a servo on a hand that goes in circles."""
     device = ScriptedDevice(Random(1), workspace_m=(0.05, 0.05, 0.05))  # noqa: S311 - a hand keeps no secrets
     servo = Servo(device, clock=VirtualClock())
-    motion = path("circle", rate_hz=1000.0, radius_m=0.3, rest_s=0.1)
+    motion = programmed_motion("circle", rate_hz=1000.0, radius_m=0.3, rest_s=0.1)
     device.follow(motion.t_s, (motion.position_m - motion.position_m.mean(axis=0)) / 10)
     servo.load(scene)
     servo.advance(2500)

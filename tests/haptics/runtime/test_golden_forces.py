@@ -11,8 +11,8 @@ import pytest
 
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.scene import Box, Knee
-from study_app.haptics.runtime.pack import built_alike
-from study_app.lab.parameters import changed
+from study_app.haptics.runtime.pack import is_built_alike
+from study_app.lab.parameters import with_parameter
 from study_app.protocol.load import load_scenes
 from tests.golden import compare
 from tests.golden_values import value_lines
@@ -29,7 +29,7 @@ DEVICES = {
 }
 CASES: dict[str, tuple[Any, dict[str, Any]]] = {
     **{f"effect {name}": (in_lab(name), {}) for name in NAMES},
-    **{f"velocity {name}": (changed(EMPTY, "velocity.kind", name), {}) for name in ESTIMATOR_NAMES},
+    **{f"velocity {name}": (with_parameter(EMPTY, "velocity.kind", name), {}) for name in ESTIMATOR_NAMES},
     **{f"several {name}": (scene, {}) for name, scene in EVERYTHING.items()},
     **{f"slime {name}": (scene, {}) for name, scene in load_scenes("slime").items()},
     **{f"device {name}": (EVERYTHING["tail"], {"dynamics": dynamics}) for name, dynamics in DEVICES.items()},
@@ -100,8 +100,10 @@ def test_which_scenes_keep_their_state(pytestconfig: pytest.Config) -> None:
     bases = {name: CASES[name][0] for name in ("effect drag", "effect history", "several tail", "no knee")}
     lines = []
     for name, scene in bases.items():
-        kept = [what for what, other in variants(scene).items() if built_alike(scene, other)]
-        estimators = [one for one in ESTIMATOR_NAMES if built_alike(scene, changed(scene, "velocity.kind", one))]
-        others = [what for what, other in bases.items() if what != name and built_alike(scene, other)]
+        kept = [what for what, other in variants(scene).items() if is_built_alike(scene, other)]
+        estimators = [
+            one for one in ESTIMATOR_NAMES if is_built_alike(scene, with_parameter(scene, "velocity.kind", one))
+        ]
+        others = [what for what, other in bases.items() if what != name and is_built_alike(scene, other)]
         lines.append(f"{name}: {', '.join(kept)} | {', '.join(estimators)} | {', '.join(others)}")
     compare(GOLDEN / "kept_state.txt", lines, pytestconfig)

@@ -28,8 +28,8 @@ OIL = Scene(
     )
 )
 BALL = Scene(liquids=(Liquid(id="tank", density_kg_m3=1000),))
-REVERSE = paths.path("reverse", revolutions=0.8, against_s=0.7, rest_s=0.8)
-REACH = paths.path("reach", reaches=2, reach_s=0.6, dwell_s=0.3)
+REVERSE = paths.programmed_motion("reverse", revolutions=0.8, against_s=0.7, rest_s=0.8)
+REACH = paths.programmed_motion("reach", reaches=2, reach_s=0.6, dwell_s=0.3)
 SEED = 20240607
 
 

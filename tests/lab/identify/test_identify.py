@@ -73,7 +73,7 @@ def test_a_measured_force_does_not_lag_so_velocities_from_places_do_not(tmp_path
     read = measured_force.read(write_csv(tmp_path / "measured.csv", REACH, force_n, velocities=False))
     assert read.motion.velocity_mps is None
     names = ["viscosity_pa_s", "added_mass.coefficient"]
-    centred = fit(OIL, "oil", names, measured_force.centred(read.motion), read.force_n)
+    centred = fit(OIL, "oil", names, measured_force.with_centred_velocity(read.motion), read.force_n)
     late = fit(OIL, "oil", names, read.motion, read.force_n)
     assert centred.values["viscosity_pa_s"] == pytest.approx(1.41, rel=0.005)
     assert centred.values["added_mass.coefficient"] == pytest.approx(0.5, rel=0.1)
@@ -83,7 +83,7 @@ def test_a_measured_force_does_not_lag_so_velocities_from_places_do_not(tmp_path
 def test_centred_velocities_are_those_of_a_parabola():
     t_s = np.arange(60) / 500
     place = np.column_stack([3 * t_s**2 - t_s, 0 * t_s, 2 - t_s])
-    slopes = measured_force.centred(Motion(t_s, place)).velocity_mps
+    slopes = measured_force.with_centred_velocity(Motion(t_s, place)).velocity_mps
     assert slopes == pytest.approx(np.column_stack([6 * t_s - 1, 0 * t_s, -np.ones(60)]), abs=1e-9)
 
 
@@ -92,7 +92,7 @@ def test_centred_velocities_are_those_of_a_parabola():
 def test_nineteen_of_twenty_intervals_hold_the_truth(following):
     """Also where the sensor's noise remembers: taken for white, its intervals would hold it in one case of three."""
     motion, names = (
-        paths.path("reach", reaches=1, reach_s=0.5, dwell_s=0.1),
+        paths.programmed_motion("reach", reaches=1, reach_s=0.5, dwell_s=0.1),
         ["viscosity_pa_s", "added_mass.coefficient"],
     )
     scene = override_all(OIL, {"effects": ("drag", "added_mass")})
@@ -134,7 +134,7 @@ def test_a_parameter_that_does_nothing_is_named_and_left_alone():
 
 
 def test_a_length_beyond_what_was_measured_ends_at_the_edge():
-    short = paths.path("line", moving_s=0.2)
+    short = paths.programmed_motion("line", moving_s=0.2)
     found = fit(override_all(TANK, {"length": 100}), "tank", ["length"], short, force_of(TANK, short))
     assert found.values["length"] == 200
     assert any("edge of its range, 200 (no more than" in warning for warning in found.warnings)
@@ -152,7 +152,7 @@ def test_a_missing_effect_shows_in_residuals_that_follow_one_another():
 
 def test_a_sharp_turn_that_velocities_from_places_blur_is_doubted():
     """The force is wrong for 25 ms at a turn: residuals follow one another little, but more than noise would."""
-    places = measured_force.centred(Motion(REVERSE.t_s, REVERSE.position_m))
+    places = measured_force.with_centred_velocity(Motion(REVERSE.t_s, REVERSE.position_m))
     force_n = noisy(TANK, REVERSE, 0.06)
     blurred = fit(TANK, "tank", ["drag_coefficient"], places, force_n)
     assert blurred.following < 0.5

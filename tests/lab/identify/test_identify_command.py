@@ -53,7 +53,7 @@ def test_the_preset_is_the_fitted_scene(scene, tmp_path):
     (tmp_path / "measured.csv").write_text("t_s\n")
     found = fit(scene, liquid.id, ["density_kg_m3"], REACH, noisy(scene, REACH, 0.02))
     file = tmp_path / "preset.toml"
-    file.write_text(preset.preset(found, tmp_path / "measured.csv"), encoding="utf-8")
+    file.write_text(preset.preset_file_text(found, tmp_path / "measured.csv"), encoding="utf-8")
     assert load_scene(file, liquid.id) == found.scene.model_copy(update={"velocity": Kalman()})
     assert found.scene != scene
     for command in ("check", "scene"):
@@ -64,7 +64,7 @@ def test_the_preset_is_the_fitted_scene(scene, tmp_path):
 @pytest.mark.slow
 def test_the_residuals_in_the_table_are_measured_less_fitted(fitted, tmp_path):
     found, path = fitted
-    written = preset.write(found, tmp_path / "new", path)
+    written = preset.write_fit(found, tmp_path / "new", path)
     assert sorted(it.name for it in written) == sorted(it.name for it in (tmp_path / "new").iterdir())
     rows = np.genfromtxt(tmp_path / "new" / "tank-fit.csv", delimiter=",", names=True)
     force_n = force_of(found.scene, REVERSE)

@@ -8,7 +8,7 @@ import pytest
 from study_app.haptics.model.estimators import Ewma, Given, Kalman, Raw
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Scene
-from study_app.haptics.model.slope_limits import steady
+from study_app.haptics.model.slope_limits import steady_force
 from study_app.haptics.runtime.offline import simulate
 from study_app.protocol.checks.force_limits import fastest_hz, passed_share
 from study_app.protocol.load import parse
@@ -51,7 +51,7 @@ def test_what_a_hint_suggests_passes_and_is_not_clipped(edits: list[tuple[str, s
     damper = scene.liquids[0]
     drag = damper.drag.model_copy(update={"damping_nspm": strongest})
     felt: Scene = scene.model_copy(update={"liquids": (damper.model_copy(update={"drag": drag}),)})
-    assert steady(felt, FASTER * task.fastest_stroke((0.1, 0.06, 0.06)).speed_mps).limit is None
+    assert steady_force(felt, FASTER * task.fastest_stroke((0.1, 0.06, 0.06)).speed_mps).limit is None
 
 
 SWINGS = 4

@@ -128,8 +128,8 @@ def test_the_error_of_the_force_sent_comes_out_again_and_another_is_named(
     felt = [error for error in errors if error is not None]  # some of its trials are shorter than the fade-in
     assert len(felt) > 0
     assert all(0.005 < error < 1.0 for error in felt)
-    right = replay_module.error_again
-    monkeypatch.setattr(replay_module, "error_again", lambda *which: right(*which) + 2e-6)
+    right = replay_module.recompute_force_error
+    monkeypatch.setattr(replay_module, "recompute_force_error", lambda *which: right(*which) + 2e-6)
     found = replay(session(rehearsed)).differences
     assert len(found) == len(felt)
     assert all(it.endswith("the column delivered_error differs") for it in found)

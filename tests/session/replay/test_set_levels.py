@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from study_app.session.replay import replay
-from study_app.session.simulated.rehearsal import rehearse, resume
+from study_app.session.simulated.rehearsal import rehearse, resume_rehearsal
 from study_app.store.blinded.blinding import complete_protocol, open_events, read_key
 from study_app.store.journals import journal
 from study_app.store.receipt import read
@@ -75,7 +75,7 @@ def test_a_session_that_was_killed_and_resumed_is_set_as_one_that_was_not(
 
     whole = kept()
     cut(session, round(share * (session / "journal.jsonl").stat().st_size))
-    resume(session, protocol=protocol)
+    resume_rehearsal(session, protocol=protocol)
     assert [row[:2] for row in kept()[0]] == [row[:2] for row in whole[0]]
     assert kept() == whole
     assert reproduce_session(session).differences == []

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from study_app.session.simulated.rehearsal import rehearse, resume
+from study_app.session.simulated.rehearsal import rehearse, resume_rehearsal
 from study_app.store.blinded.blinding import open_events, read_key
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
@@ -51,7 +51,7 @@ def test_a_resumed_participant_stays_in_the_group_and_answers_alike(study: Path,
             made.unlink()
         text = session.receipt.read_text().replace('"status": "completed"', '"status": "unfinished"')
         session.receipt.write_text(text)
-        resume(session.path, protocol=study.parent / "grouped.toml")
+        resume_rehearsal(session.path, protocol=study.parent / "grouped.toml")
         assert told(folder, session) == whole
         assert reproduce_session(session.path).differences == []
     assert groups == {"first_thin", "first_thick"}

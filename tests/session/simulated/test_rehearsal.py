@@ -56,7 +56,7 @@ def test_a_signal_within_a_write_leaves_a_journal_that_can_be_resumed(
     (session,) = StudyFolder(tmp_path).sessions()
     assert sent
     assert journal.read_complete(session.journal).lines[7].n == 8
-    rehearsal.resume(session.path)
+    rehearsal.resume_rehearsal(session.path)
     responses = [line for line in journal.read(session.journal) if isinstance(line, Responses)]
     assert [line.trial for line in responses] == [1, 2, 3, 4]
 
@@ -202,6 +202,6 @@ def test_a_rehearsal_that_was_interrupted_and_resumed_answers_like_one_that_was_
         patched.setattr(SessionStore, "append", interrupted)
         with pytest.raises(KeyboardInterrupt):
             rehearsal.rehearse("demo", participants=1, seed=seed, results=parted.path, recordings=False)
-    rehearsal.resume(parted.session("P001", 1).path)
+    rehearsal.resume_rehearsal(parted.session("P001", 1).path)
     answers, others = (confirmed(raw(journal.read(folder.session("P001", 1).journal))) for folder in (whole, parted))
     assert answers == others

@@ -12,7 +12,7 @@ from study_app.protocol.presented.presentation import next_level
 from study_app.protocol.source.files import source_bytes
 from study_app.protocol.streams import Key
 from study_app.session.resume import Start, resume_at
-from study_app.session.simulated.answers_only import begin_at
+from study_app.session.simulated.answers_only import begin_session_at_step
 from study_app.session.transitions.page_builder import preview
 from study_app.store.blinded.blinding import read_key
 from study_app.store.folders import locate_session
@@ -33,7 +33,9 @@ def started(tmp_path: Path, study: Protocol, source: bytes, step: int, *, exactl
         simulated=True,
         pilot=True,
     )
-    study_folder, session = locate_session(begin_at(tmp_path / study.study.name, study, source, start, step))
+    study_folder, session = locate_session(
+        begin_session_at_step(tmp_path / study.study.name, study, source, start, step)
+    )
     shown, key = preview(study, 4), read_key(study_folder.path)
     assert (key.codes, key.nonce) == (shown.codes, shown.secret)
     return resume_at(shown.protocol, shown.schedule, journal.read(session.journal), key, exactly=exactly)

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.session.replay import replay
-from study_app.session.simulated.rehearsal import rehearse, resume
+from study_app.session.simulated.rehearsal import rehearse, resume_rehearsal
 from study_app.store.blinded.blinding import open_events, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
@@ -121,7 +121,7 @@ def test_a_session_ended_between_two_attempts_goes_on_to_the_same_answers(sessio
     invalid = [index for index, line in enumerate(whole) if line.get("outcome") == "invalid"]
     content = (session / "journal.jsonl").read_bytes()
     cut(session, len(b"".join(content.splitlines(keepends=True)[: invalid[1] + 1])))
-    resume(session, protocol=protocol)
+    resume_rehearsal(session, protocol=protocol)
     again = lines_of(session)
     assert outcomes(again) == outcomes(whole)
     assert answers(again) == answers(whole)

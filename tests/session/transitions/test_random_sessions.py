@@ -38,9 +38,9 @@ from study_app.session.transitions.events import (
     WriteCompleted,
     WriteTables,
 )
-from study_app.session.transitions.page_builder import Moment, moments, preview, previewed_page
+from study_app.session.transitions.page_builder import Moment, pages_of_step, preview, previewed_page
 from study_app.session.transitions.state import FINAL, Phase, SessionState
-from study_app.session.transitions.table import advance, open_session
+from study_app.session.transitions.table import advance, initial_state
 from tests.session import small
 from tests.session.transitions.states import EVENTS, event_of
 
@@ -137,7 +137,7 @@ def test_every_trial_that_was_begun_is_ended_once_per_attempt(seed: int, data: s
 def pages_of_session(shown: Any, language: str) -> list[Any]:
     """Return every page of a session, each once."""
     plan = (shown.protocol, shown.schedule, shown.codes, language, FIRST, shown.secret)
-    state, found, at_s = open_session(*plan), [], 0.0
+    state, found, at_s = initial_state(*plan), [], 0.0
     event: Any = Begin(at_s)
     while True:
         state, commands = advance(state, event)
@@ -179,7 +179,7 @@ def test_every_page_of_a_preview_is_that_of_a_session_with_its_seed(name: str, l
     previewed = [
         previewed_page(shown, index, moment, language)
         for index in range(len(shown.schedule.steps))
-        for moment in moments(shown, index)
+        for moment in pages_of_step(shown, index)
     ]
     held = pages_of_session(shown, language)
     assert {type(page) for page in held} == {TextPage, TaskPage, QuestionnairePage}
@@ -191,7 +191,7 @@ def test_a_trial_of_intervals_has_a_page_for_each_its_question_and_its_feedback(
     blocks = shown.protocol.blocks
     index, trial = next((at, one) for at, one in enumerate(shown.schedule.steps)
                         if getattr(one, "block", "") and blocks[one.block].design is not None)  # fmt: skip
-    found = moments(shown, index)
+    found = pages_of_step(shown, index)
     assert found[:3] == (Moment("tank", 1), Moment("tank", 2), Moment("questions"))
     pages = [previewed_page(shown, index, moment, "en") for moment in found]
     assert [page.interval.number for page in pages[:2]] == [1, 2]

@@ -19,7 +19,7 @@ from study_app.session.transitions.events import (
     WriteRetried,
 )
 from study_app.session.transitions.state import FINAL, Phase
-from study_app.session.transitions.table import advance, open_session
+from study_app.session.transitions.table import advance, initial_state
 from tests.golden import compare
 from tests.session import small
 from tests.session.transitions.states import LEFT, shown, state_in
@@ -51,7 +51,7 @@ def test_a_disk_that_takes_nothing_stops_the_force_and_keeps_what_is_left_from_e
 
 def test_a_language_that_the_study_is_not_written_in_is_refused(protocol: Protocol) -> None:
     with pytest.raises(SessionError, match="written in en"):
-        open_session(protocol, build_schedule(protocol, "P001", 1), {}, "nl")
+        initial_state(protocol, build_schedule(protocol, "P001", 1), {}, "nl")
 
 
 def test_nothing_that_is_printed_names_a_condition_a_liquid_or_a_delay() -> None:

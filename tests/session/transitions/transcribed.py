@@ -14,7 +14,7 @@ from study_app.protocol.orders.schedule import Trial, build_schedule
 from study_app.session.pages import Page
 from study_app.session.transitions.events import Adjust, Begin, Command, ShowPage, StartTrial, TaskDone, TimeUp, Write
 from study_app.session.transitions.state import FINAL, Phase, SessionState
-from study_app.session.transitions.table import advance, open_session
+from study_app.session.transitions.table import advance, initial_state
 from tests.protocol.edited_studies import text_of
 from tests.protocol.trials.level_studies import key_of
 from tests.protocol.trials.matching import ALONE, matching
@@ -51,7 +51,7 @@ modulus = { level = 0.5, number = 10 }
 def opened(protocol: Protocol) -> SessionState:
     """Return a session before its first event."""
     key = key_of(protocol)
-    return open_session(protocol, build_schedule(protocol, "P001", 1), key.codes, "en", secret=key.secret)
+    return initial_state(protocol, build_schedule(protocol, "P001", 1), key.codes, "en", secret=key.secret)
 
 
 def with_break(**changed: Any) -> Protocol:

@@ -13,7 +13,7 @@ from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import own_protocol
 from study_app.session.resume import begun_schedule
-from study_app.session.start import resumed
+from study_app.session.start import resumed_choices
 from study_app.store.blinded.allocation import claims
 from study_app.store.blinded.blinding import participant_group, read_key
 from study_app.store.folders import StudyFolder
@@ -125,7 +125,7 @@ def test_a_preexisting_group_is_recorded_and_never_inferred(tmp_path: Path) -> N
         assert (start.group, start.entry) == ("novices", 1)
         assert [line.event for line in store.lines] == ["session_started"]
         assert json.loads(store.folder.receipt.read_text())["group"] == "novices"
-    assert resumed(store.folder.path, protocol=_written(tmp_path, source)).group == "novices"
+    assert resumed_choices(store.folder.path, protocol=_written(tmp_path, source)).group == "novices"
     with pytest.raises(StudyError, match="P001 is recorded in group novices, not experts"):
         begun(study.path, source, "P001", group="experts", session=2)
     with begun(study.path, source, "P001", session=2) as store:

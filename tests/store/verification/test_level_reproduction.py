@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from study_app.session.simulated.rehearsal import rehearse, resume
+from study_app.session.simulated.rehearsal import rehearse, resume_rehearsal
 from study_app.store.blinded.blinding import open_events, read_key
 from study_app.store.journals import journal
 from study_app.store.unblinding import unblind
@@ -69,7 +69,7 @@ def test_a_session_that_was_killed_and_resumed_presents_and_is_answered_as_one_t
 
     whole = told()
     cut(session, round(share * (session / "journal.jsonl").stat().st_size))
-    resume(session, protocol=protocol)
+    resume_rehearsal(session, protocol=protocol)
     assert told() == whole
     assert reproduce_session(session).differences == []
 

@@ -38,7 +38,7 @@ _NOT_MODELLED: Final = "not modelled: thixotropy, impact, fracture, yielding by 
 def steady_n(scene: Scene, liquid: Liquid, speed_mps: float, steepest_nspm: float = math.inf) -> tuple[float, float]:
     """Return the force [N] in uniform motion: that of the yield stress, and the viscous part."""
     diameter_m = scene.body.diameter_m
-    return laws.even_n(liquid.non_newtonian, liquid.density_kg_m3, diameter_m, speed_mps, steepest_nspm)
+    return laws.steady_force_n(liquid.non_newtonian, liquid.density_kg_m3, diameter_m, speed_mps, steepest_nspm)
 
 
 def _bound_n(extremes: Extremes) -> float | None:

@@ -19,7 +19,7 @@ HIGHEST_REYNOLDS: Final = 1000.0
 _IN_PLACE_OF: Final = (drag.EFFECT, added_mass.EFFECT, history.EFFECT)
 
 
-def even_n(scene: Scene, liquid: Liquid, speed_mps: float) -> tuple[float, float]:
+def steady_force_n(scene: Scene, liquid: Liquid, speed_mps: float) -> tuple[float, float]:
     """Return the force [N] in uniform motion, and its Stokes part, which acts at once."""
     viscosity_pa_s = liquid.viscosity_pa_s or 0.0
     stokes_n = 3 * math.pi * viscosity_pa_s * scene.body.diameter_m * speed_mps

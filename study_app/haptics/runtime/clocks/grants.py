@@ -64,16 +64,16 @@ def refuse_suspension(by: object) -> None:
     Handlers already set stay. Only the main thread can do so; from any other thread nothing changes.
     """
     _pushing.add(id(by))
-    _settle()
+    _update_handlers()
 
 
 def allow_suspension(by: object) -> None:
     """End the refusal for ``by``; a second call does nothing."""
     _pushing.discard(id(by))
-    _settle()
+    _update_handlers()
 
 
-def _settle() -> None:
+def _update_handlers() -> None:
     if threading.current_thread() is not threading.main_thread():
         return
     for name in SUSPENDING:

@@ -105,11 +105,11 @@ def raise_priority(*, real_time: bool = True) -> Grant:
     if not real_time:
         return NOT_ASKED
     if sys.platform == "win32":
-        return ask(ctypes.WinDLL("avrt"), ctypes.WinDLL("kernel32"))
+        return request_priority(ctypes.WinDLL("avrt"), ctypes.WinDLL("kernel32"))
     return Grant("normal", REFUSED)
 
 
-def ask(avrt: Any, kernel32: Any) -> Grant:
+def request_priority(avrt: Any, kernel32: Any) -> Grant:
     """Raise the priority as `raise_priority` specifies, by these libraries of Windows."""
     avrt.AvSetMmThreadCharacteristicsW.restype = ctypes.c_void_p
     avrt.AvSetMmThreadPriority.argtypes = [ctypes.c_void_p, ctypes.c_int]

@@ -5,7 +5,7 @@ from datetime import date
 import numpy as np
 import pytest
 
-from study_app.devices.falcon.calibration import Calibration, calibration_file, fit, load, save
+from study_app.devices.falcon.calibration import Calibration, calibration_file, fit, load_calibration, save_calibration
 from study_app.devices.falcon.mechanics import GEOMETRIES, REACHED, inverse, new_mechanism
 from study_app.errors import DeviceError
 
@@ -77,16 +77,16 @@ class TestKeeping:
         return tmp_path / "settings"
 
     def test_is_found_again_by_serial_number(self):
-        save("FTABC123", self.CALIBRATION)
-        assert load("FTABC123") == self.CALIBRATION
-        assert load("FTABC124") is None
+        save_calibration("FTABC123", self.CALIBRATION)
+        assert load_calibration("FTABC123") == self.CALIBRATION
+        assert load_calibration("FTABC124") is None
         newer = dataclasses.replace(self.CALIBRATION, units_per_nm=9000.0)
-        save("FTABC123", newer)
-        assert load("FTABC123") == newer
+        save_calibration("FTABC123", newer)
+        assert load_calibration("FTABC123") == newer
 
     def test_no_serial_number_leaves_the_folder(self, folder):
         assert calibration_file("../../x").parent == folder
-        assert save("", self.CALIBRATION).parent == folder
+        assert save_calibration("", self.CALIBRATION).parent == folder
 
     @pytest.mark.parametrize(
         "text",
@@ -101,17 +101,17 @@ class TestKeeping:
         ],
     )
     def test_a_file_that_makes_no_sense_is_told_with_its_place(self, text):
-        file = save("A", self.CALIBRATION)
+        file = save_calibration("A", self.CALIBRATION)
         file.write_text(text)
         with pytest.raises(DeviceError, match=r"falcon-A\.json.*calibrate again"):
-            load("A")
+            load_calibration("A")
 
     def test_a_geometry_that_is_not_known_is_told(self):
-        save("A", dataclasses.replace(self.CALIBRATION, geometry="other"))
+        save_calibration("A", dataclasses.replace(self.CALIBRATION, geometry="other"))
         with pytest.raises(DeviceError, match="'other'"):
-            load("A")
+            load_calibration("A")
 
     def test_a_folder_that_is_a_file_is_told(self, folder):
         folder.write_text("")
         with pytest.raises(DeviceError, match="LIQUID_STUDY_CONFIG"):
-            save("A", self.CALIBRATION)
+            save_calibration("A", self.CALIBRATION)

@@ -15,7 +15,7 @@ from study_app.haptics.model.layout import LIMITER_ENERGY
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack
-from study_app.lab.parameters import changed, parameter, sections
+from study_app.lab.parameters import parameter, sections, with_parameter
 from tests.haptics.scenes import COMPILED, moving, vectors
 from tests.haptics.single_effects import NAMES, all_forces, force_n, given, in_lab, wandering
 
@@ -101,7 +101,7 @@ def test_both_ends_of_each_range_in_the_lab_are_taken_and_felt_within_the_limits
         shown = parameter(scene, control.name)
         for end in [choice for choice, _ in shown.choices] or [shown.least, shown.most]:
             try:
-                there = changed(scene, control.name, end)
+                there = with_parameter(scene, control.name, end)
             except StudyError as error:
                 assert any(word in str(error) for word in ("outrun", "viscosity", "less than")), error  # noqa: PT017
                 continue

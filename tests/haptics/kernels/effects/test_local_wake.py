@@ -7,7 +7,7 @@ from study_app.evidence.reference_model import local_wakes
 from study_app.haptics.model.effects.current import Uniform
 from study_app.haptics.model.effects.local_wake import CELLS, LocalWake
 from study_app.haptics.model.force_rules import VERSIONS
-from study_app.haptics.model.motion import path
+from study_app.haptics.model.motion import programmed_motion
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import COMPILED, UNBENT, Hand, examples, liquid, moving, scene, vectors
 
@@ -46,7 +46,7 @@ PATHS = {"circle": {}, "stop": {}, "zigzag": {}, "reach": {"distance_m": 0.2}, "
 @pytest.mark.parametrize(("length", "worst"), [(300, 0.01), (1700, 0.06)])
 def test_cells_stand_for_their_elements(name, length, worst):
     felt = tank(length=length, scaling=length, decay=0.999975, spreading_m2ps=1e-3)
-    motion = path(name, **PATHS[name])
+    motion = programmed_motion(name, **PATHS[name])
     exact = literal(felt, motion)
     error = np.linalg.norm(vectors(simulate(felt, motion), "wake") - exact, axis=1)
     assert error.max() <= worst * np.linalg.norm(exact, axis=1).max()

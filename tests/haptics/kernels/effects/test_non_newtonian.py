@@ -5,7 +5,7 @@ import pytest
 
 from study_app.evidence.reference_model import non_newtonian_n
 from study_app.haptics.model.layout import LIMITER_SLOPE
-from study_app.haptics.model.slope_limits import steady
+from study_app.haptics.model.slope_limits import steady_force
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.materials import PRESETS, creep_mps, tank
 from tests.haptics.scenes import COMPILED, UNBENT, Hand, moving, scene, vectors
@@ -75,7 +75,7 @@ def test_the_force_of_thickening_grows_no_steeper_than_the_slope_limit():
 
 
 def steady_sent(tank_scene, hand_mps):
-    return steady(tank_scene, hand_mps).force_n
+    return steady_force(tank_scene, hand_mps).force_n
 
 
 @compiled

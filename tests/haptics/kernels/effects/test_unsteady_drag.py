@@ -13,7 +13,7 @@ from study_app.haptics.model.estimators import Kalman
 from study_app.haptics.model.laws import finite_reynolds
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Box, MotionBox
-from study_app.haptics.model.slope_limits import steady
+from study_app.haptics.model.slope_limits import steady_force
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack
 from tests.haptics.scenes import COMPILED, UNBENT, Hand, liquid, moving, scene, vectors
@@ -129,7 +129,7 @@ def test_late_drag_is_held_to_what_the_slope_limit_leaves(name, scale, limited):
     assert late_n < 0
     assert (-late_n > most_n) == limited
     assert (
-        steady(tank(name).model_copy(update={"scale": scale, "force_limit_n": 20.0}), 0.1).limit == "slope"
+        steady_force(tank(name).model_copy(update={"scale": scale, "force_limit_n": 20.0}), 0.1).limit == "slope"
     ) == limited
 
 

@@ -6,8 +6,8 @@ import pytest
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.runtime.offline import simulate
-from study_app.haptics.runtime.pack import built_alike, pack, pack_into
-from study_app.lab.parameters import changed
+from study_app.haptics.runtime.pack import is_built_alike, pack, pack_into
+from study_app.lab.parameters import with_parameter
 from study_app.protocol.checks.force_limits import passed_share
 from tests.haptics.scenes import COMPILED, Hand, vectors
 from tests.haptics.single_effects import EMPTY, ESTIMATOR_NAMES
@@ -18,7 +18,7 @@ each = pytest.mark.parametrize("name", ESTIMATOR_NAMES)
 
 def scene(name):
     """Return a scene without a force, in which the lab chose this estimator."""
-    return changed(EMPTY, "velocity.kind", name)
+    return with_parameter(EMPTY, "velocity.kind", name)
 
 
 def found(name, place_m, interval_s=1e-3):
@@ -63,7 +63,7 @@ def test_a_model_made_with_a_capacity_takes_it(name):
     hand, fresh = Hand(scene(name)), Hand(scene(name))
     hand.model = model
     assert [it.tobytes() for it in hand.sweep(0.1, 30)] == [it.tobytes() for it in fresh.sweep(0.1, 30)]
-    assert built_alike(scene(name), scene("ewma")) == (name == "ewma")
+    assert is_built_alike(scene(name), scene("ewma")) == (name == "ewma")
 
 
 @pytest.mark.skipif(not COMPILED, reason="thousands of ticks")

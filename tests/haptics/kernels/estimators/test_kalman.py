@@ -15,7 +15,7 @@ from study_app.haptics.model.force_rules import CURRENT, VERSIONS
 from study_app.haptics.model.layout import LIMITER_ESTIMATOR, records
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Scene
-from study_app.haptics.model.slope_limits import damping_limits, table
+from study_app.haptics.model.slope_limits import damping_limits, slope_limit_table
 from study_app.haptics.runtime.offline import new_wake_places, recompute_sample, simulate
 from study_app.haptics.runtime.pack import pack
 from tests.haptics.scenes import COMPILED, HONEY, UNBENT, WATER, Hand, vectors
@@ -114,7 +114,7 @@ def test_the_limit_holds_where_the_delay_is_wrong_by_one():
     """At 1 kHz and one tick the limit itself is that of a loop that is one tick later than believed."""
     assert damping_limits(1e-3, 1, Kalman()).drag_nspm <= boundary_nspm(Kalman(), 1e-3, 2, believed=1) * 1.01
     assert damping_limits(1e-3, 1, Kalman()).drag_nspm >= 53
-    for entry in table():
+    for entry in slope_limit_table():
         if entry.estimator == "kalman":
             assert entry.limits.drag_nspm < boundary_nspm(Ewma(), entry.period_s, entry.delay_ticks)
 

@@ -9,9 +9,9 @@ from study_app.haptics.model import laws
 from study_app.haptics.model.effects.non_newtonian import steady_n
 from study_app.haptics.model.estimators import Kalman
 from study_app.haptics.model.laws import Carreau, HerschelBulkley, Maxwell, ShearThickening
-from study_app.haptics.model.overrides import override
+from study_app.haptics.model.overrides import override_value
 from study_app.haptics.model.scene import Liquid, Scene
-from study_app.haptics.model.slope_limits import steady
+from study_app.haptics.model.slope_limits import steady_force
 from tests.haptics.materials import PRESETS, tank
 
 D = 0.068
@@ -99,7 +99,7 @@ def test_the_force_grows_with_inertia_and_has_none_at_rest():
 def test_a_bad_value_is_one_line(values, said):
     table = {"kind": "herschel-bulkley", "consistency_pa_sn": 1.0} if "kind" not in values else {}
     with pytest.raises(StudyError, match=said) as caught:
-        override(tank("ketchup"), "non_newtonian", {**table, **values})
+        override_value(tank("ketchup"), "non_newtonian", {**table, **values})
     assert "\n" not in str(caught.value)
 
 
@@ -114,7 +114,7 @@ def test_a_liquid_has_a_viscosity_or_a_flow_curve(effects):
 def test_the_steady_force_keeps_the_limits(name, velocity):
     tank_scene = tank(name, scale=3.0).model_copy(update={"velocity": velocity})
     for hand_mps in (0.001, 0.05, 0.3, 1.0):
-        found = steady(tank_scene, hand_mps)
+        found = steady_force(tank_scene, hand_mps)
         held_n = laws.yield_n(tank_scene.liquids[0].non_newtonian, D)
         assert found.force_n <= min(held_n + 53 * hand_mps, 8.0) + 1e-9
         assert found.drag_n == pytest.approx(sum(steady_n(tank_scene, tank_scene.liquids[0], 3 * hand_mps)))

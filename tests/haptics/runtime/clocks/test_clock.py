@@ -163,11 +163,11 @@ def test_windows_takes_the_multimedia_scheduler_before_a_critical_thread():
     kernel = {"GetCurrentThread": 1, "SetThreadPriority": 1}
     avrt = FakeLibrary(AvSetMmThreadCharacteristicsW=5, AvSetMmThreadPriority=1)
     none = FakeLibrary(AvSetMmThreadCharacteristicsW=0, AvSetMmThreadPriority=0)
-    assert str(clock_windows.ask(avrt, FakeLibrary(**kernel))) == "real-time (MMCSS Pro Audio)"
-    raised = clock_windows.ask(none, FakeLibrary(**kernel))
+    assert str(clock_windows.request_priority(avrt, FakeLibrary(**kernel))) == "real-time (MMCSS Pro Audio)"
+    raised = clock_windows.request_priority(none, FakeLibrary(**kernel))
     assert raised.priority == "raised (time critical)"
     assert "Multimedia Class Scheduler" in raised.advice[0]
-    refused = clock_windows.ask(none, FakeLibrary(**(kernel | {"SetThreadPriority": 0})))
+    refused = clock_windows.request_priority(none, FakeLibrary(**(kernel | {"SetThreadPriority": 0})))
     assert refused.level == "normal"
 
 
