@@ -164,7 +164,7 @@ class Live:
         lost, self._dropped = self._reader.dropped != self._dropped, self._reader.dropped
         if len(samples):
             self._counts.add(samples)
-            self.shadow.take(samples, lost=lost)
+            self.shadow.process_samples(samples, lost=lost)
         if self._ghost is not None:
             self._ghost.follow(self.servo.now_ns())
         self._load_what_is_due()
@@ -320,7 +320,7 @@ class _Ghost:
         t_s = ((times_ns - self._started_ns) * 1e-9) % self._motion.t_s[-1]
         for axis in range(3):
             samples.position_m[:, axis] = np.interp(t_s, self._motion.t_s, self._motion.position_m[:, axis])
-        self.shadow.take(samples)
+        self.shadow.process_samples(samples)
 
 
 def open_live(

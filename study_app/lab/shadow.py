@@ -157,7 +157,7 @@ class Shadow:
         if self._sides[side].scene != scene:
             self._sides[side].begin(scene)
 
-    def take(self, samples: Any, *, lost: bool = False) -> None:
+    def process_samples(self, samples: Any, *, lost: bool = False) -> None:
         """Process the servo's next samples (recarray of ``SAMPLE``); ``lost`` if some before them were dropped."""
         if lost:
             for half in self._sides.values():

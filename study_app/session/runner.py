@@ -132,7 +132,7 @@ class Runner:
     def poll(self) -> None:
         """Poll the device: update the task, handle buttons, detect faults. Call it once per frame."""
         samples = np.asarray(self._reader.read())  # field access is faster on a plain array
-        self._recording.take(samples)
+        self._recording.add_samples(samples)
         if self._ending is not None:
             if self._ports.settled():
                 (finish, at_s), self._ending = self._ending, None

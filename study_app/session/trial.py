@@ -48,7 +48,7 @@ class Recording:
         self._held = 0
         self._running = False
 
-    def take(self, samples: Any) -> None:
+    def add_samples(self, samples: Any) -> None:
         """Add the newest samples in order (array of ``layout.SAMPLE``), which must not be changed afterwards."""
         if self._recorder is None or len(samples) == 0:
             return

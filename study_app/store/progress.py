@@ -26,7 +26,7 @@ class TrialAnswer:
 
 @dataclass(slots=True, kw_only=True)
 class Progress:
-    """The progress of a session and its events, from the lines of its journal given to `take`.
+    """The progress of a session and its events, from the lines of its journal given to `process_line`.
 
     ``start`` is its first line: participant, session, seed, language and the rest. ``step`` is the index in the
     schedule of the step to continue at: the first that was not left behind. ``page`` (or form) or ``trial`` names
@@ -120,7 +120,7 @@ class Progress:
         """Whether the session reached its last page, even if trials are missing."""
         return self.ended in events.REACHED_END
 
-    def take(self, line: events.Event) -> None:
+    def process_line(self, line: events.Event) -> None:
         """Process one more line."""
         at_s = line.t_s
         match line:
@@ -277,7 +277,7 @@ def progress_of(lines: Sequence[events.Event]) -> Progress:
     events.start_of(lines)
     now = Progress()
     for line in lines:
-        now.take(line)
+        now.process_line(line)
     return now
 
 

@@ -139,8 +139,8 @@ class Pages:
     def ended_view(self) -> OperatorView:
         """Return what the operator sees in the end."""
         ended = Progress()
-        ended.take(event_of("session_started", t_s=0.0))
-        ended.take(event_of("session_ended", t_s=1.0, status="completed"))
+        ended.process_line(event_of("session_started", t_s=0.0))
+        ended.process_line(event_of("session_ended", t_s=1.0, status="completed"))
         session = Session(
             protocol=self.protocol,
             schedule=self.schedule,

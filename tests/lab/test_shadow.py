@@ -81,7 +81,7 @@ def test_the_other_side_is_what_it_would_be_were_it_felt() -> None:
     recorded = beside.servo.telemetry.ring[:2000].copy()
     alone = Shadow(Scene(), 10_000, 8.0, alone=True)
     alone.expect(1, "B", quiet, SCENES["light_oil"])
-    alone.take(recorded)
+    alone.process_samples(recorded)
     one, other = beside.trace(), alone.trace()
     assert one is not None
     assert other is not None
@@ -103,7 +103,7 @@ def test_a_tail_is_the_path_that_was_left_and_breaks_where_it_turns() -> None:
     way_m = np.arange(600) * 1e-4
     samples.position_m[:, 0] = np.minimum(way_m, 0.03)
     samples.position_m[:, 2] = np.maximum(way_m - 0.03, 0.0)
-    shadow.take(samples)
+    shadow.process_samples(samples)
     tail = shadow.tail("A")
     assert tail is not None
     assert (tail.elements, tail.alive) == (1700, 600)
@@ -126,7 +126,7 @@ def test_a_tail_forgets_what_falls_off_it() -> None:
     samples = records(SAMPLE, 400)
     samples.time_ns, samples.scene, samples.fresh = np.arange(400) * 1_000_000, 1, 1
     samples.position_m[:, 0] = np.arange(400) * 1e-4
-    shadow.take(samples)
+    shadow.process_samples(samples)
     tail = shadow.tail("A")
     assert tail is not None
     assert tail.alive == tail.elements == 100

@@ -36,7 +36,7 @@ def failed(trial: int, *broken: str, attempts: int = ATTEMPTS, phase: str = "mai
 def missing_after(*trials: list[Event], **limits: float) -> MissingTrials:
     progress = Progress()
     for line in (event_of("session_started", limits=LIMITS | limits), *(line for trial in trials for line in trial)):
-        progress.take(line)
+        progress.process_line(line)
     return progress.missing_trials
 
 

@@ -100,7 +100,7 @@ class WatchedJournal:
     def append(self, event: journal_events.Event, *, t_s: float | None = None, waits: bool = True) -> None:
         """Put an event into the journal (StoreError: nothing has changed)."""
         self._store.append(event, t_s=t_s, waits=waits)
-        self.progress.take(replace(event, t_s=self._clock() if t_s is None else t_s))
+        self.progress.process_line(replace(event, t_s=self._clock() if t_s is None else t_s))
 
     @property
     def fingerprint(self) -> str:
@@ -119,7 +119,7 @@ class WatchedJournal:
             self._store.finish(status, reason)
         finally:
             proof = {"fingerprint": self._store.fingerprint}
-            self.progress.take(
+            self.progress.process_line(
                 journal_events.SessionEnded(status=status, reason=reason, t_s=self._clock(), others=proof)
             )
 

@@ -46,13 +46,13 @@ class SessionRows:
         self._intervals: dict[tuple[int, int, int], int] = {}  # in intervals
         self._broke = self._reconnected = ""
         for line in lines:
-            self.take(line)
+            self.process_line(line)
 
     def table(self, name: str) -> list[Row]:
         """Return the rows of the table with this name."""
         return {"responses": self.responses, "trials": self.trials, "intervals": self.intervals}[name]
 
-    def take(self, line: events.Event) -> None:
+    def process_line(self, line: events.Event) -> None:
         """Process one more line."""
         match line:
             case events.TrialStarted():

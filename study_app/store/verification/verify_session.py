@@ -371,7 +371,7 @@ def wrong_responses(lines: Sequence[events.Event]) -> Iterator[str]:
             for item, answer in chosen.items():
                 if answer.given or not hides:
                     yield f"{line_name} lacks {item!r}, answered in {where}: it was changed"
-        now.take(line)
+        now.process_line(line)
 
 
 def _same_answer(listed_answer: events.Answer, given: events.Answer) -> bool:

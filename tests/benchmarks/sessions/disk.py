@@ -131,7 +131,7 @@ def main() -> None:
                 sys.stdout.flush()
         found = Findings(Path(kept))
         for study in sorted(found.folder.iterdir()):
-            found.take(verify_study(study))
+            found.extend(verify_study(study))
     few = times[:100], times[-100:]
     listed = ", ".join(f"{count} {kind}" for kind, count in sorted(happened.items()))
     sys.stdout.write(

@@ -111,7 +111,7 @@ def lab_view(bench: Workbench | None = None, *, cut: int | None = None, **fields
     shadow = Shadow(rest, ELEMENTS, 8.0)
     samples = felt_samples(bench.in_hand.scene, hand()[:cut])
     shadow.expect(1, bench.presented, bench.a.scene, bench.b.scene)
-    shadow.take(samples)
+    shadow.process_samples(samples)
     counts = LimiterCounts()
     for first in range(0, len(samples), 33):
         counts.add(samples[first : first + 33])

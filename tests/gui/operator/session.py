@@ -28,7 +28,7 @@ class Told:
 
     def tell(self, event: str, after_s: float = 0.0, **fields: Any) -> None:
         self.now_s += after_s
-        self.progress.take(event_of(event, t_s=self.now_s, **fields))
+        self.progress.process_line(event_of(event, t_s=self.now_s, **fields))
 
     def welcome(self) -> None:
         self.tell("session_started", limits=self.protocol.limits.model_dump())

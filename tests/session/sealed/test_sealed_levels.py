@@ -154,7 +154,7 @@ def operator_views(folder: Path, protocol: Path) -> list[Any]:
     for line in journal.read(place.journal):
         if isinstance(line, Recorded):  # whenever the recorder is done
             continue
-        progress.take(line)
+        progress.process_line(line)
         views.append(operator_view(session, progress, Vitals(), now_s=line.t_s, force_on=True))
     return views
 
