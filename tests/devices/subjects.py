@@ -169,7 +169,7 @@ def force_dimension(_request: Any, **limits: Any) -> Subject:
     def restore() -> None:
         emulated.state.fault = 0
 
-    subject.lose, subject.restore = lambda: emulated.take("error"), restore
+    subject.lose, subject.restore = lambda: emulated.set_fault("error"), restore
     return subject
 
 

@@ -214,7 +214,7 @@ def test_fault_during_a_bench_has_the_message_of_the_driver():
     with open_device("inverse3-emulated") as device:
         servo = excited(device, 4.0)
         servo.advance(10)
-        device.hand.take("closes")
+        device.hand.set_fault("closes")
         servo.advance(100)
         assert "the Inverse Service closed the connection" in servo.fault
         servo.stop()

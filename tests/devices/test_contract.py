@@ -210,7 +210,7 @@ def test_a_fault_in_a_stroke_ends_in_its_message_zero_force_and_silence(
     if made is force_dimension_library:
         request.getfixturevalue("standin").fault(fault)
     else:
-        (device.emulated if made is force_dimension else device.hand).take(fault)
+        (device.emulated if made is force_dimension else device.hand).set_fault(fault)
     assert servo.advance(100) < 60
     with pytest.raises((DeviceLost, ServoFault)) as ended:
         servo.check()
@@ -244,7 +244,7 @@ def refused(made: Callable[..., Subject], fault: str, request: pytest.FixtureReq
         from study_app.devices.emulators.inverse3_service import Service
 
         service = Service()
-        service.take(fault)
+        service.set_fault(fault)
         with pytest.raises(DeviceFailure) as caught:
             EmulatedInverse3(service=service).open()
         assert (service.state.pushes, service.state.ended, service.force_n) == (0, 1, (0.0, 0.0, 0.0))

@@ -190,7 +190,7 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
         if emulator.faults.is_on("busy") or emulator.faults.is_on("kernel_driver") or owner not in {None, dev_handle}:
             _check(constants.ERROR_BUSY)
         self._claims[id(emulator)] = dev_handle
-        emulator.claimed()
+        emulator.note_claim()
 
     def release_interface(self, dev_handle: _Handle, intf: int) -> None:
         emulator = self._reach(dev_handle)
@@ -302,7 +302,7 @@ class EmulatedFalcon(FalconDevice):
         return cls(request.random, **cls._given(request))
 
     def take_fault(self, fault: str) -> None:
-        self.hand.take(fault)
+        self.hand.set_fault(fault)
         self._patience_s = FAULTY_PATIENCE_S
 
     def open(self) -> None:

@@ -368,7 +368,7 @@ class Emulator(HandOrders):
         spare.pause(0.0)
         spare.power(False)
 
-    def claimed(self) -> None:
+    def note_claim(self) -> None:
         """Record that a program has claimed the bridge: the hand is ready to home the grip."""
         self.state.run.stroke_due = 1
 
@@ -400,12 +400,12 @@ class Emulator(HandOrders):
         """Connect or disconnect its mains adapter: without it, its program is lost and its motors are off."""
         supply(self.state, 1 if on else 0)
 
-    def take(self, fault: str) -> None:
+    def set_fault(self, fault: str) -> None:
         """Set a fault in the notation of the command line: ``drop=0.01``, ``frozen`` or ``power-off``."""
         if falcon_processor.fault_spelling(fault.strip()) == falcon_processor.POWER_OFF:
             self.power(False)
         else:
-            self.faults.take(fault)
+            self.faults.set_fault(fault)
 
     @property
     def powered(self) -> bool:

@@ -134,7 +134,7 @@ class Faults:
         """Leave the next ``count`` pings of the boot loader unanswered."""
         self._state.ignored_pings = count
 
-    def take(self, word: str) -> None:
+    def set_fault(self, word: str) -> None:
         """Set a fault in the notation of the command line: ``drop=0.01`` or ``frozen``."""
         name, equals, value = word.partition("=")
         name = name.strip().replace("-", "_")

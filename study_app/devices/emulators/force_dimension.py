@@ -71,7 +71,7 @@ class EmulatedFunctions:
     def address(self, name: str) -> int:
         return int(_functions()[name].address)
 
-    def take(self, fault: str, after: int = 0) -> None:
+    def set_fault(self, fault: str, after: int = 0) -> None:
         """Simulate a fault after so many readings.
 
         Raises
@@ -114,7 +114,7 @@ class EmulatedForceDimension(ForceDimensionDevice):
         return cls(request.random, **request.limits)
 
     def take_fault(self, fault: str) -> None:
-        self.emulated.take(fault, FAULT_AFTER)
+        self.emulated.set_fault(fault, FAULT_AFTER)
 
     def _connect(self) -> Functions:
         return self.emulated

@@ -64,7 +64,7 @@ class EmulatedInverse3(Inverse3Device):
         return cls(request.random, progress=request.progress, **request.limits)
 
     def take_fault(self, fault: str) -> None:
-        self.hand.take(fault, FAULT_AFTER)
+        self.hand.set_fault(fault, FAULT_AFTER)
 
     def open(self) -> None:
         """Open the session; from then on the emulator's time is that of the ticks."""

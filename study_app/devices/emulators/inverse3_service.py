@@ -246,7 +246,7 @@ class Service(HandOrders):
         super().press(buttons)
         self._refresh()
 
-    def take(self, fault: str, after: int = 0) -> None:
+    def set_fault(self, fault: str, after: int = 0) -> None:
         """Simulate a fault: at once if it concerns opening, else after so many commands.
 
         Raises

@@ -279,13 +279,13 @@ class Grip:
             raise usb_failure(ERROR_NO_DEVICE, "weighing with it")
         if answer == READ_NEW:
             self._blind = 0
-            self._see(self._read_m, elapsed_s)
+            self._update_motion(self._read_m, elapsed_s)
         else:
             self._blind += 1
         self._asked_n[:] = self._sent_n[:] = self._force_n()
         device.write.ctypes(device.context, command)
 
-    def _see(self, place_m: Any, elapsed_s: float) -> None:
+    def _update_motion(self, place_m: Any, elapsed_s: float) -> None:
         moved = (place_m - self._place_m) / elapsed_s
         self._velocity_mps += (moved - self._velocity_mps) * elapsed_s / (_SMOOTHING_S + elapsed_s)
         self._place_m[:] = place_m
@@ -303,7 +303,7 @@ class Grip:
             self.tick()
         return answer
 
-    def come(self, place_m: Any) -> None:
+    def move_to(self, place_m: Any) -> None:
         """Move the grip slowly to a position and wait until it rests there, possibly displaced by its load."""
         way = np.asarray(place_m) - self._target_m
         ticks = max(int(np.linalg.norm(way) / (_PACE_MPS * _TICK_S)), 1)
@@ -354,8 +354,8 @@ def _measure_round(grip: Grip, load_n: float) -> list[tuple[Any, float, Any]]:
     notes = []
     for place in PLACES_M:
         for side in (1.0, -1.0):
-            grip.come(np.add(place, (0.0, side * _BESIDE_M, 0.0)))
-            grip.come(place)
+            grip.move_to(np.add(place, (0.0, side * _BESIDE_M, 0.0)))
+            grip.move_to(place)
             counts, units = grip.weigh()
             notes.append((counts, load_n, units))
     return notes
@@ -366,7 +366,7 @@ def measure_with_scale(grip: Grip, ask: Ask) -> Notes:
     notes: list[tuple[Any, float, Any]] = []
     grip.wait(ask("let-go", "Let go of the grip; it will hold itself and move slowly. Keep clear of it."))
     for number, place in enumerate(PLACES_M, start=1):
-        grip.come(place)
+        grip.move_to(place)
         counts, units = grip.weigh()
         notes.append((counts, 0.0, units))
         request = (

@@ -175,17 +175,17 @@ class Answering(SimulatedParticipant):
         while self.state.phase not in FINAL and (until is None or self.state.index < until):
             match self.page:
                 case TextPage() as page:
-                    self._pass(reading_s(page))
+                    self._wait(reading_s(page))
                     self._post(Continue(self._time.seconds))
                 case TaskPage(interval=Interval(resting=True)) | FeedbackPage():
-                    self._pass(
+                    self._wait(
                         max(0.0, (self.state.until_s or 0.0) - self._time.seconds) + 0.001
                     )  # time advances in whole ms
                     self._post(TimeUp(self._time.seconds))
                 case TaskPage(adjusts=True) as page:
-                    self._set(page)
+                    self._adjust_level(page)
                 case TaskPage() as page:
-                    self._pass(page.task.shortest_s)
+                    self._wait(page.task.shortest_s)
                     self._post(TaskDone(self._time.seconds, "complete", {}))
                 case QuestionnairePage() | DesignPage() as page:
                     self._fill_in(page)
@@ -194,14 +194,14 @@ class Answering(SimulatedParticipant):
                 case _:
                     raise SessionError(f"the session failed at {self.page}")
 
-    def _set(self, page: TaskPage) -> None:
+    def _adjust_level(self, page: TaskPage) -> None:
         """Adjust the level from exactly sensed values until the setting is done or its time is over."""
-        observer, began_s = self._adjusting(page.trial), self._time.seconds
+        observer, began_s = self._adjusting_observer(page.trial), self._time.seconds
         sensed = self._sensed_in[page.trial]
-        self._pass(page.task.judged_from_s)
+        self._wait(page.task.judged_from_s)
         while True:
-            self._pass(LOOK_AT_SETTING_S)
-            steps = observer.steps(sensed[-1], self._remembered(page.trial, sensed[-1]))
+            self._wait(LOOK_AT_SETTING_S)
+            steps = observer.steps(sensed[-1], self._reference_magnitude(page.trial, sensed[-1]))
             over = self._time.seconds - began_s >= page.task.limit_s
             if over or not steps:
                 break
@@ -209,10 +209,10 @@ class Answering(SimulatedParticipant):
         self.answers += 1
         self._post(TaskDone(self._time.seconds, "timeout" if over else "complete", {}))
 
-    def _felt(self, _trial: int | None) -> TrialFeatures:
+    def _features_felt(self, _trial: int | None) -> TrialFeatures:
         return self._feels
 
-    def _sensed(self, block: Block) -> Mapping[int, Sequence[float]]:
+    def _sensed_magnitudes(self, block: Block) -> Mapping[int, Sequence[float]]:
         return {number: sensed for number, sensed in self._sensed_in.items() if self._trials[number].block == block.id}
 
     def _sense(self, trial: int, presented: Stimulated) -> None:
@@ -230,7 +230,7 @@ class Answering(SimulatedParticipant):
     def _seconds(self) -> float:
         return self._time.seconds
 
-    def _pass(self, seconds: float) -> None:
+    def _wait(self, seconds: float) -> None:
         """Advance the time, in whole milliseconds like a servo's clock."""
         self._time.seconds = round(self._time.seconds + seconds, 3)
 

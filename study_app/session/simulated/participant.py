@@ -47,7 +47,9 @@ class AdjustingObserver:
         Both are those of `Comparison.sensed`.
         """
         self._looks += 1
-        short = self._taken(standard, self._remembered_noise) - self._taken(sensed, self._noise)
+        short = self._perceived_magnitude(standard, self._remembered_noise) - self._perceived_magnitude(
+            sensed, self._noise
+        )
         way = 1 if short > 0 else -1
         crossed = self._way not in {0, way}
         if short == 0 or self._looks > MOST_LOOKS or (crossed and self._hop == 1):
@@ -61,7 +63,7 @@ class AdjustingObserver:
     def _neutral(self) -> float:
         return 0.0 if self._attended.delays else 1.0
 
-    def _taken(self, sensed: float, noise: float) -> float:
+    def _perceived_magnitude(self, sensed: float, noise: float) -> float:
         return sensed + noise if self._attended.delays else sensed * noise
 
 
@@ -84,7 +86,7 @@ class SimulatedParticipant(ABC):
         """Return the time on the session's clock."""
 
     @abstractmethod
-    def _pass(self, seconds: float) -> None:
+    def _wait(self, seconds: float) -> None:
         """Wait for a simulated time [s]."""
 
     @abstractmethod
@@ -92,28 +94,28 @@ class SimulatedParticipant(ABC):
         """Post an event to the session."""
 
     @abstractmethod
-    def _felt(self, trial: int | None) -> TrialFeatures:
+    def _features_felt(self, trial: int | None) -> TrialFeatures:
         """Return the features of a trial's last presentation; those of no trial for a form."""
 
     @abstractmethod
-    def _sensed(self, block: Block) -> Mapping[int, Sequence[float]]:
+    def _sensed_magnitudes(self, block: Block) -> Mapping[int, Sequence[float]]:
         """Return the sensed magnitudes of each interval by trial, for a block with a design."""
 
     def _stream(self, name: str) -> Draw:
         return stream(self._seed, f"rehearsal/{self._who}/{name}").random
 
-    def _attended(self, trial: int) -> Comparison:
+    def _comparison_of(self, trial: int) -> Comparison:
         """Return the comparison that the observer makes in a trial of a block with a design."""
         return Comparison.of(self._study, self._study.blocks[self._trials[trial].block], self.observer)
 
-    def _adjusting(self, trial: int) -> AdjustingObserver:
+    def _adjusting_observer(self, trial: int) -> AdjustingObserver:
         """Return the observer that adjusts the level of a trial."""
-        return AdjustingObserver(self._attended(trial), self._stream(f"{trial}/answers"))
+        return AdjustingObserver(self._comparison_of(trial), self._stream(f"{trial}/answers"))
 
-    def _remembered(self, trial: int, sensed: float) -> float:
+    def _reference_magnitude(self, trial: int, sensed: float) -> float:
         """Return the reference of a setting: the interval before, else the mean of earlier settings, else itself."""
         block = self._study.blocks[self._trials[trial].block]
-        known = self._sensed(block)
+        known = self._sensed_magnitudes(block)
         if design_of(self._study, block).intervals > 1:
             return known[trial][0]
         earlier = [magnitude for number in sorted(known) if number < trial for magnitude in known[number]]
@@ -124,14 +126,14 @@ class SimulatedParticipant(ABC):
         answers: dict[str, Value] = {}
         seen = self._notice_questions(page, answers, ())
         for choice in self._answers_to(page):
-            self._pass(choice.after_s)
+            self._wait(choice.after_s)
             if page is not self.page:
                 return
             self._post(Chosen(self._seconds(), choice.item, choice.value))
             answers[choice.item] = choice.value
             seen += self._notice_questions(page, answers, seen)
         if not isinstance(page, ChoicePage):  # on a choice page the answer continues the session
-            self._pass(1.0)
+            self._wait(1.0)
         self._post(Submitted(self._seconds()))
         self.answers += len(answers)
 
@@ -140,18 +142,18 @@ class SimulatedParticipant(ABC):
         draw, trial = self._stream(page.stream), page.trial
         block = None if trial is None else self._study.blocks[self._trials[trial].block]
         if trial is not None and block is not None and block.design is not None:
-            given = self._judged(block, trial, draw)
+            given = self._design_answer(block, trial, draw)
             if isinstance(given, float):
                 given = plain_number(max(0.01, round(given, 2)))
             return answer_choices(
                 page.items, {page.items[0].id: given}, draw, changes_mind=not isinstance(page, ChoicePage)
             )
         assert isinstance(page, QuestionnairePage)  # noqa: S101 - only designs have other pages
-        return fill_in_page(page, self._felt(trial), self._person, draw)
+        return fill_in_page(page, self._features_felt(trial), self._person, draw)
 
-    def _judged(self, block: Block, trial: int, draw: Draw) -> str | int | float:
+    def _design_answer(self, block: Block, trial: int, draw: Draw) -> str | int | float:
         """Return the answer to a trial of a block with a design; earlier ones of a resumed session are given again."""
-        sensed, design = self._sensed(block), design_of(self._study, block)
+        sensed, design = self._sensed_magnitudes(block), design_of(self._study, block)
         before: list[float] = []
         last: str | int | float | None = None
         for number in sorted(known for known in sensed if known <= trial):
@@ -159,7 +161,7 @@ class SimulatedParticipant(ABC):
             if number == trial or (answered and number not in self._said):
                 source = draw if number == trial else self._stream(f"{number}/answers")
                 course = Course(self._courses[number], last)
-                attended = self._attended(number)
+                attended = self._comparison_of(number)
                 self._said[number] = attended.answer(self._study, design, sensed[number], before, source, course)
             last = self._said.get(number, last)
             before += sensed[number]

@@ -260,13 +260,13 @@ class RehearsedSession(SimulatedParticipant):
 
     def _post(self, event: Event) -> None:
         self._runner.post(event)
-        self._notice()
+        self._end_if_stalled()
 
     def _poll(self) -> None:
         self._runner.poll()
-        self._notice()
+        self._end_if_stalled()
 
-    def _notice(self) -> None:
+    def _end_if_stalled(self) -> None:
         """Raise an error if the session stalled: a person would wait for the disk, a rehearsal ends."""
         if self._runner.stalled is not None:
             raise StoreError(self._runner.stalled)
@@ -288,13 +288,13 @@ class RehearsedSession(SimulatedParticipant):
                 yield told
             match self.page:
                 case TextPage() as page:
-                    self._pass(reading_s(page))
+                    self._wait(reading_s(page))
                     if page is self.page:
                         self._post(Continue(self._now_s()))
                 case FeedbackPage() | TaskPage(interval=Interval(resting=True)):
-                    self._pass(LOOK_S)
+                    self._wait(LOOK_S)
                 case TaskPage() as page:
-                    self._do(page)
+                    self._perform_task(page)
                 case QuestionnairePage() | DesignPage() as page:
                     self._fill_in(page)
                 case _:
@@ -303,7 +303,7 @@ class RehearsedSession(SimulatedParticipant):
     def _present(self, page: Page) -> None:
         self.page = page
 
-    def _pass(self, seconds: float) -> None:
+    def _wait(self, seconds: float) -> None:
         """Let time pass while nothing is done."""
         end_s = self._now_s() + seconds
         page = self.page
@@ -318,7 +318,7 @@ class RehearsedSession(SimulatedParticipant):
         if servo.advance(max(1, round(seconds * servo.rate_hz))) == 0 and servo.fault is None:
             raise SessionError("the rehearsal was stopped from outside")
 
-    def _do(self, page: TaskPage) -> None:
+    def _perform_task(self, page: TaskPage) -> None:
         """Perform a task until its page is left, with every frame seen and every tick felt."""
         interval = page.interval
         named = str(page.trial) if interval is None else f"{page.trial}/{interval.number}"
@@ -328,7 +328,7 @@ class RehearsedSession(SimulatedParticipant):
         self._touch.read()
         self._next_frame_ns = self.rig.servo.now_ns()
         hand = hand_behaviour(page.task, arm, draw, self._now_s())
-        setting = _Setting(self._adjusting(page.trial), self._study.scene.scale) if page.adjusts else None
+        setting = _Setting(self._adjusting_observer(page.trial), self._study.scene.scale) if page.adjusts else None
         self.look(senses)  # the first frame, which begins the trial, is painted at once
         while page is self.page:
             self._advance(LOOK_S)
@@ -338,7 +338,7 @@ class RehearsedSession(SimulatedParticipant):
             senses.feel(samples)
             self._poll()
             if setting is not None and view is not None and page is self.page:
-                self._set(page, setting, view, samples)
+                self._adjust_level(page, setting, view, samples)
             if wants_to_go_on and page is self.page:
                 self._post(Continue(self._now_s()))
         rest_hand(page.task, arm, returns=self._study.format > 1)  # rehearsals of format 1 keep their results
@@ -347,7 +347,7 @@ class RehearsedSession(SimulatedParticipant):
         if self._tell_features is not None:
             self._tell_features(page.trial, self._features_of[page.trial])
 
-    def _set(self, page: TaskPage, setting: _Setting, view: TankView, samples: Any) -> None:
+    def _adjust_level(self, page: TaskPage, setting: _Setting, view: TankView, samples: Any) -> None:
         """Make the next steps of a setting from the magnitudes sensed since the last ones, or confirm it."""
         setting.senses.feel(samples)
         setting.senses.see(self.rig.servo.now_ns(), view)
@@ -371,8 +371,8 @@ class RehearsedSession(SimulatedParticipant):
         earlier = self._features_of.get(page.trial, ()) if page.interval and page.interval.number > 1 else ()
         given = None if self._answer is None else self._answer(Question(page, (*earlier, now)))
         if given is None:
-            sensed = self._attended(page.trial).sensed(now)
-            return setting.observer.steps(sensed, self._remembered(page.trial, sensed))
+            sensed = self._comparison_of(page.trial).sensed(now)
+            return setting.observer.steps(sensed, self._reference_magnitude(page.trial, sensed))
         try:
             return operator.index(given)  # type: ignore[arg-type]  # of numpy, too
         except TypeError:
@@ -406,10 +406,10 @@ class RehearsedSession(SimulatedParticipant):
         visible = [item for item in page.items if item.id in shown(page.items, answers) and item.id in answers]
         return answer_choices(visible, answers, self._stream(page.stream), changes_mind=False)
 
-    def _felt(self, trial: int | None) -> TrialFeatures:
+    def _features_felt(self, trial: int | None) -> TrialFeatures:
         return NO_FEATURES if trial is None else {**self._features_of, **self._known}[trial][-1]
 
-    def _sensed(self, block: Block) -> Mapping[int, Sequence[float]]:
+    def _sensed_magnitudes(self, block: Block) -> Mapping[int, Sequence[float]]:
         sensed = Comparison.of(self._study, block, self.observer).sensed
         of_trials = {**self._features_of, **self._known}
         return {

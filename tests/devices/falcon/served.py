@@ -24,7 +24,7 @@ class Recorder:
         self.sent = list[bytes]()
         self.controls = list[tuple[int, int]]()
 
-    def claimed(self) -> None:
+    def note_claim(self) -> None:
         """Let a program have it."""
 
     def pause(self, _seconds: float) -> None:

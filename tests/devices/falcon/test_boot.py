@@ -87,7 +87,7 @@ def bridge(**kept: Any) -> Callable[[Emulator, Wrong], None]:
 
 
 def faulty(*faults: str) -> Callable[[Emulator, Wrong], None]:
-    return lambda emulator, _transport: [emulator.take(fault) for fault in faults] and None
+    return lambda emulator, _transport: [emulator.set_fault(fault) for fault in faults] and None
 
 
 def unpowered(emulator: Emulator, _transport: Wrong) -> None:

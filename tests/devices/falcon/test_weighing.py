@@ -112,7 +112,7 @@ class TestTheGrip:
         with EmulatedFalcon(emulator=emulator, force_limit_n=2.0) as device:
             grip = Grip(device, virtual=True)
             emulator.held = False
-            grip.come((0.02, 0.01, 0.01))
+            grip.move_to((0.02, 0.01, 0.01))
             assert grip.place_m == pytest.approx((0.02, 0.01, 0.01), abs=5e-4)
             emulator.held = True
             emulator.reach_to(-0.04, 0.0, 0.0)
@@ -125,7 +125,7 @@ class TestTheGrip:
     def test_one_that_somebody_shakes_does_not_come_to_rest(self):
         emulator = emulated(tremor_m=2e-3)
         with EmulatedFalcon(emulator=emulator) as device, pytest.raises(DeviceError, match="does not come to rest"):
-            Grip(device, virtual=True).come((0.01, 0.0, 0.0))
+            Grip(device, virtual=True).move_to((0.01, 0.0, 0.0))
         assert emulator.torques == (0, 0, 0)
 
     def test_without_news_of_its_place_it_is_let_go(self):

@@ -167,7 +167,7 @@ class TestTicks:
     ) -> None:
         ticks = Ticks(device)
         ticks.take()
-        service.take("silent")
+        service.set_fault("silent")
         before = int(service.state.commands)
         for k in range(20):
             _answer, sent_n = ticks.take((0.1 * k, 0.0, 0.0))
@@ -180,7 +180,7 @@ class TestTicks:
     def test_weaker_forces_are_sent_while_replies_stay_out(self, service: Service, device: EmulatedInverse3) -> None:
         ticks = Ticks(device)
         ticks.take((4.0, 0.0, 0.0))
-        service.take("silent")
+        service.set_fault("silent")
         for k in range(45):
             force_n = (4.0 - 0.08 * (k + 1), 0.0, 0.0)
             assert ticks.take(force_n)[1][0] == force_n[0] == pytest.approx(service.force_n[0])
@@ -224,7 +224,7 @@ def stroke(device: EmulatedInverse3, service: Service) -> Servo:
 def test_the_force_fades_at_the_handle_while_replies_stay_out(service: Service, device: EmulatedInverse3) -> None:
     servo = stroke(device, service)
     before_n = np.linalg.norm(service.force_n)
-    service.take("silent")
+    service.set_fault("silent")
     sizes_n = []
     while servo.advance(1):
         sizes_n.append(np.linalg.norm(service.force_n))
@@ -240,7 +240,7 @@ def test_the_force_fades_at_the_handle_while_replies_stay_out(service: Service, 
 def test_states_that_come_slowly_or_in_pieces_are_used_and_their_delay_is_measured(
     service: Service, fault: str, delay_ticks: int
 ) -> None:
-    service.take(fault)
+    service.set_fault(fault)
     with EmulatedInverse3(service=service) as device:
         servo = stroke(device, service)
         reader = servo.telemetry.reader()
@@ -261,7 +261,7 @@ def test_a_position_far_away_is_rejected_while_the_force_fades_and_the_servo_end
     servo = stroke(device, service)
     reader = servo.telemetry.reader()
     before_n = np.linalg.norm(service.force_n)
-    service.take("infinite")
+    service.set_fault("infinite")
     assert 40 < servo.advance(100) < 60
     samples = reader.read()
     sizes_n = np.linalg.norm(samples["device_force_n"], axis=1)

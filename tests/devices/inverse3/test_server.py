@@ -84,7 +84,7 @@ def test_a_device_is_probed_without_a_session(service: Service, server: ServiceS
     assert found.state == "connected: EMU1"
     assert found.why == ""
     assert check_force_scale(force_scale("127.0.0.1", (server.port,))) == 1.0
-    service.take("no-device")
+    service.set_fault("no-device")
     assert probe(ports=(server.port,)).state == NONE
 
 
