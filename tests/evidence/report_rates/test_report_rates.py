@@ -9,7 +9,7 @@ from study_app.analysis.evaluate import evaluate_block
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay
 from study_app.analysis.findings.finding import of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition
-from study_app.analysis.findings.statement_tests import DelayTrend, MixedModel, Pairs, SettingsDiffer
+from study_app.analysis.findings.statement_tests import DelayTrend, MeanTests, Pairs, SettingsDiffer
 from study_app.analysis.planning.simulated_studies import Plan, plan
 from study_app.analysis.statistics.outcome import Interval
 from study_app.analysis.statistics.thresholds import Threshold, noticed
@@ -79,10 +79,10 @@ def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Plan, participant
             ]
             assert (SettingsDiffer.of(quick), Pairs.of(quick)) == (SettingsDiffer.of(whole), Pairs.of(whole))
             assert [one.p_adjusted for one in DelayTrend.of(quick)] == [one.p_adjusted for one in DelayTrend.of(whole)]
-            assert (LowestDelay.of(quick), DetectionThreshold.of(quick), MixedModel.of(quick)) == (
+            assert (LowestDelay.of(quick), DetectionThreshold.of(quick), MeanTests.of(quick)) == (
                 LowestDelay.of(whole),
                 DetectionThreshold.of(whole),
-                MixedModel.of(whole),
+                MeanTests.of(whole),
             )
             recognised = LiquidRecognition.of(whole), LiquidRecognition.of(quick)
             assert len({None if one is None else (one.verdict, one.found.p) for one in recognised}) == 1
