@@ -65,12 +65,12 @@ def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force
     warned = [f"  {sentence}" for sentence in warnings(protocol, without_force=without_force)]
     decided = [("nothing", "there is no table [analysis]: the report will call all it finds exploratory")]
     if protocol.analysis is not None:
-        named = [f"{name} by {one.label}" for name, one in protocol.conditions.items() if one.label]
+        named = [f"{name} by {condition.label}" for name, condition in protocol.conditions.items() if condition.label]
         decided = list(protocol.analysis.described(named))
     people = protocol.simulated_participants
     sections = (
         _head(protocol, language),
-        *(_session(one, planned_participants(protocol, one.group), language) for one in variants(protocol)),
+        *(_session(variant, planned_participants(protocol, variant.group), language) for variant in variants(protocol)),
         *(_block(protocol, block, language, delay_ticks) for block in protocol.blocks_in_order),
         _titled("Liquids", _liquids(protocol)),
         ("Effects in each liquid", *(f"  {line}".rstrip() for line in effects[:-1])),
@@ -114,9 +114,9 @@ def _head(protocol: Protocol, language: str) -> Iterable[str]:
     study, device, scene = protocol.study, protocol.device, protocol.scene
     sizes = " × ".join(f"{size:g}" for size in device.workspace_mm)
     ball_mm = scene.body.diameter_m * 1000
-    sessions = [one.protocol for one in variants(protocol)]
-    counts = [orders_of(one).answers for one in sessions]
-    minutes = [round(expected_duration_s(one) / 60) for one in sessions]
+    sessions = [variant.protocol for variant in variants(protocol)]
+    counts = [orders_of(session).answers for session in sessions]
+    minutes = [round(expected_duration_s(session) / 60) for session in sessions]
     rows = [
         ("Languages", ", ".join(study.languages)),
         ("Parts", f"{protocol.parts}"),
@@ -139,26 +139,28 @@ def spread(numbers: Sequence[int]) -> str:
     return f"{least}" if least == largest else f"{least} to {largest}"
 
 
-def _session(one: Variant, planned: int | None, language: str) -> Iterable[str]:
-    protocol, title = one.protocol, "Session"
-    if one.name:
+def _session(variant: Variant, planned: int | None, language: str) -> Iterable[str]:
+    protocol, title = variant.protocol, "Session"
+    if variant.name:
         minutes = f"about {expected_duration_s(protocol) / 60:.0f} min"
-        title = f"{one.name[0].upper()}{one.name[1:]} ({minutes}, {counted(orders_of(protocol).answers, 'answer')})"
+        title = (
+            f"{variant.name[0].upper()}{variant.name[1:]} ({minutes}, {counted(orders_of(protocol).answers, 'answer')})"
+        )
     rows: list[tuple[str, str, str]] = []
     kind: str
     for number, step in enumerate(protocol.steps, start=1):
         if step in protocol.pages:
-            kind, words = protocol.pages[step].kind, protocol.text(protocol.pages[step].title, language)
+            kind, description = protocol.pages[step].kind, protocol.text(protocol.pages[step].title, language)
         elif step in protocol.forms:
-            kind, words = "form", f"{step}: {counted(len(protocol.forms[step].items), 'question')}"
+            kind, description = "form", f"{step}: {counted(len(protocol.forms[step].items), 'question')}"
         else:
             block = protocol.blocks[step]
             kind, trials = f"{block.phase} trials", counted(order_of(protocol, block).trials, "trial")
-            words = f"{protocol.text(block.title, language)}: {trials}"
-        rows.append((f"{number:>2}", kind, words))
+            description = f"{protocol.text(block.title, language)}: {trials}"
+        rows.append((f"{number:>2}", kind, description))
     if len(protocol.main_blocks) < 2:
         return _titled(title, rows)
-    order = block_order_words(protocol, planned, in_group=one.group is not None)
+    order = block_order_words(protocol, planned, in_group=variant.group is not None)
     return (*_titled(title, rows), f"  Order of blocks: {order}")
 
 
@@ -199,9 +201,9 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
         yield from precision_rows(protocol, block)
         return
     stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
-    standards = [one for one in standards_of(protocol, block) if one is not None]
+    standards = [standard for standard in standards_of(protocol, block) if standard is not None]
     levels = sorted(method.levels_of(stimulus))
-    against = f", standard {', '.join(f'{one:g}' for one in standards)}" if standards else ""
+    against = f", standard {', '.join(f'{standard:g}' for standard in standards)}" if standards else ""
     yield "Design", f"{kind} of {stimulus.vary}{against}: {intervals}"
     name = LEVELS[stimulus.level_kind]
     of_each = " per standard" if standards else ""
@@ -322,8 +324,8 @@ def _statements(protocol: Protocol, name: str, language: str) -> Iterable[str]:
     ]
     more = [f"  Scores: {', '.join(questionnaire.scores)}"] if questionnaire.scores else []
     if questionnaire.instrument is not None:
-        found = instrument(questionnaire.instrument)
-        more += [f"  Source: {found['source']}", f"  Compared: {found['compared']}"]
+        standard = instrument(questionnaire.instrument)
+        more += [f"  Source: {standard['source']}", f"  Compared: {standard['compared']}"]
     return (title, *_aligned(rows), *more)
 
 
@@ -342,7 +344,7 @@ def limit_rows(protocol: Protocol) -> list[tuple[str, str]]:
     """Return the limits up to which a trial is valid: each value, and what it is of."""
     units, rows = {"ms": " ms", "percent": " %"}, []
     for key, field in Limits.model_fields.items():
-        words = re.sub(r" \[.*|; .*|\.$", "", field.description or "")
+        label = re.sub(r" \[.*|; .*|\.$", "", field.description or "")
         if (value := getattr(protocol.limits, key)) is not None:
-            rows.append((f"{value:g}{units.get(key.rpartition('_')[2], '')}", words[:1].lower() + words[1:]))
+            rows.append((f"{value:g}{units.get(key.rpartition('_')[2], '')}", label[:1].lower() + label[1:]))
     return rows

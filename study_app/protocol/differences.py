@@ -44,10 +44,10 @@ def differences(old: Protocol | Mapping[str, Any], new: Protocol | Mapping[str, 
     before, after = _tables(old), _tables(new)
     _drop_unknown_comparisons(before, after)
     hidden = [_take_hidden(tables) for tables in (before, after)]
-    found = [one.sentence for one in document_differences(before, after)]
+    sentences = [difference.sentence for difference in document_differences(before, after)]
     if any(hidden[0][place] != hidden[1][place] for place in hidden[0].keys() & hidden[1].keys()):
-        found.append(CONDITIONS_DIFFER)
-    return tuple(found)
+        sentences.append(CONDITIONS_DIFFER)
+    return tuple(sentences)
 
 
 def document_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> tuple[Difference, ...]:
@@ -112,7 +112,7 @@ def _by_id(value: Any) -> bool:
     if not isinstance(value, list):
         return False
     ids = [entry.get("id") if isinstance(entry, Mapping) else None for entry in value]
-    return all(isinstance(one, str) for one in ids) and len(set(ids)) == len(ids)
+    return all(isinstance(identifier, str) for identifier in ids) and len(set(ids)) == len(ids)
 
 
 def _listed(place: Place, old: Sequence[Mapping[str, Any]], new: Sequence[Mapping[str, Any]]) -> Iterator[Difference]:

@@ -105,38 +105,38 @@ def upgraded(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
 
 def completed(document: Mapping[str, Any]) -> dict[str, Any]:
     """Return a file of format 2 with what it leaves out; what is broken stays as it is."""
-    found = dict(document)
-    head = found.get("study", {})
+    completed = dict(document)
+    head = completed.get("study", {})
     if isinstance(head, dict):
-        found["study"] = {"version": "1", "languages": ("en",), **head}
+        completed["study"] = {"version": "1", "languages": ("en",), **head}
         if isinstance(head.get("name"), str):
-            found["study"].setdefault("title", dict.fromkeys(_languages(found), head["name"]))
-    found["device"] = _with(found.get("device", {}), workspace_mm=WORKSPACE_MM)
+            completed["study"].setdefault("title", dict.fromkeys(_languages(completed), head["name"]))
+    completed["device"] = _with(completed.get("device", {}), workspace_mm=WORKSPACE_MM)
     if any(
         "stimulus" in block or "design" in block
-        for _, block in entries(found, "blocks.*")
+        for _, block in entries(completed, "blocks.*")
         if isinstance(block, Mapping)
     ):
-        found["limits"] = _with(found.get("limits", {}), **LEVEL_LIMITS)
-    found = with_scene_defaults(found)
-    if isinstance(liquids := found.get("liquids", {}), dict):
-        found.setdefault("conditions", {name: {"liquid": name} for name in liquids})
-    if isinstance(blocks := found.get("blocks", {}), dict) and blocks:
-        found["blocks"] = _with_numbers(blocks, names(found, "tasks"), _languages(found))
+        completed["limits"] = _with(completed.get("limits", {}), **LEVEL_LIMITS)
+    completed = with_scene_defaults(completed)
+    if isinstance(liquids := completed.get("liquids", {}), dict):
+        completed.setdefault("conditions", {name: {"liquid": name} for name in liquids})
+    if isinstance(blocks := completed.get("blocks", {}), dict) and blocks:
+        completed["blocks"] = _with_numbers(blocks, names(completed, "tasks"), _languages(completed))
         own = {"sequence", "sequences"}  # of groups, each of which has one, so that the study needs none
-        groups = [isinstance(one, Mapping) and one.keys() & own for _, one in entries(found, "groups.*")]
-        if "sequences" not in found and not (groups and all(groups)):
-            found.setdefault("sequence", tuple(blocks))
-    return found
+        groups = [isinstance(group, Mapping) and group.keys() & own for _, group in entries(completed, "groups.*")]
+        if "sequences" not in completed and not (groups and all(groups)):
+            completed.setdefault("sequence", tuple(blocks))
+    return completed
 
 
 def with_scene_defaults(document: Mapping[str, Any]) -> dict[str, Any]:
     """Return a file of format 2 with the estimator and the densities of dampers that it leaves out."""
-    found = dict(document)
-    found["scene"] = _with(found.get("scene", {}), velocity={"kind": ESTIMATOR})
-    if isinstance(liquids := found.get("liquids", {}), dict):
-        found["liquids"] = {name: _with_density(table) for name, table in liquids.items()}
-    return found
+    completed = dict(document)
+    completed["scene"] = _with(completed.get("scene", {}), velocity={"kind": ESTIMATOR})
+    if isinstance(liquids := completed.get("liquids", {}), dict):
+        completed["liquids"] = {name: _with_density(table) for name, table in liquids.items()}
+    return completed
 
 
 def needed_by(scene: Scene) -> int:
@@ -197,11 +197,11 @@ def _with_numbers(blocks: Mapping[str, Any], tasks: tuple[str, ...], languages: 
     """Return the blocks, the main ones numbered and with the next free letters, each and its trials named."""
     taken = [table.get("code_prefix") for table in blocks.values() if isinstance(table, Mapping)]
     letters = (letter for letter in string.ascii_uppercase if letter not in taken)
-    found: dict[str, Any] = {}
+    numbered: dict[str, Any] = {}
     part = 0
     for name, table in blocks.items():
         if not isinstance(table, dict):
-            found[name] = table
+            numbered[name] = table
             continue
         defaults: dict[str, Any] = {
             "title": name.replace("_", " ").capitalize(),
@@ -218,5 +218,5 @@ def _with_numbers(blocks: Mapping[str, Any], tasks: tuple[str, ...], languages: 
                 defaults["code_prefix"] = next(letters, "Z")
         if len(languages) > 1:
             defaults["title"] = dict.fromkeys(languages, defaults["title"])
-        found[name] = {**defaults, **table}
-    return found
+        numbered[name] = {**defaults, **table}
+    return numbered

@@ -119,7 +119,7 @@ def follows(
 
     After one of the blocks that are ``exchanged`` any of them that a session has can come.
     """
-    found: dict[str | None, None] = {}
+    preceding: dict[str | None, None] = {}
     again = False
     for group in protocol.groups or (None,):
         for steps in _sequences(protocol, group) or (steps_of(protocol, group, 1),):
@@ -127,11 +127,11 @@ def follows(
             before: str | None = None
             for step in steps:
                 if step == form and before in exchanged:
-                    found |= dict.fromkeys(one for one in steps if one in exchanged)
+                    preceding |= dict.fromkeys(block for block in steps if block in exchanged)
                 elif step == form:
-                    found[before] = None
+                    preceding[before] = None
                 before = step if step in blocks else before
-    return tuple(found) if again else ()
+    return tuple(preceding) if again else ()
 
 
 def groups_with(protocol: HasSteps, step: str) -> tuple[str, ...]:
@@ -146,9 +146,9 @@ def _of_group(protocol: HasSteps, group: str | None) -> Steps:
 def numbered_parts(steps: Iterable[str], parts: Mapping[str, int | None]) -> dict[str, int]:
     """Return the number of each block's part in a session with these steps: 1, 2 … in order of first appearance."""
     numbers: dict[int, int] = {}
-    found: dict[str, int] = {}
+    part_numbers: dict[str, int] = {}
     for step in steps:
         part = parts.get(step)
         if part is not None:
-            found[step] = numbers.setdefault(part, len(numbers) + 1)
-    return found
+            part_numbers[step] = numbers.setdefault(part, len(numbers) + 1)
+    return part_numbers

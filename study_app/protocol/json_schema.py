@@ -114,10 +114,10 @@ def _places(root: Node) -> dict[str, list[str]]:
     def visit(node: Node, place: str) -> None:
         for key, below in node.get("properties", {}).items():
             for name, inside in _models(below, f"{place}.{key}" if place else key):
-                found = places.setdefault(name, [])
-                if inside not in found:
-                    found.append(inside)
-                    if len(found) == 1:
+                paths = places.setdefault(name, [])
+                if inside not in paths:
+                    paths.append(inside)
+                    if len(paths) == 1:
                         visit(root["$defs"][name], inside)
 
     visit(root, "")
@@ -138,10 +138,10 @@ def _models(node: Node, place: str) -> Iterator[tuple[str, str]]:
 
 def _headings(root: Node, places: Mapping[str, list[str]]) -> dict[str, str]:
     """Return the heading of each model: its first place, with what tells it from others at that place."""
-    firsts = [found[0] for found in places.values()]
+    firsts = [paths[0] for paths in places.values()]
     return {
-        name: found[0] if firsts.count(found[0]) == 1 else f"{found[0]}, {_apart(root['$defs'][name])}"
-        for name, found in places.items()
+        name: paths[0] if firsts.count(paths[0]) == 1 else f"{paths[0]}, {_apart(root['$defs'][name])}"
+        for name, paths in places.items()
     }
 
 
@@ -163,8 +163,8 @@ def _table(node: Node, root: Node, headings: Mapping[str, str]) -> list[str]:
 
 
 def _values(node: Node, headings: Mapping[str, str]) -> str:
-    found = dict.fromkeys(_alternatives(node, headings))
-    return " or ".join(words for words in found if words)
+    texts = dict.fromkeys(_alternatives(node, headings))
+    return " or ".join(text for text in texts if text)
 
 
 def _alternatives(node: Node, headings: Mapping[str, str]) -> Iterator[str]:
@@ -180,7 +180,7 @@ def _alternatives(node: Node, headings: Mapping[str, str]) -> Iterator[str]:
         yield _list(node, headings)
     elif node.get("type") == "object":
         below = [*node.get("patternProperties", {}).values(), node.get("additionalProperties")]
-        inside = [_values(one, headings) for one in below if isinstance(one, Mapping)]
+        inside = [_values(node, headings) for node in below if isinstance(node, Mapping)]
         yield (
             f"tables by name, each {inside[0]}" if "patternProperties" in node else f"by language or name: {inside[0]}"
         )
@@ -198,7 +198,7 @@ def _list(node: Node, headings: Mapping[str, str]) -> str:
 
 
 def _bounds(node: Node) -> Iterator[str]:
-    return (words.format(f"{node[key]:g}") for key, words in _BOUNDS.items() if key in node)
+    return (template.format(f"{node[key]:g}") for key, template in _BOUNDS.items() if key in node)
 
 
 def _default(key: str, part: Node, node: Node) -> str:
@@ -214,7 +214,7 @@ def _meaning(part: Node, root: Node) -> str:
     """Return the description of a key, or of its only alternative to null, or of the only model that it holds."""
     alternatives = [branch for branch in part.get("anyOf", ()) if branch.get("type") != "null"]
     meant = (part, *alternatives) if len(alternatives) == 1 else (part,)
-    described = next((one for one in meant if "description" in one), None)
+    described = next((meaning for meaning in meant if "description" in meaning), None)
     models = list(dict.fromkeys(name for name, _ in _models(part, "")))
     if described or len(models) != 1:
         return str((described or {}).get("description", ""))

@@ -281,20 +281,20 @@ def _validated(model: type[M], document: Mapping[str, Any]) -> tuple[M | None, l
     named = [path for section in ("liquids", "blocks") for path, _ in entries(document, f"{section}.*.id")]
     faults = [Fault(path, "unknown key", "the name of the table is its id") for path in named]
     try:
-        found = model.model_validate(document, strict=True)
+        validated = model.model_validate(document, strict=True)
     except ValidationError as error:
         return None, faults + faults_of(error, document, schema(model))
-    if isinstance(velocity := getattr(getattr(found, "scene", None), "velocity", None), Withdrawn):
+    if isinstance(velocity := getattr(getattr(validated, "scene", None), "velocity", None), Withdrawn):
         message, hint = velocity.refusal
         return None, [*faults, Fault(("scene", "velocity", "kind"), message, hint)]
-    return found, faults
+    return validated, faults
 
 
 def located(faults: Iterable[Fault], places: Places) -> tuple[Problem, ...]:
     """Return faults as problems with their lines, in the order of the lines."""
 
-    def shortened(words: str) -> str:
-        return _LONG.sub(lambda found: f"{found[0][:SHOWN]}…", words)
+    def shortened(text: str) -> str:
+        return _LONG.sub(lambda match: f"{match[0][:SHOWN]}…", text)
 
     problems = (fault.located(places) for fault in faults)
     short = [Problem(shortened(it.place), shortened(it.message), it.line, hint=shortened(it.hint)) for it in problems]

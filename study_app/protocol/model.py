@@ -159,7 +159,9 @@ class SceneDefaults(Table):
 
 def compared(conditions: Sequence[Condition]) -> Compared:
     """Return what these conditions differ in: where they have one liquid, views or else delays if these differ."""
-    liquids, delays, views = ({getattr(one, name) for one in conditions} for name in ("liquid_ids", "delay_ms", "seen"))
+    liquids, delays, views = (
+        {getattr(condition, name) for condition in conditions} for name in ("liquid_ids", "delay_ms", "seen")
+    )
     if len(liquids) > 1:
         return "liquids"
     return "views" if len(views) > 1 else "delays" if len(delays) > 1 else "liquids"
@@ -353,9 +355,9 @@ class Contrast(Table):
         of = [conditions.get(block) for block in self.blocks]
         return (f"{first} ({of[0]})", f"{second} ({of[1]})") if len(set(of)) > 1 and None not in of else (first, second)
 
-    def described(self, words: tuple[str, str] | None = None) -> str:
-        """Return it in words; ``words`` are those of what is compared, otherwise its ids."""
-        first, second = words or self.compared
+    def described(self, names: tuple[str, str] | None = None) -> str:
+        """Describe the hypothesis; ``names`` are the names of the two sides, their ids without it."""
+        first, second = names or self.compared
         where = "" if len(self.blocks) == 2 else f" in block {self.blocks[0]}"
         moves = "differs between" if self.expected is None else f"is {self.expected} in"
         joint = "and" if self.expected is None else "than in"
@@ -442,8 +444,8 @@ class Analysis(Table):
             yield "Looks", f"at {', '.join(map(str, self.looks))} participants; alpha is shared by {self.spending}"
         if self.precision is not None:
             yield "Precision", f"group mean ±{100 * self.precision:g} % (half its 95 % interval)"
-        yield from (("Hypothesis", one.described()) for one in self.contrasts)
-        yield from (("Published", one.described()) for one in self.published)
+        yield from (("Hypothesis", contrast.described()) for contrast in self.contrasts)
+        yield from (("Published", value.described()) for value in self.published)
 
 
 T = TypeVar("T")

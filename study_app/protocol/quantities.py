@@ -102,8 +102,8 @@ def quantity_words(name: str) -> str:
     """Return the name of a quantity within a sentence, such as "viscosity" or "wake scaling"."""
     row = quantity(name)
     effect = NAMED.get(_table(row.name))
-    words = row.label if effect is None or effect.with_liquid else f"{effect.label} {row.label}"
-    return words.lower()
+    label = row.label if effect is None or effect.with_liquid else f"{effect.label} {row.label}"
+    return label.lower()
 
 
 def _table(name: str) -> str:

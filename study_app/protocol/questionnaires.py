@@ -117,8 +117,8 @@ def instruments() -> tuple[str, ...]:
 @cache
 def instrument(name: str) -> Mapping[str, Any]:
     """Return a standard questionnaire as its file holds it (OSError if there is none)."""
-    found: Mapping[str, Any] = frozen(tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8")))
-    return found
+    table: Mapping[str, Any] = frozen(tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8")))
+    return table
 
 
 def with_instruments(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
@@ -126,10 +126,10 @@ def with_instruments(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[
 
     What the study writes replaces what is known, key by key, and texts language by language.
     """
-    found, faults = dict(document), list[Fault]()
+    completed, faults = dict(document), list[Fault]()
     tables = document.get("questionnaires")
     if not isinstance(tables, Mapping):
-        return found, faults
+        return completed, faults
     languages = tuple(name for _, name in entries(document, "study.languages.*") if isinstance(name, str))
     written = document.get("scales", {})
     filled, scales = dict(tables), dict(written) if isinstance(written, Mapping) else {}
@@ -142,7 +142,7 @@ def with_instruments(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[
         else:
             path, wrong = ("questionnaires", name, "instrument"), str(table["instrument"])
             faults.append(unknown(path, f'there is no instrument "{wrong}"', wrong, instruments()))
-    return {**found, "questionnaires": filled, **({"scales": scales} if scales else {})}, faults
+    return {**completed, "questionnaires": filled, **({"scales": scales} if scales else {})}, faults
 
 
 def written_out(of: str, languages: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -152,9 +152,11 @@ def written_out(of: str, languages: tuple[str, ...]) -> tuple[dict[str, Any], di
     if not lacking:
         return table, {}
     known = instrument(of).get("scales", {}).items()
-    scales = {scale_name(of, name): _merged({"labels": one.get("labels", {})}, {}, languages) for name, one in known}
+    scales = {
+        scale_name(of, name): _merged({"labels": scale.get("labels", {})}, {}, languages) for name, scale in known
+    }
     table |= {key: filled[key] for key in ("intro", "items") if key in filled}
-    return table, {name: one for name, one in scales.items() if one}
+    return table, {name: scale for name, scale in scales.items() if scale}
 
 
 def scale_name(of: str, scale: str) -> str:
@@ -181,7 +183,7 @@ def _filled(
         """Note the languages that texts of a table lack: at its place in the study, if it is written there."""
         for key in keys:
             text = made.get(key, {})
-            lacking = [one for one in languages if one not in text] if isinstance(text, Mapping) else []
+            lacking = [code for code in languages if code not in text] if isinstance(text, Mapping) else []
             if path is None:
                 for language in lacking:
                     unwritten[language].append((key, thing))
@@ -209,20 +211,25 @@ def _filled(
         fields = KINDS[kind].model_fields
         ask(path, name, whole, *(key for key in ("text", "low", "high") if key in fields))
         if "options" in item and isinstance(written.get("options", ()), list | tuple):
-            choices, possible = _by_id(written, "options"), [one["id"] for one in item["options"]]
+            choices, possible = _by_id(written, "options"), [option["id"] for option in item["options"]]
             faults += [
-                unknown((*place, *(path or ()), *where, "id"), f'"{one}" is not an option of {name}', one, possible)
-                for one, (where, _) in choices.items()
-                if one not in possible
+                unknown(
+                    (*place, *(path or ()), *where, "id"),
+                    f'"{option_id}" is not an option of {name}',
+                    option_id,
+                    possible,
+                )
+                for option_id, (where, _) in choices.items()
+                if option_id not in possible
             ]
             whole["options"] = tuple(
-                _merged(one, choices.get(one["id"], ((), {}))[1], languages) for one in item["options"]
+                _merged(option, choices.get(option["id"], ((), {}))[1], languages) for option in item["options"]
             )
-            for one in whole["options"]:
-                if path is not None and one["id"] in choices:
-                    ask((*path, *choices[one["id"]][0]), name, one, "text")
+            for option in whole["options"]:
+                if path is not None and option["id"] in choices:
+                    ask((*path, *choices[option["id"]][0]), name, option, "text")
                 else:
-                    ask(None, name, {"options": one.get("text", {})}, "options")
+                    ask(None, name, {"options": option.get("text", {})}, "options")
         items.append(whole)
     for scale, labelled in source.get("scales", {}).items():
         own_name = scale_name(of, scale)
@@ -233,7 +240,9 @@ def _filled(
             scales[own_name] = known_labels
         else:
             ask(None, f"[scales.{own_name}], {labelled['points']} of them", known_labels, "labels")
-    faults += [_unpublished((*place, "instrument"), of, one, lacks) for one, lacks in unwritten.items() if lacks]
+    faults += [
+        _unpublished((*place, "instrument"), of, language, lacks) for language, lacks in unwritten.items() if lacks
+    ]
     scores = {name: dict(score) for name, score in source["scores"].items()}
     return {"scores": scores, **made, "items": tuple(items)}, faults
 
@@ -242,7 +251,7 @@ def _merged(known: Mapping[str, Any], own: Mapping[str, Any], languages: tuple[s
     """Return what is known of a table in these languages, replaced by what the study writes of it."""
     made = dict(known)
     for key in made.keys() & set(_TEXTS):
-        made[key] = {one: known[key][one] for one in languages if one in known[key]}
+        made[key] = {language: known[key][language] for language in languages if language in known[key]}
     for key, value in own.items():
         made[key] = {**made.get(key, {}), **value} if key in _TEXTS and isinstance(value, Mapping) else value
     return {key: value for key, value in made.items() if value or key not in _TEXTS}
@@ -251,9 +260,9 @@ def _merged(known: Mapping[str, Any], own: Mapping[str, Any], languages: tuple[s
 def _by_id(table: Mapping[str, Any], key: str) -> dict[str, tuple[Path, Mapping[str, Any]]]:
     """Return the tables of a list that have an id, with their places."""
     return {
-        one["id"]: (path, one)
-        for path, one in entries(table, f"{key}.*")
-        if isinstance(one, Mapping) and isinstance(one.get("id"), str)
+        entry["id"]: (path, entry)
+        for path, entry in entries(table, f"{key}.*")
+        if isinstance(entry, Mapping) and isinstance(entry.get("id"), str)
     }
 
 
@@ -262,9 +271,9 @@ def _unpublished(path: Path, of: str, language: str, lacks: Sequence[tuple[str, 
     keys: dict[str, list[str]] = {}
     for key, thing in dict.fromkeys(lacks):
         keys.setdefault(thing, []).append(key)
-    same = {tuple(found): [thing for thing, other in keys.items() if other == found] for found in keys.values()}
+    same = {tuple(texts): [thing for thing, other in keys.items() if other == texts] for texts in keys.values()}
     listed = "; ".join(
-        f"{', '.join(found)} of {', '.join(one)}".removesuffix(f" of {of}") for found, one in same.items()
+        f"{', '.join(texts)} of {', '.join(names)}".removesuffix(f" of {of}") for texts, names in same.items()
     )
     published = instrument(of)["languages"]
     why = (

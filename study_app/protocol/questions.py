@@ -71,7 +71,7 @@ class ShowIf(Table):
     def holds(self, answer: Value) -> bool:
         if self.values is not None:
             given = answer if isinstance(answer, tuple) else (answer,)
-            return any(one in self.permitted for one in given)
+            return any(value in self.permitted for value in given)
         if not isinstance(answer, int | float):
             return False
         return (self.at_least is None or answer >= self.at_least) and (self.at_most is None or answer <= self.at_most)
@@ -89,12 +89,12 @@ def shown(items: Iterable[Question | ItemView], answers: Mapping[str, Value]) ->
 
     Answers to items that are not shown count for nothing.
     """
-    found: list[str] = []
+    shown_ids: list[str] = []
     for item in items:
         rule = item.show_if
-        if rule is None or (rule.item in found and rule.item in answers and rule.holds(answers[rule.item])):
-            found.append(item.id)
-    return tuple(found)
+        if rule is None or (rule.item in shown_ids and rule.item in answers and rule.holds(answers[rule.item])):
+            shown_ids.append(item.id)
+    return tuple(shown_ids)
 
 
 Draw: TypeAlias = Callable[[], float]

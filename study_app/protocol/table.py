@@ -60,17 +60,17 @@ def characters(text: str) -> list[str]:
     >>> [len(characters(text)) for text in ("e\u0301t", "👨‍👩‍👧", "🇫🇷🇩🇪")]
     [2, 1, 2]
     """
-    found: list[str] = []
+    clusters: list[str] = []
     for letter in text:
         code = ord(letter)
-        before = found[-1] if found else ""
+        before = clusters[-1] if clusters else ""
         attached = unicodedata.category(letter) in _ATTACHED or letter == _JOINER or code in _TONES or code in _TAGS
         joins = before.endswith(_JOINER) or (code in _REGIONS and len(before) == 1 and ord(before) in _REGIONS)
         if before not in {"", "\n"} and (attached or joins) and len(before) < _MOST_JOINED:
-            found[-1] += letter
+            clusters[-1] += letter
         else:
-            found.append(letter)
-    return found
+            clusters.append(letter)
+    return clusters
 
 
 _APART: Final = re.compile(r"\n[ \t]*\n")
@@ -97,8 +97,10 @@ def _tidied(text: str) -> str:
 
 def unprintable(text: str, permitted: str = "") -> str | None:
     """Return the first character that cannot be printed, or hides or reorders the others; ``permitted`` ones may."""
-    hidden = (one for one in text if unicodedata.category(one) in UNPRINTABLE or one in DIRECTIONS)
-    return next((one for one in hidden if one not in permitted), None)
+    hidden = (
+        character for character in text if unicodedata.category(character) in UNPRINTABLE or character in DIRECTIONS
+    )
+    return next((character for character in hidden if character not in permitted), None)
 
 
 def _printable(text: str) -> str:
@@ -161,7 +163,7 @@ def invalid(
     ``use`` is a key of the table with a value that repairs it, ``kind`` that of the `Fault`.
     """
     stated = {"message": message, "place": key, "hint": hint, "use": use, "kind": kind}
-    return PydanticCustomError("invalid", "{message}", {name: one for name, one in stated.items() if one})
+    return PydanticCustomError("invalid", "{message}", {name: detail for name, detail in stated.items() if detail})
 
 
 class Table(BaseModel):
@@ -178,11 +180,11 @@ class Table(BaseModel):
 
     @model_validator(mode="after")
     def _gives_one_of_two(self) -> Self:
-        for one, other in self.ONE_OF:
-            given: list[Any] = [getattr(self, name) for name in (one, other)]
+        for first, other in self.ONE_OF:
+            given: list[Any] = [getattr(self, name) for name in (first, other)]
             if sum(value is not None and value != () for value in given) != 1:
-                message = f"give either {one} or {other}, one of the two"
-                raise invalid(message, one)
+                message = f"give either {first} or {other}, one of the two"
+                raise invalid(message, first)
         return self
 
     @classmethod
@@ -219,17 +221,17 @@ class OfKinds(Generic[K]):
         kind = value.get("kind") if isinstance(value, Mapping) else None
         if not isinstance(kind, str) or ":" not in kind:
             return own(value)
-        found, recorded = self.registry.get(kind), info.context == RECORDED
-        if found is None and not recorded:
+        kind_model, recorded = self.registry.get(kind), info.context == RECORDED
+        if kind_model is None and not recorded:
             message, hint = self.registry.missing(kind)
             raise invalid(message, "kind", hint)
-        return (found or self.stand_in).model_validate(value, strict=not recorded, context=info.context)
+        return (kind_model or self.stand_in).model_validate(value, strict=not recorded, context=info.context)
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Return the schema of the union, with the kinds of plug-ins."""
         node = handler(schema)
-        for kind, found in self.registry.others.items():
-            part = handler(core_schema.definitions_schema(found.__pydantic_core_schema__, []))
+        for kind, kind_model in self.registry.others.items():
+            part = handler(core_schema.definitions_schema(kind_model.__pydantic_core_schema__, []))
             handler.resolve_ref_schema(part)["title"] = kind  # classes of several packages may have one name
             node["oneOf"].append(part)
             if "discriminator" in node:

@@ -38,7 +38,7 @@ def tracks_of(protocol: Protocol, block: Block) -> tuple[Track, ...]:
     stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
     comparisons = method.presentations(stimulus)
     others = comparisons + design.noise(comparisons) + (design.first is not None)
-    catch = () if (rule := block.catch) is None else tuple(rule.stretch(one) for one in range(rule.count(others)))
+    catch = () if (rule := block.catch) is None else tuple(rule.stretch(number) for number in range(rule.count(others)))
     slots = others + len(catch)
     return tuple(
         Track(f"{'' if standard is None else f'{standard:.17g}'}/{number}", standard, None, slots, number, catch)

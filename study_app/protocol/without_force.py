@@ -27,7 +27,7 @@ def without_force(protocol: Protocol) -> Protocol:
     """
     reworded = {"pages": "body", "questionnaires": "intro", "tasks": "instruction"}
     tables = {
-        table: {name: one.model_copy(update={key: _seen(getattr(one, key))}) for name, one in given.items()}
+        table: {name: entry.model_copy(update={key: _seen(getattr(entry, key))}) for name, entry in given.items()}
         for table, key in reworded.items()
         for given in (getattr(protocol, table),)
     }
@@ -37,7 +37,7 @@ def without_force(protocol: Protocol) -> Protocol:
 def _seen(text: Any) -> Any:
     """Return a localised text without its sentences about force."""
     if isinstance(text, Mapping):
-        return {language: _seen(one) for language, one in text.items()}
+        return {language: _seen(sentence) for language, sentence in text.items()}
     for pattern, seen in _PATTERNS if isinstance(text, str) else ():
         text = pattern.sub(seen, text)
     return text

@@ -136,8 +136,11 @@ def targets(parts: Draft) -> Iterator[Fault]:
 def liquids(parts: Draft) -> Iterator[Fault]:
     """Check that a condition's liquids fit into a scene and have one ball, which meets each somewhere in the tank."""
     for name, condition in parts.conditions.items():
-        place, known = ("conditions", name, "liquids"), [one for one in condition.liquid_ids if one in parts.liquids]
-        if parts.scene is not None and len({parts.liquids[one].body_in(parts.scene) for one in known}) > 1:
+        place, known = (
+            ("conditions", name, "liquids"),
+            [liquid for liquid in condition.liquid_ids if liquid in parts.liquids],
+        )
+        if parts.scene is not None and len({parts.liquids[liquid].body_in(parts.scene) for liquid in known}) > 1:
             message = "its liquids have different balls, and one ball moves through all of them"
             yield Fault(place, message, "give them the same body")
         if len(condition.liquids) > MAX_LIQUIDS:
@@ -179,14 +182,18 @@ def equal_liquids(parts: Draft) -> Iterator[Fault]:
 def equal_conditions(parts: Draft) -> Iterator[Fault]:
     """Check that the conditions of a block differ, unless the block says that some are replicates."""
     for name, block in parts.blocks.items():
-        presented = {one: parts.conditions[one] for one in block.conditions if one in parts.conditions}
+        presented = {
+            condition_id: parts.conditions[condition_id]
+            for condition_id in block.conditions
+            if condition_id in parts.conditions
+        }
         delays = compared(list(presented.values())) == "delays"  # which the analysis pools
         first: dict[tuple[Any, ...], str] = {}
         for index, condition in enumerate(() if delays and block.replicates else block.conditions):
-            if (one := presented.get(condition)) is None:
+            if (settings := presented.get(condition)) is None:
                 continue
-            numbers_of = (round(getattr(one, key), DIGITS) for key in OF_CONDITION)
-            presents = (one.liquid_ids, one.ball, one.view, one.overlay, *numbers_of)
+            numbers_of = (round(getattr(settings, key), DIGITS) for key in OF_CONDITION)
+            presents = (settings.liquid_ids, settings.ball, settings.view, settings.overlay, *numbers_of)
             earlier = first.setdefault(presents, condition)
             if earlier != condition:
                 message = f'"{condition}" presents the same as "{earlier}"'
@@ -200,14 +207,16 @@ def compares(parts: Draft) -> Iterator[Fault]:
     Where it says views, delays may differ as well: those that make the views equally late.
     """
     for name, block in parts.blocks.items():
-        presented = [parts.conditions[one] for one in block.conditions if one in parts.conditions]
+        presented = [
+            parts.conditions[condition_id] for condition_id in block.conditions if condition_id in parts.conditions
+        ]
         if block.phase != "main" or block.design is not None or len(presented) < len(block.conditions):
             continue
-        varied = [of for of, key in VARIED.items() if len({getattr(one, key) for one in presented}) > 1]
+        varied = [of for of, key in VARIED.items() if len({getattr(condition, key) for condition in presented}) > 1]
         if block.compares == "views" and {"views", "delays"} <= {*varied}:
             varied.remove("delays")
         if len(varied) > 1:
-            differ = " and in ".join(one.removesuffix("s") for one in varied)
+            differ = " and in ".join(quantity.removesuffix("s") for quantity in varied)
             message = f"its conditions differ in {differ}, whose effects the analysis cannot tell apart"
             yield Fault(("blocks", name, "conditions"), message, "vary one of them, or use a block for each")
         elif block.compares is not None and varied not in ([], [block.compares]):

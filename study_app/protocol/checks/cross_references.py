@@ -177,14 +177,14 @@ def alike(document: Document) -> Iterator[Fault]:
         yield from _alike(points, "label")
 
 
-def _alike(found: list[tuple[Path, Any]], kind: str) -> Iterator[Fault]:
+def _alike(located_texts: list[tuple[Path, Any]], kind: str) -> Iterator[Fault]:
     """Yield a fault for every text that reads as an earlier one does; an entry may hold a text per language.
 
     People do not tell texts apart by case, width or white space, nor Latin letters from Cyrillic or Greek ones that
     look the same.
     """
     seen: set[tuple[str, str]] = set()
-    for path, entry in found:
+    for path, entry in located_texts:
         texts = entry if isinstance(entry, Mapping) else {"": entry}
         read = {(language, as_read(text)) for language, text in texts.items() if isinstance(text, str)}
         if read & seen:
@@ -211,7 +211,7 @@ def languages(document: Document) -> Iterator[Fault]:
             known = f"known: {', '.join(LANGUAGES)}"
             yield Fault(path, f'the program has no words in "{name}"', known, permitted=tuple(LANGUAGES))
     wanted = tuple(name for _, name in written)
-    texts = (found for pattern in TEXTS for found in entries(document, pattern)) if wanted else ()
+    texts = (texts_of_pattern for pattern in TEXTS for texts_of_pattern in entries(document, pattern)) if wanted else ()
     for path, text in texts:
         if isinstance(text, str) and len(wanted) > 1:
             listed = ", ".join(f'{language} = "…"' for language in wanted)
@@ -256,10 +256,10 @@ def decisions(document: Document) -> Iterator[Fault]:
     questions = (item for _, item in entries(document, "questionnaires.*.items.*") if isinstance(item, Mapping))
     items = {item["id"] for item in questions if isinstance(item.get("id"), str) and "kind" not in item}
     decided = {key: list(entries(document, f"analysis.{key}.*")) for key in DECIDED_LISTS}
-    for found in (*decided.values(), list(entries(document, "analysis.noticed"))):
-        for path, name in found:
+    for places in (*decided.values(), list(entries(document, "analysis.noticed"))):
+        for path, name in places:
             yield from _unknown(path, name, "item", items)
-        yield from _twice(found)
+        yield from _twice(places)
     falling, named = ([name for _, name in decided[key]] for key in ("falling", "names"))
     for path, name in decided["rising"]:
         if name in falling:

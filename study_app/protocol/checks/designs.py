@@ -66,8 +66,8 @@ def designs(protocol: Protocol) -> Iterator[Fault]:
     for block in protocol.blocks.values():
         if block.design is not None:
             yield from _block(protocol, block)
-    for number, one in enumerate(protocol.analysis.published if protocol.analysis is not None else ()):
-        yield from _published(protocol, one, ("analysis", "published", number))
+    for number, published in enumerate(protocol.analysis.published if protocol.analysis is not None else ()):
+        yield from _published(protocol, published, ("analysis", "published", number))
     for number, contrast in enumerate(protocol.analysis.contrasts if protocol.analysis is not None else ()):
         yield from _contrast(protocol, contrast, ("analysis", "contrasts", number))
 
@@ -113,45 +113,55 @@ def _block(protocol: Protocol, block: Block) -> Iterator[Fault]:
             "there is no threshold"
         )
         yield Fault((*place, "method"), message, 'method = "constant", or level = "weber" or "difference"')
-    if unknown := [one for one in block.standards if one not in protocol.stimuli[block.stimulus].standards]:
-        listed = ", ".join(f"{one:g}" for one in protocol.stimuli[block.stimulus].standards)
+    if unknown := [
+        standard for standard in block.standards if standard not in protocol.stimuli[block.stimulus].standards
+    ]:
+        listed = ", ".join(f"{standard:g}" for standard in protocol.stimuli[block.stimulus].standards)
         yield Fault((*place, "standards"), f"the stimulus has no standard {unknown[0]:g}", f"these: {listed or 'none'}")
     if design.first is not None and len(tracks_of(protocol, block)) > 1:
         yield Fault((*place, "design"), "a modulus needs a single standard", "omit it, or use one block per standard")
     yield from _levels(protocol, block)
 
 
-def _published(protocol: Protocol, one: Published, place: Path) -> Iterator[Fault]:
+def _published(protocol: Protocol, published: Published, place: Path) -> Iterator[Fault]:
     """Check that a published value belongs to a block of levels, and its standard to the block."""
     of_levels = [block.id for block in protocol.blocks.values() if block.stimulus is not None]
-    if one.block not in of_levels:
-        fault = unknown((*place, "block"), f'there is no block of levels "{one.block}"', one.block, of_levels)
+    if published.block not in of_levels:
+        fault = unknown(
+            (*place, "block"), f'there is no block of levels "{published.block}"', published.block, of_levels
+        )
         yield fault if of_levels else fault._replace(hint="omit it")
         return
-    standards = [standard for standard in standards_of(protocol, protocol.blocks[one.block]) if standard is not None]
-    if one.standard is not None and one.standard not in standards:
+    standards = [
+        standard for standard in standards_of(protocol, protocol.blocks[published.block]) if standard is not None
+    ]
+    if published.standard is not None and published.standard not in standards:
         listed = f"these: {', '.join(f'{standard:g}' for standard in standards)}" if standards else "omit it"
-        yield Fault((*place, "standard"), f"the block has no standard {one.standard:g}", listed)
-    ends = (one.value if one.low is None else one.low, one.value, one.value if one.high is None else one.high)
+        yield Fault((*place, "standard"), f"the block has no standard {published.standard:g}", listed)
+    ends = (
+        published.value if published.low is None else published.low,
+        published.value,
+        published.value if published.high is None else published.high,
+    )
     if list(ends) != sorted(ends):
         yield Fault((*place, "low"), "low, value and high must ascend", "order them")
 
 
-def _contrast(protocol: Protocol, one: Contrast, place: Path) -> Iterator[Fault]:
+def _contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iterator[Fault]:
     """Check that the blocks of a contrast have its measure, and its conditions."""
-    for name in one.blocks:
+    for name in contrast.blocks:
         block, asked = protocol.blocks[name], protocol.questionnaire_of(name)
         if block.phase != "main":
             yield Fault((*place, "blocks"), f"{name} is no main block: it is not analysed", "choose another")
             continue
         items = [item.id for item in asked.statements] if asked is not None else []
         known = OF_LEVELS if block.design is not None else items
-        if one.measure not in known:
-            yield unknown((*place, "measure"), f'block "{name}" has no {one.measure}', one.measure, known)
-        missing = [condition for condition in one.conditions or () if condition not in block.conditions]
+        if contrast.measure not in known:
+            yield unknown((*place, "measure"), f'block "{name}" has no {contrast.measure}', contrast.measure, known)
+        missing = [condition for condition in contrast.conditions or () if condition not in block.conditions]
         if missing:
             yield unknown((*place, "conditions"), f"block {name} has no {missing[0]}", missing[0], block.conditions)
-        if one.conditions is not None and block.design is not None:
+        if contrast.conditions is not None and block.design is not None:
             yield Fault((*place, "conditions"), f"the results of {name} are of all its levels", "compare two blocks")
 
 
@@ -309,4 +319,4 @@ def _can_change(protocol: Protocol, condition: str, vary: str, values: list[floa
     if vary in OF_LINK:
         return False
     scenes = [scene_of(protocol, Stimulated(condition, vary, value)) for value in values]
-    return all(is_built_alike(one, other) for one, other in pairwise(scenes))
+    return all(is_built_alike(scene, other) for scene, other in pairwise(scenes))

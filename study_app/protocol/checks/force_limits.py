@@ -91,20 +91,20 @@ def _lagging(protocol: Protocol) -> Iterator[Fault]:
 
 def by_stimulus(protocol: Protocol) -> list[list[Block]]:
     """Return the blocks of levels, those that present one stimulus together."""
-    found: dict[str, list[Block]] = {}
+    blocks_of: dict[str, list[Block]] = {}
     for block in protocol.blocks.values():
         if block.stimulus is not None:
-            found.setdefault(block.stimulus, []).append(block)
-    return list(found.values())
+            blocks_of.setdefault(block.stimulus, []).append(block)
+    return list(blocks_of.values())
 
 
 def beyond_slope_limit(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> Fault | None:
     """Return that dampings of blocks with one stimulus exceed the slope limit for a delay [ticks]; None: none does."""
     stimulus = stimulus_of(protocol, blocks[0])
-    found = [one for block in blocks for one in ends(protocol, block)]
-    if not found:
+    extremes = [extreme for block in blocks for extreme in ends(protocol, block)]
+    if not extremes:
         return None
-    standard, level, scene = max(found, key=lambda one: damping_of(one[2]))
+    standard, level, scene = max(extremes, key=lambda extreme: damping_of(extreme[2]))
     highest_nspm, (limit_nspm, loop) = damping_of(scene), _loop(scene, delay_ticks)
     if highest_nspm <= limit_nspm:
         return None
@@ -113,7 +113,7 @@ def beyond_slope_limit(protocol: Protocol, blocks: Sequence[Block], delay_ticks:
         hint = f"damping_nspm = {floored(limit_nspm, 1):g}"
     else:
         every = list(_every(protocol, blocks))
-        gives = _named(every, [one for one in every if one.damping_nspm > limit_nspm], _GIVES)
+        gives = _named(every, [level for level in every if level.damping_nspm > limit_nspm], _GIVES)
         hint = _within_limit(stimulus, standard, level, limit_nspm)
     message = f"{gives} {highest_nspm:g} N·s/m at the hand; {loop} is {limit_nspm:g}"
     return Fault(("stimuli", str(blocks[0].stimulus), "levels"), message, hint)
@@ -130,27 +130,27 @@ def clipped(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> It
         yield beyond
     place, stimulus = ("stimuli", str(blocks[0].stimulus), "levels"), stimulus_of(protocol, blocks[0])
     blocks = [block for block in blocks if isinstance(protocol.tasks[block.task], Follow)]
-    found = [(block, scene) for block in blocks for *_, scene in ends(protocol, block) if len(scene.liquids) == 1]
-    if all(steady_force(scene, hand_mps_of(protocol, block)).limit is None for block, scene in found):
+    felt = [(block, scene) for block in blocks for *_, scene in ends(protocol, block) if len(scene.liquids) == 1]
+    if all(steady_force(scene, hand_mps_of(protocol, block)).limit is None for block, scene in felt):
         return
     condition = condition_of(protocol, stimulus)
     if stimulus.vary in OF_LINK:
-        block, scene = max(found, key=lambda one: hand_mps_of(protocol, one[0]))
+        block, scene = max(felt, key=lambda pair: hand_mps_of(protocol, pair[0]))
         yield from clipped_at_pace(protocol, block, scene, f'"{condition}" is', place)
         return
     every, scene = _every(protocol, blocks), protocol.scene_for(condition)
     limit_nspm, loop = _loop(scene, delay_ticks)
-    by_loop = [one for one in every if one.damping_nspm > limit_nspm or one.clipped_by == "slope"]
+    by_loop = [level for level in every if level.damping_nspm > limit_nspm or level.clipped_by == "slope"]
     if by_loop and beyond is None:
-        most = max(by_loop, key=lambda one: one.asked_n or 0.0)
+        most = max(by_loop, key=lambda level: level.asked_n or 0.0)
         message = (
             f"{_named(list(every), by_loop, _IS)} {most.asked_n:.1f} N at {FASTER:g} times the paced "
             f"{hand_mps_of(protocol, every[most]) / FASTER:.3g} m/s; {loop} leaves {most.sent_n:.1f} N"
         )
         yield Fault(place, message, _highest_in_full(protocol, every[most], most.standard))
-    by_force = [one for one in every if (one.asked_n or 0.0) > scene.force_limit_n and one not in by_loop]
+    by_force = [level for level in every if (level.asked_n or 0.0) > scene.force_limit_n and level not in by_loop]
     if by_force:
-        most = max(by_force, key=lambda one: one.asked_n or 0.0)
+        most = max(by_force, key=lambda level: level.asked_n or 0.0)
         strongest = override_value(scene, stimulus.vary, most.comparison)
         named = _named(list(every), by_force, _IS)
         yield from clipped_at_pace(protocol, every[most], strongest, named, place)
@@ -158,13 +158,13 @@ def clipped(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> It
 
 def _every(protocol: Protocol, blocks: Sequence[Block]) -> dict[Level, Block]:
     """Return each level of blocks with one stimulus once: where its force is the largest, with its block."""
-    found: dict[tuple[float, float], tuple[Level, Block]] = {}
+    levels_by_value: dict[tuple[float, float], tuple[Level, Block]] = {}
     for block in blocks:
-        for one in levels(protocol, block.id):
-            known = found.get(key := (one.standard or 0.0, one.level))
-            if known is None or (one.asked_n or 0.0) > (known[0].asked_n or 0.0):
-                found[key] = one, block
-    return dict(found[key] for key in sorted(found))
+        for level in levels(protocol, block.id):
+            known = levels_by_value.get(key := (level.standard or 0.0, level.level))
+            if known is None or (level.asked_n or 0.0) > (known[0].asked_n or 0.0):
+                levels_by_value[key] = level, block
+    return dict(levels_by_value[key] for key in sorted(levels_by_value))
 
 
 def clipped_unpaced(protocol: Protocol, blocks: Sequence[Block]) -> str | None:
@@ -173,13 +173,13 @@ def clipped_unpaced(protocol: Protocol, blocks: Sequence[Block]) -> str | None:
     The blocks have one stimulus and one task.
     """
     task = blocks[0].task
-    found = [scene for one in blocks for *_, scene in ends(protocol, one) if len(scene.liquids) == 1]
-    if isinstance(protocol.tasks[task], Follow) or all(steady_force(one, UNPACED_MPS).limit is None for one in found):
+    scenes = [scene for one in blocks for *_, scene in ends(protocol, one) if len(scene.liquids) == 1]
+    if isinstance(protocol.tasks[task], Follow) or all(steady_force(one, UNPACED_MPS).limit is None for one in scenes):
         return None
     every = list(_every(protocol, blocks))
-    some = [one for one in every if one.clipped_by is not None]
+    some = [level for level in every if level.clipped_by is not None]
     of = f" of {_listed(every, some)}" if some else ""  # a number of the condition changes no force
-    by_loop = any(steady_force(one, UNPACED_MPS).limit == "slope" for one in found)
+    by_loop = any(steady_force(scene, UNPACED_MPS).limit == "slope" for scene in scenes)
     limit = "by the slope limit" if by_loop else f"at {protocol.device.force_limit_n:g} N"
     return f"tasks.{task}: at {UNPACED_MPS:g} m/s the force{of} is clipped {limit}: such trials are repeated: {PACED}"
 
@@ -246,30 +246,30 @@ def _highest_in_full(protocol: Protocol, block: Block, standard: float | None) -
 
 def _named(every: Sequence[Level], some: Sequence[Level], verbs: tuple[str, str]) -> str:
     """Return some levels as the subject of a sentence, with its verb: "levels 40 and 60 give up to"."""
-    words = _listed(every, some)
-    several = words.startswith("levels") or len({one.standard for one in some}) > 1
-    return f"{words} {verbs[several]}{' up to' * (len(some) > 1)}"
+    subject = _listed(every, some)
+    several = subject.startswith("levels") or len({level.standard for level in some}) > 1
+    return f"{subject} {verbs[several]}{' up to' * (len(some) > 1)}"
 
 
 def _listed(every: Sequence[Level], some: Sequence[Level]) -> str:
     """Return some levels by their standards; of many in a row the first and the last."""
-    found = []
-    for standard in dict.fromkeys(one.standard for one in some):
-        own = [one for one in every if one.standard == standard]
+    phrases = []
+    for standard in dict.fromkeys(level.standard for level in some):
+        own = [level for level in every if level.standard == standard]
         rows: list[list[Level]] = []
-        for place, one in enumerate(own):
-            if one not in some:
+        for place, level in enumerate(own):
+            if level not in some:
                 continue
             if rows and own[place - 1] is rows[-1][-1] and len(some) > MOST_NAMED:
-                rows[-1].append(one)
+                rows[-1].append(level)
             else:
-                rows.append([one])
-        ends = [[f"{float(f'{one.level:.3g}'):g}" for one in (row[0], row[-1])] for row in rows]
-        words = [f"{low} to {high}" if row[1:] else low for row, (low, high) in zip(rows, ends, strict=True)]
-        joined = " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
+                rows.append([level])
+        ends = [[f"{float(f'{level.level:.3g}'):g}" for level in (row[0], row[-1])] for row in rows]
+        ranges = [f"{low} to {high}" if row[1:] else low for row, (low, high) in zip(rows, ends, strict=True)]
+        joined = " and ".join(filter(None, (", ".join(ranges[:-1]), ranges[-1])))
         levels_ = f"level{'s' * (len(rows) > 1 or len(rows[0]) > 1)} {joined}"
-        found.append(levels_ if standard is None else f"standard {standard:g} at {levels_}")
-    return " and ".join(filter(None, (", ".join(found[:-1]), found[-1])))
+        phrases.append(levels_ if standard is None else f"standard {standard:g} at {levels_}")
+    return " and ".join(filter(None, (", ".join(phrases[:-1]), phrases[-1])))
 
 
 def passed_share(velocity: Velocity, rate_hz: float, frequency_hz: float) -> float:
@@ -283,7 +283,10 @@ def passed_share(velocity: Velocity, rate_hz: float, frequency_hz: float) -> flo
 def fastest_hz(velocity: Velocity, rate_hz: float, share: float) -> float:
     """Return the highest frequency [Hz] up to which an estimator passes this share, to 1 mHz; at most 20 Hz."""
     mhz = range(1, 20_000)
-    return bisect_left(mhz, True, key=lambda one: passed_share(velocity, rate_hz, one / 1000) < share) / 1000
+    return (
+        bisect_left(mhz, True, key=lambda frequency_mhz: passed_share(velocity, rate_hz, frequency_mhz / 1000) < share)
+        / 1000
+    )
 
 
 def returned(protocol: Protocol) -> Iterator[Fault]:
@@ -332,5 +335,7 @@ def returned_j(damping: float, stroke: Stroke, delay_s: float) -> float:
 
 def longest_ms(damping: float, stroke: Stroke) -> float:
     """Return the longest delay at which a damper [N·s/m] returns no more than the limit [whole ms]."""
-    beyond = (one for one in range(MOST_DELAY_MS + 1) if returned_j(damping, stroke, one / 1000) > LIMIT_J)
+    beyond = (
+        delay_ms for delay_ms in range(MOST_DELAY_MS + 1) if returned_j(damping, stroke, delay_ms / 1000) > LIMIT_J
+    )
     return next(beyond, MOST_DELAY_MS + 1) - 1

@@ -86,10 +86,10 @@ class Balance:
 
 def numbered(count: int, first: str = "P001") -> tuple[str, ...]:
     """Return so many ids from the first one on; StudyError if that does not end in a number."""
-    found = re.fullmatch(r"([A-Za-z0-9]*?)([0-9]+)", first)
-    if found is None:
+    match = re.fullmatch(r"([A-Za-z0-9]*?)([0-9]+)", first)
+    if match is None:
         raise StudyError(f"{first!r} is no first participant: give letters and digits that end in a number, as P061")
-    return tuple(f"{found[1]}{int(found[2]) + more:0{len(found[2])}d}" for more in range(count))
+    return tuple(f"{match[1]}{int(match[2]) + more:0{len(match[2])}d}" for more in range(count))
 
 
 def evenness(codes: Sequence[str], orders: Iterable[Sequence[str]]) -> Evenness:
@@ -156,9 +156,11 @@ def balances(protocol: Protocol, participants: Sequence[str], seed: int) -> Iter
         elif protocol.groups:
             group = next_group(protocol.shares, {name: len(members[name]) for name in protocol.groups})
         members[group].append(who)
-    for one in variants(protocol):
-        if members[one.group] or one.group is None:
-            yield balance(one.protocol, members[one.group], seed, one.name, in_group=one.group is not None)
+    for variant in variants(protocol):
+        if members[variant.group] or variant.group is None:
+            yield balance(
+                variant.protocol, members[variant.group], seed, variant.name, in_group=variant.group is not None
+            )
 
 
 def planned_participants(protocol: Protocol, group: str | None) -> int | None:
@@ -171,14 +173,14 @@ def planned_participants(protocol: Protocol, group: str | None) -> int | None:
 
 def block_orders_by_group(protocol: Protocol) -> dict[str, str]:
     """Return in which order the main blocks come in each group; under "" if all groups are alike or there are none."""
-    words = {
-        one.group or "": block_order_words(
-            one.protocol, planned_participants(protocol, one.group), in_group=one.group is not None
+    orders_by_group = {
+        variant.group or "": block_order_words(
+            variant.protocol, planned_participants(protocol, variant.group), in_group=variant.group is not None
         )
-        for one in variants(protocol)
-        if len(one.protocol.main_blocks) > 1
+        for variant in variants(protocol)
+        if len(variant.protocol.main_blocks) > 1
     }
-    return {"": next(iter(words.values()))} if len({*words.values()}) == 1 else words
+    return {"": next(iter(orders_by_group.values()))} if len({*orders_by_group.values()}) == 1 else orders_by_group
 
 
 def block_order_words(protocol: Protocol, planned: int | None, *, in_group: bool = False) -> str:
@@ -193,23 +195,23 @@ def block_order_words(protocol: Protocol, planned: int | None, *, in_group: bool
     if orders.block_order == "random":
         of = "" if planned is None else f": {planned / blocks:.3g} of {planned} participants have a block in a place"
         return f"random: drawn in each session, even on average only{of}"
-    found = _of_blocks(orders, [("", place) for place in range(1, planned + 1)], 1) if planned else None
+    order_evenness = _of_blocks(orders, [("", place) for place in range(1, planned + 1)], 1) if planned else None
     rows = row_count("williams", blocks)
     by, of = ("place in the group", " per group") if in_group else ("number in the participant's id", "")
-    words = f"balanced: {rows} orders, by the {by}"
-    if planned is None or found is None:
-        return f"{words}; any multiple of {rows} participants{of} is even"
-    counts = [count for line in found.positions for count in line]
-    even = _times(counts[0]) if found.positions_even else _range(counts)
-    more = "" if found.balanced else f"; {planned + -planned % rows} would be even"
-    return f"{words}; {planned} participants{of} have each block in each place {even}{more}"
+    text = f"balanced: {rows} orders, by the {by}"
+    if planned is None or order_evenness is None:
+        return f"{text}; any multiple of {rows} participants{of} is even"
+    counts = [count for line in order_evenness.positions for count in line]
+    even = _times(counts[0]) if order_evenness.positions_even else _range(counts)
+    more = "" if order_evenness.balanced else f"; {planned + -planned % rows} would be even"
+    return f"{text}; {planned} participants{of} have each block in each place {even}{more}"
 
 
 def _of_blocks(orders: Orders, placed: Iterable[tuple[str, int | None]], seed: int) -> Evenness:
     """Return how even the orders of the main blocks are; ``placed`` are ids with the numbers that assign their rows."""
     names = [block.id for block in orders.blocks if block.phase == "main"]
     shown = (blocks_in_order(orders, who, seed, place) for who, place in placed)
-    return evenness(names, ([names[number] for number in one] for one in shown))
+    return evenness(names, ([names[number] for number in order] for order in shown))
 
 
 def describe_balance(judged: Balance) -> str:

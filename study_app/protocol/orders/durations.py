@@ -74,11 +74,11 @@ def duration_range_s(protocol: Protocol) -> tuple[float, float]:
     def session_s(own: Protocol, task_s: Callable[[AnyTask], float]) -> float:
         return sum(step_duration_s(own, step, own.study.languages[0], task_s) for step in own.steps)
 
-    kinds = [one.protocol for one in variants(protocol)]
+    kinds = [variant.protocol for variant in variants(protocol)]
     least_s = min(
-        session_s(one, lambda task: task.expected_s if task.least_s is None else task.least_s) for one in kinds
+        session_s(session, lambda task: task.expected_s if task.least_s is None else task.least_s) for session in kinds
     )
-    return least_s, max(session_s(one, lambda task: task.limit_s) for one in kinds)
+    return least_s, max(session_s(session, lambda task: task.limit_s) for session in kinds)
 
 
 def step_duration_s(

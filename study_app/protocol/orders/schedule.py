@@ -157,9 +157,9 @@ def _placed(orders: Orders, participant: str, seed: int, place: int | None) -> t
     places = [at for at, step in enumerate(orders.steps) if isinstance(step, BlockOrder) and step.phase == "main"]
     steps = list(orders.steps)
     for at, number in zip(places, blocks_in_order(orders, participant, seed, place), strict=True):
-        there, block = orders.steps[at], orders.steps[places[number]]
-        if isinstance(there, BlockOrder) and isinstance(block, BlockOrder):
-            steps[at] = replace(block, part=there.part)
+        target, block = orders.steps[at], orders.steps[places[number]]
+        if isinstance(target, BlockOrder) and isinstance(block, BlockOrder):
+            steps[at] = replace(block, part=target.part)
     return tuple(steps)
 
 
@@ -260,10 +260,10 @@ def reproduce(
     planned = {trial.number: trial for trial in build_schedule(protocol, participant, seed, place).trials}
     attempts = tuple(recorded)
     run = [trial for trial in attempts if isinstance(trial, RecordedTrial)]
-    found = [sentence for trial in run for sentence in _against(planned.get(trial.number), trial)]
+    differences = [sentence for trial in run for sentence in _against(planned.get(trial.number), trial)]
     numbers = [trial if isinstance(trial, int) else trial.number for trial in attempts]
-    found += _progress(numbers, planned, complete=complete, blocks=protocol.study.resume == "block")
-    return tuple(dict.fromkeys(found))
+    differences += _progress(numbers, planned, complete=complete, blocks=protocol.study.resume == "block")
+    return tuple(dict.fromkeys(differences))
 
 
 def _against(planned: Trial | None, run: RecordedTrial) -> Iterator[str]:
@@ -293,7 +293,7 @@ def _progress(numbers: list[int], planned: dict[int, Trial], *, complete: bool, 
     first = {trial.block: number for number, trial in reversed(planned.items())}
     for number in numbers:
         due = {before, before + 1}
-        again = {first[planned[one].block] for one in due & planned.keys()} if blocks else set()
+        again = {first[planned[number].block] for number in due & planned.keys()} if blocks else set()
         if number not in due | again:
             after = f"after trial {before}" if before else "first"
             yield f"trial {number}: came {after}, where trial {before + 1} was due"

@@ -76,8 +76,8 @@ def longest_delay_s(protocol: Protocol, block: Block) -> float:
     """Return the longest delay that a block can present [s]: the same for all its trials, so that it reveals none."""
     if block.stimulus is not None and (stimulus := stimulus_of(protocol, block)).vary == DELAY:
         standards = standards_of(protocol, block)
-        compared = [stimulus.comparison(one, level) for one in standards for level in stimulus.levels]
-        return max(*compared, *(one for one in standards if one is not None)) / 1000
+        compared = [stimulus.comparison(standard, level) for standard in standards for level in stimulus.levels]
+        return max(*compared, *(standard for standard in standards if standard is not None)) / 1000
     return max(protocol.delay_s(name) for name in protocol.conditions_in(block.id))
 
 
@@ -120,10 +120,10 @@ def next_level(
     """
     block = protocol.blocks[trial.block]
     track = track_of(protocol, block, key.codes[block.id][trial.code])
-    earlier = [one for one in heard if one.trial < trial.number]
+    earlier = [result for result in heard if result.trial < trial.number]
     if criterion_met(block, schedule, earlier):
         return None
-    numbers = {one.number for one in schedule.trials if (one.block, one.code) == (trial.block, trial.code)}
+    numbers = {other.number for other in schedule.trials if (other.block, other.code) == (trial.block, trial.code)}
     slot = sum(number < trial.number for number in numbers)
     draws = _Draws(key.secret, f"{schedule.participant}/{schedule.seed}/{block.id}/{trial.code}")
     design = design_of(protocol, block)
@@ -135,19 +135,21 @@ def next_level(
         return presentation_of(protocol, block, track, draws.arrangement(design, slot), None)
     method, stimulus = method_of(protocol, block), stimulus_of(protocol, block)
     setting = TrackSetting(stimulus, design, track.number)
-    answered = sorted((one for one in earlier if one.trial in numbers and not one.catch), key=lambda one: one.trial)
+    answered = sorted(
+        (result for result in earlier if result.trial in numbers and not result.catch), key=lambda result: result.trial
+    )
     if method.ended(setting, answered):
         return None
     catch = draws.catch(track.catch)
     if slot in catch:
         arrangement = draws.arrangement(design, catch.index(slot), "catch")
         return presentation_of(protocol, block, track, arrangement, stimulus.levels[1], catch=True)
-    slot -= sum(one < slot for one in catch)
+    slot -= sum(position < slot for position in catch)
     noise = draws.noise(design.noise(method.presentations(stimulus)), track.slots - len(catch))
     if slot in noise:
         return presentation_of(protocol, block, track, STANDARD_ALONE, 0.0)
     rounds = draws.rounds(method.rounds(stimulus))
-    level = method.level(setting, slot - sum(one < slot for one in noise), answered, rounds)
+    level = method.level(setting, slot - sum(position < slot for position in noise), answered, rounds)
     return presentation_of(protocol, block, track, draws.arrangement(design, slot), level)
 
 
@@ -155,9 +157,11 @@ def criterion_met(block: Block, schedule: Schedule, heard: Sequence[TrialResult]
     """Return whether so many of a block's last answers among those ``heard`` were correct that it ends."""
     if block.until is None:
         return False
-    numbers = {one.number for one in schedule.trials if one.block == block.id}
-    latest = sorted((one for one in heard if one.trial in numbers), key=lambda one: one.trial)[-block.until.of :]
-    return sum(one.correct is True for one in latest) >= block.until.right
+    numbers = {planned.number for planned in schedule.trials if planned.block == block.id}
+    latest = sorted((result for result in heard if result.trial in numbers), key=lambda result: result.trial)[
+        -block.until.of :
+    ]
+    return sum(result.correct is True for result in latest) >= block.until.right
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -63,7 +63,7 @@ class LevelLimits:
     @property
     def lowest(self) -> float | None:
         """The value above which a limit clips the force; None where none does."""
-        return min((one for one in (self.force, self.loop) if one is not None), default=None)
+        return min((limit for limit in (self.force, self.loop) if limit is not None), default=None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,8 +122,8 @@ def standard_of(protocol: Protocol, block_id: str, standard: float) -> Level:
     block = protocol.blocks[block_id]
     stimulus = stimulus_of(protocol, block)
     scene = protocol.scene_for(condition_of(protocol, stimulus))
-    found = _level(stimulus, scene, hand_mps_of(protocol, block), None, standard)
-    return replace(found, standard=standard, level=0.0, comparison=standard)
+    level = _level(stimulus, scene, hand_mps_of(protocol, block), None, standard)
+    return replace(level, standard=standard, level=0.0, comparison=standard)
 
 
 def _level(stimulus: Stimulus, scene: Scene, hand_mps: float, standard: float | None, level: float) -> Level:
@@ -194,7 +194,7 @@ def clipping(protocol: Protocol, block: Block, limits: LevelLimits | None = None
     limits = limits or level_limits(protocol, block)
     if limits is None or not limits.lowest:
         return None
-    *others, standard = sorted(one for one in standards_of(protocol, block) if one is not None) or (None,)
+    *others, standard = sorted(value for value in standards_of(protocol, block) if value is not None) or (None,)
     return Clipping(standard, limits.lowest, isinstance(protocol.tasks[block.task], Follow), tuple(others))
 
 

@@ -37,14 +37,14 @@ def value_at(document: Any, path: Path) -> Any:
 
 def entries(document: Any, pattern: str) -> Iterator[tuple[Path, Any]]:
     """Yield what is at the places of ``pattern`` with their paths: "blocks.*.conditions.*", where ``*`` is any."""
-    found: list[tuple[Path, Any]] = [((), document)]
+    nodes: list[tuple[Path, Any]] = [((), document)]
     for step in pattern.split("."):
-        found = [
+        nodes = [
             ((*path, key), value)
-            for path, node in found
+            for path, node in nodes
             for key, value in (_inside(node) if step == "*" else ((step, node[step]),) if has(node, step) else ())
         ]
-    return iter(found)
+    return iter(nodes)
 
 
 def _inside(node: Any) -> Iterable[tuple[str | int, Any]]:
@@ -104,8 +104,8 @@ class Node(NamedTuple):
 @lru_cache(maxsize=2)
 def scan(text: str) -> tuple[Node, ...]:
     """Return every header, key and array entry of a TOML text, in the order in which they begin."""
-    found = _Scan(text).nodes
-    return tuple(sorted(found, key=attrgetter("start")))
+    nodes = _Scan(text).nodes
+    return tuple(sorted(nodes, key=attrgetter("start")))
 
 
 class _Scan:
@@ -228,13 +228,13 @@ class Places:
     def _lines(self) -> dict[Path, int]:
         """The lines by path; a text without problems is not scanned for them."""
         line_starts = [0, *(match.end() for match in re.finditer("\n", self._source))]
-        found: dict[Path, int] = {}
+        lines: dict[Path, int] = {}
         for node in scan(self._source):
             line = bisect_right(line_starts, node.start)
             for length in range(1, len(node.path)):
-                found.setdefault(node.path[:length], line)
-            found[node.path] = line
-        return found
+                lines.setdefault(node.path[:length], line)
+            lines[node.path] = line
+        return lines
 
     def line(self, path: Path) -> int | None:
         """Return the line (from 1) of ``path``, or of the innermost table around it that is in the file."""

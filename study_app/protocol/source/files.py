@@ -79,8 +79,8 @@ def hashes_in(source: bytes) -> dict[str, str]:
 
 def _split(source: bytes, header: bytes) -> tuple[bytes, dict[str, str]]:
     """Return what stands before a header, and the table after it."""
-    before, found, table = source.rpartition(header)
-    return (before, tomllib.loads(table.decode())) if found else (source, {})
+    before, separator, table = source.rpartition(header)
+    return (before, tomllib.loads(table.decode())) if separator else (source, {})
 
 
 def _table(header: bytes, texts: Mapping[str, str]) -> bytes:
@@ -130,8 +130,12 @@ def _values(study: bytes, section: str, key: str) -> list[str]:
         tables = tomllib.loads(study.decode()).get(section)
     except (ValueError, RecursionError):
         return []
-    found = (one.get(key) for one in tables.values() if isinstance(one, Mapping)) if isinstance(tables, Mapping) else ()
-    return sorted({value for value in found if isinstance(value, str)})
+    values = (
+        (table.get(key) for table in tables.values() if isinstance(table, Mapping))
+        if isinstance(tables, Mapping)
+        else ()
+    )
+    return sorted({value for value in values if isinstance(value, str)})
 
 
 def _read(path: Path) -> str | None:
@@ -193,8 +197,8 @@ def find(name_or_path: str | Path) -> Path:
         return path
     if path.name == str(name_or_path) and path.suffix != ".toml":
         for folder in (workspace().protocols, _shipped_folder()):
-            if (found := folder / f"{path.name}.toml").is_file():
-                return found
+            if (file := folder / f"{path.name}.toml").is_file():
+                return file
         raise _not_found(name_or_path, "no protocol of this name", did_you_mean(path.name, at_hand()))
     if path.is_dir():
         raise _not_found(name_or_path, "is a folder, not a protocol file", "name one of the .toml files in it")

@@ -105,20 +105,20 @@ def rule_of(pattern: str) -> str:
 
 def did_you_mean(word: str, permitted: Iterable[str]) -> str:
     """Return "did you mean …?" for the nearest permitted word, or the list of them if none is near."""
-    words = sorted(permitted)
-    near = difflib.get_close_matches(word, words, n=1, cutoff=0.6)
+    known = sorted(permitted)
+    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
     if near:
         return f'did you mean "{near[0]}"?'
-    return f"known: {', '.join(words)}" if words else ""
+    return f"known: {', '.join(known)}" if known else ""
 
 
 def unknown(path: Path, message: str, word: str, permitted: Iterable[str], cutoff: float = 0.0) -> Fault:
     """Return the fault of a word that names nothing: with the nearest permitted one, or the list of them."""
-    words = sorted(permitted)
-    nearest = difflib.get_close_matches(word, words, n=1, cutoff=cutoff)
-    near = difflib.get_close_matches(word, words, n=1, cutoff=0.6)
-    use, others = (path, nearest[0]) if nearest else None, () if near else tuple(words)
-    return Fault(path, message, did_you_mean(word, words), use=use, kind="unknown name", permitted=others)
+    known = sorted(permitted)
+    nearest = difflib.get_close_matches(word, known, n=1, cutoff=cutoff)
+    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
+    use, others = (path, nearest[0]) if nearest else None, () if near else tuple(known)
+    return Fault(path, message, did_you_mean(word, known), use=use, kind="unknown name", permitted=others)
 
 
 def _quoted(path: Path, value: Any, message: str, permitted: str) -> Fault:
@@ -129,11 +129,11 @@ def _quoted(path: Path, value: Any, message: str, permitted: str) -> Fault:
 
 def faults_of(error: ValidationError, document: Mapping[str, Any], schema: Schema) -> list[Fault]:
     """Return pydantic's findings about ``document``; ``schema`` is the JSON Schema of what it should be."""
-    found = [_fault(details, document, schema) for details in error.errors(include_url=False)]
-    paths = [fault.path for fault in found]
+    faults = [_fault(details, document, schema) for details in error.errors(include_url=False)]
+    paths = [fault.path for fault in faults]
     return [  # where an entry of an array is broken, pydantic counts the sound ones only
         fault
-        for fault in found
+        for fault in faults
         if not (fault.counts_entries and any(path[:-1][: len(fault.path)] == fault.path for path in paths))
     ]
 
@@ -163,12 +163,12 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
         tag = str(value["kind"])
         return unknown(path, f"{shown(tag)} {details['msg']}", tag, context["permitted"].split(", "))
     if kind == "literal_error":
-        words = str(context["expected"]).replace("'", '"')
-        return _quoted(path, value, f"{shown(value)} is not {words}", words)
+        expected = str(context["expected"]).replace("'", '"')
+        return _quoted(path, value, f"{shown(value)} is not {expected}", expected)
     if kind in _BOUNDS:
-        (key, words), hints = _BOUNDS[kind], (node.get(REASON, "") for node in _nodes_at(document, path, schema))
+        (key, expected), hints = _BOUNDS[kind], (node.get(REASON, "") for node in _nodes_at(document, path, schema))
         bound = int(context[key]) if float(context[key]).is_integer() else context[key]
-        sentence = f"is {shown(value)}, must be {words} {shown(bound)}"
+        sentence = f"is {shown(value)}, must be {expected} {shown(bound)}"
         return Fault(path, sentence, next(filter(None, hints), ""), use=(path, bound) if key in {"ge", "le"} else None)
     if kind in _KINDS:
         number: FaultKind = "not a number" if "number" in _KINDS[kind] else ""

@@ -216,7 +216,7 @@ class Oddity(Design):
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
         """Return the interval that is farthest from the mean of the others."""
         total = sum(perceived)
-        distances = [abs(one - (total - one) / (len(perceived) - 1)) for one in perceived]
+        distances = [abs(value - (total - value) / (len(perceived) - 1)) for value in perceived]
         return self.answers[distances.index(max(distances))]
 
 
@@ -376,5 +376,8 @@ def _item(design: Design, text: Localised, languages: Sequence[str]) -> Question
         return Number(**about, least=LEAST)
     if design.reply == "setting":
         return Number(**about, whole=True, unit="steps")
-    named = {answer: {one: words(one).design_answers[answer] for one in languages} for answer in design.answers}
+    named = {
+        answer: {language: words(language).design_answers[answer] for language in languages}
+        for answer in design.answers
+    }
     return Choice(**about, options=tuple(Option(id=answer, text=said) for answer, said in named.items()))

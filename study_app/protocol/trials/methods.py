@@ -172,10 +172,10 @@ class Method(Table):
             heard: list[list[TrialResult]] = [[] for _ in draws]
             levels, running = np.zeros(len(draws)), np.ones(len(draws), bool)
             for number in count():
-                for one in np.flatnonzero(running):
-                    running[one] = not self.ended(track, heard[one])
-                    sources = [np.random.default_rng(seed).random for seed in seeds[one]]
-                    levels[one] = self.level(track, number, heard[one], sources)
+                for observer in np.flatnonzero(running):
+                    running[observer] = not self.ended(track, heard[observer])
+                    sources = [np.random.default_rng(seed).random for seed in seeds[observer]]
+                    levels[observer] = self.level(track, number, heard[observer], sources)
                 right = yield np.array([stimulus.coordinate(level) for level in levels]), running
                 for of_track, level, success in zip(heard, levels.tolist(), right.tolist(), strict=True):
                     of_track.append(TrialResult(trial=number, code="", level=level, success=success, correct=success))
@@ -325,8 +325,8 @@ class Adjusting:
     def reached(self, steps: Iterable[int]) -> int:
         """Return the place that a setting reached by these steps, in their order."""
         place = 0
-        for one in steps:
-            place = self.moved(place, one)
+        for step in steps:
+            place = self.moved(place, step)
         return place
 
 
@@ -418,7 +418,7 @@ class QuestPlus(Adaptive):
         return None if guess is None else f"threshold at {50 * (1 + guess):.3g} % {success}"
 
     def ended(self, track: TrackSetting, heard: Sequence[TrialResult]) -> bool:
-        if self.stop is None or sum(not one.noise for one in heard) < self.stop.after:
+        if self.stop is None or sum(not result.noise for result in heard) < self.stop.after:
             return False
         search, counts = self._search(track), self._counts(track, heard)
         interval = fit(search.levels, *counts, search.grid).interval
@@ -427,7 +427,7 @@ class QuestPlus(Adaptive):
     def after(self, track: TrackSetting, heard: Sequence[TrialResult]) -> float:
         """Return the level after these answers: their order does not matter."""
         levels = _levels(track)
-        if all(one.noise for one in heard) and (first := self.first(track.number)) is not None:
+        if all(result.noise for result in heard) and (first := self.first(track.number)) is not None:
             return levels[_nearest(_coordinates(track), track.stimulus.coordinate(first))]
         return levels[self._search(track).next(*self._counts(track, heard))]
 
@@ -454,7 +454,7 @@ class QuestPlus(Adaptive):
     def _counts(self, track: TrackSetting, heard: Sequence[TrialResult]) -> tuple[list[int], list[int]]:
         coordinates = _coordinates(track)
         counts = ([0] * len(coordinates), [0] * len(coordinates))
-        for (level, success), number in Counter((one.level, bool(one.success)) for one in heard).items():
+        for (level, success), number in Counter((answer.level, bool(answer.success)) for answer in heard).items():
             counts[0 if success else 1][_nearest(coordinates, track.stimulus.coordinate(level))] += number
         return counts
 
@@ -576,7 +576,7 @@ class UpDown(Adaptive):
 
 def _answers(track: TrackSetting, heard: Sequence[TrialResult]) -> list[Answer]:
     """Return the answers to comparisons, with their levels in u: noise trials move no track."""
-    return _in_u(track.stimulus, [(one.level, bool(one.success)) for one in heard if not one.noise])
+    return _in_u(track.stimulus, [(result.level, bool(result.success)) for result in heard if not result.noise])
 
 
 def _in_u(stimulus: Stimulus, answers: Sequence[Answer]) -> list[Answer]:

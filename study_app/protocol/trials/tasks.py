@@ -282,15 +282,15 @@ class Reach(Task):
     def _time_for_every_target(self) -> Self:
         limit, targets = self.duration_s or self.timeout_s, self.count or 1
         if targets * self.dwell_s >= limit:
-            each = "a target" if targets == 1 else f"each of {targets} targets"
+            subject = "a target" if targets == 1 else f"each of {targets} targets"
             lasting_s = f"takes as long as the {limit:g} s that the task lasts at most"
-            raise invalid(f"dwell_s = {self.dwell_s:g} in {each} {lasting_s}: shorten it", "dwell_s")
+            raise invalid(f"dwell_s = {self.dwell_s:g} in {subject} {lasting_s}: shorten it", "dwell_s")
         return self
 
     @model_validator(mode="after")
     def _targets_apart(self) -> Self:
-        for index, (one, other) in enumerate(pairwise((*self.targets_mm, self.targets_mm[0])), start=1):
-            distance = math.dist(one, other)
+        for index, (target, other) in enumerate(pairwise((*self.targets_mm, self.targets_mm[0])), start=1):
+            distance = math.dist(target, other)
             if distance <= 2 * self.radius_mm:
                 apart = f"target {index} and the next are {distance:g} mm apart"
                 raise invalid(f"{apart} and overlap at radius_mm = {self.radius_mm:g}", "targets_mm")

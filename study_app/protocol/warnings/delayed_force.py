@@ -63,10 +63,10 @@ def table() -> tuple[Entry, ...]:
 
 def longest_ms(liquid: str, estimator: str, hand: str = "light", withheld_percent: float = WITHHELD_PERCENT) -> float:
     """Return up to which delay [ms] no more than ``withheld_percent`` of the force is withheld; -1 if at none."""
-    found = _rows(liquid, estimator, hand)
-    if not found:
+    rows = _rows(liquid, estimator, hand)
+    if not rows:
         raise KeyError((liquid, estimator, hand))
-    permitted = takewhile(lambda it: it.withheld_percent <= withheld_percent, found)
+    permitted = takewhile(lambda it: it.withheld_percent <= withheld_percent, rows)
     return max((it.delay_ms for it in permitted), default=-1.0)
 
 
@@ -91,9 +91,11 @@ def delay_warnings(protocol: Protocol) -> Iterator[str]:
         if name not in presented or delay_ms == 0 or len(condition.liquid_ids) > 1:
             continue
         listed = _in_table(protocol, condition.liquid_ids[0])
-        found = _of_energy(protocol, name, delay_ms) if listed is None else _of_table(protocol, name, listed, delay_ms)
-        if found is not None:
-            yield f"conditions.{name}.force_delay_ms: {found}, or delay the picture"
+        problem = (
+            _of_energy(protocol, name, delay_ms) if listed is None else _of_table(protocol, name, listed, delay_ms)
+        )
+        if problem is not None:
+            yield f"conditions.{name}.force_delay_ms: {problem}, or delay the picture"
 
 
 def _of_table(protocol: Protocol, name: str, liquid: str, delay_ms: float) -> str | None:
@@ -120,8 +122,10 @@ def _of_energy(protocol: Protocol, name: str, delay_ms: float) -> str | None:
     tasks = [
         protocol.tasks[block.task] for block in protocol.blocks.values() if name in protocol.conditions_in(block.id)
     ]
-    strokes = [one.fastest_stroke(workspace_m) if isinstance(one, Follow) else STIRRED for one in tasks]
-    energy_j, stroke = max((returned_j(damping_nspm(scene, one), one, delay_ms / 1000), one) for one in strokes)
+    strokes = [task.fastest_stroke(workspace_m) if isinstance(task, Follow) else STIRRED for task in tasks]
+    energy_j, stroke = max(
+        (returned_j(damping_nspm(scene, stroke), stroke, delay_ms / 1000), stroke) for stroke in strokes
+    )
     if energy_j <= LIMIT_J:
         return None
     damping = damping_nspm(scene, stroke)

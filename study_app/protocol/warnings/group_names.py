@@ -43,6 +43,6 @@ _WORDS: Final = re.compile(
 
 def suggests_attribute(name: str) -> bool:
     """Return whether the name of a group suggests an attribute that participants already have."""
-    words = re.findall(r"[a-z]+", name.casefold())
+    name_parts = re.findall(r"[a-z]+", name.casefold())
     whole = name.casefold() in ("old", "oud", "alt", "vieux")
-    return whole or any(_STEMS.match(word) or _WORDS.fullmatch(word) for word in words)
+    return whole or any(_STEMS.match(word) or _WORDS.fullmatch(word) for word in name_parts)

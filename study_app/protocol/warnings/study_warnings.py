@@ -66,14 +66,14 @@ def liquid_warnings(protocol: Protocol) -> tuple[str, ...]:
 def _alike(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
     seen: set[frozenset[str]] = set()
     for block in protocol.main_blocks:
-        for one, other in combinations(_liquids_of(protocol, block), 2):
-            pair = frozenset((one, other))
-            smaller_n, greater_n = sorted((felt[one].force_n, felt[other].force_n))
+        for liquid, other in combinations(_liquids_of(protocol, block), 2):
+            pair = frozenset((liquid, other))
+            smaller_n, greater_n = sorted((felt[liquid].force_n, felt[other].force_n))
             if (greater_n > 0 and greater_n - smaller_n >= TELLING * smaller_n) or pair in seen:
                 continue
             seen.add(pair)
             yield (
-                f"{one} and {other} of block {block.id} are hard to tell apart: {felt[one].force_n:.2f} and "
+                f"{liquid} and {other} of block {block.id} are hard to tell apart: {felt[liquid].force_n:.2f} and "
                 f"{felt[other].force_n:.2f} N at {HAND_MPS:g} m/s of the hand, less than {TELLING:.0%} of the smaller "
                 "between them"
             )
@@ -147,7 +147,7 @@ def _of_different_sizes(protocol: Protocol) -> Iterator[str]:
 def level_warnings(protocol: Protocol, *, simulates: bool = True) -> Iterator[str]:
     """Yield what to think over of the blocks with a design; ``simulates``: also what takes simulated observers."""
     blocks = (block for block in protocol.blocks_in_order if block.design is not None)
-    yield from dict.fromkeys(one for block in blocks for one in _of_block(protocol, block, simulates))
+    yield from dict.fromkeys(warning for block in blocks for warning in _of_block(protocol, block, simulates))
 
 
 def _of_block(protocol: Protocol, block: Block, simulates: bool) -> Iterator[str]:
@@ -179,7 +179,9 @@ def _of_block(protocol: Protocol, block: Block, simulates: bool) -> Iterator[str
 def _unpaced(protocol: Protocol, block: Block) -> Iterator[str]:
     if isinstance(protocol.tasks[block.task], Follow) or block.stimulus is None:
         return
-    alike = [one for one in protocol.blocks.values() if (one.stimulus, one.task) == (block.stimulus, block.task)]
+    alike = [
+        other for other in protocol.blocks.values() if (other.stimulus, other.task) == (block.stimulus, block.task)
+    ]
     if (said := clipped_unpaced(protocol, alike)) is not None:
         yield said
     error_percent = protocol.limits.level_error_percent
@@ -196,9 +198,11 @@ def _unperceived(protocol: Protocol, without_force: str) -> Iterator[str]:
     for block in protocol.blocks_in_order:
         conditions = {name: protocol.conditions[name] for name in protocol.conditions_in(block.id)}
         vary = None if block.stimulus is None else protocol.stimuli[block.stimulus].vary
-        hides = [name for name, one in conditions.items() if one.ball == "hidden" and not one.shows_video]
-        for name, one in conditions.items():
-            places = {key: f"conditions.{name}.{key}" for key in OF_CONDITION if getattr(one, key)}
+        hides = [
+            name for name, condition in conditions.items() if condition.ball == "hidden" and not condition.shows_video
+        ]
+        for name, condition in conditions.items():
+            places = {key: f"conditions.{name}.{key}" for key in OF_CONDITION if getattr(condition, key)}
             if vary in OF_CONDITION:
                 places[vary] = f"stimuli.{block.stimulus}.vary"
             stroke = protocol.tasks[block.task].fastest_stroke(protocol.device.workspace_m)
@@ -241,8 +245,8 @@ def _unanswerable(protocol: Protocol) -> Iterator[str]:
     yield from _attributes(protocol)
     yield from _order_of_blocks(protocol)
     yield from dict.fromkeys(_pages_again(protocol))
-    for number, one in enumerate(() if decided is None else decided.published):
-        yield from _not_bracketed(protocol, number, one)
+    for number, value in enumerate(() if decided is None else decided.published):
+        yield from _not_bracketed(protocol, number, value)
 
 
 def _attributes(protocol: Protocol) -> Iterator[str]:
@@ -257,7 +261,7 @@ def _attributes(protocol: Protocol) -> Iterator[str]:
 
 def _pages_again(protocol: Protocol) -> Iterator[str]:
     """Yield the pages that a session has several times and that are no breaks."""
-    for steps in (one.protocol.steps for one in variants(protocol)):
+    for steps in (variant.protocol.steps for variant in variants(protocol)):
         for name, page in protocol.pages.items():
             if page.kind != "break" and (times := steps.count(name)) > 1:
                 yield f"pages.{name}: this page of kind {page.kind} comes {times} times in a session"
@@ -265,11 +269,11 @@ def _pages_again(protocol: Protocol) -> Iterator[str]:
 
 def _order_of_blocks(protocol: Protocol) -> Iterator[str]:
     """Yield contrasts of blocks that come in one order, and blocks that stay while others take their places."""
-    for number, one in enumerate(() if protocol.analysis is None else protocol.analysis.contrasts):
-        if len(one.blocks) == 2 and protocol.study.block_order == "fixed" and not protocol.groups:
+    for number, contrast in enumerate(() if protocol.analysis is None else protocol.analysis.contrasts):
+        if len(contrast.blocks) == 2 and protocol.study.block_order == "fixed" and not protocol.groups:
             yield (
-                f"analysis.contrasts.{number}: all participants have {' and '.join(one.blocks)} in one order: their "
-                'difference cannot be told from practice and fatigue: choose study.block_order = "balanced"'
+                f"analysis.contrasts.{number}: all participants have {' and '.join(contrast.blocks)} in one order: "
+                'their difference cannot be told from practice and fatigue: choose study.block_order = "balanced"'
             )
     blocks = protocol.blocks_in_order
     main = [at for at, block in enumerate(blocks) if block.phase == "main"]
@@ -288,15 +292,17 @@ def _of_conditions(protocol: Protocol, block: Block) -> Iterator[str]:
     if alone and len(protocol.main_blocks) > 1:
         yield f"blocks.{block.id}.conditions: one condition is compared with nothing: a main block needs two"
     if protocol.compared_in(block.id) == "delays":
-        for one, other in pairwise(sorted({condition.delay_ms for condition in conditions})):
-            if other - one < FRAME_MS:
+        for delay_ms, other in pairwise(sorted({condition.delay_ms for condition in conditions})):
+            if other - delay_ms < FRAME_MS:
                 yield (
-                    f"blocks.{block.id}.conditions: delays of {one:g} and {other:g} ms differ by less than a frame of "
-                    f"{FRAME_MS:g} ms: the screen cannot show the difference"
+                    f"blocks.{block.id}.conditions: delays of {delay_ms:g} and {other:g} ms differ by less than a "
+                    f"frame of {FRAME_MS:g} ms: the screen cannot show the difference"
                 )
     texts = [block.setting_label] if isinstance(block.setting_label, str) else list(block.setting_label.values())
-    words = {word for text in texts for word in re.findall(r"\w+", text.casefold())}
-    for name in sorted({*block.conditions, *(liquid for one in conditions for liquid in one.liquid_ids)} & words):
+    title_words = {word for text in texts for word in re.findall(r"\w+", text.casefold())}
+    for name in sorted(
+        {*block.conditions, *(liquid for condition in conditions for liquid in condition.liquid_ids)} & title_words
+    ):
         yield f"blocks.{block.id}.setting_label: names the condition “{name}”, which participants then know"
 
 

@@ -85,11 +85,11 @@ def describe_untranslated(document: Mapping[str, Any], *, lists_places: bool) ->
     """Yield a warning for each language with untranslated texts; ``lists_places`` adds where the first ones are."""
     texts, only_one = untranslated_texts(document), len(languages_of(document)) == 1
     for (language, source), count in Counter((text.language, text.source) for text in texts).items():
-        told, wanted = language_name(source), language_name(language)
-        what = f"{counted(count, 'text')} to translate to {wanted}, as in {told} so far"
+        stated, wanted = language_name(source), language_name(language)
+        what = f"{counted(count, 'text')} to translate to {wanted}, as in {stated} so far"
         if only_one:
             are = f"{counted(count, 'text')} {'is' if count == 1 else 'are'}"
-            what = f"{are} still in {told} although the study's only language is {wanted}"
+            what = f"{are} still in {stated} although the study's only language is {wanted}"
         of_these = [text for text in texts if (text.language, text.source) == (language, source)]
         yield f"study.languages: {what}{f': {listed_places(of_these)}' if lists_places else ''}"
 
@@ -183,12 +183,12 @@ def _read_table(file: File) -> Mapping[str, Any]:
 
 def _languages_by_text(tables: Sequence[tuple[Mapping[str, Any], Sequence[str]]]) -> Mapping[str, frozenset[str]]:
     """Return the parts of all texts of documents, each with the languages that they are stated to be in."""
-    found: dict[str, set[str]] = {}
+    languages: dict[str, set[str]] = {}
     for table, patterns in tables:
         first = languages_of(table)[0]
         for pattern in patterns:
             for _, value in entries(table, pattern):
                 for code, text in (value if isinstance(value, Mapping) else {first: value}).items():
                     for part in _parts(text):
-                        found.setdefault(part, set()).add(code)
-    return {text: frozenset(codes) for text, codes in found.items()}
+                        languages.setdefault(part, set()).add(code)
+    return {text: frozenset(codes) for text, codes in languages.items()}

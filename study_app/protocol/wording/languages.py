@@ -53,8 +53,8 @@ class Words:
         numbers = readings_of(text, self.decimal_sign)
         if len(numbers) < 2:
             return ""
-        one, other = (exact_text(number).replace(".", self.decimal_sign) for number in numbers)
-        return self.number_unclear.format(text=text.strip(), one=one, other=other)
+        reading, other = (exact_text(number).replace(".", self.decimal_sign) for number in numbers)
+        return self.number_unclear.format(text=text.strip(), one=reading, other=other)
 
     def missing(self, numbers: Sequence[int]) -> str:
         """Return the sentence that names the statements (by number, at least one) still without an answer."""
@@ -64,11 +64,11 @@ class Words:
         """Return the sentence that names the questions of a form (by number) still without an answer."""
         return self._missing(numbers, self.one_question_missing, self.many_questions_missing)
 
-    def _missing(self, numbers: Sequence[int], one: str, many: str) -> str:
+    def _missing(self, numbers: Sequence[int], singular: str, many: str) -> str:
         listed = self.joined([str(number) for number in numbers])
         count = len(numbers)
         if count == 1:
-            return one.format(list=listed)
+            return singular.format(list=listed)
         named = self.small_numbers[count - 1] if count <= len(self.small_numbers) else str(count)
         return many.format(n=named, list=listed)
 
