@@ -85,7 +85,7 @@ def main() -> None:
             code = commands.main(standalone_mode=False)
     except click.UsageError as error:
         command = error.ctx.command_path if error.ctx else "liquid-study"
-        example = f"; example: {words}" if error.ctx and (words := example_of(error.ctx)) else ""
+        example = f"; example: {usage}" if error.ctx and (usage := example_of(error.ctx)) else ""
         click.echo(f"{command}: {_shortened(error.format_message())} (see {command} --help{example})", err=True)
         sys.exit(EXIT_USER_ERROR)
     except (click.Abort, KeyboardInterrupt):

@@ -131,15 +131,15 @@ def unblind(results: Path, by: str, reason: str) -> None:
     from study_app.store.exclusions import describe_exclusion
     from study_app.store.unblinding import unblind_folder
 
-    for prefix, found in unblind_folder(results, by=by, reason=reason).items():
-        for block, codes in found.codes.items():
+    for prefix, unblinding in unblind_folder(results, by=by, reason=reason).items():
+        for block, codes in unblinding.codes.items():
             for code, condition in codes.items():
                 standard, of_track, _ = condition.partition("/")
                 shown = f"standard {standard}" if standard else "all levels"
                 click.echo(f"{block}  {prefix}{code}  {shown if of_track else condition}")
-        for row in found.excluded:
+        for row in unblinding.excluded:
             click.echo(f"excluded  {describe_exclusion(row)}: {row.reason}")
-        for sentence in found.left:
+        for sentence in unblinding.left:
             click.echo(f"warning: {sentence}", err=True)
 
 
@@ -220,9 +220,9 @@ def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[
         click.echo(f"warning: {sentence}", err=True)
 
 
-def _site(_context: click.Context, _parameter: click.Parameter, words: tuple[str, ...]) -> dict[str, Path]:
+def _site(_context: click.Context, _parameter: click.Parameter, texts: tuple[str, ...]) -> dict[str, Path]:
     sites: dict[str, Path] = {}
-    for text in words:
+    for text in texts:
         name, equals, folder = text.partition("=")
         if not (name and equals and folder):
             raise click.BadParameter(f"{text!r} is not NAME=RESULTS, such as A=results/rek2024")
@@ -275,12 +275,12 @@ def reproduce(session: Path) -> None:
     """Recompute a session's orders and levels and compare them with the recorded ones."""
     from study_app.store.verification.reproduction import reproduce_session
 
-    found = reproduce_session(session)
-    for line in (*found.differences, *found.followed):
+    reproduction = reproduce_session(session)
+    for line in (*reproduction.differences, *reproduction.followed):
         click.echo(line)
     same = "reproduced: trials and statements have the order of the receipt"
-    click.echo("orders or levels differ" if found.differences else same)
-    end_if(found.differences)
+    click.echo("orders or levels differ" if reproduction.differences else same)
+    end_if(reproduction.differences)
 
 
 @click.command()
@@ -304,19 +304,19 @@ def verify(results: Path, fingerprints: Path | None, xdf: Path | None) -> None:
 
     with progress() as show:
         show("checking every file")
-        found = verify_folder(results, fingerprints)
-        measured = [] if xdf is None else check_recording(xdf, results, found)
-    for finding in found.errors:
+        verification = verify_folder(results, fingerprints)
+        measured = [] if xdf is None else check_recording(xdf, results, verification)
+    for finding in verification.errors:
         click.echo(f"error: {finding}")
-    for finding in sorted(found.warnings, key=lambda one: one.shares):
+    for finding in sorted(verification.warnings, key=lambda finding: finding.shares):
         click.echo(f"{'to share it' if finding.shares else 'warning'}: {finding}")
-    for package, names in found.plug_ins.items():
+    for package, names in verification.plug_ins.items():
         click.echo(f"plug-in {package}: {', '.join(names)}")
     for line in measured:
         click.echo(line)
-    running = f", {found.running} running" if found.running else ""
-    click.echo(f"{counted(found.sessions, 'session')}{running}: {'sound' if found.is_sound else 'not sound'}")
-    end_if(not found.is_sound)
+    running = f", {verification.running} running" if verification.running else ""
+    click.echo(f"{counted(verification.sessions, 'session')}{running}: {'sound' if verification.is_sound else 'not sound'}")
+    end_if(not verification.is_sound)
 
 
 @click.command()
@@ -370,21 +370,21 @@ def replay(session: Path) -> None:
     """
     from study_app.session.replay import replay as replay_session
 
-    found = replay_session(session)
-    for sentence in (*found.differences, *found.missing, *found.uncompared):
+    replayed = replay_session(session)
+    for sentence in (*replayed.differences, *replayed.missing, *replayed.uncompared):
         click.echo(sentence)
-    if not (found.recordings or found.missing or found.uncompared):
+    if not (replayed.recordings or replayed.missing or replayed.uncompared):
         click.echo("the session kept no recordings")
-    verdict = "forces differ" if found.differences else "all compared forces are equal"
-    if not found.seconds:
+    verdict = "forces differ" if replayed.differences else "all compared forces are equal"
+    if not replayed.seconds:
         verdict = "no force was compared, so the result is not proved"
-    if found.recordings:
-        pace = found.lasted_s / found.computed_s if found.computed_s else 0.0
-        many, ran = ("1 recording", "it") if found.recordings == 1 else (f"{found.recordings} recordings", "they")
+    if replayed.recordings:
+        pace = replayed.lasted_s / replayed.computed_s if replayed.computed_s else 0.0
+        many, ran = ("1 recording", "it") if replayed.recordings == 1 else (f"{replayed.recordings} recordings", "they")
         click.echo(
-            f"{many}, {found.lasted_s:.1f} s, recomputed {pace:.0f} times as fast as {ran} ran "
-            f"({found.took_s:.1f} s in all): {verdict}"
+            f"{many}, {replayed.lasted_s:.1f} s, recomputed {pace:.0f} times as fast as {ran} ran "
+            f"({replayed.took_s:.1f} s in all): {verdict}"
         )
     else:
         click.echo(verdict)
-    end_if(not found.proved)
+    end_if(not replayed.proved)

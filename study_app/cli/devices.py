@@ -64,15 +64,15 @@ def plugins() -> None:
     """
     from study_app.discovery import UPDATE, plug_ins
 
-    found = plug_ins()
-    for package, version, origin in dict.fromkeys((one.package, one.version, one.origin) for one in found):
+    entries = plug_ins()
+    for package, version, origin in dict.fromkeys((entry.package, entry.version, entry.origin) for entry in entries):
         click.echo(f"{package} {version}  ({origin})")
-        for one in found:
-            if (one.package, one.version) == (package, version):
-                click.echo(f"    {one.kind:<9} {one.name}{f': {one.fault}; {UPDATE}' if one.fault else ''}")
-    if not found:
+        for entry in entries:
+            if (entry.package, entry.version) == (package, version):
+                click.echo(f"    {entry.kind:<9} {entry.name}{f': {entry.fault}; {UPDATE}' if entry.fault else ''}")
+    if not entries:
         click.echo("No plug-in is installed; docs/plug-ins.md says how to make one.")
-    end_if(any(one.fault for one in found))
+    end_if(any(entry.fault for entry in entries))
 
 
 @devices.command(cls=TakesDeviceOptions)
@@ -92,15 +92,15 @@ def doctor(name: str, faults: tuple[str, ...], to: Path | None, device_options: 
     from study_app.devices.registry import check_options, doctor_of
 
     check_options(name, device_options)
-    found = doctor_of(name).examine(name, options=device_options, faults=faults, progress=click.echo)
-    for line in report_lines(found):
+    diagnosis = doctor_of(name).examine(name, options=device_options, faults=faults, progress=click.echo)
+    for line in report_lines(diagnosis):
         click.echo(line)
     if to is not None:
         from study_app.store.support import write_support
 
-        write_support(to, "\n".join(report_lines(found)).strip() + "\n")
+        write_support(to, "\n".join(report_lines(diagnosis)).strip() + "\n")
         click.echo(f"Written: {to}")
-    end_if(not found.well)
+    end_if(not diagnosis.well)
 
 
 @devices.command()
@@ -133,14 +133,14 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
             else calibration.measure_with_weight(grip, weight_n, ask)
         )
         serial = device.describe()["serial"]
-    found = calibration.fit(measures, notes.counts, notes.forces_n, notes.units)
-    for line in _calibrated(found, notes):
+    calibrated = calibration.fit(measures, notes.counts, notes.forces_n, notes.units)
+    for line in _calibrated(calibrated, notes):
         click.echo(line)
-    if found.residual_n > calibration.MOST_RESIDUAL_N:
+    if calibrated.residual_n > calibration.MOST_RESIDUAL_N:
         unexplained = f"More than {calibration.MOST_RESIDUAL_N} N is unexplained"
         click.echo(f"{unexplained}, so nothing was saved. Repeat the calibration.")
         end_if(True)
-    click.echo(f"Saved in {calibration.save_calibration(serial or '', found)}.")
+    click.echo(f"Saved in {calibration.save_calibration(serial or '', calibrated)}.")
 
 
 @devices.command(cls=TakesDeviceOptions)
@@ -176,39 +176,39 @@ def bench(name: str, to: Path | None, device_options: dict[str, str | Path]) -> 
     folder.mkdir(parents=True, exist_ok=True)
     with open_device(name, options=device_options, progress=click.echo) as device:
         simulated = descriptor.moves_by_itself
-        found = run_bench(
+        results = run_bench(
             device,
             ask_simulated_hand(device, click.echo) if simulated else _ask_operator(Terminal(sys.stdin.fileno())),
             progress=click.echo,
             clock=VirtualClock() if simulated else SystemClock(),
         )
-    _keep_bench(found, folder, simulated=descriptor.simulated)
+    _keep_bench(results, folder, simulated=descriptor.simulated)
 
 
 def _ask_operator(terminal: Terminal) -> AskOperator:
     """Return what asks at the terminal; only "let-go" is answered by Enter alone."""
-    return lambda kind, words: terminal.ask(kind if kind == "let-go" else "reading", words)
+    return lambda kind, question: terminal.ask(kind if kind == "let-go" else "reading", question)
 
 
-def _keep_bench(found: Found, folder: Path, *, simulated: bool) -> None:
+def _keep_bench(results: Found, folder: Path, *, simulated: bool) -> None:
     """Write the report, and keep the numbers in this machine's settings where the device is a real one."""
     from study_app.devices.bench.procedure import as_json, as_markdown, workstation_results
     from study_app.store import workstation
     from study_app.store.atomic import write_file
 
     day = date.today().isoformat()
-    text = as_markdown(found, day)
-    for name, content in (("bench.md", text), ("bench.json", as_json(found, day))):
+    text = as_markdown(results, day)
+    for name, content in (("bench.md", text), ("bench.json", as_json(results, day))):
         write_file(folder / name, content.encode())
     click.echo(f"\n{text}\nWritten: {folder / 'bench.md'}, {folder / 'bench.json'}")
     if simulated:
         click.echo("The device is simulated: its measurements are not kept for receipts.")
         return
-    if not found.fits:
+    if not results.fits:
         click.echo("Nothing was kept for receipts: mass, damping and friction do not explain how the handle moved.")
         end_if(True)
     report = str((folder / "bench.md").resolve())
-    bench = workstation.DeviceBench.model_validate({**workstation_results(found, day), "report": report})
+    bench = workstation.DeviceBench.model_validate({**workstation_results(results, day), "report": report})
     workstation.save_settings(workstation.load_or_default()[0].with_bench(bench))
     click.echo("Saved in this machine's settings: receipts of later sessions record it, and Devices shows it.")
 
@@ -235,21 +235,21 @@ def _falcon(name: str, firmware: Path | None, grams: float | None) -> tuple[Falc
     return EmulatedFalcon(firmware=firmware, progress=click.echo, emulator=emulator), emulator
 
 
-def _calibrated(found: Calibration, notes: Notes) -> list[str]:
+def _calibrated(fit: Calibration, notes: Notes) -> list[str]:
     from study_app.devices.falcon.calibration import UNCALIBRATED_UNITS_PER_NM, residual_forces
 
     lines = ["", "rest  load [N]  unexplained x, y, z [N]"]
     for number, (load, left) in enumerate(
-        zip(-notes.forces_n[:, 1], residual_forces(found, notes.counts, notes.forces_n, notes.units), strict=True),
+        zip(-notes.forces_n[:, 1], residual_forces(fit, notes.counts, notes.forces_n, notes.units), strict=True),
         start=1,
     ):
         lines.append(f"{number:>4}  {load:>8.2f}  {left[0]:+.3f} {left[1]:+.3f} {left[2]:+.3f}")
-    share = found.units_per_nm / UNCALIBRATED_UNITS_PER_NM
+    share = fit.units_per_nm / UNCALIBRATED_UNITS_PER_NM
     lines += [
         "",
-        f"{found.units_per_nm:.0f} motor units per newton metre, {share:.2f} times those of one without calibration",
-        f"arms' offset {degrees(found.arm_offset_rad):+.2f} degrees; the grip's own weight {found.own_weight_n:.2f} N",
-        f"unexplained {found.residual_n:.3f} N RMS, mostly friction",
+        f"{fit.units_per_nm:.0f} motor units per newton metre, {share:.2f} times those of one without calibration",
+        f"arms' offset {degrees(fit.arm_offset_rad):+.2f} degrees; the grip's own weight {fit.own_weight_n:.2f} N",
+        f"unexplained {fit.residual_n:.3f} N RMS, mostly friction",
     ]
     return lines
 
@@ -265,13 +265,13 @@ class Terminal:
         self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         threading.Thread(target=self._listen, daemon=True).start()
 
-    def ask(self, kind: str, words: str) -> Callable[[], str | None]:
+    def ask(self, kind: str, question: str) -> Callable[[], str | None]:
         """Ask for an answer; the end of the input gives up. What was typed before the question does not count."""
         if os.isatty(self._descriptor):
             with suppress(queue.Empty):
                 while self._lines.get_nowait() is not None:
                     pass
-        click.echo(words if kind == "reading" else f"{words} Then press Enter.")
+        click.echo(question if kind == "reading" else f"{question} Then press Enter.")
 
         def answered() -> str | None:
             try:
@@ -297,8 +297,8 @@ class Terminal:
 def _ask_emulator(emulator: Emulator, weight_n: float) -> Ask:
     """Let the emulated hand do what is asked for."""
 
-    def ask(kind: str, words: str) -> Callable[[], str | None]:
-        click.echo(words)
+    def ask(kind: str, question: str) -> Callable[[], str | None]:
+        click.echo(question)
         if kind in {"hang", "take-off"}:
             emulator.weight_n = weight_n if kind == "hang" else 0.0
         emulator.held = kind == "take-off"

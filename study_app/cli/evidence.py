@@ -42,20 +42,20 @@ if TYPE_CHECKING:
 EXIT_UNDECIDED = 4
 
 
-def present(found: Evidence, to: Path | None, *, with_text: bool = True) -> None:
+def present(result: Evidence, to: Path | None, *, with_text: bool = True) -> None:
     """Print evidence and write it into a folder, if one was given.
 
     The exit code is 3 if a limit is missed, and 4 if one is undecided. ``with_text``: print the text in any case, not
     only where there is no folder.
     """
     if with_text or to is None:
-        click.echo(found.text, nl=False)
+        click.echo(result.text, nl=False)
     if to is not None:
-        echo_files(found.write(to))
-    if found.closing:
-        click.echo(found.closing)
-    end_if(found.missed)
-    if found.undecided:
+        echo_files(result.write(to))
+    if result.closing:
+        click.echo(result.closing)
+    end_if(result.missed)
+    if result.undecided:
         click.get_current_context().exit(EXIT_UNDECIDED)
 
 
@@ -96,15 +96,15 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
     from study_app.evidence.accuracy.comparison import accuracy as measure
 
     numerical, physical, notes = _subjects(scene, liquid)
-    one = numerical or physical
-    motion = motion_along(path, one) if one is not None else None
+    subject = numerical or physical
+    motion = motion_along(path, subject) if subject is not None else None
     if motion is None:
         raise click.UsageError(f"nothing can be measured: {'; '.join(notes)}")
     prepare(to)
     named = "stirring" if path == DEFAULT_PATH else path
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
-        found = measure(numerical, physical, motion, named=named, notes=notes, progress=show)
-    present(evidence(found), to, with_text=False)
+        measured = measure(numerical, physical, motion, named=named, notes=notes, progress=show)
+    present(evidence(measured), to, with_text=False)
 
 
 def _survey(file: str | None, to: Path | None) -> None:
@@ -114,10 +114,10 @@ def _survey(file: str | None, to: Path | None) -> None:
 
     prepare(to)
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
-        found = survey(load_scenes(file or REAL), show)
-    if not found:
+        errors = survey(load_scenes(file or REAL), show)
+    if not errors:
         raise click.UsageError(f"{file}: no liquid has a viscosity, so there is no physical reference to compare with")
-    present(evidence(found), to, with_text=False)
+    present(evidence(errors), to, with_text=False)
 
 
 def _subjects(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scene | None, tuple[str, ...]]:
@@ -133,10 +133,10 @@ def _subjects(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scen
         known = ", ".join(dict.fromkeys([*thesis, *real]))
         raise click.UsageError(f"--liquid {liquid}: there are {known}; or give FILE, which has it")
     if liquid is None:
-        there = load_scenes(scene)
-        if len(there) > 1:
-            raise click.UsageError(f"{scene}: say which --liquid of {', '.join(there)}")
-        liquid = next(iter(there))
+        scenes = load_scenes(scene)
+        if len(scenes) > 1:
+            raise click.UsageError(f"{scene}: say which --liquid of {', '.join(scenes)}")
+        liquid = next(iter(scenes))
     chosen = load_scene(scene, liquid)
     if chosen.liquids[0].viscosity_pa_s is None:
         return chosen, None, (f"{liquid} has no viscosity, so there is no physical reference to compare with",)
@@ -218,11 +218,11 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
         source = to if solve else None
         tables, drag = stored(source), steady(source)
         if refit:
-            found = law_fit.evidence(law_fit.refit((*tables, *training(source)), held_out(source), show))
+            result = law_fit.evidence(law_fit.refit((*tables, *training(source)), held_out(source), show))
         else:
-            found = fits.evidence(tables, drag, fits.fit_all(tables, show))
+            result = fits.evidence(tables, drag, fits.fit_all(tables, show))
     echo_files(solved)
-    present(found, to, with_text=False)
+    present(result, to, with_text=False)
 
 
 def _materials(to: Path | None, workers: Workers, *, solve: bool) -> None:
@@ -279,7 +279,7 @@ def stability(
     model of hand and device, a wrong delay estimate, lost samples, releases in mid-stroke, and the driver of the Falcon
     with its emulator. Ends with exit code 3 if a case is unstable with the safety layer on.
     """
-    from study_app.evidence.stability import stability_report as found
+    from study_app.evidence.stability import stability_report
     from study_app.evidence.stability.case_groups import groups, some, sweep
     from study_app.evidence.stability.stability_cases import parse
 
@@ -289,13 +289,15 @@ def stability(
     if line is not None:
         case = parse(line)
         click.echo(str(case))
-        verdicts = found.verdicts_on(case)
-        click.echo("\n".join(found.in_words(verdict) for verdict in verdicts))
+        verdicts = stability_report.verdicts_on(case)
+        click.echo("\n".join(stability_report.in_words(verdict) for verdict in verdicts))
         end_if(not verdicts[-1].stable)
         return
     if table is not None:
         with progress() as show, executor_for(workers) as executor:
-            limits = found.limits(executor, lambda done, of: show(f"{done} of {of} limits", done / of), table.name)
+            limits = stability_report.limits(
+                executor, lambda done, of: show(f"{done} of {of} limits", done / of), table.name
+            )
         present(limits, table.parent)
         return
     if delayed is not None:
@@ -316,15 +318,15 @@ def stability(
         names = ", ".join(group.name for group in groups(seed, cases))
         raise StudyError(f"no group has {only!r} in its name: there are {names}")
     with progress() as show, executor_for(workers) as executor:
-        swept = found.run_sweep(
+        swept = stability_report.run_sweep(
             some(sweep(seed), cases) if only is None else (),
             chosen,
             executor,
             lambda done, of: show(f"{done} of {of} verdicts", done / of),
         )
         show("comparing forces")
-        compared = found.fidelities(executor=executor) if only is None else ()
-    shown = found.evidence(swept, compared)
+        compared = stability_report.fidelities(executor=executor) if only is None else ()
+    shown = stability_report.evidence(swept, compared)
     click.echo(shown.text, nl=False)
     if to is not None:
         click.echo()
@@ -424,9 +426,9 @@ def timing(
             from study_app.evidence.outlets.localhost import localhost_only
 
             localhost_only()
-            found = streams.stream(seconds, ending=ending, progress=show)
+            lateness = streams.stream(seconds, ending=ending, progress=show)
             compared = streams.compare(min(seconds, MOST_COMPARED_S), ending=ending, progress=show)
-            return streams.evidence(found, compared)
+            return streams.evidence(lateness, compared)
         from study_app.evidence.outlets import triggers as ports
 
         return ports.evidence(ports.measure(triggers or "", seconds, ending=ending, progress=show))
@@ -436,18 +438,18 @@ def timing(
         from study_app.evidence.timing.delays import evidence
 
         with progress(partial(click.echo, err=True)) as show:
-            found = evidence(delays(seconds, load, progress=show))
+            result = evidence(delays(seconds, load, progress=show))
     else:
         windows = windows_thread(load) if load != "none" or not other else None
         with ending_by_signal() as (ending, _), progress(partial(click.echo, err=True)) as show:
             if other:
-                found = under_load(load, windows, partial(measured, ending, show))
+                result = under_load(load, windows, partial(measured, ending, show))
             else:
                 from study_app.evidence.timing import measurement, report
 
                 timed = measurement.timing(seconds, load, windows, spin_us=spin_us, ending=ending, progress=show)
-                found = report.evidence(timed)
-    present(found, to)
+                result = report.evidence(timed)
+    present(result, to)
 
 
 def _choose_display() -> None:
@@ -509,14 +511,14 @@ def soak(
     scenes = load_scenes(protocol)
     prepare(to)
     with ending_by_signal() as (ending, received):
-        found = under_load(
+        result = under_load(
             load,
             windows_thread(load) if load != "none" else None,
             lambda: soak_servo(scenes, hours, virtual=virtual, seed=seed, ending=ending, progress=click.echo),
         )
-    if found.ticks > 0:
+    if result.ticks > 0:
         click.echo()
-    present(found.evidence(), to)
+    present(result.evidence(), to)
     if received:
         context.exit(128 + received[0])
 
@@ -640,5 +642,5 @@ def delay_thresholds(people: int, seed: int, to: Path | None) -> None:
 
     with progress() as show:
         show("simulating people")
-        found = compare(people, seed)
-    present(evidence(found), to)
+        comparison = compare(people, seed)
+    present(evidence(comparison), to)

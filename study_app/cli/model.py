@@ -74,7 +74,7 @@ def scene(scene: str, liquid: str | None, delay: int) -> None:
     from study_app.protocol.load import load_scene, load_scenes
 
     chosen = [load_scene(scene, liquid)] if liquid else list(load_scenes(scene).values())
-    click.echo("\n\n".join(f"{report(one)}\n{error_report(one, delay)}" for one in chosen))
+    click.echo("\n\n".join(f"{report(subject)}\n{error_report(subject, delay)}" for subject in chosen))
 
 
 @click.command()
@@ -122,13 +122,13 @@ def identify(
     chosen = _changed(scene, liquid, changes)
     read = measurements.read(measured)
     fitted = [name.strip() for name in names.split(",")]
-    found: Fit | CurveFit
+    fitted_liquid: Fit | CurveFit
     with progress() as show:
         show(f"fitting {names}")
         if isinstance(read, measurements.FlowCurve):
-            found = fit_curve(chosen, liquid, fitted, read)
+            fitted_liquid = fit_curve(chosen, liquid, fitted, read)
         else:
             motion = measurements.with_centred_velocity(read.motion) if velocity == "centred" else read.motion
-            found = fit(chosen, liquid, fitted, motion, read.force_n)
-    click.echo(identified.report_text(found))
-    echo_files(identified.write_fit(found, to, measured) if to is not None else ())
+            fitted_liquid = fit(chosen, liquid, fitted, motion, read.force_n)
+    click.echo(identified.report_text(fitted_liquid))
+    echo_files(identified.write_fit(fitted_liquid, to, measured) if to is not None else ())

@@ -70,8 +70,8 @@ class GroupedCommands(click.Group):
         for old, new in RENAMED.get(args[0] if args else "", {}).items():
             if any(word.partition("=")[0] == old for word in args):
                 click.echo(f"{old} is {new} now" if new else f"{old} is no longer needed", err=True)
-            words = [word for word in args if word != old or new]
-            args[:] = [_renamed(word, old, new) for word in words]
+            renamed = [word for word in args if word != old or new]
+            args[:] = [_renamed(word, old, new) for word in renamed]
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -93,14 +93,18 @@ def _renamed(word: str, old: str, new: str) -> str:
 
 def example_of(ctx: click.Context) -> str:
     """Return a command with its arguments and required options; empty without any."""
-    words: list[str] = []
-    for one in ctx.command.params:
-        name = one.opts[0] if isinstance(one, click.Option) else (one.metavar or one.name or "").strip("[]")
-        if isinstance(one, click.Argument) and (one.required or name in SAMPLES):
-            words.append(SAMPLES.get(name, name))
-        elif isinstance(one, click.Option) and one.required:
-            words += [name, SAMPLES.get(name, str(one.metavar))]
-    return " ".join((ctx.command_path, *words)) if words else ""
+    parts: list[str] = []
+    for parameter in ctx.command.params:
+        name = (
+            parameter.opts[0]
+            if isinstance(parameter, click.Option)
+            else (parameter.metavar or parameter.name or "").strip("[]")
+        )
+        if isinstance(parameter, click.Argument) and (parameter.required or name in SAMPLES):
+            parts.append(SAMPLES.get(name, name))
+        elif isinstance(parameter, click.Option) and parameter.required:
+            parts += [name, SAMPLES.get(name, str(parameter.metavar))]
+    return " ".join((ctx.command_path, *parts)) if parts else ""
 
 
 class Target(click.Path):
@@ -134,8 +138,8 @@ def takes_study(function: Command) -> Command:
     @click.argument("named", metavar="[RESULTS]", required=False)
     @RESULTS
     @wraps(function)
-    def run(*words: Any, named: str | None, results: Path | None, **options: Any) -> Any:
-        return function(*words, results=study_at(named, results), **options)
+    def run(*arguments: Any, named: str | None, results: Path | None, **options: Any) -> Any:
+        return function(*arguments, results=study_at(named, results), **options)
 
     return run  # type: ignore[return-value]
 
@@ -146,8 +150,8 @@ def takes_session(function: Command) -> Command:
     @click.argument("session", metavar="SESSION")
     @RESULTS
     @wraps(function)
-    def run(*words: Any, session: str, results: Path | None, **options: Any) -> Any:
-        return function(*words, session=session_at(session, results), **options)
+    def run(*arguments: Any, session: str, results: Path | None, **options: Any) -> Any:
+        return function(*arguments, session=session_at(session, results), **options)
 
     return run  # type: ignore[return-value]
 
@@ -195,9 +199,9 @@ def keep_offered_workspace() -> None:
         click.echo(f"workspace of this machine: {offered.folder} (liquid-study workspace DIR changes it)", err=True)
 
 
-def end_if(found: object) -> None:
+def end_if(problems: object) -> None:
     """End the command with exit code 3 if a check found a problem."""
-    if found:
+    if problems:
         raise click.exceptions.Exit(EXIT_FOUND)
 
 
@@ -269,13 +273,13 @@ def takes_workers(function: Command) -> Command:
         help="Scheduler of a Dask cluster that computes instead, such as tcp://HOST:8786.",
     )
     @wraps(function)
-    def run(*words: Any, count: int, cluster: str | None, **options: Any) -> Any:
+    def run(*arguments: Any, count: int, cluster: str | None, **options: Any) -> Any:
         of_count, of_cluster = (click.get_current_context().get_parameter_source(it) for it in ("count", "cluster"))
         if of_count == of_cluster == ParameterSource.COMMANDLINE:
             raise click.UsageError("--workers and --cluster exclude each other: a cluster has its own workers")
         here = cluster is None or of_count == ParameterSource.COMMANDLINE
         workers = Workers(None if count < 0 else count) if here else Workers(cluster=cluster)
-        return function(*words, workers=workers, **options)
+        return function(*arguments, workers=workers, **options)
 
     return run  # type: ignore[return-value]
 

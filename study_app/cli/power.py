@@ -115,7 +115,7 @@ def power(
         sizes = looks
     elif study.analysis is not None and not stated and 1 < (study.analysis.participants or 0) <= MOST:
         sizes = tuple(sorted({*sizes, study.analysis.participants or 0}))
-    found: Powers | Precisions | None = None
+    estimate: Powers | Precisions | None = None
     steps: Iterator[Powers] | Iterator[Precisions]
     cancelled = False
     try:
@@ -124,14 +124,14 @@ def power(
                 steps = _of_thresholds(study, planned, sizes, studies or THRESHOLD_STUDIES, seed, show, executor)
             else:
                 steps = _of_statements(study, sizes, studies or STUDIES, seed, show, executor)
-            for found in steps:
-                show(f"{found.studies} of {found.asked} studies of each size", found.studies / found.asked)
+            for estimate in steps:
+                show(f"{estimate.studies} of {estimate.asked} studies of each size", estimate.studies / estimate.asked)
     except KeyboardInterrupt:
         cancelled = True
-    if found is not None:
-        _write(found, to)
+    if estimate is not None:
+        _write(estimate, to)
     if cancelled:
-        click.echo("ended early" if found else "ended before the first studies were complete", err=True)
+        click.echo("ended early" if estimate else "ended before the first studies were complete", err=True)
         click.get_current_context().exit(EXIT_CANCELLED)
 
 
@@ -162,23 +162,23 @@ def _of_thresholds(
     from study_app.analysis.planning.threshold_studies import Precisions, sweep
 
     show("simulating observers")
-    for done, found in sweep(planned, sizes, studies, seed, executor):
-        yield Precisions(protocol=study, sizes=sizes, studies=done, asked=studies, seed=seed, found=found)
+    for done, precision in sweep(planned, sizes, studies, seed, executor):
+        yield Precisions(protocol=study, sizes=sizes, studies=done, asked=studies, seed=seed, found=precision)
 
 
-def _write(found: Powers | Precisions, to: Path | None) -> None:
+def _write(estimate: Powers | Precisions, to: Path | None) -> None:
     """Print the tables; write them and the figures into a folder."""
     from study_app.analysis.planning.power_curves import Powers, power_markdown, write_power
     from study_app.analysis.planning.threshold_studies import threshold_csv, threshold_markdown
     from study_app.store.output_files import write_files
 
-    if isinstance(found, Powers):
-        click.echo(power_markdown(found), nl=False)
-        written = write_power(found, to) if to is not None else ()
+    if isinstance(estimate, Powers):
+        click.echo(power_markdown(estimate), nl=False)
+        written = write_power(estimate, to) if to is not None else ()
     else:
-        words = threshold_markdown(found)
-        click.echo(words, nl=False)
-        files = {"power.md": words.encode(), "power.csv": threshold_csv(found)}
+        text = threshold_markdown(estimate)
+        click.echo(text, nl=False)
+        files = {"power.md": text.encode(), "power.csv": threshold_csv(estimate)}
         written = write_files(to, files) if to is not None else ()
     echo_files(written)
 

@@ -40,7 +40,7 @@ def kinds_markdown() -> str:
         (
             "Templates",
             ("`--template`", "title", "question"),
-            ((f"`{name}`", *words) for name, words in TEMPLATES.items()),
+            ((f"`{name}`", *description) for name, description in TEMPLATES.items()),
         ),
     )
     return "\n".join(line for heading, columns, rows in tables for line in _table(heading, columns, rows))
@@ -48,16 +48,16 @@ def kinds_markdown() -> str:
 
 def delayed_force_markdown() -> str:
     """Return how much of a delayed force is left, and up to which delay at least 95 % are, by liquid and hand."""
-    entries = [one for one in delayed_force.table() if one.estimator == "kalman"]
-    delays = [delay for delay in sorted({one.delay_ms for one in entries}) if delay >= LEAST_DELAY_MS]
-    left = {(one.liquid, one.hand, one.delay_ms): f"{one.left_percent:.0f}" for one in entries}
-    liquids = dict.fromkeys(one.liquid for one in entries)
-    words = {liquid: liquid.replace("physical2_", "`physical2`: ").replace("_", " ") for liquid in liquids}
+    entries = [entry for entry in delayed_force.table() if entry.estimator == "kalman"]
+    delays = [delay for delay in sorted({entry.delay_ms for entry in entries}) if delay >= LEAST_DELAY_MS]
+    left = {(entry.liquid, entry.hand, entry.delay_ms): f"{entry.left_percent:.0f}" for entry in entries}
+    liquids = dict.fromkeys(entry.liquid for entry in entries)
+    labels = {liquid: liquid.replace("physical2_", "`physical2`: ").replace("_", " ") for liquid in liquids}
     shares = (
-        (words[name], *(f"{left[name, 'light', delay]} ({left[name, 'middle', delay]})" for delay in delays))
+        (labels[name], *(f"{left[name, 'light', delay]} ({left[name, 'middle', delay]})" for delay in delays))
         for name in liquids
     )
-    longest = ((words[name], *(f"{delayed_force.longest_ms(name, *how):g}" for how in LOOPS)) for name in liquids)
+    longest = ((labels[name], *(f"{delayed_force.longest_ms(name, *how):g}" for how in LOOPS)) for name in liquids)
     tables = (
         (
             "Force left [%], light hand (middle hand), `kalman`",
@@ -81,11 +81,11 @@ def _described(kinds: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
 
 def _questions() -> Iterator[tuple[str, ...]]:
     common = {*questions.Question.model_fields, "kind"}
-    for name, words in _described(questions.KINDS):
+    for name, description in _described(questions.KINDS):
         kind = questions.KINDS[name.strip("`")]
         keys = (field.alias or key for key, field in kind.model_fields.items() if key not in common)
         shown = "no `kind`" if name == f"`{questions.STATEMENT}`" else name
-        yield shown, words, ", ".join(f"`{key}`" for key in keys), kind.value_type
+        yield shown, description, ", ".join(f"`{key}`" for key in keys), kind.value_type
 
 
 def _instruments() -> Iterator[tuple[str, ...]]:
@@ -99,9 +99,9 @@ def _instruments() -> Iterator[tuple[str, ...]]:
 
 def _effects() -> Iterator[tuple[str, ...]]:
     for effect in EFFECTS:
-        words = sys.modules[effect.bound_n.__module__].__doc__ or ""
+        description = sys.modules[effect.bound_n.__module__].__doc__ or ""
         excluded = ", ".join(f"`{name}`" for name in effect.excludes)
-        yield f"`{effect.name}`", words, str(effect.format), "yes" if effect.automatic else "no", excluded
+        yield f"`{effect.name}`", description, str(effect.format), "yes" if effect.automatic else "no", excluded
 
 
 def _limiters() -> Iterator[tuple[str, ...]]:
@@ -117,8 +117,12 @@ def _devices() -> Iterator[tuple[str, ...]]:
 
 def _checks() -> Iterator[tuple[str, ...]]:
     for device in DEVICES:
-        for one in device.doctor.findings() if device.doctor and device.kind != "simulated" else ():
-            yield f"`{device.name}` {one.number}: {one.tested}", one.symptom, f"{one.cause}; {one.cure}"
+        for finding in device.doctor.findings() if device.doctor and device.kind != "simulated" else ():
+            yield (
+                f"`{device.name}` {finding.number}: {finding.tested}",
+                finding.symptom,
+                f"{finding.cause}; {finding.cure}",
+            )
 
 
 def commands_markdown() -> str:
@@ -164,10 +168,10 @@ def _option(option: click.Option, context: click.Context) -> str:
     names = ", ".join(f"`{name}{metavar}`" for name in option.opts).replace("|", "\\|")
     default = option.get_default(context, call=False)
     shown = "" if option.is_flag or option.multiple or callable(default) else str(default)
-    words = (
+    value = (
         "required" if option.required else f"`{shown}`" if shown and "UNSET" not in shown and shown != "None" else ""
     )
-    return f"| {names} | {words} | {_cell(option.help or '')} |"
+    return f"| {names} | {value} | {_cell(option.help or '')} |"
 
 
 def _cell(text: str) -> str:

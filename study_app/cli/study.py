@@ -322,22 +322,22 @@ SECTIONS_SHOWN: Final = 5
 
 
 @click.command()
-@click.argument("words", metavar="[PAGE | WORDS]", nargs=-1)
-def docs(words: tuple[str, ...]) -> None:
+@click.argument("search_words", metavar="[PAGE | WORDS]", nargs=-1)
+def docs(search_words: tuple[str, ...]) -> None:
     """Print a page of the documentation with its lists, such as data-dictionary; or the best section for some words.
 
     Without an argument it prints the names of all pages.
     """
     from study_app import documentation
 
-    typed = " ".join(words)
+    typed = " ".join(search_words)
     if not typed or typed in documentation.names():
         click.echo(documentation.page(typed) if typed else "\n".join(documentation.names()))
         return
-    found = documentation.search(typed)[:SECTIONS_SHOWN]
-    if not found:
+    sections = documentation.search(typed)[:SECTIONS_SHOWN]
+    if not sections:
         raise click.UsageError(f"no page has a word of {typed!r}: liquid-study docs lists the pages")
-    best, *others = found
+    best, *others = sections
     click.echo(f"{best.page}: {best.heading}\n\n{best.source.strip()}\n")
-    for one in others:
-        click.echo(f"see also  {one.page}: {one.heading}")
+    for section in others:
+        click.echo(f"see also  {section.page}: {section.heading}")
