@@ -144,10 +144,13 @@ def delays(seconds: float, load: LoadName, *, progress: Callable[[str], object] 
     shown: list[Shown] = []
     with collecting_here():
         for refresh_hz in rates:
-            for each in loads:
-                with tempfile.TemporaryDirectory() as folder, busy_cores() if each == "gui+cpu" else nullcontext():
-                    shown.extend(_Showing(Path(folder), seconds, refresh_hz, each).run())
-                progress(f"{shown[-1].screen}, {BESIDE[each]}")
+            for background in loads:
+                with (
+                    tempfile.TemporaryDirectory() as folder,
+                    busy_cores() if background == "gui+cpu" else nullcontext(),
+                ):
+                    shown.extend(_Showing(Path(folder), seconds, refresh_hz, background).run())
+                progress(f"{shown[-1].screen}, {BESIDE[background]}")
     return Delayed(machine_here(), seconds, SIZE_PX, tuple(shown))
 
 
@@ -281,16 +284,16 @@ class WindowsThread(QObject):
         with collecting_here(), ThreadPoolExecutor(1, thread_name_prefix="timing") as thread:
             if self._painting is not None:
                 self._painting.begin()
-            found = thread.submit(work)
-            found.add_done_callback(lambda _found: self._asked.emit(loop.quit))
+            future = thread.submit(work)
+            future.add_done_callback(lambda _future: self._asked.emit(loop.quit))
             try:
                 loop.exec()
             finally:
-                wait((found,))
+                wait((future,))
                 heart.stop()
                 if self._painting is not None:
                     self._painting.end()
-        return found.result()
+        return future.result()
 
     def timer(self, period_ms: int, count: int, fire: Callable[[], object]) -> int:
         """Call ``fire`` from a precise timer of Qt; return when it was started [ns]. For ``work``, in its thread."""

@@ -44,10 +44,10 @@ SMALLEST_N = 0.001
 
 def cost_rows(costs: Costs) -> tuple[CostRow, ...]:
     """Return what each part of a tick takes, the most expensive first, then what is not there, and why."""
-    there = [CostRow(NAMED[it.effect].label, it.ns) for it in costs.effects if it.ns is not None]
-    there.append(CostRow("Servo alone", costs.rest_ns))
+    rows = [CostRow(NAMED[it.effect].label, it.ns) for it in costs.effects if it.ns is not None]
+    rows.append(CostRow("Servo alone", costs.rest_ns))
     absent = (CostRow(NAMED[it.effect].label, None, it.why) for it in costs.effects if it.ns is None)
-    return (*sorted(there, key=lambda row: -(row.ns or 0.0)), *absent)
+    return (*sorted(rows, key=lambda row: -(row.ns or 0.0)), *absent)
 
 
 def error_rows(errors: Errors) -> tuple[ErrorRow, ...]:
@@ -242,10 +242,10 @@ class LabSaving(QObject):
         ProtocolError
             Every problem of the file.
         """
-        found = liquids_of(str(path))
-        self.liquids = (*(it for it in self.liquids if it not in found), *found)
-        self.said = f"Opened {path.name}: {', '.join(displayed_name(it.liquid) for it in found)}"
-        return found[0]
+        choices = liquids_of(str(path))
+        self.liquids = (*(it for it in self.liquids if it not in choices), *choices)
+        self.said = f"Opened {path.name}: {', '.join(displayed_name(it.liquid) for it in choices)}"
+        return choices[0]
 
     def wait(self, patience_s: float = PATIENCE_S) -> None:
         """Wait until everything is on the disk, and tell of it."""
@@ -258,16 +258,16 @@ class LabSaving(QObject):
             before.join()
         try:
             save_preset(path, preset_text(setting))
-            found: object = f"Saved as {path.name} in {path.parent}", available_liquids(saved=at_hand)
+            outcome: object = f"Saved as {path.name} in {path.parent}", available_liquids(saved=at_hand)
         except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
-            found = error
-        self._done.emit(found)
+            outcome = error
+        self._done.emit(outcome)
 
-    def _tell(self, found: Exception | tuple[str, tuple[Choice, ...]]) -> None:
-        if isinstance(found, Exception):
-            self.failed.emit(found)
+    def _tell(self, outcome: Exception | tuple[str, tuple[Choice, ...]]) -> None:
+        if isinstance(outcome, Exception):
+            self.failed.emit(outcome)
             return
-        self.said, written = found
+        self.said, written = outcome
         self.liquids = tuple(dict.fromkeys((*self.liquids, *written)))
 
 

@@ -313,7 +313,7 @@ class SessionBridge(QObject):
             parts = (self.participant, *self.participant.findChildren(QWidget))  # also of plug-ins
             kinds = {kind for part in parts for kind in type(part).__mro__}
             methods = (unwrap(vars(kind)[name]) for kind in kinds for name in PAINTING if name in vars(kind))
-            paints_here = all(getattr(one, "__code__", None) is not frame.f_code for one in methods)
+            paints_here = all(getattr(method, "__code__", None) is not frame.f_code for method in methods)
         (self.operator.tell_of_failure if paints_here else self.fail)(error)
         return paints_here
 
@@ -424,7 +424,7 @@ class SessionBridge(QObject):
             faults=self._faults,
             rate_hz=parts.servo.rate_hz,
             forces=None if self.forces is None else self.forces.figures(),
-            lost={one.trial: one.reason for one in parts.recorder.lost} if parts.recorder is not None else {},
+            lost={loss.trial: loss.reason for loss in parts.recorder.lost} if parts.recorder is not None else {},
             dropped=parts.recorder.dropped if parts.recorder is not None else 0,
             outlets_lost=None if parts.outlets is None else parts.outlets.lost,
         )

@@ -249,11 +249,11 @@ class LiveSession(QObject):
         shown_on, operated_on = self.screens()
         shares_screen, rate_hz = shown_on is operated_on, shown_on.refreshRate()
         text_scale = text_scale_on(self.settings, shown_on)
-        found = preflight_checks(made.facts_with(rate_hz, shown_on.devicePixelRatio()), protocol)
+        results = preflight_checks(made.facts_with(rate_hz, shown_on.devicePixelRatio()), protocol)
         if self._progress is not None:
-            for one in found:
-                self._progress(str(one))
-        if reason := refusal_reasons(found):
+            for check in results:
+                self._progress(str(check))
+        if reason := refusal_reasons(results):
             raise SessionError(f"the session did not start: {reason}")
         screens = described(self.settings, shown_on, operated_on)
         yield
@@ -275,7 +275,7 @@ class LiveSession(QObject):
             with suppress(StoreError):  # only the designer's comparisons would miss it
                 keep_content(source)
         self._crash_trace = CrashTrace(store.folder.crash)
-        store.append(journal_events.Preflight(checks=[one.entry for one in found]))
+        store.append(journal_events.Preflight(checks=[check.entry for check in results]))
         plan = bridge.planned(chosen, protocol, store)
         self.bridge = bridge.connect_windows(
             chosen, plan, store, rig, operator, participant, refresh_hz=rate_hz, videos=made.videos

@@ -187,18 +187,18 @@ class Playing(QObject):
             return
         study = opened.study
         try:
-            found = playable(study, opened.selected, self.where())
+            playable_part = playable(study, opened.selected, self.where())
         except NotPlayableError as refused:
-            names = {str(one): row.name for one, row in zip(study.problems, problem_rows(study), strict=True)}
-            named = (replace(one, place=names.get(str(one), one.place)) for one in refused.problems)
+            names = {str(problem): row.name for problem, row in zip(study.problems, problem_rows(study), strict=True)}
+            named = (replace(problem, place=names.get(str(problem), problem.place)) for problem in refused.problems)
             self._show(shown.refuses(tuple(map(str, named))))
             return
-        self._asked = found
+        self._asked = playable_part
         if self.device == SIMULATED:
             self._prepare()
         else:
             has_force = descriptor_of(self.device).kind == "felt"
-            self._show(shown.asks_for_device(title_of(self.device), found.words, has_force=has_force))
+            self._show(shown.asks_for_device(title_of(self.device), playable_part.words, has_force=has_force))
 
     def stop(self) -> None:
         """Stop what is played: zero force first."""
@@ -229,17 +229,17 @@ class Playing(QObject):
     def _prepare(self) -> None:
         """Simulate the steps before the first one that is shown, in the background."""
         self._delete()
-        found, self._asked = self._asked, None
-        if found is None:
+        part, self._asked = self._asked, None
+        if part is None:
             return
         try:
             folder = Path(tempfile.mkdtemp(prefix=FOLDER))
         except OSError as error:
             self.place.message.emit("The study cannot be played", f"No temporary folder can be made: {error.strerror}.")
             return
-        pilot = self.pilot = _Pilot(found, self.device, folder)
+        pilot = self.pilot = _Pilot(part, self.device, folder)
         self._preparing.run(lambda: _prepared(pilot))
-        self._show(shown.under_way(found.words, title_of(pilot.device)))
+        self._show(shown.under_way(part.words, title_of(pilot.device)))
 
     def _begin(self, made: tuple[_Pilot, NewSession | StudyError]) -> None:
         pilot, choices = made
@@ -326,28 +326,28 @@ class Playing(QObject):
 
 def _prepared(pilot: _Pilot) -> tuple[_Pilot, NewSession | StudyError]:
     """Return the choices of a session that goes on where the pilot begins, or why there is none."""
-    found, study = pilot.what, pilot.what.protocol.study
+    part, study = pilot.what, pilot.what.protocol.study
     file = pilot.folder / f"{study.name}.toml"
     start = SessionStart(
         PARTICIPANT,
-        seed=found.position.seed,
+        seed=part.position.seed,
         operator="",
-        language=found.position.language,
+        language=part.position.language,
         device={"name": pilot.device},
-        screens={"participant": "simulated", "steps": found.step},
+        screens={"participant": "simulated", "steps": part.step},
         simulated=True,
         pilot=True,
     )
     try:
-        write_file(file, found.source, waits=False)
+        write_file(file, part.source, waits=False)
         session = begin_session_at_step(
-            pilot.folder / "results" / study.name, found.protocol, found.source, start, found.step
+            pilot.folder / "results" / study.name, part.protocol, part.source, start, part.step
         )
         options = descriptor_of(pilot.device).window_values(settings_here()[0].device_options)
         choices = resumed_choices(
             session, protocol=str(file), device=pilot.device, windowed=True, device_options=options
         )
-        return pilot, replace(choices, played=True, footage=found.folder)
+        return pilot, replace(choices, played=True, footage=part.folder)
     except StudyError as error:
         return pilot, error
 

@@ -172,13 +172,13 @@ class Preflight(QObject):
 
     @property
     def _facts(self) -> Measurements:
-        found, shown_on = self.appraisal, self._screen()
+        appraisal, shown_on = self.appraisal, self._screen()
         return replace(
             self._ready.facts_with(shown_on.refreshRate(), shown_on.devicePixelRatio()),
-            tick_s=found.tick_s,
-            withheld=found.withheld,
-            delivery=found.delivery,
-            velocity_errors=found.velocity_errors,
+            tick_s=appraisal.tick_s,
+            withheld=appraisal.withheld,
+            delivery=appraisal.delivery,
+            velocity_errors=appraisal.velocity_errors,
         )
 
     def _show(self) -> None:
@@ -192,9 +192,9 @@ class Preflight(QObject):
         error_n, now = self.appraisal.error_n, datetime.now().astimezone()
         asked_error = error_n is not None or not self.appraisal.over
         planned = planned_rows(self._protocol, now, error_n, asked_error=asked_error)
-        found, rows = preflight_checks(facts, self._protocol), (*self._goes_on, *planned)
+        results, rows = preflight_checks(facts, self._protocol), (*self._goes_on, *planned)
         self.window.show_view(
-            PreflightView(self._protocol.study.name, self._who, facts, found, rows, busy=self.measuring.busy)
+            PreflightView(self._protocol.study.name, self._who, facts, results, rows, busy=self.measuring.busy)
         )
 
     def _look(self) -> None:
@@ -221,11 +221,11 @@ class Preflight(QObject):
             self.measuring.run(lambda: measure_rig(ready.rig, self._chosen, ready.videos, sleep=sleep))
             self._show()
 
-    def _take(self, found: Measurements) -> None:
-        self._ready = replace(self._ready, facts=found)
-        if _dynamics(found, self._protocol) != self.appraisal.dynamics:  # the delay, and with it what is withheld
+    def _take(self, facts: Measurements) -> None:
+        self._ready = replace(self._ready, facts=facts)
+        if _dynamics(facts, self._protocol) != self.appraisal.dynamics:  # the delay, and with it what is withheld
             self.appraisal.close()
-            self.appraisal, self._appraised = _appraisal(self._protocol, found), False
+            self.appraisal, self._appraised = _appraisal(self._protocol, facts), False
         self._show()
 
     def _start(self) -> None:
@@ -263,17 +263,17 @@ def _dynamics(facts: Measurements, protocol: Protocol) -> Dynamics:
 
 def study_scenes(protocol: Protocol) -> tuple[Asked, ...]:
     """Return the study's scenes of one liquid, each once, with the fastest stroke of the tasks that it is felt in."""
-    found: dict[Scene, Asked] = {}
+    scenes: dict[Scene, Asked] = {}
     for block in protocol.blocks.values():
         stroke = protocol.tasks[block.task].fastest_stroke(protocol.device.workspace_m)
         for condition in protocol.conditions_in(block.id):
             scene = protocol.scene_for(condition)
             if len(scene.liquids) != 1:
                 continue
-            before = found.get(scene)
+            before = scenes.get(scene)
             if before is None or stroke.speed_mps > before.stroke.speed_mps:
-                found[scene] = Asked(scene.liquids[0].id, scene, stroke)
-    return tuple(found.values())
+                scenes[scene] = Asked(scene.liquids[0].id, scene, stroke)
+    return tuple(scenes.values())
 
 
 MEASURED_S = 2.0
@@ -339,8 +339,8 @@ class ComputerCheck(QObject):
             bug = f"{type(error).__name__}: {error}; the terminal shows the details"
             self.window.show_sentence(f"{error if isinstance(error, StudyError) else bug}.")
 
-    def _show(self, found: tuple[Check, ...]) -> None:
+    def _show(self, results: tuple[Check, ...]) -> None:
         if self._closed:
             self._close()
         else:
-            self.window.show_checks(found)
+            self.window.show_checks(results)
