@@ -19,10 +19,10 @@ SWITCH_INTERVAL_S = 0.0005
 
 def application_here() -> QApplication:
     """Return the application, made on first use."""
-    there = QApplication.instance()
-    if isinstance(there, QApplication):
-        there.setQuitOnLastWindowClosed(False)
-        return there
+    instance = QApplication.instance()
+    if isinstance(instance, QApplication):
+        instance.setQuitOnLastWindowClosed(False)
+        return instance
     check_display()
     os.environ.setdefault("MESA_SHADER_CACHE_DISABLE", "true")  # its idle thread delays the end by seconds under load
     QGuiApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)

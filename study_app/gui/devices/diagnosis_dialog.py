@@ -89,8 +89,8 @@ class DiagnosisDialog(QDialog):
         self.examine()
 
     def _lay_out(self, title: str) -> None:
-        words = vbox(label(f"Diagnose {title}", "title_dense"), self.step, spacing=4)
-        head = hbox((self.sign, 0, Qt.AlignmentFlag.AlignTop), (words, 1), spacing=14)
+        text = vbox(label(f"Diagnose {title}", "title_dense"), self.step, spacing=4)
+        head = hbox((self.sign, 0, Qt.AlignmentFlag.AlignTop), (text, 1), spacing=14)
         foot = hbox(self.close_button, STRETCH, self.support, self.copy, self.again, spacing=12)
         vbox(
             head,
@@ -155,13 +155,13 @@ class DiagnosisDialog(QDialog):
         self.report = said
         self.copy.setEnabled(True)
         well = said.well
-        words = said.conclusion if said.failure is None else _sentence(said.failure)
-        self._say(words, "text2" if well else "bad", "check" if well else "warning", "ok" if well else "bad")
+        sentence = said.conclusion if said.failure is None else _sentence(said.failure)
+        self._say(sentence, "text2" if well else "bad", "check" if well else "warning", "ok" if well else "bad")
         self.text.setPlainText(self._written())
         self.over.emit(well)
 
-    def _say(self, words: str, ink: str, sign: str, sign_ink: str) -> None:
-        self.step.setText(words)
+    def _say(self, sentence: str, ink: str, sign: str, sign_ink: str) -> None:
+        self.step.setText(sentence)
         set_ink(self.step, ink)  # type: ignore[arg-type]
         self.sign.show_icon(sign, sign_ink)  # type: ignore[arg-type]
 
@@ -206,8 +206,8 @@ class DiagnosisDialog(QDialog):
         super().done(result)
 
 
-def _sentence(words: str) -> str:
-    return words[:1].upper() + words[1:] + ("" if words.endswith((".", "!", "?")) else ".")
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
 
 
 HELD = (

@@ -42,17 +42,17 @@ class DeviceRow(QWidget):
         self.diagnose.clicked.connect(lambda: diagnose(self.name))
         inset = () if shown.choosable else (INSET,)
         head = hbox(*inset, self.title, STRETCH, self.chip, spacing=10)
-        words = vbox(self.can, self.why, self.by, STRETCH, spacing=4)
-        below = hbox((words, 1), (self.diagnose, 0, Qt.AlignmentFlag.AlignTop), spacing=16, margins=(INSET, 0, 0, 0))
+        text = vbox(self.can, self.why, self.by, STRETCH, spacing=4)
+        below = hbox((text, 1), (self.diagnose, 0, Qt.AlignmentFlag.AlignTop), spacing=16, margins=(INSET, 0, 0, 0))
         vbox(head, below, spacing=2, margins=(0, 6, 0, 6), parent=self)
         self.show_device(shown)
 
     def show_device(self, shown: DeviceShown) -> None:
         self.chip.show_state(shown.tone, shown.sign, shown.word)
         ways = shown.ways if len(shown.ways) > 1 else ()
-        for line, words in ((self.can, shown.can), (self.why, shown.why), (self.by, "   ·   ".join(ways))):
-            line.setText(words)
-            line.setVisible(bool(words))
+        for line, text in ((self.can, shown.can), (self.why, shown.why), (self.by, "   ·   ".join(ways))):
+            line.setText(text)
+            line.setVisible(bool(text))
         set_ink(self.why, "warn" if shown.tone == "warn" else "text2")
         self.title.setAccessibleName(f"{shown.title}. {shown.word}. {shown.can} {shown.why}".strip())
 
@@ -88,13 +88,13 @@ class HelpCard(Card):
 
     def __init__(self) -> None:
         super().__init__("Before the first session", gap=8)
-        for words in (
+        for paragraph in (
             "Connect the USB cable and the power adapter, then press “Refresh”.",
             "“Diagnose …” finds, opens, loads, homes and tests the device without force, and says what is wrong.",
             "“liquid-study devices calibrate” measures its force with a known weight.",
             "“liquid-study devices bench” measures any device with force in ten minutes.",
         ):
-            line = label(words, "label", "text2", wraps=True, weight=400)
+            line = label(paragraph, "label", "text2", wraps=True, weight=400)
             line.setMinimumWidth(LEAST_WORDS)
             self.column.addWidget(line)
 
@@ -179,10 +179,10 @@ class DevicesPlace(Place):
     def _forget_dialog(self) -> None:
         self.dialog = None
 
-    def _show_found(self, found: tuple[DeviceShown, ...]) -> None:
+    def _show_found(self, devices: tuple[DeviceShown, ...]) -> None:
         if not self._ended:
             self.show_looking(False)
-            self.show_devices(found)
+            self.show_devices(devices)
             self.looked.emit()
 
     def _show_unexamined(self, error: Exception) -> None:

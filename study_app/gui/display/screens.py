@@ -67,8 +67,8 @@ def choose_screens(number: int | None) -> tuple[QScreen, QScreen]:
     """
     screens = QGuiApplication.screens()
     if number is not None and not 1 <= number <= len(screens):
-        there = "there is 1 screen" if len(screens) == 1 else f"there are {len(screens)} screens"
-        raise DisplayError(f"screen {number} cannot be used: {there}; choose a number from 1 to {len(screens)}")
+        known = "there is 1 screen" if len(screens) == 1 else f"there are {len(screens)} screens"
+        raise DisplayError(f"screen {number} cannot be used: {known}; choose a number from 1 to {len(screens)}")
     participant = screens[(number or len(screens)) - 1]
     others = [screen for screen in screens if screen is not participant]
     return participant, others[0] if others else participant

@@ -77,18 +77,18 @@ def entries() -> tuple[HelpEntry, ...]:
     return tuple(rows)
 
 
-def found(words: str) -> tuple[HelpEntry, ...]:
+def found(text: str) -> tuple[HelpEntry, ...]:
     """Return the pages that have the words, the best first, each at its best heading; all pages for no words."""
-    if not words.strip():
+    if not text.strip():
         return entries()
     titles = {entry.page: entry.title for entry in entries()}
     return tuple(
         HelpEntry(
-            page=one.page,
-            title=titles[one.page],
-            anchor="" if one.heading == titles[one.page] else anchor_of(one.heading),
+            page=section.page,
+            title=titles[section.page],
+            anchor="" if section.heading == titles[section.page] else anchor_of(section.heading),
         )
-        for one in documentation.search(words)
+        for section in documentation.search(text)
     )
 
 
@@ -225,14 +225,14 @@ class PageReader(Coloured, QTextBrowser):
     def _colour_links(self, block: QTextBlock) -> None:
         links = QTextCharFormat()
         links.setForeground(QColor(self.theme.accent))
-        found: list[tuple[int, int]] = []
+        spans: list[tuple[int, int]] = []
         parts = block.begin()
         while not parts.atEnd():
             part = parts.fragment()
             if part.charFormat().isAnchor():
-                found.append((part.position(), part.length()))
+                spans.append((part.position(), part.length()))
             parts += 1
-        for start, length in found:
+        for start, length in spans:
             cursor = QTextCursor(block)
             cursor.setPosition(start)
             cursor.setPosition(start + length, QTextCursor.MoveMode.KeepAnchor)

@@ -48,9 +48,9 @@ class DeviceCard(Card):
         self.icon.show_icon(shown.icon, "text2")
         self.name.setText(shown.title)
         self.state.show_state(shown.tone, shown.sign, shown.word)
-        for line, words in ((self.about, shown.can), (self.why, shown.why)):
-            line.setText(words)
-            line.setVisible(bool(words))
+        for line, text in ((self.about, shown.can), (self.why, shown.why)):
+            line.setText(text)
+            line.setVisible(bool(text))
         set_ink(self.why, "warn" if shown.tone == "warn" else "bad" if shown.tone == "bad" else "text2")
 
     def show_screens(self, lines: tuple[str, ...]) -> None:
@@ -125,9 +125,9 @@ class ResumeBanner(QWidget):
         self.line = label("", "label", "warn", wraps=True)
         self.resume = ActionButton("play", "Resume", role="primary")
         self.resume.clicked.connect(lambda: self.resume_asked.emit(self._shown))
-        words = vbox(self.heading, self.line, spacing=4)
+        text = vbox(self.heading, self.line, spacing=4)
         margins = (SHADOW + 22, 14, SHADOW + 18, 14)
-        hbox(Icon("clock", "warn", 26), (words, 1), self.resume, spacing=18, margins=margins, parent=self)
+        hbox(Icon("clock", "warn", 26), (text, 1), self.resume, spacing=18, margins=margins, parent=self)
         self.hide()
 
     def show_interrupted(self, session: Interrupted | None) -> None:
@@ -203,9 +203,9 @@ class SessionsCard(Card):
     def shown(self) -> tuple[SessionFacts, ...]:
         return self.rows.shown
 
-    def show_sessions(self, found: Sequence[SessionFacts], where: str, now: datetime) -> None:
+    def show_sessions(self, sessions: Sequence[SessionFacts], where: str, now: datetime) -> None:
         """Show these sessions in place of those before; ``where`` names the results folder."""
-        self._found, self._now = tuple(found), now
+        self._found, self._now = tuple(sessions), now
         self.where.show_text(f"in {where}")
         self._show_kinds()
         self.rows.show_rows(self._found, now)
@@ -219,19 +219,19 @@ class SessionsCard(Card):
         chosen = self.kind.currentData() or ""
         with QSignalBlocker(self.kind):
             self.kind.clear()
-            for kind, words in KINDS.items():
-                count = sum(one.kind == kind for one in self._found)
-                self.kind.addItem(f"{words} ({count})", kind)
+            for kind, plural in KINDS.items():
+                count = sum(session.kind == kind for session in self._found)
+                self.kind.addItem(f"{plural} ({count})", kind)
             self.kind.addItem(f"All ({len(self._found)})", EVERY)
             self.kind.setCurrentIndex(self.kind.findData(chosen))
 
     def _filter(self) -> None:
         kind = str(self.kind.currentData() or "") if self._found else EVERY
-        self.rows.show_matching(lambda one: kind in (one.kind, EVERY))
+        self.rows.show_matching(lambda session: kind in (session.kind, EVERY))
         hidden = [
             counted(count, f"{other or 'participant'} session")
             for other in KINDS
-            if (count := sum(one.kind == other for one in self._found))
+            if (count := sum(session.kind == other for session in self._found))
         ]
         self.nothing.setText(f"{NONE[kind]} Not shown: {', '.join(hidden)}." if hidden else NONE[kind])
         emptied = self.rows.isHidden() != self.is_empty
@@ -311,8 +311,8 @@ class StudyCard(FileCard):
             self.draft.setText(f"{facts.draft.words}. Sessions use the saved file.")
         self.column.addStretch()
         time = f"{facts.duration}  ·  {facts.languages}"
-        for icon, words in (("layers", facts.extent), ("clock", time), ("device", facts.needs)):
-            add_layout(self.column, hbox(Icon(icon, "text2", 18), (label(words, "body"), 1), spacing=10))
+        for icon, text in (("layers", facts.extent), ("clock", time), ("device", facts.needs)):
+            add_layout(self.column, hbox(Icon(icon, "text2", 18), (label(text, "body"), 1), spacing=10))
         self.held = label("", "label", "text2")
         self.column.addWidget(self.held)
         self.new = ActionButton("plus", "New session", role="primary" if first and facts.draft is None else "")

@@ -226,6 +226,7 @@ class NewSessionDialog(QDialog):
         self._suggested = str(study_results(self._all_results, study.name, device))
         devices = dict.fromkeys((*list_devices(), device))
         languages = {code: language_name(code) for code in study.languages}
+        screen_titles = {screen.number: f"Screen {screen.number}: {screen.words}" for screen in screens}
         fields = (
             Field("participant", "Participant", aside="letters and digits, no name"),
             Field("session", "Session", "count", limits=(1, MAX_SESSION)),
@@ -233,9 +234,7 @@ class NewSessionDialog(QDialog):
             Field("operator", "Operator", longest=40, placeholder="Initials, such as AK"),
             choice("language", "Language of the participant's pages", languages),
             choice("device", "Device", {name: device_label(name) for name in devices}),
-            choice(
-                "screen", "Participant's screen", {one.number: f"Screen {one.number}: {one.words}" for one in screens}
-            ),
+            choice("screen", "Participant's screen", screen_titles),
             Field("windowed", "In a window instead of full screen", "check"),
             Field("pilot", "Pilot: marked by a frame, stored separately", "check"),
             Field("results", "Results folder of this study", "folder"),
@@ -257,14 +256,14 @@ class NewSessionDialog(QDialog):
         redraw.setAutoDefault(False)
         redraw.clicked.connect(lambda: self.editors["seed"].show_value(draw_seed()))
         self.editors: dict[str, Editor] = {
-            one.name: Editor(one, redraw if one.name == "seed" else None, judges=True) for one in fields
+            field.name: Editor(field, redraw if field.name == "seed" else None, judges=True) for field in fields
         }
         values = {
             "seed": draw_seed(),
             "operator": machine.operator,
             "device": device,
             "windowed": len(screens) == 1,
-            "screen": machine.screen_among([one.name for one in screens]),
+            "screen": machine.screen_among([screen.name for screen in screens]),
             "results": self._suggested,
             **machine.device_options,
         }
@@ -304,10 +303,22 @@ class NewSessionDialog(QDialog):
                 cells.addWidget(part, row, column, 1, 3 - len(pair))
         self._area = scrolled(self._inside)
         about = f"{self.facts.title}  ·  {self.facts.extent}  ·  {self.facts.duration}"
-        head, told = label("New session", "title_dense"), label(about, "body", "text2", wraps=True)
+        head, explanation = label("New session", "title_dense"), label(about, "body", "text2", wraps=True)
         note = label("Nothing is created until you begin.", "label", "text2")
         foot = hbox(self.cancel, note, STRETCH, self.begin, spacing=16)
-        vbox(head, told, 6, (self._area, 1), 10, Rule(), 4, foot, spacing=10, margins=(32, 28, 32, 24), parent=self)
+        vbox(
+            head,
+            explanation,
+            6,
+            (self._area, 1),
+            10,
+            Rule(),
+            4,
+            foot,
+            spacing=10,
+            margins=(32, 28, 32, 24),
+            parent=self,
+        )
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
@@ -385,9 +396,9 @@ class NewSessionDialog(QDialog):
             self._refuse()
         except (StudyError, ValueError) as error:
             fault = str(error)
-        words = fault or f"{participant} is free, session {session}"
-        by_id = words.startswith(f"{participant} ")  # an id stands as it was typed
-        self.verdict.setText(words if by_id else words[:1].upper() + words[1:])
+        sentence = fault or f"{participant} is free, session {session}"
+        by_id = sentence.startswith(f"{participant} ")  # an id stands as it was typed
+        self.verdict.setText(sentence if by_id else sentence[:1].upper() + sentence[1:])
         set_ink(self.verdict, "bad" if fault else "ok")
         self.verdict_icon.show_icon(*(("warning", "bad") if fault else ("check", "ok")))
         self.begin.setEnabled(not fault)

@@ -105,14 +105,14 @@ class RailButton(Themed, PressedByEnter):
         ink = t.accent if self.here else t.text2
         if self._narrow:
             draw_icon(painter, self.icon_name, QRectF(rect.width() / 2 - 10, 8, 20, 20), ink)
-            words, align = QRectF(0, 30, rect.width(), 22), Qt.AlignmentFlag.AlignCenter
+            room, align = QRectF(0, 30, rect.width(), 22), Qt.AlignmentFlag.AlignCenter
             painter.setFont(font("key"))
         else:
             draw_icon(painter, self.icon_name, QRectF(14, rect.height() / 2 - 10, 20, 20), ink)
-            words, align = QRectF(46, 0, rect.width() - 46, rect.height()), Qt.AlignmentFlag.AlignVCenter
+            room, align = QRectF(46, 0, rect.width() - 46, rect.height()), Qt.AlignmentFlag.AlignVCenter
             painter.setFont(font("label", weight=600 if self.here else 500))
         painter.setPen(QColor(ink))
-        painter.drawText(words, align, self.text())
+        painter.drawText(room, align, self.text())
 
 
 class Rail(Coloured, QWidget):

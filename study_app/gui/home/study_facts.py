@@ -103,8 +103,8 @@ class DraftFacts:
 def sources() -> tuple[str, ...]:
     """Return the studies at hand: recent files, then names in the workspace, then those that ship; no liquid files."""
     names = sorted(at_hand(), key=lambda name: (is_shipped(name), name != "rek2024", name == "demo", name))
-    found = dict.fromkeys((*recent_protocols(), *names))
-    return tuple(source for source in found if not holds_liquids_alone(source))
+    known = dict.fromkeys((*recent_protocols(), *names))
+    return tuple(source for source in known if not holds_liquids_alone(source))
 
 
 def file_states(opened: Iterable[str]) -> frozenset[tuple[Path, int, int]]:
@@ -141,9 +141,11 @@ def held_ns(session: Path) -> int:
 
 def last_study(results: Path) -> str:
     """Return the study of the session that was held last under ``results``, samples aside; "" where there is none."""
-    found = results.glob("*/data/sub-*/ses-*")
+    folders = results.glob("*/data/sub-*/ses-*")
     with suppress(StudyError, ValueError):
-        last = max((one for one in found if not one.relative_to(results).parts[0].startswith(SAMPLE)), key=held_ns)
+        last = max(
+            (folder for folder in folders if not folder.relative_to(results).parts[0].startswith(SAMPLE)), key=held_ns
+        )
         return start_of(journal.read(last / "journal.jsonl")).study
     return ""
 
@@ -160,7 +162,7 @@ def read_studies(
     last = "" if results is None else last_study(results)
     begins = results is not None and not last
     drafts = (_of_draft(file, draft_words) for file in unsaved_files(workspace().protocols))
-    found = (
+    facts = (
         *filter(None, drafts),
         *(study_facts(source, draft_words) for source in dict.fromkeys((*opened, *sources()))),
     )
@@ -169,7 +171,7 @@ def read_studies(
         first = it.name == last if last and isinstance(it, StudyFacts) else it.source == FIRST_STUDY and begins
         return 0.0 if it.draft is None else -_seconds(it.draft.kept_at), it.source not in opened, not first
 
-    return tuple(sorted(found, key=place))
+    return tuple(sorted(facts, key=place))
 
 
 def _of_draft(file: Path, draft_words: LoadWords) -> DraftFacts | None:
@@ -296,14 +298,14 @@ class Interrupted:
 
 
 def interrupted(
-    found: Iterable[SessionFacts], studies: Iterable[StudyFacts | BrokenFacts], now: datetime
+    sessions: Iterable[SessionFacts], studies: Iterable[StudyFacts | BrokenFacts], now: datetime
 ) -> Interrupted | None:
     """Return the newest session that can go on here, if any: unfinished, open in no program, of a protocol at hand.
 
     A protocol that cannot be used because its liquid file is lost still resumes: its liquids are sealed in the key.
     """
     studies = tuple(studies)
-    for session in found:
+    for session in sessions:
         candidates = [it.source for it in studies if isinstance(it, BrokenFacts) or it.name == session.study]
         if session.status != "unfinished" or not candidates or is_open(session.folder):
             continue
@@ -349,15 +351,15 @@ def place_words(protocol: Protocol, schedule: Schedule, step: int) -> str:
     return f"in part {here.part}, {label}" if here.part else f"in {label}"
 
 
-def held(found: Iterable[SessionFacts], study: str) -> str:
+def held(sessions: Iterable[SessionFacts], study: str) -> str:
     """Return how many sessions of a study there are: "5 sessions, 3 complete, 1 incomplete, 1 excluded, 2 pilots"."""
-    of_study = [session for session in found if session.study == study]
+    of_study = [session for session in sessions if session.study == study]
     own = [session for session in of_study if not session.kind]
     pilots = sum(session.kind == "pilot" for session in of_study)
     complete = sum(session.status == COMPLETED for session in own)
     incomplete = sum(session.status == INCOMPLETE for session in own)
     excluded = sum(session.excluded is not None for session in own)
-    words = [f"{counted(len(own), 'session')}, {complete} complete" if own else "no participant yet"]
-    words += [f"{incomplete} incomplete"] * bool(incomplete)
-    words += [f"{excluded} excluded"] * bool(excluded) + [counted(pilots, "pilot")] * bool(pilots)
-    return ", ".join(words)
+    parts = [f"{counted(len(own), 'session')}, {complete} complete" if own else "no participant yet"]
+    parts += [f"{incomplete} incomplete"] * bool(incomplete)
+    parts += [f"{excluded} excluded"] * bool(excluded) + [counted(pilots, "pilot")] * bool(pilots)
+    return ", ".join(parts)

@@ -250,7 +250,10 @@ class HomePlace(Place):
     def _focus_card(self, at: int, source: str, button: int) -> None:
         """Give the keyboard to the card of a study, which may be elsewhere now, else to the one at its place."""
         cards = [card for card in self.grid.cards if isinstance(card, StudyCard | BrokenCard)]
-        card = next((one for one in cards if one.facts.source == source), cards[at] if at < len(cards) else None)
+        card = next(
+            (candidate for candidate in cards if candidate.facts.source == source),
+            cards[at] if at < len(cards) else None,
+        )
         if card is not None:
             _buttons(card)[min(button, len(_buttons(card)) - 1)].setFocus(Qt.FocusReason.OtherFocusReason)
             QTimer.singleShot(0, card, lambda: self.cards_area.ensureWidgetVisible(card))  # once it has its place
@@ -274,17 +277,21 @@ class HomePlace(Place):
             self._reader.run(partial(_read, self.results, self._facts))
 
     def _show_read(self, read: tuple[Path, tuple[SessionFacts, ...], Interrupted | None]) -> None:
-        results, found, stopped = read
-        self.sessions.show_sessions(found, str(results), datetime.now().astimezone())
-        self._show_last(found)
+        results, sessions, stopped = read
+        self.sessions.show_sessions(sessions, str(results), datetime.now().astimezone())
+        self._show_last(sessions)
         self.banner.show_interrupted(stopped)
         for card in self.grid.cards:
             if isinstance(card, StudyCard):
-                card.held.setText(held(found, card.facts.protocol.study.name))
+                card.held.setText(held(sessions, card.facts.protocol.study.name))
 
-    def _show_last(self, found: tuple[SessionFacts, ...]) -> None:
+    def _show_last(self, sessions: tuple[SessionFacts, ...]) -> None:
         """Show the sessions of the kind that was held last, and its study first, once there is another one."""
-        last = max((one for one in found if one.kind != "sample"), key=lambda one: held_ns(one.folder), default=None)
+        last = max(
+            (session for session in sessions if session.kind != "sample"),
+            key=lambda session: held_ns(session.folder),
+            default=None,
+        )
         before, self._last = self._last, None if last is None else last.folder
         if last is not None and last.folder != before:
             self.sessions.show_kind(last.kind)
@@ -394,10 +401,10 @@ def _buttons(card: StudyCard | BrokenCard) -> tuple[QWidget, ...]:
 def _read(results: Path, studies: tuple[Facts, ...]) -> tuple[Path, tuple[SessionFacts, ...], Interrupted | None]:
     """Return the sessions in the results folder, and the one that can go on."""
     counts = {it.name: set(extent_of(it.protocol).answers) for it in studies if isinstance(it, StudyFacts)}
-    answers = {name: max(each) for name, each in counts.items() if len(each) == 1}
-    found = sessions(results, answers)
+    answers = {name: max(numbers) for name, numbers in counts.items() if len(numbers) == 1}
+    known = sessions(results, answers)
     saved = [it for it in studies if not isinstance(it, DraftFacts)]
-    return results, found, interrupted(found, saved, datetime.now().astimezone())
+    return results, known, interrupted(known, saved, datetime.now().astimezone())
 
 
 def _screens(settings: MachineSettings) -> tuple[str, ...]:

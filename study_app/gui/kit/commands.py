@@ -87,13 +87,16 @@ COMMANDS: Final = (
     Command("remove", "Remove its key from the file", ("Ctrl+Delete",), within="field"),
     Command("count", "Count up, down", ("Up", "Down"), within="field"),
 )
-_OF: Final = {one.id: one for one in COMMANDS}
+_OF: Final = {command.id: command for command in COMMANDS}
 _NAMES: Final = {"Return": "Enter", "Escape": "Esc", "Insert": "Ins", "Delete": "Del"}
 
 
 def keys_markdown() -> str:
     """Return every command with its keys, as a table of Markdown."""
-    rows = (f"| {', '.join(one.shown)} | {one.words}{one.within and f' ({one.within})'} |" for one in COMMANDS)
+    rows = (
+        f"| {', '.join(command.shown)} | {command.words}{command.within and f' ({command.within})'} |"
+        for command in COMMANDS
+    )
     return "\n".join(("| key | does |", "| --- | --- |", *rows, ""))
 
 
@@ -124,13 +127,13 @@ def key_cap(action: str) -> str:
     return _OF[action].shown[0].replace("+", " ")
 
 
-def with_key(words: str, action: str) -> str:
+def with_key(text: str, action: str) -> str:
     """Return words followed by the key of an action, for a tip: "Duplicate (Ctrl+D)"."""
-    return _with_keys(_OF[action], words)
+    return _with_keys(_OF[action], text)
 
 
-def _with_keys(command: Command, words: str = "") -> str:
-    return f"{words or command.words} ({command.shown[0]})"
+def _with_keys(command: Command, text: str = "") -> str:
+    return f"{text or command.words} ({command.shown[0]})"
 
 
 def tip(action: str) -> str:

@@ -52,7 +52,7 @@ class DeviceShown:
 def devices_shown(backends: Sequence[Backend]) -> tuple[DeviceShown, ...]:
     """Return what to show of each device, those that people use first; backends of one device are one."""
     names = list(dict.fromkeys(backend.name for backend in backends))
-    shown = [_shown(name, [one for one in backends if one.name == name]) for name in names]
+    shown = [_shown(name, [backend for backend in backends if backend.name == name]) for name in names]
     return tuple(sorted(shown, key=lambda device: device.simulated))
 
 
@@ -165,8 +165,8 @@ def _descriptor(name: str) -> DeviceDescriptor | None:
     return DEVICES.get(name.partition(":")[0])
 
 
-def _sentence(words: str) -> str:
-    return words[:1].upper() + words[1:] + ("" if not words or words[-1] in ".!?" else ".")
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:] + ("" if not text or text[-1] in ".!?" else ".")
 
 
 def settings_here() -> tuple[MachineSettings, str]:

@@ -64,7 +64,7 @@ class Question(QDialog):
         self.setModal(False)
         self.setMinimumWidth(width)
         self._needs = needs
-        self.editors = {one.name: Editor(one, judges=True) for one in fields}
+        self.editors = {field.name: Editor(field, judges=True) for field in fields}
         self.missing = label("", "label", "bad", wraps=True)
         self.missing.hide()
         self.go_on = go_on or ActionButton("", "Close", role="primary")
@@ -139,23 +139,23 @@ class Work(Question):
     stop_asked = Signal()
     opened = Signal()
 
-    def __init__(self, *words: Any, **more: Any) -> None:
+    def __init__(self, *arguments: Any, **more: Any) -> None:
         self.bar = QProgressBar(textVisible=False)
         self.bar.setFixedHeight(8)
-        super().__init__(*words, inside=self.bar, **more)
+        super().__init__(*arguments, inside=self.bar, **more)
         self.setModal(True)
         self.bar.hide()
         self.working = self.over = False
 
-    def show_progress(self, words: str, share: float | None = None) -> None:
+    def show_progress(self, sentence: str, share: float | None = None) -> None:
         """Say what is being done, and which share of it is done (0 to 1), if that is known."""
-        self.said.setText(words)
+        self.said.setText(sentence)
         self.bar.setRange(0, 0 if share is None else STEPS)
         self.bar.setValue(round(STEPS * (share or 0.0)))
 
-    def show_done(self, words: str, opens: str) -> None:
+    def show_done(self, sentence: str, opens: str) -> None:
         """Say what came of it; the button ``opens`` it."""
-        self._end(words)
+        self._end(sentence)
         self.over = True
         self.back.show_action("", "Close")
         self.go_on.show_action("", opens)
@@ -196,10 +196,10 @@ class Work(Question):
             self.said.setText("Stopping …")
             self.stop_asked.emit()
 
-    def _end(self, words: str) -> None:
+    def _end(self, sentence: str) -> None:
         self.working = False
         self.bar.hide()
-        self.said.setText(words)
+        self.said.setText(sentence)
         self.go_on.show()
         self.back.setEnabled(True)  # it may have come to an end although one asked to stop
         self._shrink()

@@ -96,8 +96,8 @@ class Radios(QWidget):
 
     def __init__(self, options: Iterable[tuple[Any, str]]) -> None:
         super().__init__()
-        self._values, words = zip(*options, strict=True)
-        self.group, buttons = QButtonGroup(self), [Radio(each) for each in words]
+        self._values, labels = zip(*options, strict=True)
+        self.group, buttons = QButtonGroup(self), [Radio(text) for text in labels]
         for at, button in enumerate(buttons):
             button.setFont(font("body"))
             self.group.addButton(button, at)
@@ -173,8 +173,8 @@ class Editor(QWidget):
                 return count
             case "choice":
                 choice = Choice()
-                for value, words in self.field.options:
-                    choice.addItem(words, value)
+                for value, text in self.field.options:
+                    choice.addItem(text, value)
                 choice.currentIndexChanged.connect(lambda _at: self.edited.emit(self.field.name))
                 choice.activated.connect(lambda _at: self.changed.emit(self.field.name, self.value))
                 return choice
@@ -218,8 +218,8 @@ class Editor(QWidget):
         assert isinstance(self.control, QComboBox)  # noqa: S101 - only of a choice
         self._values = [*options]
         self.control.clear()
-        for value, words in options.items():
-            self.control.addItem(words, value)
+        for value, text in options.items():
+            self.control.addItem(text, value)
 
     def show_value(self, value: Any, hint: str | None = None) -> None:
         """Show a value, and a hint below; what is being typed stays."""

@@ -59,7 +59,7 @@ class Legend(Themed, QWidget):
     def show_entries(self, entries: tuple[tuple[CurveStyle, str], ...]) -> None:
         if entries != self._entries:
             self._entries = entries
-            self.setAccessibleName(", ".join(words for _, words in entries))
+            self.setAccessibleName(", ".join(text for _, text in entries))
             self._fit()
             self.update()
 
@@ -74,8 +74,8 @@ class Legend(Themed, QWidget):
     def _places(self) -> list[QPointF]:
         metrics = QFontMetricsF(self._font)
         places, x, y = [], 0.0, LEGEND_LINE / 2
-        for _, words in self._entries:
-            width = STROKE_WIDTH + 6 + metrics.horizontalAdvance(words)
+        for _, text in self._entries:
+            width = STROKE_WIDTH + 6 + metrics.horizontalAdvance(text)
             if x and x + width > self.width():
                 x, y = 0.0, y + LEGEND_LINE
             places.append(QPointF(x, y))
@@ -85,12 +85,12 @@ class Legend(Themed, QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = smooth_painter(self)
         painter.setFont(self._font)
-        for (style, words), place in zip(self._entries, self._places(), strict=True):
+        for (style, text), place in zip(self._entries, self._places(), strict=True):
             ink = style.colour(self.theme)
             painter.setPen(pen(ink, style.width * self.devicePixelRatioF(), DASH[style.stroke]))
             painter.drawLine(place, place + QPointF(STROKE_WIDTH, 0))
             painter.setPen(QColor(ink if style is LIMIT else self.theme.text2))
-            painter.drawText(place + QPointF(STROKE_WIDTH + 6, 4.5), words)
+            painter.drawText(place + QPointF(STROKE_WIDTH + 6, 4.5), text)
 
 
 class CurvePlot(Plot):
@@ -269,9 +269,9 @@ class CostLine(QWidget):
         ns = cost.ns or 0.0
         self.name.show_text(cost.effect)
         self.bar.show_share(ns / most_ns if most_ns > 0 else 0.0)
-        words = f"{ns:.0f} ns" if ns >= LEAST_NS else f"< {LEAST_NS:g} ns"
-        self.ns.setText(words)
-        self.setAccessibleName(f"{cost.effect}: {words}")
+        text = f"{ns:.0f} ns" if ns >= LEAST_NS else f"< {LEAST_NS:g} ns"
+        self.ns.setText(text)
+        self.setAccessibleName(f"{cost.effect}: {text}")
 
     def show_waiting(self) -> None:
         self.bar.show_share(0.0)

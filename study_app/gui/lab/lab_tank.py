@@ -391,12 +391,12 @@ class LabTank(Themed, QWidget):
             self._chip(painter, left, CHIP_EDGE, top)
             self._chip(painter, right, self.width() - CHIP_EDGE - self._wide(right), y)
 
-    def _wide(self, words: Words) -> float:
-        return plate(words, self.devicePixelRatioF()).width() / self.devicePixelRatioF() if words[0] else 0.0
+    def _wide(self, note: Words) -> float:
+        return plate(note, self.devicePixelRatioF()).width() / self.devicePixelRatioF() if note[0] else 0.0
 
-    def _chip(self, painter: QPainter, words: Words, left: float, top: float) -> None:
-        if words[0]:
-            painter.drawImage(QPointF(left, top), plate(words, self.devicePixelRatioF()))
+    def _chip(self, painter: QPainter, note: Words, left: float, top: float) -> None:
+        if note[0]:
+            painter.drawImage(QPointF(left, top), plate(note, self.devicePixelRatioF()))
 
     def _paint_corners(self, painter: QPainter) -> None:
         """Round the corners with the window's colour, and paint the focus ring."""
@@ -412,9 +412,9 @@ class LabTank(Themed, QWidget):
 
 
 @lru_cache(maxsize=64)
-def plate(words: Words, ratio: float) -> QImage:
+def plate(note: Words, ratio: float) -> QImage:
     """Return words with their icon on a dark plate, for a screen of pixel ratio ``ratio``."""
-    text, icon = words
+    text, icon = note
     face = font("label", weight=600, tabular=True)
     wide = QFontMetricsF(face).horizontalAdvance(text) + (24 if icon else 0) + 24
     image = QImage(math.ceil(wide * ratio), math.ceil(CHIP_HEIGHT * ratio), QImage.Format.Format_ARGB32_Premultiplied)
@@ -511,10 +511,10 @@ class TankNote(Card):
         view = self._view
         if view is None:
             return
-        icon, ink, words = _said(view)
+        icon, ink, sentence = _said(view)
         self.sign.show_icon(icon, ink)
-        self.words.setText(words)
-        self.setAccessibleName(words)
+        self.words.setText(sentence)
+        self.setAccessibleName(sentence)
         waiting = bool(view.busy) and not view.trouble
         self.bar.setVisible(waiting)
         self.cancel.setVisible(waiting)

@@ -80,8 +80,8 @@ class Segment(Themed, QPushButton):
         if (shown := (name, letter, self.theme)) == self._shown:
             return
         self._shown = shown
-        words = self.fontMetrics().elidedText(name, Qt.TextElideMode.ElideRight, WIDEST - BADGE - 30)
-        self.setText(words.replace("&", "&&"))
+        text = self.fontMetrics().elidedText(name, Qt.TextElideMode.ElideRight, WIDEST - BADGE - 30)
+        self.setText(text.replace("&", "&&"))
         self.setToolTip(plain_tip(name))
         picture = QPixmap((QSizeF(self.iconSize()) * self.devicePixelRatioF()).toSize())
         picture.setDevicePixelRatio(self.devicePixelRatioF())
@@ -145,8 +145,8 @@ class Picker(Choice):
         if choices != self._choices:
             self._choices = choices
             self.clear()
-            for value, words in choices:
-                self.addItem(words, value)
+            for value, text in choices:
+                self.addItem(text, value)
         self.setCurrentIndex(self.findData(chosen))
 
     def show_whole(self, yes: bool) -> None:
@@ -318,9 +318,9 @@ class NumberRow(ParameterRow):
         unit = label(parameter.shown_unit, "small", "text2")
         unit.setFixedWidth(UNIT_WIDTH)
         add_parts(self.line, self.name, (self.slider, 1), self.field, unit)
-        words = f"{parameter.label}, {parameter.shown_unit}".rstrip(", ")
-        self.slider.setAccessibleName(words)
-        self.field.setAccessibleName(words)
+        name = f"{parameter.label}, {parameter.shown_unit}".rstrip(", ")
+        self.slider.setAccessibleName(name)
+        self.field.setAccessibleName(name)
         self.slider.slid.connect(self._slide)
         self.field.entered.connect(self._enter)
         self.field.unread.connect(self._misread)
@@ -412,8 +412,8 @@ class ChoiceRow(ParameterRow):
         self.choice.setProperty("dense", "true")
         self.choice.setFont(font("label"))
         self.choice.setAccessibleName(parameter.label)
-        for value, words in parameter.choices:
-            self.choice.addItem(words, value)
+        for value, text in parameter.choices:
+            self.choice.addItem(text, value)
         self.choice.activated.connect(self._choose)
         add_parts(self.line, self.name, (self.choice, 1))
 
@@ -469,8 +469,8 @@ def row_for(parameter: Parameter) -> ParameterRow:
     return (SwitchRow if {value for value, _ in parameter.choices} == SWITCHED else ChoiceRow)(parameter)
 
 
-def _name(words: str) -> QLabel:
-    made = label(words, "label", "text")
+def _name(text: str) -> QLabel:
+    made = label(text, "label", "text")
     made.setFixedWidth(LABEL_WIDTH)
     made.setMinimumHeight(HEIGHT)
     made.setWordWrap(True)
@@ -501,11 +501,11 @@ class SectionBlock(QWidget):
             line += 1
 
     def show_section(self, section: Section, setting: Setting) -> None:
-        found = [FormRow(it, setting.value(it.name), setting.chosen_value(it.name)) for it in section.parameters]
-        for row in found:
+        rows = [FormRow(it, setting.value(it.name), setting.chosen_value(it.name)) for it in section.parameters]
+        for row in rows:
             self.rows[row.parameter.name].show_row(row)
-        changed = sum(row.changed for row in found)
-        self.count.setText(f"{changed} of {len(found)} changed" if changed else "")
+        changed = sum(row.changed for row in rows)
+        self.count.setText(f"{changed} of {len(rows)} changed" if changed else "")
 
 
 class FormPanel(Card):
@@ -584,26 +584,26 @@ class FormPanel(Card):
         index = self.liquid.findText(bench.in_hand.name)
         self.liquid.setCurrentIndex(index)
         self.liquid.setPlaceholderText(bench.in_hand.name)
-        words = f"Copy to {other_side(bench.presented)}"
-        self.copy.show_action("copy", words)
+        text = f"Copy to {other_side(bench.presented)}"
+        self.copy.show_action("copy", text)
 
     def _show_form(self, setting: Setting, *, forget: bool) -> None:
-        found = sections(setting.scene)
-        shape = [(section.title, tuple(it.name for it in section.parameters)) for section in found]
+        parts = sections(setting.scene)
+        shape = [(section.title, tuple(it.name for it in section.parameters)) for section in parts]
         if shape != [(title, tuple(block.rows)) for title, block in self.blocks.items()]:
-            self._make(found)
+            self._make(parts)
         elif forget:
             for row in self.rows.values():
                 row.let_go()
-        for section in found:
+        for section in parts:
             self.blocks[section.title].show_section(section, setting)
 
-    def _make(self, found: tuple[Section, ...]) -> None:
+    def _make(self, form_sections: tuple[Section, ...]) -> None:
         """Make the rows anew; the keyboard stays in the row that has it, and what is read in its place."""
         rows = self.rows.items()
         focused = [(name, at) for name, row in rows for at, part in enumerate(row.parts()) if part.hasFocus()]
         scrolled_px = self.area.verticalScrollBar().value()
-        self.blocks = {section.title: SectionBlock(section) for section in found}
+        self.blocks = {section.title: SectionBlock(section) for section in form_sections}
         self.rows = {name: row for block in self.blocks.values() for name, row in block.rows.items()}
         for row in self.rows.values():
             row.changed.connect(self.changed)

@@ -221,5 +221,5 @@ class LabPlace(Place):
 
 def preset_name(title: str) -> str:
     """Return a setting's title as a file is called: "Water, edited" becomes "water-edited"."""
-    words = "".join(sign if sign.isalnum() else " " for sign in title.lower()).split()
-    return "-".join(words) or "preset"
+    parts = "".join(sign if sign.isalnum() else " " for sign in title.lower()).split()
+    return "-".join(parts) or "preset"

@@ -51,8 +51,8 @@ class Actions(Card):
         self._show_pause()
 
     def _show_pause(self) -> None:
-        sign, words = ("play", "Resume") if self._resumes else ("pause", "Pause")
-        self.pause.show_action(sign if self._signs else "", words)
+        sign, text = ("play", "Resume") if self._resumes else ("pause", "Pause")
+        self.pause.show_action(sign if self._signs else "", text)
 
     def show_view(self, view: OperatorView) -> None:
         self._resumes = view.may_resume

@@ -161,7 +161,9 @@ class Session:
     def broken(self, progress: Progress) -> dict[int, tuple[Broken, ...]]:
         """Return what the trials done broke, as far as the operator may know: if double-blind, lateness and gaps."""
         hidden = SEALED if self.protocol.study.blinding == "double" else frozenset()
-        return {trial: tuple(one for one in them if one[0] not in hidden) for trial, them in progress.broken.items()}
+        return {
+            trial: tuple(limit for limit in them if limit[0] not in hidden) for trial, them in progress.broken.items()
+        }
 
 
 def operator_view(
@@ -239,14 +241,14 @@ def operator_view(
 
 
 def _track(session: Session, progress: Progress) -> tuple[str, ...]:
-    trial = next((one for one in session.schedule.trials if one.number == progress.of_intervals), None)
+    trial = next((planned for planned in session.schedule.trials if planned.number == progress.of_intervals), None)
     if trial is None or progress.ended:
         return ()
     design = design_of(session.protocol, session.protocol.blocks[trial.block])
     names = words(session.language).design_answers
-    told = track_words(progress, session.schedule, trial, {one: names[one] for one in design.answers})
+    lines = track_words(progress, session.schedule, trial, {answer: names[answer] for answer in design.answers})
     own = session.protocol.study.codes == "participant"
-    return (told[0].replace(f" {trial.code}:", ":", 1), *told[1:]) if own else told
+    return (lines[0].replace(f" {trial.code}:", ":", 1), *lines[1:]) if own else lines
 
 
 def _state(progress: Progress, *, force_on: bool, trouble: str) -> State:
@@ -359,7 +361,7 @@ def _counts(session: Session, progress: Progress) -> tuple[tuple[str, str], ...]
     broken, missing = session.broken(progress).values(), progress.missing_trials
     return (
         ("Answers on disk", f"{sum(progress.answered.values())} of {session.answers_of}"),
-        ("Trials within limits", f"{sum(not one for one in broken)} of {len(broken)}"),
+        ("Trials within limits", f"{sum(not limits for limits in broken)} of {len(broken)}"),
         *([("Trials not delivered", f"{missing.count} of {missing.asked}")] if missing.count else []),
         ("Marks, repeats", f"{sum(note.kind == 'mark' for note in progress.notes)}, {progress.repeats}"),
     )
@@ -397,7 +399,7 @@ def _beyond(session: Session, progress: Progress) -> tuple[str, ...]:
     """Return a sentence for every finished trial that broke a limit, the newest first."""
     labels = {trial.number: trial.label(session.protocol, session.language) for trial in session.schedule.trials}
     return tuple(
-        f"{labels[number]} out of limits: " + "; ".join(broken_words(*one) for one in beyond)
+        f"{labels[number]} out of limits: " + "; ".join(broken_words(*limit) for limit in beyond)
         for number, beyond in reversed(session.broken(progress).items())
         if beyond
     )
@@ -445,10 +447,10 @@ def track_words(progress: Progress, schedule: Schedule, trial: Trial, choices: M
 
     A line that ends in "check" deserves attention.
     """
-    own = [one.number for one in schedule.trials if (one.block, one.code) == (trial.block, trial.code)]
+    own = [planned.number for planned in schedule.trials if (planned.block, planned.code) == (trial.block, trial.code)]
     answers = [progress.trial_answers[number] for number in own if number in progress.trial_answers]
     limits = Counter(limit for number in own for limit in progress.undelivered.get(number, ()))
-    given_up = [one for one in progress.missing_trials.missing if one.trial in own]
+    given_up = [lost for lost in progress.missing_trials.missing if lost.trial in own]
     reasons = Counter(reason for number in own for reason in progress.repeated.get(number, ()))
     return (
         f"Track {trial.code}: {len(answers)} of at most {grouped(len(own))} answered",
@@ -460,11 +462,11 @@ def track_words(progress: Progress, schedule: Schedule, trial: Trial, choices: M
 
 
 def _of_answers(answers: Sequence[TrialAnswer], choices: Mapping[str, str]) -> list[str]:
-    given = [str(one.value) for one in answers]
-    shares = ", ".join(f"{words} {100 * given.count(choice) / len(given):.0f} %" for choice, words in choices.items())
+    given = [str(answer.value) for answer in answers]
+    shares = ", ".join(f"{label} {100 * given.count(choice) / len(given):.0f} %" for choice, label in choices.items())
     run = max(len(list(same)) for _, same in groupby(given))
     lines = [*([shares] if shares else []), f"longest run {run}" + (": check" if run >= LONG_RUN else "")]
-    seconds = [one.seconds for one in answers if one.seconds is not None]
+    seconds = [answer.seconds for answer in answers if answer.seconds is not None]
     if seconds:
         middle = median(seconds)
         lines.append(f"median answer time {middle:.2f} s" + (": check" if middle < FAST_S else ""))

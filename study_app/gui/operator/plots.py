@@ -195,9 +195,9 @@ class TileCard(Card):
         self.unit.setText(tile.unit)
         self.line.show_text(tile.line)
         self.sign.show_icon(*VERDICTS[tile.verdict])
-        words = {"ok": "within limits", "late": "outside limits", "open": "not measured yet"}
+        states = {"ok": "within limits", "late": "outside limits", "open": "not measured yet"}
         value = f"{tile.value} {tile.unit}".strip()
-        self.setAccessibleName(f"{tile.title}: {value}, {words[tile.verdict]}, {tile.line}")
+        self.setAccessibleName(f"{tile.title}: {value}, {states[tile.verdict]}, {tile.line}")
 
 
 class Tiles(QWidget):

@@ -124,11 +124,11 @@ class Banner(QWidget):
         give_ground(self, "bad tint")
         self.what = label("", "strong", "bad", wraps=True)
         self.then = label(WHAT_TO_DO, "label", "text", wraps=True)
-        words = vbox(self.what, self.then, spacing=4)
+        text = vbox(self.what, self.then, spacing=4)
         sign = Icon("warning", "bad", 24), 0, Qt.AlignmentFlag.AlignTop
         self.reconnect = ActionButton("repeat", "Reconnect", key="C", role="primary")
         button = self.reconnect, 0, Qt.AlignmentFlag.AlignVCenter
-        hbox(sign, (words, 1), button, spacing=14, margins=(20, 14, 20, 14), parent=self)
+        hbox(sign, (text, 1), button, spacing=14, margins=(20, 14, 20, 14), parent=self)
         self.reconnect.hide()
         self.hide()
 

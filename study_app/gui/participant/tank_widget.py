@@ -64,10 +64,10 @@ def look(page: TaskPage, captions: Captions, width: int, height: int) -> tuple[B
     return box, Camera.fitted(box, left * width, top * height, wide * width, min(high * height, room))
 
 
-def paint_ahead(page: TaskPage, words: Words, text_scale: float, size: QSize, ratio: float) -> Thread:
+def paint_ahead(page: TaskPage, wording: Words, text_scale: float, size: QSize, ratio: float) -> Thread:
     """Paint the still images of a page that is to come, in a thread of their own, so that it comes at once."""
     width, height = size.width(), size.height()
-    box, camera = look(page, Captions(page, words, text_scale), width, height)
+    box, camera = look(page, Captions(page, wording, text_scale), width, height)
     painting = Thread(target=backdrop, args=((width, height), ratio, box, camera), name="backdrop")
     painting.start()
     return painting
@@ -89,7 +89,7 @@ class TankWidget(QWidget):
     def __init__(
         self,
         page: TaskPage,
-        words: Words,
+        wording: Words,
         parent: QWidget | None = None,
         *,
         text_scale: float = 1.0,
@@ -99,9 +99,9 @@ class TankWidget(QWidget):
     ) -> None:
         super().__init__(parent)
         if by_mouse:
-            for_mouse = {"continue_now": words.click_now, "pause_hint": words.pause_title}
-            words = type(words)({**vars(words), **for_mouse})
-        self._words = words
+            for_mouse = {"continue_now": wording.click_now, "pause_hint": wording.pause_title}
+            wording = type(wording)({**vars(wording), **for_mouse})
+        self._words = wording
         self._by_mouse = by_mouse
         self._photodiode = photodiode
         self._pane: QWidget | None = self._made_pane() if on_card else None
@@ -109,7 +109,7 @@ class TankWidget(QWidget):
         self.setAccessibleName(page.instruction)
         self._page = page
         self._box = Box.around(page.workspace_m, page.body_radius_m)
-        self._captions = Captions(page, words, text_scale)
+        self._captions = Captions(page, wording, text_scale)
         self.patch = OnsetPatch()
         self.video = VideoLayer()
         self.view: TankView | None = None
@@ -254,7 +254,7 @@ class TankWidget(QWidget):
 
         In a rest that waits for the ball, that it is to come back; otherwise "".
         """
-        todo, view, words = self._page.task, self.view, self._words
+        todo, view, wording = self._page.task, self.view, self._words
         if self._page.adjusts:
             return self._captions.setting_keys if self._by_mouse else ""
         following = todo.paced and not self.resting
@@ -263,10 +263,10 @@ class TankWidget(QWidget):
         target = todo.targets_m[view.task.lit] if todo.targets_m else todo.start_m
         if target is None:
             return ""
-        x, y, z = (there - float(here) for there, here in zip(target, view.position_m, strict=True))
+        x, y, z = (goal - float(here) for goal, here in zip(target, view.position_m, strict=True))
         if self._by_mouse and math.hypot(x, y) <= NEAR_RADII * todo.radius_m and abs(z) > todo.radius_m:
-            return words.nearer if z > 0 else words.further_away
-        return words.back_to_target if self.resting and math.hypot(x, y, z) > todo.radius_m else ""
+            return wording.nearer if z > 0 else wording.further_away
+        return wording.back_to_target if self.resting and math.hypot(x, y, z) > todo.radius_m else ""
 
     def _ready(self) -> Backdrop:
         """Return the still images for the present size and screen; lay everything out if they changed."""

@@ -172,8 +172,8 @@ class PointerCapture(QObject):
         self.moved.emit(*self._hand)
 
 
-def _apart(one: QPoint, other: QPoint) -> int:
-    return (one - other).manhattanLength()
+def _apart(first: QPoint, other: QPoint) -> int:
+    return (first - other).manhattanLength()
 
 
 WIDGETS: Final[dict[type[Page], Callable[[Any, PageContext], PageWidget]]] = {

@@ -139,17 +139,17 @@ def computer_checks(
     limits apply; ``cache`` is the folder of compiled code, None where nothing can be stored.
     """
     of_servo = {check.name: check for check in preflight_checks(facts, protocol)}
-    found = [of_servo[name] for name in OF_THE_COMPUTER]
-    return (*found, _devices(devices), _compiled(cache, compiled))
+    results = [of_servo[name] for name in OF_THE_COMPUTER]
+    return (*results, _devices(devices), _compiled(cache, compiled))
 
 
 def _devices(devices: Sequence[Backend]) -> Check:
     """Say which haptic devices are connected; without one sessions run with the mouse."""
-    haptic = [one for one in devices if one.state.startswith("connected")]
-    missing = [one.name for one in devices if one.state == NOT_AVAILABLE]
+    haptic = [device for device in devices if device.state.startswith("connected")]
+    missing = [device.name for device in devices if device.state == NOT_AVAILABLE]
     about = f"cannot be used now: {', '.join(missing)}" if missing else "every device can be used"
     if haptic:
-        return Check("Haptic devices", "ok", ", ".join(one.name for one in haptic), about=about)
+        return Check("Haptic devices", "ok", ", ".join(device.name for device in haptic), about=about)
     advice = "Connect one, then look at Devices; without one only the mouse and the simulated hand can be used."
     return Check("Haptic devices", "warning", "none connected", about=about, advice=advice)
 
@@ -336,7 +336,7 @@ class PreflightWindow(QWidget):
             self.chip.show_state("ok", "check", view.passed)
 
     def _show_rows(self, view: PreflightView) -> None:
-        for place, (name, words) in enumerate(view.rows):
+        for place, (name, text) in enumerate(view.rows):
             if name not in self._values:
                 value = figures("", "label", weight=600)
                 value.setAlignment(Qt.AlignmentFlag.AlignRight)
@@ -344,7 +344,7 @@ class PreflightWindow(QWidget):
                 self._grid.addWidget(label(name, "label", "text2"), place, 0)
                 self._grid.addWidget(value, place, 1)
                 self._values[name] = value
-            self._values[name].setText(words)
+            self._values[name].setText(text)
 
     def values(self) -> tuple[QLabel, ...]:
         return tuple(self._values.values())
@@ -384,8 +384,8 @@ class MaskingQuestion(QWidget):
         super().__init__()
         self.means = Choice()
         self.means.setAccessibleName("Motors masked?")
-        for means, words in MEANS.items():
-            self.means.addItem(words, means)
+        for means, text in MEANS.items():
+            self.means.addItem(text, means)
         self.noise_db = Number(QUIETEST_DB, LOUDEST_DB, USUAL_DB)
         self.noise_db.setAccessibleName("Level of the noise in dB")
         self.noise_db.setSuffix(" dB")

@@ -49,10 +49,10 @@ def unblinded_words(reveal: Mapping[str, str]) -> str:
     return f"Unblinded{day} by {reveal.get('by', 'unknown')}: {reveal.get('reason', 'no reason given')}"
 
 
-def excluded_words(one: Exclusion) -> str:
+def excluded_words(exclusion: Exclusion) -> str:
     """Return what is excluded: "P003, session 2, trial 4"."""
-    name = one.participant if one.session == 1 else f"{one.participant}, session {one.session}"
-    return name if one.trial is None else f"{name}, trial {one.trial}"
+    name = exclusion.participant if exclusion.session == 1 else f"{exclusion.participant}, session {exclusion.session}"
+    return name if exclusion.trial is None else f"{name}, trial {exclusion.trial}"
 
 
 def time_of(text: object) -> datetime | None:
@@ -118,12 +118,12 @@ class ResultsView:
 
 def in_figures(sessions: Sequence[SessionFacts]) -> tuple[str, str]:
     """Return how many sessions are in the figures, and why the others are not; empty without sessions."""
-    inside = [one for one in sessions if one.counts]
+    inside = [session for session in sessions if session.counts]
     head = f"{len(inside)} of {counted(len(sessions), 'session')} in the figures"
     if not sessions:
         return "", ""
-    excluded = [one.name for one in sessions if one.excluded is not None]
-    open_ones = [one.name for one in sessions if one.excluded is None and not one.counts]
+    excluded = [session.name for session in sessions if session.excluded is not None]
+    open_ones = [session.name for session in sessions if session.excluded is None and not session.counts]
     parts = [_are(open_ones, "not complete"), _are(excluded, "excluded")]
     line = "; ".join(filter(None, parts))
     return head, f"{line}." if line else ""
@@ -175,8 +175,8 @@ def _ink(theme: Theme, role: str) -> str:
 def _dyed(part: bytes, by: Mapping[bytes, bytes], accent: bytes) -> bytes:
     """Replace colours; the accent as a shade, laid on with an opacity under letters, stays as deep as it is."""
     shade = b"fill: " + re.escape(accent) + rb"; (?:fill-)?opacity"
-    found = re.compile(b"|".join([shade, *map(re.escape, sorted(by, key=len, reverse=True))]))
-    return found.sub(lambda match: by.get(match[0], match[0]), part)
+    pattern = re.compile(b"|".join([shade, *map(re.escape, sorted(by, key=len, reverse=True))]))
+    return pattern.sub(lambda match: by.get(match[0], match[0]), part)
 
 
 def drawn(svg: bytes, size: QSize, ratio: float) -> QImage:
@@ -213,8 +213,8 @@ class FigureView(Coloured, QWidget):
     def show_figure(self, figure: FigureDrawn, colours: Mapping[str, str]) -> None:
         """Draw another figure from now on; the one before stays until that one is drawn."""
         self._figure, self._colours = figure, colours
-        found = SIZE.search(figure.svg)
-        self._proportion = float(found[2]) / float(found[1]) if found else 0.5
+        size = SIZE.search(figure.svg)
+        self._proportion = float(size[2]) / float(size[1]) if size else 0.5
         self.setAccessibleName(figure.title)
         self.setAccessibleDescription(figure.caption)
         self.updateGeometry()
@@ -298,18 +298,18 @@ class FigureCard(Card):
     def show_figure(self, figure: FigureDrawn, colours: Mapping[str, str]) -> None:
         self.figure = figure
         self.caption.setText(figure.caption)
-        there = bool(figure.svg)
+        has_figure = bool(figure.svg)
         self._title.setText(figure.title)
-        self._title.setVisible(not there)  # a figure has its own
-        self.more.setVisible(there)
+        self._title.setVisible(not has_figure)  # a figure has its own
+        self.more.setVisible(has_figure)
         self.more.setAccessibleName(f"Caption of {figure.title}")
-        self.caption.setVisible(not there or self.more.isChecked())
-        if self.drawing is not None and there:
+        self.caption.setVisible(not has_figure or self.more.isChecked())
+        if self.drawing is not None and has_figure:
             self.drawing.show_figure(figure, colours)
         elif self.drawing is not None:
             remove_widget(self.drawing)
             self.drawing = None
-        elif there:
+        elif has_figure:
             self.drawing = FigureView(figure, colours)
             self._place.addWidget(self.drawing, 0, Qt.AlignmentFlag.AlignHCenter)
             self.more.raise_()

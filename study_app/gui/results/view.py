@@ -86,12 +86,12 @@ class WriteDialog(Work):
     """
 
     def __init__(
-        self, *words: Any, go_on: str, to: Path, extras: Sequence[Extra] = (), opens_file: bool = False
+        self, *arguments: Any, go_on: str, to: Path, extras: Sequence[Extra] = (), opens_file: bool = False
     ) -> None:
         checks = (Field(extra.name, extra.words, "check", hint=extra.why_not) for extra in extras)
         folder = Field("to", "Folder", "folder", hint="Existing files will be overwritten.")
         super().__init__(
-            *words,
+            *arguments,
             ActionButton("", go_on, role="primary"),
             fields=(*checks, folder),
             needs={"to": "Please choose a folder."},
@@ -167,7 +167,7 @@ class LeaveOutDialog(Question):
 
     def _show_trials(self) -> None:
         trials = self._trials.get(self.value("session"), ())
-        self.editors["trial"].offer({None: "Whole session", **{at: f"Trial {at}: {words}" for at, words in trials}})
+        self.editors["trial"].offer({None: "Whole session", **{at: f"Trial {at}: {text}" for at, text in trials}})
 
     @property
     def chosen(self) -> tuple[str, int, int | None]:
@@ -204,8 +204,8 @@ class SessionsCard(Card):
         self.details = IconButton("file", "Details of the selected session", size=36, role="plain")
         self.details.setEnabled(False)
         self.details.clicked.connect(self.rows.open_chosen)
-        words = "What changed in the study since the selected session"
-        self.version = IconButton("designer", words, size=36, role="plain")
+        tip = "What changed in the study since the selected session"
+        self.version = IconButton("designer", tip, size=36, role="plain")
         self.version.setEnabled(False)
         self.version.clicked.connect(self.rows.ask_for_version)
         self.rows.chosen_changed.connect(self._enable)
@@ -220,18 +220,18 @@ class SessionsCard(Card):
         self.details.setEnabled(chosen is not None)
         self.version.setEnabled(chosen is not None and bool(chosen.version))
 
-    def show_sessions(self, found: Sequence[SessionFacts], none: str = "No sessions.") -> None:
+    def show_sessions(self, sessions: Sequence[SessionFacts], none: str = "No sessions.") -> None:
         """Show these sessions in place of those before, or the words ``none`` in their place; the filters stay."""
         self._none = none
-        self.rows.show_rows(found, datetime.now().astimezone())
+        self.rows.show_rows(sessions, datetime.now().astimezone())
         chosen = self.state.currentData()
         with QSignalBlocker(self.state):
             self.state.clear()
             self.state.addItem(EVERY, "")
-            for state, words in states_of(found):
-                self.state.addItem(words, state)
+            for state, text in states_of(sessions):
+                self.state.addItem(text, state)
             self.state.setCurrentIndex(max(0, self.state.findData(chosen)))
-        head, why = in_figures(found)
+        head, why = in_figures(sessions)
         self.head.setText(head)
         self.why.setText(why)
         self.why.setVisible(bool(why))
@@ -275,7 +275,7 @@ class ExclusionsCard(Card):
             self.leave_out.setFocus()
         for line in self.lines:
             remove_widget(line)
-        self.lines = [self._line(one) for one in reversed(listed)]
+        self.lines = [self._line(exclusion) for exclusion in reversed(listed)]
         for place, line in enumerate(self.lines):
             self._rows.insertWidget(place, line)
         self.none.setVisible(not listed)
@@ -284,19 +284,19 @@ class ExclusionsCard(Card):
         grows = QSizePolicy.Policy.Preferred if listed else QSizePolicy.Policy.Maximum
         self.setSizePolicy(QSizePolicy.Policy.Preferred, grows)
 
-    def _line(self, one: Exclusion) -> QWidget:
+    def _line(self, exclusion: Exclusion) -> QWidget:
         """Return one decision: what, why, who and when."""
         back = ActionButton("undo", "Include again …", role="plain", height=30)
-        back.setAccessibleName(f"Include again: {excluded_words(one)}")
-        back.clicked.connect(lambda: self.take_back_asked.emit(one))
+        back.setAccessibleName(f"Include again: {excluded_words(exclusion)}")
+        back.clicked.connect(lambda: self.take_back_asked.emit(exclusion))
         made = QWidget()
-        what = label(excluded_words(one), "label", wraps=True, weight=600)
-        why = label(one.reason, "label", "text2", wraps=True, weight=400)
-        now, at = datetime.now().astimezone(), time_of(one.excluded_at)
-        by = one.rule_or_person + ("" if at is None else f", {started_words(at.astimezone(now.tzinfo), now)}")
+        what = label(excluded_words(exclusion), "label", wraps=True, weight=600)
+        why = label(exclusion.reason, "label", "text2", wraps=True, weight=400)
+        now, at = datetime.now().astimezone(), time_of(exclusion.excluded_at)
+        by = exclusion.rule_or_person + ("" if at is None else f", {started_words(at.astimezone(now.tzinfo), now)}")
         who = label(by, "small", "text2")
         vbox(hbox((what, 1), back), why, who, spacing=0, margins=(0, 0, 6, 0), parent=made)
-        made.setAccessibleName(f"{excluded_words(one)}: {one.reason} ({by})")
+        made.setAccessibleName(f"{excluded_words(exclusion)}: {exclusion.reason} ({by})")
         return made
 
 
@@ -448,7 +448,7 @@ class ResultsPlace(Place):
         self.unblind.setVisible(view.sealed is True)
         for button in (self.unblind, self.export, self.report):
             button.setEnabled(view.can_be_written)
-        self.exclusions.leave_out.setEnabled(any(one.excluded is None for one in view.sessions))
+        self.exclusions.leave_out.setEnabled(any(session.excluded is None for session in view.sessions))
         self._panel.setVisible(view.chosen is not None)
         self.figures.show_view(view)
 
@@ -473,24 +473,24 @@ class ResultsPlace(Place):
             chips.append(("neutral", "lock", "Blinded: shown by code", "The names of the settings are sealed"))
         if self.view.opened:
             opened, most = self.view.opened, 2 * REASON_SIGNS
-            words = opened if len(opened) <= most else f"{opened[: most - 1].rstrip()}…"
-            chips.append(("neutral", "eye", words, opened))
+            text = opened if len(opened) <= most else f"{opened[: most - 1].rstrip()}…"
+            chips.append(("neutral", "eye", text, opened))
         if self.view.doubts:
-            words = "1 file is" if len(self.view.doubts) == 1 else f"{len(self.view.doubts)} files are"
-            chips.append(("warn", "warning", f"{words} not as recorded", "\n".join(self.view.doubts)))
-        if [chip.word for chip in self.chips] != [words for _, _, words, _ in chips]:
+            text = "1 file is" if len(self.view.doubts) == 1 else f"{len(self.view.doubts)} files are"
+            chips.append(("warn", "warning", f"{text} not as recorded", "\n".join(self.view.doubts)))
+        if [chip.word for chip in self.chips] != [text for _, _, text, _ in chips]:
             for chip in self.chips:
                 remove_widget(chip)
             self.chips = []
-            for tone, icon, words, tip in chips:
-                chip = Chip(tone, icon, words)  # type: ignore[arg-type]  # the tones above
+            for tone, icon, text, tip in chips:
+                chip = Chip(tone, icon, text)  # type: ignore[arg-type]  # the tones above
                 chip.setToolTip(plain_tip(tip))
                 self._chips.addWidget(chip)
                 self.chips.append(chip)
             self._arrange()
 
     def _ask_unblind(self) -> None:
-        running = sum(one.needs_care for one in self.view.sessions)
+        running = sum(session.needs_care for session in self.view.sessions)
         many = "1 session is" if running == 1 else f"{running} sessions are"
         later = f"{many} not complete. Operators of the remaining sessions will no longer be blind." if running else ""
         dialog = Question(
@@ -514,8 +514,8 @@ class ResultsPlace(Place):
         self._open(page)
 
     def _ask_leave_out(self) -> None:
-        there = [one for one in self.view.sessions if one.excluded is None]
-        dialog = LeaveOutDialog(self, self.theme, there, self.view.trials, self.sessions.rows.chosen)
+        included = [session for session in self.view.sessions if session.excluded is None]
+        dialog = LeaveOutDialog(self, self.theme, included, self.view.trials, self.sessions.rows.chosen)
         decide = partial(self._decide, "leaving out", LeaveOut)
 
         def leave_out() -> None:
@@ -526,19 +526,19 @@ class ResultsPlace(Place):
         dialog.accepted.connect(leave_out)
         self._open(dialog)
 
-    def _ask_take_back(self, one: Exclusion) -> None:
+    def _ask_take_back(self, exclusion: Exclusion) -> None:
         dialog = Question(
             self,
             self.theme,
-            f"Include again: {excluded_words(one)}",
-            f"It was excluded for this reason: “{one.reason}”. It will count again in measures, figures and tests. "
-            "Your name, the reason and the time are stored in exclusions_reversed.jsonl.",
+            f"Include again: {excluded_words(exclusion)}",
+            f"It was excluded for this reason: “{exclusion.reason}”. It will count again in measures, figures and "
+            "tests. Your name, the reason and the time are stored in exclusions_reversed.jsonl.",
             ActionButton("undo", "Include again", role="primary"),
             fields=by_and_reason("By", "Your name or initials, such as AK", "wrong participant"),
             needs=NEEDS,
             width=QUESTION_PX,
         )
-        which = {"participant": one.participant, "session": one.session, "trial": one.trial}
+        which = {"participant": exclusion.participant, "session": exclusion.session, "trial": exclusion.trial}
         decide = partial(self._decide, "taking the exclusion back", TakeBack, **which)
         dialog.accepted.connect(lambda: decide(by=dialog.value("by"), reason=dialog.value("reason")))
         self._open(dialog)
@@ -675,15 +675,15 @@ class ResultsPlace(Place):
                 )
             case FigureDrawn() if newest:
                 self._redrawn.add(answer.name)
-                there = [figure.name for figure in self.view.figures]
+                names = [figure.name for figure in self.view.figures]
                 figures = [answer if figure.name == answer.name else figure for figure in self.view.figures]
-                self._show(figures=tuple(figures if answer.name in there else [*figures, answer]))
+                self._show(figures=tuple(figures if answer.name in names else [*figures, answer]))
 
-    def _take_studies(self, found: StudiesFound) -> None:
-        there = [one.folder for one in found.studies]
-        chosen = self.view.chosen if self.view.chosen in there else None
-        if chosen is None and there:
-            chosen = max(found.studies, key=lambda one: one.newest_s).folder
+    def _take_studies(self, answer: StudiesFound) -> None:
+        folders = [study.folder for study in answer.studies]
+        chosen = self.view.chosen if self.view.chosen in folders else None
+        if chosen is None and folders:
+            chosen = max(answer.studies, key=lambda study: study.newest_s).folder
         if chosen is None:
             sentence = f"The first session of a study creates its folder in {self.results}."
             self.show_view(
@@ -692,7 +692,7 @@ class ResultsPlace(Place):
                 )
             )
             return
-        self._show(studies=found.studies)
+        self._show(studies=answer.studies)
         self._read(chosen)
 
     def _choose(self, folder: Path) -> None:
@@ -708,15 +708,15 @@ class ResultsPlace(Place):
         self._show(trouble=None, untested=False, listed=False)
         self._ask(ReadStudy(folder), f"reading {folder.name}")
 
-    def _take_sessions(self, found: SessionsFound) -> None:
-        facts = session_facts(found.folder, found.rows, found.exclusions, {})
-        facts.sort(key=lambda one: (not one.needs_care, one.participant, one.session))
-        reveal = found.reveal
+    def _take_sessions(self, answer: SessionsFound) -> None:
+        facts = session_facts(answer.folder, answer.rows, answer.exclusions, {})
+        facts.sort(key=lambda session: (not session.needs_care, session.participant, session.session))
+        reveal = answer.reveal
         self._show(
             sessions=tuple(facts),
             listed=True,
-            left_out=found.exclusions,
-            exclusions_file=exclusions_at(found.folder),
+            left_out=answer.exclusions,
+            exclusions_file=exclusions_at(answer.folder),
             sealed=reveal is None,
             opened="" if reveal is None else unblinded_words(reveal),
         )

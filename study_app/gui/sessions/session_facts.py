@@ -100,19 +100,21 @@ def sessions(results: Path, answers_of: Mapping[str, int]) -> tuple[SessionFacts
 
     ``answers_of`` says how many answers a whole session of a study has. Folders that hold no study are passed over.
     """
-    found: list[SessionFacts] = []
+    facts: list[SessionFacts] = []
     for data in sorted(results.glob("*/data")):
         with contextlib.suppress(StoreError):  # not ours, or not readable: the commands say why when asked about it
             rows = participant_rows(StudyFolder(data.parent))
-            found += session_facts(data.parent, rows, _exclusions(data.parent), answers_of)
-    return tuple(sorted(found, key=lambda session: (not session.needs_care, -session.started.timestamp())))
+            facts += session_facts(data.parent, rows, _exclusions(data.parent), answers_of)
+    return tuple(sorted(facts, key=lambda session: (not session.needs_care, -session.started.timestamp())))
 
 
 def session_facts(
     study: Path, rows: Iterable[Mapping[str, Any]], listed: Iterable[Exclusion], answers_of: Mapping[str, int]
 ) -> list[SessionFacts]:
     """Return the rows of a study's participants as facts; ``listed`` is what is excluded from the analysis."""
-    reasons = {(one.participant, one.session): one.reason for one in listed if one.trial is None}
+    reasons = {
+        (exclusion.participant, exclusion.session): exclusion.reason for exclusion in listed if exclusion.trial is None
+    }
     placed = [(row, session_in(study, row["participant"], int(row["session"]))) for row in rows]
     counts = [
         journal.count_events(session.journal, "recording_lost", "device_reconnected", "outlet_lost")
@@ -257,12 +259,12 @@ def answers_words(facts: SessionFacts) -> str:
     return f"{facts.answers} of {facts.answers_of}" if facts.answers_of is not None else str(facts.answers)
 
 
-def matching(words: str, status: str) -> Callable[[SessionFacts], bool]:
-    """Return whether a session's participant holds ``words`` and its state is ``status`` ("" for any).
+def matching(text: str, status: str) -> Callable[[SessionFacts], bool]:
+    """Return whether a session's participant holds ``text`` and its state is ``status`` ("" for any).
 
     ``status`` is one of `STATUS`, "excluded", "invalid" or "lost".
     """
-    wanted = words.strip().lower()
+    wanted = text.strip().lower()
 
     def matches(facts: SessionFacts) -> bool:
         if wanted not in facts.participant.lower():
@@ -276,15 +278,17 @@ def matching(words: str, status: str) -> Callable[[SessionFacts], bool]:
     return matches
 
 
-def states_of(found: Iterable[SessionFacts]) -> list[tuple[str, str]]:
+def states_of(sessions: Iterable[SessionFacts]) -> list[tuple[str, str]]:
     """Return the states that occur among sessions, with their words, in the order of `STATUS`."""
-    there = list(found)
-    states = [(status, word) for status, (_, _, word) in STATUS.items() if any(one.status == status for one in there)]
-    if any(one.validity == "invalid" for one in there):
+    listed = list(sessions)
+    states = [
+        (status, word) for status, (_, _, word) in STATUS.items() if any(session.status == status for session in listed)
+    ]
+    if any(session.validity == "invalid" for session in listed):
         states.append(("invalid", VALIDITY["invalid"][2]))
-    if any(one.lost for one in there):
+    if any(session.lost for session in listed):
         states.append(("lost", LOST[2]))
-    if any(one.excluded is not None for one in there):
+    if any(session.excluded is not None for session in listed):
         states.append(("excluded", "Excluded"))
     return states
 
@@ -328,14 +332,14 @@ class Extent:
 
 def extent_of(protocol: Protocol) -> Extent:
     """Return how much the sessions of a study ask; of one session where its own protocol is given."""
-    sessions = [one.protocol for one in variants(protocol)]
-    orders = [orders_of(one) for one in sessions]
+    sessions = [variant.protocol for variant in variants(protocol)]
+    orders = [orders_of(session) for session in sessions]
     return Extent(
-        parts=tuple(one.parts for one in sessions),
-        settings=tuple(sum(block.trials for block in one.blocks if block.phase == "main") for one in orders),
+        parts=tuple(session.parts for session in sessions),
+        settings=tuple(sum(block.trials for block in order.blocks if block.phase == "main") for order in orders),
         setting="setting" if all(block.design is None for block in protocol.blocks.values()) else "trial",
-        answers=tuple(one.answers for one in orders),
-        expected_s=tuple(expected_duration_s(one) for one in sessions),
+        answers=tuple(order.answers for order in orders),
+        expected_s=tuple(expected_duration_s(session) for session in sessions),
     )
 
 

@@ -92,7 +92,7 @@ def read_record(folder: Path) -> SessionRecord:
         raise StoreError(f"{session.journal} has no line: the session did not begin")
     listed = exclusions(study.path)
     (facts,) = session_facts(study.path, row_of(session, key), listed, {})
-    own = tuple(one for one in listed if one.what[:2] == (facts.participant, facts.session))
+    own = tuple(exclusion for exclusion in listed if exclusion.what[:2] == (facts.participant, facts.session))
     start = start_of(lines)
     rows = session_tables.SessionRows(lines).trials
     trials = _trials(rows, lines, start.limits, own)
@@ -121,9 +121,11 @@ def limits_sentence(
 ) -> str:
     """Return how many trials were not delivered, how many kept the study's limits, and what that means."""
     lost = f"{missing_sentence(missing, excluded=excluded)} " if missing.count else ""
-    repeated = sum(one.outcome == UNDELIVERED for one in trials)
+    repeated = sum(trial.outcome == UNDELIVERED for trial in trials)
     again = f"{counted(repeated, 'presentation')} broke a limit and had no question. " if repeated else ""
-    return f"{lost}{again}{_judged_sentence([one for one in trials if one.outcome != UNDELIVERED], sealed=sealed)}"
+    return (
+        f"{lost}{again}{_judged_sentence([trial for trial in trials if trial.outcome != UNDELIVERED], sealed=sealed)}"
+    )
 
 
 def missing_sentence(missing: MissingTrials, *, excluded: bool) -> str:
@@ -137,8 +139,8 @@ def missing_sentence(missing: MissingTrials, *, excluded: bool) -> str:
 
 
 def _judged_sentence(trials: Sequence[TrialRecord], *, sealed: bool) -> str:
-    judged = [one for one in trials if one.valid is not None]
-    outside = [one for one in judged if not one.valid]
+    judged = [trial for trial in trials if trial.valid is not None]
+    outside = [trial for trial in judged if not trial.valid]
     later = " Delay error, withheld force and targets reached are judged once the study is unblinded." if sealed else ""
     if not judged:
         return f"No trial has been measured yet.{later}"
@@ -155,7 +157,7 @@ def _judged_sentence(trials: Sequence[TrialRecord], *, sealed: bool) -> str:
 def _trials(
     rows: Sequence[Mapping[str, Any]], lines: Sequence[Event], limits: Mapping[str, float], own: Sequence[Exclusion]
 ) -> tuple[TrialRecord, ...]:
-    reasons = {one.trial: one.reason for one in own}
+    reasons = {exclusion.trial: exclusion.reason for exclusion in own}
     answered: dict[tuple[int, int], int] = {}
     unconfirmed = progress_of(lines).unconfirmed
     for row in session_tables.SessionRows(lines).responses:
@@ -168,7 +170,7 @@ def _trials(
             words=_words(row),
             outcome=row["outcome"] or "running",
             valid=row["valid"],
-            broken=tuple(broken_words(*one) for one in beyond_limits(row, limits)),
+            broken=tuple(broken_words(*limit) for limit in beyond_limits(row, limits)),
             answers=answered.get((row["trial"], row["attempt"]), 0),
             unconfirmed=_choices(unconfirmed.get((row["trial"], row["attempt"]), {})),
             notes=" · ".join(_row_notes(row)),
@@ -181,8 +183,8 @@ def _trials(
 
 def _choices(given: Mapping[str, Answer]) -> tuple[str, ...]:
     """Return choices as "item: value", in the order in which the items were first answered."""
-    chosen = sorted(given.items(), key=lambda one: one[1].first_s or 0.0)
-    return tuple(f"{item}: {'cannot judge' if one.value is None else one.value}" for item, one in chosen)
+    chosen = sorted(given.items(), key=lambda entry: entry[1].first_s or 0.0)
+    return tuple(f"{item}: {'cannot judge' if answer.value is None else answer.value}" for item, answer in chosen)
 
 
 def _row_notes(row: Mapping[str, Any]) -> list[str]:
@@ -214,7 +216,7 @@ def _about(lines: Sequence[Event], happened: str) -> str:
 
 
 def _notes(lines: Sequence[Event]) -> list[str]:
-    trial, found = None, []
+    trial, notes = None, []
     for line in lines:
         if isinstance(line, TrialStarted):  # recordings of the trial before are reported later
             trial = line.trial
@@ -222,8 +224,8 @@ def _notes(lines: Sequence[Event]) -> list[str]:
             continue
         text = f"repeated: {line.reason}" if isinstance(line, Repeat) else line.text or "marked"
         where = "before the first trial" if trial is None else f"trial {trial}"
-        found.append(f"{datetime.fromisoformat(line.at):%H:%M}, {where}: {text}")
-    return found
+        notes.append(f"{datetime.fromisoformat(line.at):%H:%M}, {where}: {text}")
+    return notes
 
 
 HEADINGS = ("Trial", "Presented", "Ended", "Limits", "Answers", "Notes")
@@ -234,7 +236,7 @@ SIZE = (1040, 700)
 def trial_cell(trial: TrialRecord, heading: str) -> dict[int, Any]:
     """Return the values of a trial's cell under a heading, by their roles."""
     chip = trial_chip(trial)
-    words = {
+    text = {
         "Trial": str(trial.number),
         "Presented": trial.words,
         "Ended": trial.outcome,
@@ -243,8 +245,8 @@ def trial_cell(trial: TrialRecord, heading: str) -> dict[int, Any]:
         "Notes": trial.notes,
     }[heading]
     return {
-        Qt.ItemDataRole.DisplayRole: words,
-        Qt.ItemDataRole.AccessibleTextRole: words,
+        Qt.ItemDataRole.DisplayRole: text,
+        Qt.ItemDataRole.AccessibleTextRole: text,
         Qt.ItemDataRole.ToolTipRole: trial_words(trial),
         CHIP_ROLE: chip if heading == "Limits" else None,
     }
@@ -358,8 +360,9 @@ class SessionPage(Themed, QDialog):
         self.notes.setText("\n".join(record.notes) or "No notes.")
         self.files.setText("\n".join(f"{name}  {_size(size)}" for name, size in record.files))
         left_out = (
-            f"{'Whole session' if one.trial is None else f'Trial {one.trial}'}: {one.reason} ({one.rule_or_person})"
-            for one in record.left_out
+            f"{'Whole session' if exclusion.trial is None else f'Trial {exclusion.trial}'}: "
+            f"{exclusion.reason} ({exclusion.rule_or_person})"
+            for exclusion in record.left_out
         )
         self.out.setText("\n".join(left_out) or "Nothing is excluded from the analysis.")
         self._choose_trial()

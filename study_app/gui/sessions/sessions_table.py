@@ -36,22 +36,22 @@ def session_cell(facts: SessionFacts, name: str, now: datetime) -> dict[int, Any
     tip, face = ", ".join(filter(None, (said, str(missing or ""), incidents(facts)))), None
     match name:
         case "participant":
-            words, face = facts.name, font("label", weight=600, scale=1.08)
+            text, face = facts.name, font("label", weight=600, scale=1.08)
         case "study":
-            words = facts.study
+            text = facts.study
         case "started":
-            words = began
+            text = began
         case "version":
-            words, face = facts.version, font("label", weight=400, tabular=True)
+            text, face = facts.version, font("label", weight=400, tabular=True)
             face.setUnderline(True)
-            tip = f"Show what changed in the study since version {words}" if words else tip
+            tip = f"Show what changed in the study since version {text}" if text else tip
         case _:
-            words = answers_words(facts) if chip is None else chip(facts)[2]
+            text = answers_words(facts) if chip is None else chip(facts)[2]
     if name == "validity" and facts.excluded is not None:
         tip = f"Excluded from the analysis: {facts.excluded}"
     return {
-        ROLE.DisplayRole: words,
-        ROLE.AccessibleTextRole: ", ".join(filter(None, (words, below))),
+        ROLE.DisplayRole: text,
+        ROLE.AccessibleTextRole: ", ".join(filter(None, (text, below))),
         ROLE.ToolTipRole: tip,
         ROLE.FontRole: face,
         CHIP_ROLE: None if chip is None else chip(facts),
@@ -102,16 +102,16 @@ class SessionsTable(QWidget):
         row = self.table.chosen_row
         return None if row is None else self.shown[row]
 
-    def show_rows(self, found: Sequence[SessionFacts], now: datetime) -> None:
+    def show_rows(self, sessions: Sequence[SessionFacts], now: datetime) -> None:
         """Show these sessions in place of those before, as far as they match; the one that was chosen stays so."""
-        self._every, self._now = tuple(found), now
+        self._every, self._now = tuple(sessions), now
         self.show_matching(self._matches)
 
     def show_matching(self, matches: Callable[[SessionFacts], bool]) -> None:
         """Show the sessions alone that match, now and later."""
         before, self._matches = self.chosen, matches
         self.model.show(filter(matches, self._every))
-        places = [one.folder for one in self.shown]
+        places = [session.folder for session in self.shown]
         if before is not None and before.folder in places:
             self.table.selectRow(places.index(before.folder))
         self.chosen_changed.emit()

@@ -122,7 +122,7 @@ class OffsetForm(QWidget):
             number("spread", "Spread", "ms", SPREAD_MS, DECIMALS),
             choice("how", "Measured by", {way: way.capitalize() for way in HOWS}),
         )
-        self.editors = {one.name: Editor(one) for one in fields}
+        self.editors = {field.name: Editor(field) for field in fields}
         self.said = label("", "label", "text2", wraps=True, weight=400, tabular=True)
         self.said.setMinimumWidth(LEAST_WORDS)
         self.keep = ActionButton("save", "Save offset", height=38)
@@ -141,15 +141,15 @@ class OffsetForm(QWidget):
                 self.editors[name].show_value(value)
 
     def _keep(self) -> None:
-        found = []
+        values = []
         for editor in self.editors.values():
             try:
-                found.append(editor.value)
+                values.append(editor.value)
             except ValueError as refusal:
                 editor.show_refusal(str(refusal))
                 editor.control.setFocus()
                 return
-        mean_ms, spread_ms, how = found
+        mean_ms, spread_ms, how = values
         self.kept.emit(mean_ms, spread_ms or 0.0, how)
 
 
@@ -246,8 +246,8 @@ class DisplayTest(QWidget):
         self.update(self.patch_area())
 
     def show_figures(self) -> None:
-        for value, words in zip(self.values, self.times.words(), strict=True):
-            value.setText(words)
+        for value, text in zip(self.values, self.times.words(), strict=True):
+            value.setText(text)
 
     def patch_area(self) -> QRect:
         return patch_place(self.width(), self.height()).toAlignedRect()
@@ -332,11 +332,11 @@ FIELDS = (
     ),
 )  # fmt: skip
 OF_PROGRAM = tuple(  # what has a title in `MachineSettings`: one of a few words, or a switch
-    choice(name, found.title, {word: word.capitalize() for word in words})
-    if (words := get_args(found.annotation))
-    else Field(name, found.title, "switch")
-    for name, found in MachineSettings.model_fields.items()
-    if found.title
+    choice(name, setting.title, {word: word.capitalize() for word in words})
+    if (words := get_args(setting.annotation))
+    else Field(name, setting.title, "switch")
+    for name, setting in MachineSettings.model_fields.items()
+    if setting.title
 )
 
 
@@ -406,7 +406,8 @@ class MachinePlace(Place):
         self.devices = ActionButton("", "Devices", height=40)
         self.change = ActionButton("", "Change …", height=40)
         self.editors = {
-            one.name: Editor(one, self.devices if one.name == "device" else None) for one in (*FIELDS, *OF_PROGRAM)
+            field.name: Editor(field, self.devices if field.name == "device" else None)
+            for field in (*FIELDS, *OF_PROGRAM)
         }
         for editor in self.editors.values():
             editor.changed.connect(lambda name, value: self.changed.emit({name: value}))
@@ -455,7 +456,7 @@ class MachinePlace(Place):
             (
                 card("Display offset", self.offset, Rule(), "photodiode"),
                 card("New sessions", "device", folder, "camera"),
-                card("This program", *(one.name for one in OF_PROGRAM)),
+                card("This program", *(field.name for field in OF_PROGRAM)),
             ),
         )
         self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
@@ -493,16 +494,16 @@ class MachinePlace(Place):
 
     def _show(self) -> None:
         self._screens = screens_shown()
-        settings, there = self.settings, self.participants
+        settings, screen = self.settings, self.participants
         for name, editor in self.editors.items():
             editor.show_value(settings.device.partition(":")[0] if name == "device" else getattr(settings, name))
-        self.editors["screen_width_mm"].show_value(settings.screen_width_mm, width_words(settings, there))
-        missing = settings.screen if settings.screen not in {"", *(one.name for one in self._screens)} else ""
-        self.screens.show_screens(self._screens, there.number, missing)
-        scale = settings.text_scale(there.width_px, there.width_mm)
+        self.editors["screen_width_mm"].show_value(settings.screen_width_mm, width_words(settings, screen))
+        missing = settings.screen if settings.screen not in {"", *(screen.name for screen in self._screens)} else ""
+        self.screens.show_screens(self._screens, screen.number, missing)
+        scale = settings.text_scale(screen.width_px, screen.width_mm)
         self.sample.setFont(font("statement", scale=min(scale, MOST_SAMPLE)))
-        self.said.setText(size_words(settings, there, scale))
-        self.offset.show_offset(settings.display_offset, there.name)
+        self.said.setText(size_words(settings, screen, scale))
+        self.offset.show_offset(settings.display_offset, screen.name)
 
     def _choose_folder(self) -> None:
         if chosen := QFileDialog.getExistingDirectory(self, "Workspace", self.folder.whole):
@@ -511,14 +512,14 @@ class MachinePlace(Place):
     def open_test(self) -> None:
         if self.test is not None:
             return
-        there, screens = self.participants, QGuiApplication.screens()
-        if there.number > len(screens):  # it was unplugged
+        screen, screens = self.participants, QGuiApplication.screens()
+        if screen.number > len(screens):  # it was unplugged
             self._show()
             return
-        words = "  ·  ".join(filter(None, (f"Screen {there.number}", there.name, there.words)))
-        self.test = DisplayTest(words, there.refresh_hz)
+        text = "  ·  ".join(filter(None, (f"Screen {screen.number}", screen.name, screen.words)))
+        self.test = DisplayTest(text, screen.refresh_hz)
         self.test.left.connect(self._test_left)
-        self.test.open_on(screens[there.number - 1])
+        self.test.open_on(screens[screen.number - 1])
 
     def _test_left(self) -> None:
         test, self.test = self.test, None

@@ -95,12 +95,12 @@ def _parsed(name: str) -> tuple[QPainterPath, QPainterPath]:
     """Return the stroked and the filled path of an icon on the grid."""
     stroked, filled = QPainterPath(), QPainterPath()
     path = stroked
-    words = iter(PATHS[name].split())
+    tokens = iter(PATHS[name].split())
 
     def numbers(count: int) -> list[float]:
-        return [float(next(words)) for _ in range(count)]
+        return [float(next(tokens)) for _ in range(count)]
 
-    for word in words:
+    for word in tokens:
         match word:
             case "fill":
                 path = filled

@@ -34,8 +34,8 @@ def _given(part: object) -> Theme | None:
     """Return the theme of the window that a part is in; between them may be what PySide had better not wrap."""
     while isinstance(part, QWidget):
         window = part.window()
-        if (found := getattr(window, "given_theme", None)) is not None:
-            return found
+        if (theme := getattr(window, "given_theme", None)) is not None:
+            return theme
         part = window.parentWidget()
     return None
 

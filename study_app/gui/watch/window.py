@@ -427,16 +427,16 @@ class WatchWindow(Themed, QDialog):
         dialog = self.export_dialog
         assert dialog is not None  # noqa: S101 - it has begun
         try:
-            found = next(pictures)
+            progress = next(pictures)
         except StudyError as refused:
             self._writing.stop()
             dialog.show_refused(f"{str(refused)[:1].upper()}{str(refused)[1:]}.")
             return
-        if isinstance(found, Path):
+        if isinstance(progress, Path):
             self._writing.stop()
-            dialog.show_done(f"The video is {found}.", "Open the folder")
+            dialog.show_done(f"The video is {progress}.", "Open the folder")
         else:
-            dialog.show_progress("Painting …", found)
+            dialog.show_progress("Painting …", progress)
 
     def _pictures(self, to: Path) -> Iterator[float | Path]:
         """Write a video; yield the share that is done, then the file."""

@@ -18,7 +18,7 @@ def give_role(widget: QWidget, role: QAccessible.Role) -> None:
     Call it last: Qt forgets the role once a signal is connected to a method that the widget's class has in Python.
     """
     if len(_given) % _PRUNED_AT == 0:
-        _given[:] = [one for one in _given if shiboken6.isValid(one)]
+        _given[:] = [part for part in _given if shiboken6.isValid(part)]
     made = QAccessibleWidget(widget, role)
     QAccessible.registerAccessibleInterface(made)
     _given.append(made)
@@ -73,7 +73,7 @@ class HeadingLabel(PlainLabel):
         self.setAccessibleName(text)
 
 
-def say(widget: QWidget, words: str) -> None:
-    """Have ``words`` said of a widget, where anybody listens."""
+def say(widget: QWidget, sentence: str) -> None:
+    """Announce a sentence about a widget to screen readers that listen."""
     if QAccessible.isActive():
-        QAccessible.updateAccessibility(QAccessibleAnnouncementEvent(widget, words))
+        QAccessible.updateAccessibility(QAccessibleAnnouncementEvent(widget, sentence))

@@ -100,31 +100,31 @@ class Background(QObject):
 
     def _begin(self, job: Callable[[], Any]) -> None:
         def work() -> None:
-            found, whole = None, False
+            outcome, whole = None, False
             try:
-                found, whole = job(), True
+                outcome, whole = job(), True
             except self._refusals as error:
-                found = error
+                outcome = error
             except BaseException as error:
-                found = error
+                outcome = error
                 raise
             finally:
                 with _telling:
                     if not _program_ends.is_set():
-                        self._ends.came.emit((self, job, whole, found))
+                        self._ends.came.emit((self, job, whole, outcome))
 
         self._thread = threading.Thread(target=work, name="background", daemon=True)
         _threads.add(self._thread)
         self._thread.start()
 
-    def take(self, job: Callable[[], Any], whole: bool, found: Any) -> None:
+    def take(self, job: Callable[[], Any], whole: bool, outcome: Any) -> None:
         """Pass on what a job returned, or raised where it is not ``whole``; begin the one that took its place."""
         self._thread = None
         if self._wanted is not job and self._wanted is not None:
             self._begin(self._wanted)
             return
         self._wanted = None
-        refused = not whole and isinstance(found, self._refusals)
+        refused = not whole and isinstance(outcome, self._refusals)
         if refused and not self.isSignalConnected(QMetaMethod.fromSignal(self.failed)):
-            log.warning("%s", found)
-        (self.done if whole else self.failed).emit(found)
+            log.warning("%s", outcome)
+        (self.done if whole else self.failed).emit(outcome)

@@ -51,9 +51,9 @@ class PressedByEnter(QPushButton):
 class Cap(Themed, QWidget):
     """Keys as on a keyboard."""
 
-    def __init__(self, words: str) -> None:
+    def __init__(self, text: str) -> None:
         super().__init__()
-        self.words = words
+        self.words = text
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
 
     def sizeHint(self) -> QSize:
@@ -64,20 +64,20 @@ class Cap(Themed, QWidget):
         paint_cap(painter, QPointF(), self.words, self.theme.text, self.theme.ctl)
 
 
-def cap_size(words: str) -> QSize:
+def cap_size(text: str) -> QSize:
     """Return the room for keys as on a keyboard; none where there are no keys."""
-    return QSize(max(20, round(QFontMetricsF(font("key")).horizontalAdvance(words)) + 10) if words else 0, 20)
+    return QSize(max(20, round(QFontMetricsF(font("key")).horizontalAdvance(text)) + 10) if text else 0, 20)
 
 
-def paint_cap(painter: QPainter, at: QPointF, words: str, ink: str, edge: str) -> None:
+def paint_cap(painter: QPainter, at: QPointF, text: str, ink: str, edge: str) -> None:
     """Paint keys as on a keyboard, with their upper left corner at ``at``."""
-    body = QRectF(at, cap_size(words).toSizeF())
+    body = QRectF(at, cap_size(text).toSizeF())
     painter.setPen(QPen(QColor(edge), 1))
     painter.setBrush(Qt.BrushStyle.NoBrush)
     painter.drawRoundedRect(body.adjusted(0.5, 0.5, -0.5, -0.5), 5, 5)
     painter.setPen(QColor(ink))
     painter.setFont(font("key"))
-    painter.drawText(body, Qt.AlignmentFlag.AlignCenter, words)
+    painter.drawText(body, Qt.AlignmentFlag.AlignCenter, text)
 
 
 class ActionButton(Themed, PressedByEnter):
@@ -149,15 +149,15 @@ class ActionButton(Themed, PressedByEnter):
 class CompactStop(Themed, QPushButton):
     """Stop force, in the force stop's own colour; it acts when pressed, not when released, and is never disabled.
 
-    Where the stop ends more than the force, ``words`` say so; ``cap`` are the keys that are shown behind them.
+    Where the stop ends more than the force, ``text`` says so; ``cap`` are the keys that are shown behind them.
     """
 
-    def __init__(self, words: str = "Stop force", cap: str = "") -> None:
+    def __init__(self, text: str = "Stop force", cap: str = "") -> None:
         super().__init__()
-        self.words, self.cap = words, cap
+        self.words, self.cap = text, cap
         self.setProperty("role", "stop")
-        self.setAccessibleName(f"{words}. Holding Esc does the same.")
-        self.setToolTip(f"{words} (or hold Esc)")
+        self.setAccessibleName(f"{text}. Holding Esc does the same.")
+        self.setToolTip(f"{text} (or hold Esc)")
         self.setFixedHeight(STOP_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
@@ -242,8 +242,8 @@ class Choice(Themed, QComboBox):
     def wheelEvent(self, event: QWheelEvent) -> None:
         event.ignore()
 
-    def fitted(self, words: str, room_px: int) -> str:
-        return self.fontMetrics().elidedText(words, Qt.TextElideMode.ElideRight, room_px)
+    def fitted(self, text: str, room_px: int) -> str:
+        return self.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, room_px)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QStylePainter(self)
@@ -336,8 +336,8 @@ class Toggle(Check):
         painter = smooth_painter(self)
         painter.setPen(QColor(t.text if self.isEnabled() else t.text3))
         painter.setFont(self.font())
-        words = QRectF(46, 0, self.width() - 46, self.height())
-        painter.drawText(words, Qt.AlignmentFlag.AlignVCenter, self.text())
+        room = QRectF(46, 0, self.width() - 46, self.height())
+        painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, self.text())
         track = QRectF(4, self.height() / 2 - 9, 32, 18)
         painter.setPen(QPen(QColor(t.accent if self.isChecked() else t.ctl), 1.4))
         painter.setBrush(QColor(t.accent if self.isChecked() else t.surface))
@@ -381,8 +381,8 @@ def _begin_mark(button: QAbstractButton, theme: Theme) -> tuple[QPainter, QRectF
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.setPen(QColor(theme.text if button.isEnabled() else theme.text3))
     painter.setFont(button.font())
-    words = QRectF(30, 0, button.width() - 30, button.height())
-    painter.drawText(words, Qt.AlignmentFlag.AlignVCenter, button.text())
+    room = QRectF(30, 0, button.width() - 30, button.height())
+    painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, button.text())
     marked = button.isChecked() or button.hasFocus()
     painter.setPen(QPen(QColor(theme.accent if marked else theme.ctl), 2 if button.hasFocus() else 1.4))
     return painter, QRectF(2, button.height() / 2 - 9, 18, 18)

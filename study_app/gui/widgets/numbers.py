@@ -170,13 +170,13 @@ class Range:
         if share >= 1.0:
             return self.most
         if self._by_decades:
-            found = self.least * (self.most / self.least) ** share
-            digits = FIGURES - 1 - math.floor(math.log10(abs(found)))
+            number = self.least * (self.most / self.least) ** share
+            digits = FIGURES - 1 - math.floor(math.log10(abs(number)))
         else:
-            found = self.least + share * (self.most - self.least)
+            number = self.least + share * (self.most - self.least)
             digits = FIGURES - math.floor(math.log10(self.most - self.least))
-        found = round(found) if self.whole else round(found, digits)
-        return min(max(float(found), self.least), self.most)
+        number = round(number) if self.whole else round(number, digits)
+        return min(max(float(number), self.least), self.most)
 
     @property
     def _by_decades(self) -> bool:
@@ -307,10 +307,10 @@ class Slider(Themed, QSlider):
     def _stepped(self, steps: int) -> float:
         """Return the number some steps on: always another one, unless the end is reached."""
         share = self._span.share(self._value)
-        found = self._span.value(share + steps / self._span.steps)
-        if self._span.whole and found == self._value:
-            found = min(max(self._value + math.copysign(1, steps), self._span.least), self._span.most)
-        return found
+        value = self._span.value(share + steps / self._span.steps)
+        if self._span.whole and value == self._value:
+            value = min(max(self._value + math.copysign(1, steps), self._span.least), self._span.most)
+        return value
 
     def _move(self, value: float, *, held: bool) -> None:
         if value == self._value:

@@ -106,10 +106,10 @@ class _Cells(QStyledItemDelegate):
         painter.restore()
 
 
-def _write(painter: QPainter, place: QRectF, face: QFont, ink: str, words: str) -> None:
+def _write(painter: QPainter, place: QRectF, face: QFont, ink: str, text: str) -> None:
     painter.setFont(face)
     painter.setPen(QColor(ink))
-    shown = painter.fontMetrics().elidedText(words, Qt.TextElideMode.ElideRight, int(place.width()))
+    shown = painter.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, int(place.width()))
     painter.drawText(place, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, shown)
 
 

@@ -108,14 +108,14 @@ class QuestionWords(QWidget):
         ink = PARTICIPANT.warn if self.missing else PARTICIPANT.text3
         note_top, note_left = top + high, left + self._note_left
         text_face, note_face, number_face = self._faces
-        for face, colour, place, words in (
+        for face, colour, place, text in (
             (number_face, ink, QRect(0, top, left, high), self._number),
             (text_face, PARTICIPANT.text, QRect(left, top, width - left, high), self.text),
             (note_face, ink, QRect(note_left, note_top, width - note_left, note_high), self.note),
         ):
             painter.setFont(face)
             painter.setPen(QColor(colour))
-            painter.drawText(self._placed(place), self._flags, words)
+            painter.drawText(self._placed(place), self._flags, text)
         if self.missing:
             room = self._placed(
                 QRect(left, note_top + (note_high - round(self._sign)) // 2, self._note_left, note_high)
@@ -137,8 +137,8 @@ class QuestionWords(QWidget):
     def _placed(self, place: QRect) -> QRectF:
         return QRectF(QStyle.visualRect(self.layoutDirection(), self.rect(), place))
 
-    def _bounds(self, face: QFont, words: str, width: int) -> QRect:
-        return QFontMetrics(face).boundingRect(0, 0, width, HIGHEST, self._flags, words)
+    def _bounds(self, face: QFont, text: str, width: int) -> QRect:
+        return QFontMetrics(face).boundingRect(0, 0, width, HIGHEST, self._flags, text)
 
     def _heights(self, width: int) -> tuple[int, int]:
         """Return the heights [px] of number and text, and of the note."""
@@ -193,13 +193,13 @@ class QuestionField(QWidget):
     left = Signal()
     seen = Signal()
 
-    def __init__(self, view: ItemView, words: Words, parent: QWidget) -> None:
+    def __init__(self, view: ItemView, wording: Words, parent: QWidget) -> None:
         super().__init__(parent)
         self.view = view
         self.value: Value = None
         self.is_answered = False
         self.missing = False
-        self._words = words
+        self._words = wording
         self._seen = False
         self._answer: QWidget | None = None
         self.scale = 1.0
@@ -346,12 +346,12 @@ class QuestionField(QWidget):
             painter.drawRoundedRect(bar, 2 * scale, 2 * scale)
 
     def _tell(self) -> None:
-        words = self._words
+        wording = self._words
         self.statement.show_note(self.note, missing=self.missing)
         if self.is_answered:
-            state = f"{words.chosen}: {self.spoken()}"
+            state = f"{wording.chosen}: {self.spoken()}"
         else:
-            state = (self.note or words.please_answer) if self.missing else words.no_answer_yet
+            state = (self.note or wording.please_answer) if self.missing else wording.no_answer_yet
         if self.note and not self.missing:
             state = f"{self.note}, {state}"
         self.setAccessibleDescription(state)
@@ -377,24 +377,24 @@ Look: TypeAlias = Literal["words", "point", "off scale"]
 
 
 @lru_cache(maxsize=1024)
-def widest_word(words: str, scale: float) -> float:
+def widest_word(text: str, scale: float) -> float:
     """Return the width of the widest word of an answer [px]; the points of all rows of a page are alike."""
     metrics = QFontMetricsF(font("chosen", scale=scale))
-    return max((metrics.horizontalAdvance(word) for word in words.split()), default=0.0)
+    return max((metrics.horizontalAdvance(word) for word in text.split()), default=0.0)
 
 
 @lru_cache(maxsize=1024)
-def size_of(words: str, scale: float) -> QSize:
+def size_of(text: str, scale: float) -> QSize:
     """Return a size that can be hit, as wide as the longest word [px]."""
     least = target_px(scale)
-    return QSize(round(max(least, widest_word(words, scale) + TAKEN * scale)), round(least))
+    return QSize(round(max(least, widest_word(text, scale) + TAKEN * scale)), round(least))
 
 
 @lru_cache(maxsize=1024)
-def height_of(words: str, scale: float, width_px: float) -> float:
+def height_of(text: str, scale: float, width_px: float) -> float:
     """Return the height of an answer that is wrapped at a width [px]."""
     room = QRectF(0, 0, width_px, 1e4)
-    return QFontMetricsF(font("chosen", scale=scale)).boundingRect(room, CENTRE, words).height()
+    return QFontMetricsF(font("chosen", scale=scale)).boundingRect(room, CENTRE, text).height()
 
 
 class OpenLook(NamedTuple):
@@ -535,14 +535,14 @@ class OptionLook(Button):
         mark = min(MARK * scale, body.width() * 0.34)
         gap = min(6 * scale, body.width() * 0.06) if text else 0.0
         room = QRectF(0, 0, max(1.0, body.width() - mark - gap - ROOM * scale), body.height())
-        words = QFontMetricsF(face).boundingRect(room, CENTRE, text).width()
-        left = body.center().x() - (mark + gap + words) / 2
+        width = QFontMetricsF(face).boundingRect(room, CENTRE, text).width()
+        left = body.center().x() - (mark + gap + width) / 2
         flip = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
-        x_mark, x_words = (left + words + gap, left) if flip else (left, left + mark + gap)
+        x_mark, x_words = (left + width + gap, left) if flip else (left, left + mark + gap)
         draw_icon(painter, "check", QRectF(x_mark, body.center().y() - mark / 2, mark, mark), theme.on_accent, 2.4)
         painter.setFont(face)
         painter.setPen(QColor(theme.on_accent))
-        painter.drawText(QRectF(x_words - 1, 0, words + 2, body.height()), CENTRE, text)
+        painter.drawText(QRectF(x_words - 1, 0, width + 2, body.height()), CENTRE, text)
 
 
 class RadioOption(OptionLook, QRadioButton):

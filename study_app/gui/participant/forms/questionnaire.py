@@ -133,10 +133,10 @@ class StatementField(ScaleField):
     """A statement with its cells; their names stand over the columns, once for all statements."""
 
     def __init__(
-        self, view: ItemView, labels: tuple[str, ...], judge: str | None, words: Words, parent: QWidget
+        self, view: ItemView, labels: tuple[str, ...], judge: str | None, wording: Words, parent: QWidget
     ) -> None:
         self.sizes: Grid | None = None
-        super().__init__(view, words, parent)
+        super().__init__(view, wording, parent)
         self.build(labels, judge, NO_WORDS)
         self.statement.fill_row()
         self.cells, self.row = QHBoxLayout(), QHBoxLayout()

@@ -50,12 +50,12 @@ class ChoiceField(OptionsField):
 
     widget_id: ClassVar[str] = "choice"
 
-    def __init__(self, view: ItemView, words: Words, parent: QWidget) -> None:
+    def __init__(self, view: ItemView, wording: Words, parent: QWidget) -> None:
         assert isinstance(view, ChoiceView)  # noqa: S101 - the registry names this widget
         self.several = view.several
         self._ids = [option for option, _ in view.options]
         self._texts = dict(view.options)
-        super().__init__(view, words, parent)
+        super().__init__(view, wording, parent)
         kind = CheckOption if view.several else RadioOption
         self.hold([kind(text, text, view.text, self) for _, text in view.options])
         longest = max(len(text) for _, text in view.options)
@@ -77,7 +77,7 @@ class ChoiceField(OptionsField):
     @property
     def chosen(self) -> tuple[int, ...]:
         given = self.value if isinstance(self.value, tuple) else (self.value,)
-        return tuple(place for place, one in enumerate(self._ids) if one in given)
+        return tuple(place for place, option in enumerate(self._ids) if option in given)
 
     def value_at(self, place: int) -> Value:
         return self._ids[place]
@@ -109,7 +109,7 @@ class ChoiceField(OptionsField):
             super().choose(place, by_key=by_key)
             return
         before = self.chosen
-        if now := tuple(one for number, one in enumerate(self._ids) if (number in before) != (number == place)):
+        if now := tuple(option for number, option in enumerate(self._ids) if (number in before) != (number == place)):
             self.give(now)
         else:
             self.take_back()
@@ -131,18 +131,18 @@ class NumberField(TypedField):
 
     widget_id: ClassVar[str] = "number"
 
-    def __init__(self, view: ItemView, words: Words, parent: QWidget) -> None:
+    def __init__(self, view: ItemView, wording: Words, parent: QWidget) -> None:
         assert isinstance(view, NumberView)  # noqa: S101 - the registry names this widget
         self._number = view
-        super().__init__(view, words, parent)
+        super().__init__(view, wording, parent)
         self.entry = Entry(self)
         self.entry.setAccessibleName(" ".join(filter(None, (view.text, view.unit))))
         self.entry.setMaxLength(20)
         self.entry.textChanged.connect(self._edit)
         self._unit = PlainLabel(view.unit)
         self._unit.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
-        more = (*(() if view.whole else (words.decimal_sign,)), *self._signs())
-        self._pad = DigitPad(self.entry, more, ACROSS, words.delete_digit, self)
+        more = (*(() if view.whole else (wording.decimal_sign,)), *self._signs())
+        self._pad = DigitPad(self.entry, more, ACROSS, wording.delete_digit, self)
         self._wrong = PlainLabel(wraps=True)
         self._wrong.setStyleSheet(f"color: {PARTICIPANT.warn}; background: transparent;")
         self._wrong.hide()
@@ -233,18 +233,18 @@ class NumberField(TypedField):
             self.take_back()
 
     def _expected(self) -> str:
-        words, view = self._words, self._number
-        kind = words.whole_number if view.whole else words.any_number
+        wording, view = self._words, self._number
+        kind = wording.whole_number if view.whole else wording.any_number
         least, most = (
-            None if bound is None else write_number(bound, 9, words.decimal_sign) for bound in (view.least, view.most)
+            None if bound is None else write_number(bound, 9, wording.decimal_sign) for bound in (view.least, view.most)
         )
         if least is not None and most is not None:
-            return words.number_between.format(kind=kind, least=least, most=most)
+            return wording.number_between.format(kind=kind, least=least, most=most)
         if least is not None:
-            return words.number_from.format(kind=kind, least=least)
+            return wording.number_from.format(kind=kind, least=least)
         if most is not None:
-            return words.number_to.format(kind=kind, most=most)
-        return words.number_needed.format(kind=kind)
+            return wording.number_to.format(kind=kind, most=most)
+        return wording.number_needed.format(kind=kind)
 
     def _say(self, problem: str) -> None:
         self._wrong.setText(problem)
@@ -264,9 +264,9 @@ class RatingField(ScaleField):
 
     widget_id: ClassVar[str] = "rating"
 
-    def __init__(self, view: ItemView, words: Words, parent: QWidget) -> None:
+    def __init__(self, view: ItemView, wording: Words, parent: QWidget) -> None:
         assert isinstance(view, RatingView)  # noqa: S101 - the registry names this widget
-        super().__init__(view, words, parent)
+        super().__init__(view, wording, parent)
         self.build(view.labels, view.cannot_judge, view.cannot_judge)
         scale, area = QWidget(self), QWidget(self)
         scale.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
@@ -450,16 +450,16 @@ class SliderField(QuestionField):
 
     widget_id: ClassVar[str] = "slider"
 
-    def __init__(self, view: ItemView, words: Words, parent: QWidget) -> None:
+    def __init__(self, view: ItemView, wording: Words, parent: QWidget) -> None:
         assert isinstance(view, SliderView)  # noqa: S101 - the registry names this widget
         self._slider = view
-        super().__init__(view, words, parent)
+        super().__init__(view, wording, parent)
         area = QWidget(self)
         area.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # a scale has the same order in every language
         self.line = Line(view.steps, area)
         self.line.setAccessibleName(view.text)
         self.line.set_to.connect(lambda step: self.give(view.at(step)))
-        self._ends = (PlainLabel(view.low), PlainLabel(words.no_answer_yet), PlainLabel(view.high))
+        self._ends = (PlainLabel(view.low), PlainLabel(wording.no_answer_yet), PlainLabel(view.high))
         for end, side in zip(self._ends, (Qt.AlignmentFlag.AlignLeft, None, Qt.AlignmentFlag.AlignRight), strict=True):
             end.setWordWrap(side is not None)
             end.setAlignment((side or Qt.AlignmentFlag.AlignHCenter) | ABSOLUTE | Qt.AlignmentFlag.AlignTop)
@@ -524,10 +524,10 @@ class TextField(TypedField):
 
     widget_id: ClassVar[str] = "text"
 
-    def __init__(self, view: ItemView, words: Words, parent: QWidget) -> None:
+    def __init__(self, view: ItemView, wording: Words, parent: QWidget) -> None:
         assert isinstance(view, TextView)  # noqa: S101 - the registry names this widget
         self._shown = view
-        super().__init__(view, words, parent)
+        super().__init__(view, wording, parent)
         self.entry = TextEntry(view.lines, self)
         self.entry.setAccessibleName(view.text)
         self.entry.textChanged.connect(self._edit)
@@ -580,7 +580,9 @@ class TextField(TypedField):
 
     def _printable(self, text: str) -> str:
         """Return a text without what cannot be printed; a field of one line has no line breaks."""
-        kept = "".join(one for one in text if one == "\n" or unicodedata.category(one) not in UNPRINTABLE)
+        kept = "".join(
+            character for character in text if character == "\n" or unicodedata.category(character) not in UNPRINTABLE
+        )
         return kept.replace("\n", " ") if self._shown.lines == 1 else kept
 
 

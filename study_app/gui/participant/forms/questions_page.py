@@ -44,12 +44,12 @@ WRAPPED = int(Qt.TextFlag.TextWordWrap)
 class Foot(QWidget):
     """One line; the keys give way where a message needs the room. All but the button is painted."""
 
-    def __init__(self, words: Words, parent: QWidget) -> None:
+    def __init__(self, wording: Words, parent: QWidget) -> None:
         super().__init__(parent)
-        self._words = words
+        self._words = wording
         self._scale = 1.0
         self._message, self._count, self._answer_keys = "", "", ""
-        self.button = GoButton(words.continue_, words.enter_key, self)
+        self.button = GoButton(wording.continue_, wording.enter_key, self)
         self._row = hbox((STRETCH, 1), self.button, parent=self)
         give_role(self, QAccessible.Role.StaticText)
 
@@ -103,8 +103,8 @@ class Foot(QWidget):
 
     def _paint_keys(self, painter: QPainter, end: int, room: float) -> int:
         """Draw the keys up to ``end`` where there is ``room`` for them; return where they begin [px]."""
-        gap, words = round(GAP * self._scale), self._words
-        hints = ((MOVE_KEYS, words.key_move), (self._answer_keys, words.key_answer))
+        gap, wording = round(GAP * self._scale), self._words
+        hints = ((MOVE_KEYS, wording.key_move), (self._answer_keys, wording.key_answer))
         caps = [round(key_size(key, self._scale)[0]) + 2 for key, _ in hints]
         line = self._row.contentsRect()
         high = round(key_size(MOVE_KEYS, self._scale)[1]) + 2
@@ -139,23 +139,23 @@ class Foot(QWidget):
             place.setHeight(low)
             self._write(painter, place, self._words.answers_kept, self._small, PARTICIPANT.text2)
 
-    def _write(self, painter: QPainter, place: QRect, words: str, face: QFont, ink: str) -> None:
+    def _write(self, painter: QPainter, place: QRect, text: str, face: QFont, ink: str) -> None:
         painter.setFont(face)
         painter.setPen(QColor(ink))
         flags = int(beginning(self) | Qt.AlignmentFlag.AlignVCenter) | WRAPPED
-        painter.drawText(QRectF(place), flags, words)
+        painter.drawText(QRectF(place), flags, text)
 
     def _placed(self, left: int, width: int) -> QRect:
         """Return a place, as high as the foot, so far from where lines begin [px]."""
         line = self._row.contentsRect()
         return QStyle.visualRect(self.layoutDirection(), line, QRect(left, line.top(), width, line.height()))
 
-    def _width(self, face: QFont, words: str) -> int:
+    def _width(self, face: QFont, text: str) -> int:
         """Return the width of words on one line [px]."""
-        return self._bounds(face, words, HIGHEST).width()
+        return self._bounds(face, text, HIGHEST).width()
 
-    def _bounds(self, face: QFont, words: str, width: int) -> QRect:
-        return QFontMetrics(face).boundingRect(0, 0, width, HIGHEST, int(beginning(self)) | WRAPPED, words)
+    def _bounds(self, face: QFont, text: str, width: int) -> QRect:
+        return QFontMetrics(face).boundingRect(0, 0, width, HIGHEST, int(beginning(self)) | WRAPPED, text)
 
 
 ANSWERING = 0.8  # share of the present trial's bar that is full
@@ -425,7 +425,7 @@ class QuestionsPage(PageWidget):
         for field in self.fields:
             if field not in asked and field.is_answered:
                 field.forget()
-        if asked != tuple(one for part in self.parts for one in part):
+        if asked != tuple(field for part in self.parts for field in part):
             self._arrange()
         self._tell()
 

@@ -128,7 +128,7 @@ class ChoiceWidget(AnswerPage):
         elif away is not None:
             self._go(-away if self.mirrored else away)
         elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
-            focused = [one for one in self.buttons if one.hasFocus()]
+            focused = [button for button in self.buttons if button.hasFocus()]
             if focused:
                 focused[0].pressed.emit()
         else:
@@ -140,7 +140,7 @@ class ChoiceWidget(AnswerPage):
         if len(self.buttons) == 2:
             self.answer(self._values[0 if step < 0 else 1])
             return
-        at = next((place for place, one in enumerate(self.buttons) if one.hasFocus()), -1 if step > 0 else 0)
+        at = next((place for place, button in enumerate(self.buttons) if button.hasFocus()), -1 if step > 0 else 0)
         self.buttons[(at + step) % len(self.buttons)].setFocus()
 
 
@@ -175,38 +175,38 @@ SQUARE = 16.0
 GAP = 10.0
 
 
-def interval_width(interval: Interval, words: Words, scale: float) -> float:
+def interval_width(interval: Interval, wording: Words, scale: float) -> float:
     """Return the width that words and squares take [px]."""
-    return _words_width(interval, words, scale) + GAP * scale + interval.of * (SQUARE + GAP) * scale
+    return _words_width(interval, wording, scale) + GAP * scale + interval.of * (SQUARE + GAP) * scale
 
 
-def _words_width(interval: Interval, words: Words, scale: float) -> float:
-    text = words.reached.format(reached=interval.number, of=interval.of)
+def _words_width(interval: Interval, wording: Words, scale: float) -> float:
+    text = wording.reached.format(reached=interval.number, of=interval.of)
     return QFontMetricsF(font("statement", scale=scale, weight=600)).horizontalAdvance(text) + 4
 
 
 def draw_interval(
-    painter: QPainter, width: float, middle: float, interval: Interval, words: Words, scale: float
+    painter: QPainter, width: float, middle: float, interval: Interval, wording: Words, scale: float
 ) -> None:
     """Draw words and squares, centred in a page of ``width`` around the height ``middle`` [px].
 
     In a rest no square is filled; in a language that is read from right to left the first is on the right.
     """
-    text = words.reached.format(reached=interval.number, of=interval.of)
+    text = wording.reached.format(reached=interval.number, of=interval.of)
     side, gap = SQUARE * scale, GAP * scale
     painter.save()
     painter.setFont(font("statement", scale=scale, weight=600))
-    wide = _words_width(interval, words, scale)
-    x = (width - interval_width(interval, words, scale)) / 2
+    wide = _words_width(interval, wording, scale)
+    x = (width - interval_width(interval, wording, scale)) / 2
     painter.setPen(QColor(PARTICIPANT.text))
     words_at = QRectF(x, middle - 20 * scale, wide, 40 * scale)
-    if words.right_to_left:
+    if wording.right_to_left:
         words_at.moveRight(width - x)
     painter.drawText(words_at, int(Qt.AlignmentFlag.AlignCenter), text)
     painter.setPen(QPen(QColor(PARTICIPANT.text), 2 * scale))
     for number in range(1, interval.of + 1):
         place = QRectF(x + wide + gap + (number - 1) * (side + gap), middle - side / 2, side, side)
-        if words.right_to_left:
+        if wording.right_to_left:
             place.moveRight(width - place.left())
         filled = number == interval.number and not interval.resting
         painter.setBrush(QColor(PARTICIPANT.text) if filled else Qt.BrushStyle.NoBrush)
@@ -243,11 +243,11 @@ class NumberWidget(AnswerPage):
 
     def lay_out(self, scale: float) -> None:
         super().lay_out(scale)
-        words = self.words_scale
+        words_scale = self.words_scale
         self.field.setFixedSize(*(round(side * scale) for side in FIELD_PX))
         self.field.setFont(sized(NUMBER_TEXT_PX * scale))
-        self.wrong.setFont(sized(18 * words))
-        self.button.set_scale(words)
+        self.wrong.setFont(sized(18 * words_scale))
+        self.button.set_scale(words_scale)
         width, height = (round(side * scale) for side in KEY_PX)
         self._pad.set_size(width, height, round(KEY_GAP_PX * scale), sized(20 * scale))
 
@@ -293,7 +293,7 @@ class SettingControls(QWidget):
     event_made = Signal(object)
 
     def __init__(
-        self, page: TaskPage, words: Words, clock: Callable[[], float], parent: QWidget, *, buttons: bool
+        self, page: TaskPage, wording: Words, clock: Callable[[], float], parent: QWidget, *, buttons: bool
     ) -> None:
         super().__init__(parent)
         self._room = parent
@@ -306,10 +306,10 @@ class SettingControls(QWidget):
         self._timer.timeout.connect(lambda: self._step(self._held))
         self.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
         self.setCursor(Qt.CursorShape.ArrowCursor)
-        self.less, self.more = (QPushButton(text, self) for text in (f"← {words.less}", f"{words.more} →"))
-        self.done = GoButton(words.done, words.enter_key, self)
+        self.less, self.more = (QPushButton(text, self) for text in (f"← {wording.less}", f"{wording.more} →"))
+        self.done = GoButton(wording.done, wording.enter_key, self)
         hbox(self.less, self.more, self.done, spacing=GAP_PX, margins=0, parent=self)
-        for button, name, way in ((self.less, words.less, -1), (self.more, words.more, 1)):
+        for button, name, way in ((self.less, wording.less, -1), (self.more, wording.more, 1)):
             button.setAccessibleName(name)
             button.setAccessibleDescription(page.question)
             button.setAutoRepeat(True)
@@ -317,8 +317,8 @@ class SettingControls(QWidget):
             button.setAutoRepeatInterval(STEP_MS)
             button.clicked.connect(lambda _=False, way=way: self._step(way))
         self.done.clicked.connect(self._confirm)
-        for one in (self.less, self.more, self.done):
-            one.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        for control in (self.less, self.more, self.done):
+            control.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setVisible(self._adjusts and buttons)
 
     def turn_to(self, page: TaskPage) -> None:

@@ -56,9 +56,9 @@ def words_scale(width: float, height: float, text_scale: float) -> float:
     return max(page_scale(width, height), min(text_scale, most))
 
 
-def direction(words: Words) -> Qt.LayoutDirection:
+def direction(wording: Words) -> Qt.LayoutDirection:
     """Return in which direction pages in a language are laid out."""
-    return Qt.LayoutDirection.RightToLeft if words.right_to_left else Qt.LayoutDirection.LeftToRight
+    return Qt.LayoutDirection.RightToLeft if wording.right_to_left else Qt.LayoutDirection.LeftToRight
 
 
 def beginning(widget: QWidget) -> Qt.AlignmentFlag:
@@ -142,26 +142,26 @@ BEGINNING = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)  # Q
 BAR = (40.0, 6.0, 8.0)  # width, height, gap [logical px at scale 1]
 
 
-def progress_words(progress: Progress, words: Words) -> tuple[str, str]:
+def progress_words(progress: Progress, wording: Words) -> tuple[str, str]:
     """Return "Part 2 of 2" and "Delay setting 3 of 7"; what is the only one of its kind is not counted."""
     counted = progress.part is not None and progress.parts > 1
-    part = words.part.format(part=progress.part, parts=progress.parts) if counted else ""
+    part = wording.part.format(part=progress.part, parts=progress.parts) if counted else ""
     named = progress.label and progress.of > 1
-    template = words.setting_at_most if progress.at_most else words.setting
+    template = wording.setting_at_most if progress.at_most else wording.setting
     setting = template.format(label=progress.label, of=progress.of) if named else progress.label
     return part, setting
 
 
 def draw_progress(
-    painter: QPainter, room: QRectF, progress: Progress, words: Words, *, scale: float = 1.0, share: float = 0.5
+    painter: QPainter, room: QRectF, progress: Progress, wording: Words, *, scale: float = 1.0, share: float = 0.5
 ) -> float:
     """Draw words and bars from the beginning of a line in ``room``; return the width [px].
 
     ``share`` is how much of the present bar is full: the task is its first half, the questionnaire its second. Bars
     that find no room are left out; the words say the same.
     """
-    flip = words.right_to_left
-    part, setting = progress_words(progress, words)
+    flip = wording.right_to_left
+    part, setting = progress_words(progress, wording)
     x = 0.0
     painter.save()
     painter.setLayoutDirection(Qt.LayoutDirection.RightToLeft if flip else Qt.LayoutDirection.LeftToRight)
@@ -212,15 +212,15 @@ def _from(room: QRectF, x: float, width: float, height: float, *, flip: bool) ->
 class ProgressLine(QWidget):
     """The progress at the head of a page; empty, but as high, where a page has none."""
 
-    def __init__(self, progress: Progress | None, words: Words, share: float, parent: QWidget | None = None) -> None:
+    def __init__(self, progress: Progress | None, wording: Words, share: float, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._progress = progress
-        self._words = words
+        self._words = wording
         self._share = share
         self._scale = 1.0
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         if progress is not None:
-            self.setAccessibleName(" · ".join(filter(None, progress_words(progress, words))))
+            self.setAccessibleName(" · ".join(filter(None, progress_words(progress, wording))))
         self.set_scale(1.0)
 
     def set_scale(self, scale: float) -> None:

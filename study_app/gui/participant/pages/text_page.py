@@ -225,10 +225,10 @@ class TextWidget(ReadingPage):
     """
 
     def __init__(self, page: TextPage, context: PageContext) -> None:
-        words = context.words
+        wording = context.words
         self._consent = page.kind == "consent"
-        key = words.enter_key if self._consent else words.space_key
-        progress = ProgressLine(page.progress, words, 0.0) if page.progress is not None else None
+        key = wording.enter_key if self._consent else wording.space_key
+        progress = ProgressLine(page.progress, wording, 0.0) if page.progress is not None else None
         column = (ICONS[page.kind], page.title, page.paragraphs, PARTICIPANT.accent)
         super().__init__(column, context, (page.button, key), progress)
         self._stays_until_s = page.stays_until_s
@@ -239,13 +239,13 @@ class TextWidget(ReadingPage):
         self._stacked = False
         self.languages: LanguageSwitch | None = None
         if page.languages:
-            self.languages = LanguageSwitch(page.languages, page.language, words.choose_language, self)
+            self.languages = LanguageSwitch(page.languages, page.language, wording.choose_language, self)
             later = Qt.ConnectionType.QueuedConnection  # the page goes, and must not while its button hears a key
             self.languages.chosen.connect(self._choose_language, later)
             for language in self.languages.buttons:
                 assert self.button is not None  # noqa: S101  # these pages have one
                 QWidget.setTabOrder(language, self.button)  # above the text, so before its button
-        self.decline = DeclineButton(words.decline, self) if self._consent else None
+        self.decline = DeclineButton(wording.decline, self) if self._consent else None
         if self.decline is not None:
             self.decline.clicked.connect(self._decline)
         if page.stays_until_s is not None:
@@ -371,16 +371,16 @@ class PauseWidget(ReadingPage):
     """
 
     def __init__(self, page: PausePage, context: PageContext, under: QPixmap | None = None) -> None:
-        self.under, words = under, context.words
+        self.under, wording = under, context.words
         if page.force_off and not context.by_mouse:
-            body = words.force_off_body if page.held is None else words.force_held_body
-            column = ("stop", words.force_off_title, (body,), PARTICIPANT.bad)
-            label = words.force_on
+            body = wording.force_off_body if page.held is None else wording.force_held_body
+            column = ("stop", wording.force_off_title, (body,), PARTICIPANT.bad)
+            label = wording.force_on
         else:
-            body = words.pause_body if page.held is None else words.pause_held_body
-            column = ("pause", words.pause_title, (body,), PARTICIPANT.accent)
-            label = words.resume
-        button = (label, words.enter_key) if page.held is None else None
+            body = wording.pause_body if page.held is None else wording.pause_held_body
+            column = ("pause", wording.pause_title, (body,), PARTICIPANT.accent)
+            label = wording.resume
+        button = (label, wording.enter_key) if page.held is None else None
         super().__init__(column, context, button)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -416,11 +416,11 @@ class NoticeWidget(ReadingPage):
     """
 
     def __init__(self, page: TroublePage | EndPage, context: PageContext) -> None:
-        ended, words = isinstance(page, EndPage), context.words
+        ended, wording = isinstance(page, EndPage), context.words
         icon, colour = ("check", PARTICIPANT.ok) if ended else ("info", PARTICIPANT.warn)
-        said = f"{page.paragraph} {words.let_go}" if ended and not context.by_mouse else page.paragraph
+        said = f"{page.paragraph} {wording.let_go}" if ended and not context.by_mouse else page.paragraph
         column = (icon, page.title, (said,), colour)
-        button = (words.close, words.space_key) if ended else None
+        button = (wording.close, wording.space_key) if ended else None
         super().__init__(column, context, button)
 
     def focus_first(self) -> None:

@@ -44,13 +44,13 @@ class Captions:
     is mirrored but the tank and the photodiode's patch.
     """
 
-    def __init__(self, page: TaskPage, words: Words, text_scale: float = 1.0) -> None:
+    def __init__(self, page: TaskPage, wording: Words, text_scale: float = 1.0) -> None:
         self._page = page
-        self._words = words
+        self._words = wording
         self._text_scale = text_scale
         self._small: QFont
         self._line: float
-        self._way = Qt.LayoutDirection.RightToLeft if words.right_to_left else Qt.LayoutDirection.LeftToRight
+        self._way = Qt.LayoutDirection.RightToLeft if wording.right_to_left else Qt.LayoutDirection.LeftToRight
         self.lay_out(*DESIGNED_FOR, 0.84 * DESIGNED_FOR[1])
 
     def turn_to(self, page: TaskPage) -> None:
@@ -146,12 +146,12 @@ class Captions:
 
     def draw(self, painter: QPainter, region: QRegion, task: TaskShown | None, hint: str = "") -> None:
         """Draw the words in ``region``; ``hint`` is how the ball gets into its target, "" where it needs none."""
-        page, words = self._page, self._words
+        page, wording = self._page, self._words
         painter.setLayoutDirection(self._way)
         if page.progress is not None and region.intersects(self._head.toAlignedRect()):
-            draw_progress(painter, self._head, page.progress, words, scale=self._head_scale, share=0.5)
+            draw_progress(painter, self._head, page.progress, wording, scale=self._head_scale, share=0.5)
         if page.interval is not None:
-            draw_interval(painter, self._width, self._head.center().y(), page.interval, words, self._head_scale)
+            draw_interval(painter, self._width, self._head.center().y(), page.interval, wording, self._head_scale)
         if page.task.targets_m and region.intersects(self._count.toAlignedRect()):
             self._draw_count(painter, task)
         if region.intersects(self._instruction.toAlignedRect()):
@@ -162,7 +162,7 @@ class Captions:
             self._draw_foot(painter)
         hints = self._hint_words(task, hint)
         if hints and region.intersects(self._hint.toAlignedRect()):
-            strong = bool(hint) or hints.startswith(words.continue_now) or hints == words.time_is_up
+            strong = bool(hint) or hints.startswith(wording.continue_now) or hints == wording.time_is_up
             colour = PARTICIPANT.text if strong else PARTICIPANT.text3
             _text(painter, self._hint, int(Qt.AlignmentFlag.AlignCenter), hints, self._small, colour)
 
@@ -194,30 +194,30 @@ class Captions:
 
     @property
     def setting_keys(self) -> str:
-        words = self._words
-        return f"← {words.less} · {words.more} → · {words.enter_key}: {words.done}"
+        wording = self._words
+        return f"← {wording.less} · {wording.more} → · {wording.enter_key}: {wording.done}"
 
     def _longest_hints(self) -> tuple[str, ...]:
-        words = self._words
-        counted = words.seconds_left.format(seconds=999)
-        both = words.seconds_left.format(seconds=COUNTED_DOWN_S)
+        wording = self._words
+        counted = wording.seconds_left.format(seconds=999)
+        both = wording.seconds_left.format(seconds=COUNTED_DOWN_S)
         if self._page.task.targets_m:
-            return tuple(f"{away} · {both}" for away in (words.further_away, words.nearer, words.time_is_up))
+            return tuple(f"{away} · {both}" for away in (wording.further_away, wording.nearer, wording.time_is_up))
         if self._page.task.paced:
-            return words.back_to_target, words.further_away, words.nearer
-        return f"{words.continue_now} · {both}", words.continue_in.format(seconds=999), counted, words.time_is_up
+            return wording.back_to_target, wording.further_away, wording.nearer
+        return f"{wording.continue_now} · {both}", wording.continue_in.format(seconds=999), counted, wording.time_is_up
 
     def _draw_foot(self, painter: QPainter) -> None:
-        fine, words = self._fine, self._words
-        key, _ = key_size(words.escape_key, 1.1 * fine)
+        fine, wording = self._fine, self._words
+        key, _ = key_size(wording.escape_key, 1.1 * fine)
         cap = self._placed(QRectF(self._foot.left(), self._foot.top(), key, self._foot.height()))
-        draw_key(painter, cap.left(), cap.center().y(), words.escape_key, 1.1 * fine)
+        draw_key(painter, cap.left(), cap.center().y(), wording.escape_key, 1.1 * fine)
         words_at = self._foot.adjusted(key + 12 * fine, 0, 0, 0)
-        _text(painter, self._placed(words_at), BEGINNING, words.pause_hint, self._pause_font, PARTICIPANT.text2)
+        _text(painter, self._placed(words_at), BEGINNING, wording.pause_hint, self._pause_font, PARTICIPANT.text2)
 
     def _hint_words(self, task: TaskShown | None, hint: str) -> str:
         """Return how the ball gets into its target, and how long it takes until the participant may or must go on."""
-        todo, words = self._page.task, self._words
+        todo, wording = self._page.task, self._words
         if self._page.adjusts:
             return hint
         if todo.paced or (self._page.interval is not None and self._page.interval.resting):
@@ -225,13 +225,13 @@ class Captions:
         elapsed_s = task.elapsed_s if task else 0.0  # before the first view nothing has happened yet
         left = math.ceil(todo.limit_s - elapsed_s)
         if left <= 0:
-            return words.time_is_up
-        counted = words.seconds_left.format(seconds=left)
+            return wording.time_is_up
+        counted = wording.seconds_left.format(seconds=left)
         if todo.least_s is not None:
             wait = math.ceil(todo.least_s - elapsed_s)
             if wait > 0:
-                return words.continue_in.format(seconds=wait)
-            return words.continue_now if left > COUNTED_DOWN_S else f"{words.continue_now} · {counted}"
+                return wording.continue_in.format(seconds=wait)
+            return wording.continue_now if left > COUNTED_DOWN_S else f"{wording.continue_now} · {counted}"
         counts = todo.wanted is None or left <= COUNTED_DOWN_S
         return " · ".join(filter(None, (hint, counted if counts else "")))
 
