@@ -213,12 +213,12 @@ class DesignerController(QObject):
         card.answered.connect(self.editing.ask)
         self.place.show_prompt(card, card.first)
 
-    def repair(self, row: ProblemRow, words: str) -> None:
-        offered = self._repairs.repair(row, words)
+    def repair(self, row: ProblemRow, sentence: str) -> None:
+        offered = self._repairs.repair(row, sentence)
         if offered is None:
             return
         try:
-            self.editing.make(words, *offered.edits, select=row.element or None)
+            self.editing.make(sentence, *offered.edits, select=row.element or None)
         except Refused as refusal:
             self.place.message.emit("This repair cannot be made", f"{refusal}.")
 
@@ -269,8 +269,8 @@ class DesignerController(QObject):
         )
         self._repairs.begin(study, () if opened.read_only else problems)
 
-    def find(self, words: str) -> None:
-        self._find = words
+    def find(self, text: str) -> None:
+        self._find = text
         self.show_outline()
 
     def show_outline(self) -> None:

@@ -110,10 +110,10 @@ class Editing(QObject):
         opened.edit(f"Rename to {wanted}", *edits, select=select, key=opened.last[0])
         self._note()
 
-    def make(self, words: str, *edits: Edit, text: str | None = None, select: Place | None = None) -> None:
+    def make(self, name: str, *edits: Edit, text: str | None = None, select: Place | None = None) -> None:
         """Make a step of edits, or of another text; one that is refused changes nothing."""
         if (opened := self.writable) is not None:
-            opened.edit(words, *edits, text=text, select=select)
+            opened.edit(name, *edits, text=text, select=select)
             self._note()
 
     def undo(self) -> None:

@@ -47,15 +47,15 @@ class VisibleLine(NamedTuple):
 
 def visible_lines(text: QPlainTextEdit) -> list[VisibleLine]:
     """Return the visible lines."""
-    found = []
+    lines = []
     block, offset = text.firstVisibleBlock(), text.contentOffset()
     while block.isValid():
         place = text.blockBoundingGeometry(block).translated(offset)
         if place.top() > text.viewport().height():
             break
-        found.append(VisibleLine(number=block.blockNumber(), top=place.top(), height=place.height()))
+        lines.append(VisibleLine(number=block.blockNumber(), top=place.top(), height=place.height()))
         block = block.next()
-    return found
+    return lines
 
 
 @dataclass(frozen=True, slots=True)

@@ -90,9 +90,9 @@ class NoticeCard(Card):
         self.icon.show_icon(notice.icon, INKS[notice.tone])
         self._lines = [label(line, "label", "text2", wraps=True) for line in notice.listed]
         add_parts(self._listed, *self._lines)
-        for action, words in notice.actions:
+        for action, text in notice.actions:
             icon, cap = ICONS.get(action, "") if self._of_playing else "", key_cap("stop") if action == "stop" else ""
-            made = ActionButton(icon, words, cap=cap, role=ROLES.get(action, ""), height=36)
+            made = ActionButton(icon, text, cap=cap, role=ROLES.get(action, ""), height=36)
             made.clicked.connect(lambda _checked=False, action=action: self.asked.emit(action))
             self._buttons.addWidget(made)
             made.show()  # at once: a part that is not shown cannot take the keyboard
@@ -137,22 +137,22 @@ class PlayDevices:
 def asks_for_device(title: str, step: str, *, has_force: bool) -> Notice:
     """Return the question before a device other than the scripted hand is used."""
     force = "The force fades in when a trial begins; hold" if has_force else "It has no force. Hold"
-    words = f"Play from {step}, with the device {title}? {force} Esc to stop."
-    return Notice(words, (("play", "Play"), ("close", "Cancel")), "warn", "device")
+    question = f"Play from {step}, with the device {title}? {force} Esc to stop."
+    return Notice(question, (("play", "Play"), ("close", "Cancel")), "warn", "device")
 
 
 def refuses(problems: tuple[str, ...]) -> Notice:
     """Return why the study cannot be played from here."""
     more = (f"and {len(problems) - MOST_PROBLEMS} more",) if len(problems) > MOST_PROBLEMS else ()
-    words = "The study cannot be played from here: correct these problems first"
+    sentence = "The study cannot be played from here: correct these problems first"
     actions = (("problems", "Show problems"), ("close", "Close"))
-    return Notice(words, actions, "bad", "warning", (*problems[:MOST_PROBLEMS], *more))
+    return Notice(sentence, actions, "bad", "warning", (*problems[:MOST_PROBLEMS], *more))
 
 
 def under_way(step: str, title: str) -> Notice:
     """Return what is said while a pilot is played."""
-    words = f"Playing from {step}, with the device {title}. Hold Esc to stop."
-    return Notice(words, (("stop", "Stop"),), "ok", "play")
+    sentence = f"Playing from {step}, with the device {title}. Hold Esc to stop."
+    return Notice(sentence, (("stop", "Stop"),), "ok", "play")
 
 
 def ended(step: str, how: str) -> Notice:
@@ -191,8 +191,8 @@ class PlayControls(QWidget):
         self.devices = devices
         self.menu.clear()
         group = QActionGroup(self.menu)
-        for name, words in devices.choices:
-            action = self.menu.addAction(words)
+        for name, title in devices.choices:
+            action = self.menu.addAction(title)
             action.setCheckable(True)
             action.setChecked(name == devices.chosen)
             group.addAction(action)
@@ -311,9 +311,9 @@ class ChipButton(Themed, PressedByEnter):
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
 
-    def show_state(self, tone: Tone, icon: str, words: str) -> None:
-        self._state = (tone, icon, words)
-        self.setAccessibleName(f"{words}: {self._does}")
+    def show_state(self, tone: Tone, icon: str, text: str) -> None:
+        self._state = (tone, icon, text)
+        self.setAccessibleName(f"{text}: {self._does}")
         self.updateGeometry()
         self.update()
 
@@ -391,18 +391,18 @@ class DesignerHeader(QWidget):
                 self.study.addItem("New study …", NEW)
                 self.study.addItem("Open file …", OPEN)
                 self.study.setCurrentIndex(self.study.findData(state.chosen) if state.chosen else -1)
-        there = bool(state.chosen)
+        is_open = bool(state.chosen)
         for part in (self.problems, self.undo, self.redo, self.play, self.save):
-            part.setVisible(there)
+            part.setVisible(is_open)
         self.problems.show_state(*state.problems)
         self.draft.show_state("neutral", "save", state.draft)
         self.version.show_state(state.version.tone, state.version.icon, state.version.words)
         self.version.setToolTip(state.version.tip)
         for button, action, what in ((self.undo, "undo", state.undo), (self.redo, "redo", state.redo)):
-            words = ": ".join(filter(None, (action.capitalize(), what)))
+            text = ": ".join(filter(None, (action.capitalize(), what)))
             self._enable(button, on=bool(what) and not state.read_only)
-            button.setAccessibleName(words)
-            button.setToolTip(with_key(words, action))
+            button.setAccessibleName(text)
+            button.setToolTip(with_key(text, action))
         self.save.show_action("save", state.version.save)
         self._enable(self.save, on=state.can_save)
         self._make_room()
@@ -419,8 +419,8 @@ class DesignerHeader(QWidget):
         named = min(NAME_MOST_PX, self.study.fontMetrics().horizontalAdvance(self.study.currentText()) + NAME_EDGES_PX)
         more = max(0, named - self.study.minimumWidth())
         widest = ((self.problems, WIDEST_PROBLEMS), (self.draft, WIDEST_DRAFT), (self.version, WIDEST_VERSION))
-        for chip, words in widest:
-            chip.setMinimumWidth(chip_size(words, small=False).width())
+        for chip, text in widest:
+            chip.setMinimumWidth(chip_size(text, small=False).width())
         self.title.show()
         self.draft.setVisible(bool(state.chosen and state.draft))
         self.version.setVisible(bool(state.chosen and state.version.words))

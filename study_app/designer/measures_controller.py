@@ -78,7 +78,7 @@ class MeasuresController(QObject):
         place.left.connect(self.leave)
         place.pane.facts.appeared.connect(self._idle.start)
         measures = place.measures
-        measures.repair_asked.connect(lambda row, words: place.ask("repair", row, words))
+        measures.repair_asked.connect(lambda row, sentence: place.ask("repair", row, sentence))
         measures.controls.participants.entered.connect(self._take_participants)
         measures.controls.threshold.entered.connect(self._take_threshold)
         measures.controls.lapses.entered.connect(self._take_lapses)
@@ -94,7 +94,7 @@ class MeasuresController(QObject):
         path, problems = opened.selected, problem_rows(opened.study)
         if opened.study.formed is not None:
             self._sound = opened.study
-        now, before = (None if one is None else valid_part(one).protocol for one in (opened.study, self._sound))
+        now, before = (None if study is None else valid_part(study).protocol for study in (opened.study, self._sound))
         lost = now is None or (focus_of(now, path).block is None and focus_of(before, path).block is not None)
         study = opened.study if self._sound is None or not lost else self._sound
         valid = valid_part(study)
@@ -216,7 +216,7 @@ class MeasuresController(QObject):
             return known
         if self._failed:
             return Simulated(warnings=self.warnings, failed=self._failed)
-        of_block = (one for key, one in reversed(self._answers.items()) if key.block == wanted.block)
+        of_block = (answer for key, answer in reversed(self._answers.items()) if key.block == wanted.block)
         return replace(next(of_block, Simulated()), warnings=self.warnings, waiting=ANEW)
 
     def _close(self) -> None:
@@ -226,8 +226,8 @@ class MeasuresController(QObject):
         if client is not None:
             client.close()
 
-    def _repairs_found(self, row: ProblemRow, words: tuple[str, ...]) -> None:
-        self._repairs[row] = words
+    def _repairs_found(self, row: ProblemRow, sentences: tuple[str, ...]) -> None:
+        self._repairs[row] = sentences
         self._idle.start()
 
     def _take_participants(self, number: float) -> None:
@@ -238,9 +238,9 @@ class MeasuresController(QObject):
 
     def _take_threshold(self, number: float) -> None:
         if self._focus.plan is not None and self._focus.block is not None:
-            words = LevelWords(self._focus.plan.stimulus, self._focus.plan.design)
+            wording = LevelWords(self._focus.plan.stimulus, self._focus.plan.design)
             low, high = self._focus.plan.stimulus.levels
-            self._thresholds[self._focus.block.id] = min(high, max(low, number / words.factor))
+            self._thresholds[self._focus.block.id] = min(high, max(low, number / wording.factor))
             self.show()
 
     def _take_lapses(self, number: float) -> None:

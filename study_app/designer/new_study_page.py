@@ -107,8 +107,8 @@ class KnownAnswer:
 @cache
 def known_answers() -> dict[str, KnownAnswer]:
     """Return the known answers of the templates that have one, as they were computed when the templates were made."""
-    found: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
-    return {name: KnownAnswer(**values) for name, values in found.items()}
+    answers: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
+    return {name: KnownAnswer(**values) for name, values in answers.items()}
 
 
 COPY: Final = "copy"
@@ -180,15 +180,15 @@ def languages_offered() -> tuple[tuple[str, str], ...]:
 
 def template_choice(name: str, study: Study) -> TemplateChoice:
     """Return what is shown of a template."""
-    title, words = _described(study.document)
-    shown, question = TEMPLATES.get(name, (name, words))
+    title, description = _described(study.document)
+    shown, question = TEMPLATES.get(name, (name, description))
     protocol = study.protocol
-    found = TemplateChoice(
+    choice = TemplateChoice(
         source=f"template:{name}", title=shown, description=question, recovery=known_answers().get(name),
         study_title=title, languages=languages_of(study.document), questions=tuple(_questions(name, study)),
     )  # fmt: skip
     if protocol is None:
-        return found
+        return choice
     language, document = protocol.study.languages[0], study.document
     session = (
         (
@@ -202,15 +202,15 @@ def template_choice(name: str, study: Study) -> TemplateChoice:
     )
     blind = "Double-blind" if protocol.study.blinding == "double" else "Single-blind"
     tags = (("device", f"Up to {protocol.device.force_limit_n:g} N"), ("lock", blind))
-    return replace(found, figures=tuple(_figures(protocol)), tags=tags, session=tuple(session))
+    return replace(choice, figures=tuple(_figures(protocol)), tags=tags, session=tuple(session))
 
 
 def copy_choice(source: str, document: Mapping[str, Any], note: str, name: str) -> TemplateChoice:
     """Return what is shown of a study that can be copied."""
-    title, words = _described(document)
+    title, description = _described(document)
     return TemplateChoice(
-        source=source, title=title or source, description=words, copy=True, note=note, name=name, study_title=title,
-        languages=languages_of(document),
+        source=source, title=title or source, description=description, copy=True, note=note, name=name,
+        study_title=title, languages=languages_of(document),
     )  # fmt: skip
 
 
@@ -230,16 +230,16 @@ def _figures(protocol: Protocol) -> Iterator[tuple[str, str]]:
 
 
 def _questions(name: str, study: Study) -> Iterator[OwnQuestion]:
-    for words, path in QUESTIONS.get(name, ()):
+    for question, path in QUESTIONS.get(name, ()):
         row = row_at(study.document, path)
         if row is not None:
-            there = row.default if row.value is None else row.value
-            several = isinstance(there, tuple)
-            parts = there if isinstance(there, tuple) else (there,)
+            current = row.default if row.value is None else row.value
+            several = isinstance(current, tuple)
+            parts = current if isinstance(current, tuple) else (current,)
             value = ", ".join(f"{part:g}" for part in parts if isinstance(part, int | float))
             unit = row.unit or _unit_of(study, path)
             yield OwnQuestion(
-                path=path, words=words, unit=unit, bounds=", ".join(row.bounds), value=value, several=several
+                path=path, words=question, unit=unit, bounds=", ".join(row.bounds), value=value, several=several
             )
 
 
@@ -256,13 +256,13 @@ def studies(opened: Document | None) -> tuple[StudyChoice, ...]:
 
     They are in the order of their titles; studies that ship with the program come last.
     """
-    found = dict.fromkeys([*map(str, unsaved_files(workspace().protocols)), *sources()])
+    known = dict.fromkeys([*map(str, unsaved_files(workspace().protocols)), *sources()])
     own = "" if opened is None else source_of(opened.file)
     if opened is not None:
-        found[own] = None
+        known[own] = None
     drafted = {file.resolve() for file in drafted_files()}
     choices = []
-    for source in found:
+    for source in known:
         file = _resolved(source)
         if Path(source).suffix == ".toml" and Path(source).exists() and holds_liquids_alone(source):
             continue
@@ -319,8 +319,8 @@ def header_state(
 
 def source_of(file: Path) -> str:
     """Return what a study's file is opened by: its name at hand, else its path."""
-    found = _file(file.stem)
-    return file.stem if found is not None and found.resolve() == file.resolve() else str(file)
+    found_file = _file(file.stem)
+    return file.stem if found_file is not None and found_file.resolve() == file.resolve() else str(file)
 
 
 def new_choices(source: str = "") -> tuple[TemplateChoice, ...]:
@@ -420,8 +420,8 @@ class TemplateButton(Themed, QAbstractButton):
         self.setText(choice.title)
         self.setCheckable(True)
         self.setAccessibleName(f"{'Copy of' if choice.copy else 'Template'} {choice.title}")
-        words = ", ".join(words for _, words in choice.figures)
-        self.setAccessibleDescription(". ".join(filter(None, (choice.description.rstrip("."), choice.note, words))))
+        figures = ", ".join(counts for _, counts in choice.figures)
+        self.setAccessibleDescription(". ".join(filter(None, (choice.description.rstrip("."), choice.note, figures))))
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -437,7 +437,7 @@ class TemplateButton(Themed, QAbstractButton):
             if self._empty:
                 described.setAlignment(aligned)
                 title.setAlignment(aligned)
-            counts = hbox(*(part for one in choice.figures for part in self._figure(*one)), STRETCH, spacing=6)
+            counts = hbox(*(part for figure in choice.figures for part in self._figure(*figure)), STRETCH, spacing=6)
             below = vbox(title, described, STRETCH, counts, spacing=4, margins=(16, 10, 16, 10))
             picture_row = (hbox(STRETCH, above, STRETCH, margins=(0, 70, 0, 8)),) if self._empty else (above,)
             vbox(*picture_row, (below, 1), spacing=0, margins=RING + 1, parent=self)
@@ -451,8 +451,8 @@ class TemplateButton(Themed, QAbstractButton):
     def _lay_out_copy(self) -> None:
         sign = Icon("lock" if self.choice.note == SHIPPED else "layers", "text2", 18)
         title = Clamped(self.choice.title, 2, "label", steady=False)
-        words = vbox(STRETCH, title, cut_text(self.choice.note), STRETCH, spacing=0)
-        hbox(sign, (words, 1), spacing=14, margins=(RING + 22, RING, RING + 12, RING), parent=self)
+        texts = vbox(STRETCH, title, cut_text(self.choice.note), STRETCH, spacing=0)
+        hbox(sign, (texts, 1), spacing=14, margins=(RING + 22, RING, RING + 12, RING), parent=self)
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
@@ -505,8 +505,8 @@ class RecoveryBar(Themed, QWidget):
         painter.setPen(QColor(t.text2))
         for tick in range(TICKS + 1):
             value = shown.most * tick / TICKS
-            words = f"{value:g} {shown.unit}" if tick == TICKS else f"{value:g}"
-            painter.drawText(QRectF(place(value) - 30, 30, 60, 16), Qt.AlignmentFlag.AlignCenter, words)
+            label = f"{value:g} {shown.unit}" if tick == TICKS else f"{value:g}"
+            painter.drawText(QRectF(place(value) - 30, 30, 60, 16), Qt.AlignmentFlag.AlignCenter, label)
 
 
 FIELD_PX, WORDS_PX = 36, 112
@@ -528,8 +528,8 @@ class Questions(Themed, QWidget):
         self.own: dict[OwnQuestion, QLineEdit] = {}
         self._grid = grid_of(8, 8, margins=0, parent=self)
         self._grid.setColumnStretch(1, 1)
-        for row, (words, field) in enumerate((("Title", self.title), ("Short name", self.name))):
-            self._add(row, words, field)
+        for row, (title, field) in enumerate((("Title", self.title), ("Short name", self.name))):
+            self._add(row, title, field)
         box = QWidget()
         checks = grid_of(2, 2, margins=0, parent=box)
         for at, (code, name) in enumerate(languages_offered()):
@@ -551,8 +551,8 @@ class Questions(Themed, QWidget):
         made.returnPressed.connect(self.entered)
         return made
 
-    def _add(self, row: int, words: str, field: QWidget) -> QWidget:
-        shown = label(words, "label", wraps=True)
+    def _add(self, row: int, title: str, field: QWidget) -> QWidget:
+        shown = label(title, "label", wraps=True)
         shown.setFixedWidth(WORDS_PX)
         self._grid.addWidget(shown, row, 0)
         self._grid.addWidget(field, row, 1)
@@ -593,11 +593,11 @@ class Questions(Themed, QWidget):
 
     def _show_first_texts(self) -> None:
         """Say in which language the texts begin where none of the template's is chosen."""
-        there = () if self._choice is None else self._choice.languages
+        languages = () if self._choice is None else self._choice.languages
         chosen = [code for code, check in self.languages.items() if check.isChecked()]
-        without = bool(there and chosen) and set(there).isdisjoint(chosen)
+        without = bool(languages and chosen) and set(languages).isdisjoint(chosen)
         if without:
-            self.first_texts.setText(f"The texts begin in {dict(languages_offered())[there[0]]}: translate them.")
+            self.first_texts.setText(f"The texts begin in {dict(languages_offered())[languages[0]]}: translate them.")
         self.first_texts.setVisible(without)
 
     @property
@@ -678,7 +678,7 @@ class ChosenCard(Card):
         self.title.setText(choice.title)
         before = (self.about, self.details)
         self.about, self.details = QWidget(), QWidget()
-        tags = (Chip("neutral", icon, words, small=True) for icon, words in choice.tags)
+        tags = (Chip("neutral", icon, text, small=True) for icon, text in choice.tags)
         described = label(choice.description, "label", "text2", wraps=True)
         _column(self.about, described, hbox(*tags, STRETCH, spacing=8), Rule())
         column = _column(self.details)
@@ -757,18 +757,18 @@ class NewStudyPage(Themed, QWidget):
             ("Templates", "", False, ACROSS),
             ("Or a copy of a study", "with its comments; the original stays as it is", True, COPIES_ACROSS),
         ):
-            words = label(heading, "card"), label(aside, "small", "text2")
-            add_layout(column, hbox(*words, STRETCH, spacing=10, margins=(RING, 0, 0, 0)))
+            labels = label(heading, "card"), label(aside, "small", "text2")
+            add_layout(column, hbox(*labels, STRETCH, spacing=10, margins=(RING, 0, 0, 0)))
             grid = grid_of(14 - 2 * RING, 14 - 2 * RING)
             columns = across if self.width() >= NARROW_BELOW else 2
-            for at, choice in enumerate(one for one in choices if one.copy == copies):
+            for at, choice in enumerate(choice for choice in choices if choice.copy == copies):
                 made = TemplateButton(choice)
                 made.came.connect(partial(self._come, made))
                 self._group.addButton(made)
                 grid.addWidget(made, at // columns, at % columns)
                 self.buttons.append(made)
-            for one in range(columns):
-                grid.setColumnStretch(one, 1)
+            for number in range(columns):
+                grid.setColumnStretch(number, 1)
             add_layout(column, grid)
         column.addStretch()
         name_bars(inside)

@@ -109,18 +109,18 @@ def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> 
     if study.unreadable:
         only = Element(FIRST, title_of({}, FIRST), FIRST[0], faults=len(study.faults))
         return (_row(study, only, {}, in_session=False),)
-    shown, words = outline(study), find.strip()
-    fields = found_in_elements(study, words)
+    shown, text = outline(study), find.strip()
+    fields = found_in_elements(study, text)
     rows: list[OutlineRow] = []
     titles = _titles((*shown.parts, *shown.session, *shown.study))
-    settings = [one for one in shown.study if one.path != FIRST]
-    own = [one for one in shown.study if one.path == FIRST]
+    settings = [element for element in shown.study if element.path != FIRST]
+    own = [element for element in shown.study if element.path == FIRST]
     for heading, elements in (("", own), (SESSION, shown.session), (PARTS, shown.parts), (SETTINGS, settings)):
-        named = [replace(one, title=titles[one.path]) for one in elements]
+        named = [replace(element, title=titles[element.path]) for element in elements]
         inner = [_row(study, element, times_s, in_session=heading == SESSION) for element in named]
-        if words:
+        if text:
             inner = [row for row in inner if len(row.path) > 1 or heading != PARTS]
-            inner = [kept for row in inner if (kept := _found(study, row, words, fields.get(row.path))) is not None]
+            inner = [kept for row in inner if (kept := _found(study, row, text, fields.get(row.path))) is not None]
         total = duration(sum(times_s.values())) if times_s and heading == SESSION else ""
         if inner:
             rows += [*([OutlineRow(path=(), title=heading, note=total, name=heading)] if heading else []), *inner]
@@ -130,19 +130,21 @@ def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> 
 def _titles(elements: Sequence[Element]) -> dict[Path, str]:
     """Return the name of each element: its title, with its id if an earlier element of the section has this title."""
     first: dict[tuple[Path, str], Path] = {}
-    for one in elements:
-        first.setdefault((one.path[:-1], one.title), one.path)
-    mine = {one.path: first[one.path[:-1], one.title] == one.path for one in elements}
-    return {one.path: one.title if mine[one.path] else f"{one.title} ({one.id})" for one in elements}
+    for element in elements:
+        first.setdefault((element.path[:-1], element.title), element.path)
+    mine = {element.path: first[element.path[:-1], element.title] == element.path for element in elements}
+    return {
+        element.path: element.title if mine[element.path] else f"{element.title} ({element.id})" for element in elements
+    }
 
 
-def _found(study: Study, row: OutlineRow, words: str, field: FoundField | None) -> OutlineRow | None:
+def _found(study: Study, row: OutlineRow, text: str, field: FoundField | None) -> OutlineRow | None:
     """Return a row where its element was found, with the label of the field that was; else None."""
-    named = found(study.document, row.path, words, named=True)
+    named = found(study.document, row.path, text, named=True)
     if field is not None and (field.rank == LABEL or not named):
         title, name = f"{row.title} · {field.label}", f"{row.name}, field {field.label}"
         return replace(row, title=title, name=name, field=field.field, named=named)
-    return replace(row, named=named) if named or found(study.document, row.path, words) else None
+    return replace(row, named=named) if named or found(study.document, row.path, text) else None
 
 
 def icon_of(path: Path, document: Mapping[str, Any]) -> str:
@@ -219,8 +221,8 @@ def addable(study: Study, selected: Path) -> tuple[Addable, ...]:
         row.path for row in rows(document, ()) if row.kind == "tables" and (second or row.path[0] not in TABLES)
     ]
     sections.sort(key=lambda path: path[:1] != selected[:1])
-    found = [_of_list(study, path) for path in lists]
-    found += [
+    entries = [_of_list(study, path) for path in lists]
+    entries += [
         Addable(
             words=label_of(singular(path[0])),
             icon=icon_of(path, study.document),
@@ -229,9 +231,9 @@ def addable(study: Study, selected: Path) -> tuple[Addable, ...]:
         )
         for path in sections
     ]
-    found += _questions(study, around) if not any(path[0] == QUESTIONNAIRES for path in lists) else ()
-    found += _instruments() if second else ()
-    return tuple(found)
+    entries += _questions(study, around) if not any(path[0] == QUESTIONNAIRES for path in lists) else ()
+    entries += _instruments() if second else ()
+    return tuple(entries)
 
 
 def _questions(study: Study, around: Path) -> Iterator[Addable]:
@@ -241,7 +243,7 @@ def _questions(study: Study, around: Path) -> Iterator[Addable]:
     """
     named = value_at(study.document, (*around, "questionnaire")) if around else None
     tables = names(study.document, QUESTIONNAIRES)
-    every = [one for one in tables if value_at(study.document, (QUESTIONNAIRES, one, "instrument")) is None]
+    every = [name for name in tables if value_at(study.document, (QUESTIONNAIRES, name, "instrument")) is None]
     for name in (named,) if named in every else every:
         first = _of_list(study, (QUESTIONNAIRES, str(name), "items"))
         title = title_of(study.document, (QUESTIONNAIRES, str(name)))
@@ -251,14 +253,14 @@ def _questions(study: Study, around: Path) -> Iterator[Addable]:
 @cache
 def _instruments() -> tuple[Addable, ...]:
     """Return the standard questionnaires, with who published each and under which licence its texts are."""
-    found = []
+    entries = []
     for name in instruments():
         source = instrument(name)
         texts = "" if source["languages"] else ". Its texts are not included: write them in the study"
         help_ = f"{source['source']}. Licence: {source['licence']}{texts}"
-        words = f"Instrument: {name.upper()}, {len(source['items'])} questions"
-        found.append(Addable(words=words, icon="list", asks=AddInstrument(name), help=help_))
-    return tuple(found)
+        title = f"Instrument: {name.upper()}, {len(source['items'])} questions"
+        entries.append(Addable(words=title, icon="list", asks=AddInstrument(name), help=help_))
+    return tuple(entries)
 
 
 def _of_list(study: Study, path: Path) -> Addable:
@@ -316,17 +318,17 @@ class AddList(Themed, QFrame):
         self.show()
         self.words.setFocus(Qt.FocusReason.PopupFocusReason)
 
-    def _type(self, words: str) -> None:
-        wanted = words_sought(words)
+    def _type(self, text: str) -> None:
+        wanted = words_sought(text)
         self.list.clear()
-        fitting = [one for one in self._every if all(part in f"{one.words} {one.help}".casefold() for part in wanted)]
-        typed = words.casefold().split()
-        fitting.sort(key=lambda one: one.words.casefold().split()[: len(typed)] != typed)  # whole words come first
-        for one in fitting:
-            item = QListWidgetItem(icon(one.icon, self.theme.text2, 18), one.words)
-            item.setData(Qt.ItemDataRole.UserRole, one)
-            item.setToolTip(plain_tip(one.help))
-            item.setData(Qt.ItemDataRole.AccessibleDescriptionRole, one.help)
+        fitting = [entry for entry in self._every if all(part in f"{entry.text} {entry.help}".casefold() for part in wanted)]
+        typed = text.casefold().split()
+        fitting.sort(key=lambda entry: entry.text.casefold().split()[: len(typed)] != typed)  # whole text come first
+        for entry in fitting:
+            item = QListWidgetItem(icon(entry.icon, self.theme.text2, 18), entry.text)
+            item.setData(Qt.ItemDataRole.UserRole, entry)
+            item.setToolTip(plain_tip(entry.help))
+            item.setData(Qt.ItemDataRole.AccessibleDescriptionRole, entry.help)
             item.setSizeHint(QSize(WIDTH - 40, ADD_ROW_PX))
             self.list.addItem(item)
         self.list.setCurrentRow(0)
@@ -431,8 +433,8 @@ class RowPainter(QStyledItemDelegate):
         painter.setFont(font("label", weight=600 if chosen else 500))
         painter.setPen(QColor(ink))
         room = QRectF(x + 46, place.top(), right - x - 46, place.height())
-        words = painter.fontMetrics().elidedText(row.title, Qt.TextElideMode.ElideRight, int(room.width()))
-        painter.drawText(room, middle, words)
+        title = painter.fontMetrics().elidedText(row.title, Qt.TextElideMode.ElideRight, int(room.width()))
+        painter.drawText(room, middle, title)
 
 
 def sign_right(row: OutlineRow) -> float:
@@ -538,18 +540,18 @@ class Tree(Themed, QTreeView):
     def _target(self, at: QPoint) -> tuple[ElementPath, float] | None:
         """Return the place of the entry that comes next where the line is, and how far down the line is."""
         place = self.dragged[:-1]
-        found: list[tuple[ElementPath, float]] = []
+        places: list[tuple[ElementPath, float]] = []
         end: tuple[ElementPath, float] | None = None
         index = self.model().index(0, 0)
         while index.isValid():
             row, box = index.data(ROW_ROLE), QRectF(self.visualRect(index))
             if row.step and row.step[:-1] == place:
-                found.append((row.step, box.top()))
+                places.append((row.step, box.top()))
                 end = (*place, int(row.step[-1]) + 1), box.bottom()
             elif end is not None and row.path and self._below(index, place):
                 end = end[0], box.bottom()
             index = self.indexBelow(index)
-        return min((*found, *([end] if end else ())), key=lambda one: abs(one[1] - at.y()), default=None)
+        return min((*places, *([end] if end else ())), key=lambda place: abs(place[1] - at.y()), default=None)
 
     def _below(self, index: QModelIndex, place: ElementPath) -> bool:
         """Return whether a row is shown below an entry of a list."""
@@ -661,8 +663,8 @@ class OutlineCard(Coloured, Card):
         self.mark(selected)
 
     def _say_whether_found(self, rows: tuple[OutlineRow, ...]) -> None:
-        words = self.words.text().strip()
-        sentence = f'Nothing called "{words}" in this study' if words and not rows else ""
+        text = self.words.text().strip()
+        sentence = f'Nothing called "{text}" in this study' if text and not rows else ""
         if sentence and sentence != self.nothing.whole:
             say(self.words, sentence)
         self.nothing.show_text(sentence)
@@ -673,34 +675,34 @@ class OutlineCard(Coloured, Card):
         current = self.tree.currentIndex()
         if current.isValid() and current.data(ROW_ROLE).path == path:
             return
-        found = next((index for index in self.indexes() if index.data(ROW_ROLE).path == path), None)
+        index = next((index for index in self.indexes() if index.data(ROW_ROLE).path == path), None)
         self._filling = True
-        if found is None:
+        if index is None:
             self.tree.clearSelection()
             self.tree.setCurrentIndex(QModelIndex())
         else:
-            if reveals and found.parent().isValid():
-                self.tree.expand(found.parent())
+            if reveals and index.parent().isValid():
+                self.tree.expand(index.parent())
             if reveals and "blocks" in path[:1]:  # type: ignore[index]  # a path
-                self.tree.expand(found)
+                self.tree.expand(index)
             down = self.tree.verticalScrollBar().value()
             flags = QItemSelectionModel.SelectionFlag
-            self.tree.selectionModel().setCurrentIndex(found, flags.ClearAndSelect)
+            self.tree.selectionModel().setCurrentIndex(index, flags.ClearAndSelect)
             if reveals:
-                self.tree.scrollTo(found)
+                self.tree.scrollTo(index)
             else:  # Qt scrolls to it, too
                 self.tree.verticalScrollBar().setValue(down)
         self._filling = False
 
     def indexes(self) -> list[QModelIndex]:
         """Return the rows in their order, those of branches that are closed included."""
-        found: list[QModelIndex] = []
+        indexes: list[QModelIndex] = []
         waiting = [self.items.index(row, 0) for row in range(self.items.rowCount())]
         while waiting:
             index = waiting.pop(0)
-            found.append(index)
+            indexes.append(index)
             waiting[:0] = [self.items.index(row, 0, index) for row in range(self.items.rowCount(index))]
-        return found
+        return indexes
 
     def _key(self, index: Index) -> object:
         row, parent = index.data(ROW_ROLE), index.parent()

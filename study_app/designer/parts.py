@@ -26,10 +26,10 @@ class _Segment(PressedByEnter):
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setSizePolicy(QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Fixed)
 
-    def show_words(self, words: str) -> None:
-        if words != self.text():
-            self.setText(words)
-            self.setAccessibleName(words)
+    def show_words(self, text: str) -> None:
+        if text != self.text():
+            self.setText(text)
+            self.setAccessibleName(text)
 
     def nextCheckState(self) -> None:
         """Leave it to `Segments` which is chosen."""
@@ -62,8 +62,8 @@ class Segments(Themed, QWidget):
         while len(self.buttons) < len(values):
             self._add_button()
         self._values = tuple(value for value, _ in values)
-        for button, (value, words) in zip(self.buttons, values, strict=False):
-            button.show_words(words)
+        for button, (value, text) in zip(self.buttons, values, strict=False):
+            button.show_words(text)
             button.setChecked(value == chosen)
             button.setToolTip(plain_tip(self.tips.get(value, "")))
             button.update()
@@ -100,9 +100,9 @@ def dense(part: W, name: str, height: int = FIELD_PX) -> W:
     return part
 
 
-def small_button(icon: str, words: str, *, cap: str = "", role: str = "", height: int = 34) -> ActionButton:
+def small_button(icon: str, label: str, *, cap: str = "", role: str = "", height: int = 34) -> ActionButton:
     """Return a button with little room around its words."""
-    made = ActionButton(icon, words, cap=cap, role=role, height=height)
+    made = ActionButton(icon, label, cap=cap, role=role, height=height)
     made.setProperty("dense", "true")
     made.setFont(font("label"))
     return made

@@ -74,19 +74,19 @@ def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
             for fault, problem in zip(study.faults, study.problems, strict=True)
         )
     places = places_of(study.text)
-    found = [_row(study, fault, places.line(fault.path)) for fault in study.faults]
-    return tuple(sorted(found, key=lambda row: row.line or 0))
+    rows = [_row(study, fault, places.line(fault.path)) for fault in study.faults]
+    return tuple(sorted(rows, key=lambda row: row.line or 0))
 
 
 def warning_rows(study: Study, sentences: Iterable[str]) -> tuple[ProblemRow, ...]:
     """Return the warnings of ``check``, in its order, each with the element that it names first."""
     places = places_of(study.text) if study.is_toml else None
-    found = []
+    rows = []
     for sentence in dict.fromkeys(sentences):
-        path, words = _placed(study, sentence)
+        path, text = _placed(study, sentence)
         line = None if places is None else places.line(path)
-        found.append(replace(_row(study, Fault(path, words), line), warning=True))
-    return tuple(found)
+        rows.append(replace(_row(study, Fault(path, text), line), warning=True))
+    return tuple(rows)
 
 
 def _placed(study: Study, sentence: str) -> tuple[Path, str]:
@@ -145,15 +145,15 @@ class RepairSearch(QObject):
         else:
             self._timer.stop()
 
-    def repair(self, row: ProblemRow, words: str) -> Repair | None:
+    def repair(self, row: ProblemRow, sentence: str) -> Repair | None:
         """Return a repair by its words; one that was offered before the last edit is looked for at once."""
         self._look(row)
-        return next((one for one in self._known.get(row, ()) if one.words == words), None)
+        return next((repair for repair in self._known.get(row, ()) if repair.words == sentence), None)
 
     def show(self, row: ProblemRow) -> None:
         self._look(row)
         if row in self._known:
-            self.found.emit(row, tuple(one.words for one in self._known[row]))
+            self.found.emit(row, tuple(repair.words for repair in self._known[row]))
 
     def _look(self, row: ProblemRow) -> None:
         study = self._study
@@ -172,16 +172,16 @@ class RepairButton(ActionButton):
 
     typed = Signal(object)
 
-    def __init__(self, problem: ProblemRow, words: str) -> None:
-        super().__init__("", words, height=32)
+    def __init__(self, problem: ProblemRow, sentence: str) -> None:
+        super().__init__("", sentence, height=32)
         self.setProperty("dense", "true")
         self.setFont(font("label"))
         self.problem = problem
-        self.offer(words)
+        self.offer(sentence)
 
-    def offer(self, words: str) -> None:
-        self.show_action("", words)
-        self.setAccessibleName(f"{words}: {self.problem.name}")
+    def offer(self, sentence: str) -> None:
+        self.show_action("", sentence)
+        self.setAccessibleName(f"{sentence}: {self.problem.name}")
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.text().strip() and event.text().isprintable():
@@ -236,10 +236,10 @@ class ProblemLine(Coloured, QWidget):
         self._place.show_text(row.place)
 
     def show_repairs(self, repairs: tuple[str, ...]) -> None:
-        for button, words in zip(self.repairs, repairs, strict=False):
-            button.offer(words)
-        for words in repairs[len(self.repairs) : 2]:
-            made = RepairButton(self.row, words)
+        for button, sentence in zip(self.repairs, repairs, strict=False):
+            button.offer(sentence)
+        for sentence in repairs[len(self.repairs) : 2]:
+            made = RepairButton(self.row, sentence)
             made.clicked.connect(lambda _checked=False, made=made: self.repair_asked.emit(made.text()))
             self._repairs.addWidget(made)
             made.show()  # at once: Tab passes what a layout is still to show
@@ -289,8 +289,8 @@ class ProblemsCard(Card):
         self.next = small_button("", "Next", cap=key_cap("next problem"), height=36)
         self.next.setToolTip(tip("next problem"))
         self.close_button = IconButton("cross", "Close the list of problems", size=36, role="plain")
-        words = self.heading, label("the same as liquid-study check prints", "small", "text2")
-        top = hbox(*words, STRETCH, self.limit, self.next, self.close_button, spacing=10)
+        titles = self.heading, label("the same as liquid-study check prints", "small", "text2")
+        top = hbox(*titles, STRETCH, self.limit, self.next, self.close_button, spacing=10)
         self.area = QScrollArea()
         self.area.setWidgetResizable(True)
         self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -309,7 +309,7 @@ class ProblemsCard(Card):
     def show_problems(self, rows: tuple[ProblemRow, ...], element: object) -> None:
         """Show problems; ``element`` is the selected one. The list closes when the last problem is solved."""
         had, self.problems, self._element = bool(self.problems), rows, element
-        self.repairs = {row: words for row, words in self.repairs.items() if row in rows}
+        self.repairs = {row: sentences for row, sentences in self.repairs.items() if row in rows}
         self._show(closes=had)
 
     def show_warnings(self, rows: tuple[ProblemRow, ...]) -> None:
@@ -358,7 +358,7 @@ class ProblemsCard(Card):
         narrow = (self.parentWidget() or self).width() < NARROW_BELOW
         made = ProblemLine(row, self.repairs.get(row, ()), narrow=narrow)
         made.opened.connect(lambda: self.open(made.row))
-        made.repair_asked.connect(lambda words: self.repair_asked.emit(made.row, words))
+        made.repair_asked.connect(lambda sentence: self.repair_asked.emit(made.row, sentence))
         made.here = row == self.at
         for part in (made, Rule()):
             self._column.insertWidget(self._column.count() - 1, part)

@@ -70,15 +70,17 @@ class DeleteCard(Prompt):
         used = "It is used in 1 place:" if count == 1 else f"It is used in {count} places:"
         super().__init__(f"Delete {title_of(document, path)}?", used)
         inside = QWidget()
-        vbox(*(label(words, "label") for words in places), margins=0, parent=inside)
+        vbox(*(label(place, "label") for place in places), margins=0, parent=inside)
         area = QScrollArea()
         area.setWidgetResizable(True)
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         area.setWidget(inside)
         area.setFixedHeight(min(PLACES_PX, inside.sizeHint().height()))
         self.column.addWidget(area)
-        gone = (one for one in with_references(document, path, study.needs) if one != path and len(one) == 2)
-        if too := ", ".join(kind_and_title(document, one) for one in gone if isinstance(one[1], str)):
+        gone = (
+            element for element in with_references(document, path, study.needs) if element != path and len(element) == 2
+        )
+        if too := ", ".join(kind_and_title(document, path) for path in gone if isinstance(path[1], str)):
             self.column.addWidget(label(f"Also deletes: {too}.", "label", wraps=True))
         self.all = ActionButton("trash", "Delete them too", role="danger", height=40)
         self.all.clicked.connect(lambda: self.answered.emit(DeleteElement(path, "all")))
@@ -105,7 +107,7 @@ class ConfirmCard(Prompt):
 
     def __init__(self, title: str, explanation: str, action: str, icon: str = "", breaks: Sequence[str] = ()) -> None:
         super().__init__(title, explanation)
-        add_parts(self.column, *(label(f"•  {words}", "label", wraps=True) for words in breaks))
+        add_parts(self.column, *(label(f"•  {text}", "label", wraps=True) for text in breaks))
         self.go_on = ActionButton(icon, action, role="danger", height=40)
         self.go_on.clicked.connect(lambda: self.answered.emit(action))
         self.buttons.addWidget(self.go_on)
@@ -125,8 +127,8 @@ class SeriesCard(Prompt):
         self.study, self.path, self.numbers = study, path, numbers
         self.number = dense(Choice(), "Number that differs")
         for row in numbers:
-            words = ", ".join(label_of(step) for step in row.path[2:])
-            self.number.addItem(f"{words} [{row.unit}]" if row.unit else words)
+            number_title = ", ".join(label_of(step) for step in row.path[2:])
+            self.number.addItem(f"{number_title} [{row.unit}]" if row.unit else number_title)
         self.values = dense(QLineEdit(), "Values of the copies")
         self.values.setPlaceholderText("60 120 240")
         self.copies = label("", "label", wraps=True)

@@ -79,12 +79,12 @@ class Saving(QObject):
         opened = self.editing.opened
         draft = None if opened is None else opened.draft if opened.base else draft_of(opened.file)
         if opened is not None and draft is not None and opened.edited:
-            words = f"Draft of {time_words(draft.kept_at)}, {'not' if opened.base else 'never'} saved"
-            self._note(words, ("discard", "Discard the draft"), lasts=True)
+            sentence = f"Draft of {time_words(draft.kept_at)}, {'not' if opened.base else 'never'} saved"
+            self._note(sentence, ("discard", "Discard the draft"), lasts=True)
 
-    def _note(self, words: str | None, *actions: tuple[str, str], lasts: bool | None = None) -> None:
+    def _note(self, sentence: str | None, *actions: tuple[str, str], lasts: bool | None = None) -> None:
         """Show a line that needs no answer where no other one is needed, None for none; ``lasts`` says for how long."""
-        self._notice, self._lasts = None if words is None else Notice(words, actions, closes=True), lasts
+        self._notice, self._lasts = None if sentence is None else Notice(sentence, actions, closes=True), lasts
 
     def _end_notice(self) -> None:
         """Take back what is true no longer: that the draft differs from the file, or that the file has problems."""
@@ -131,7 +131,7 @@ class Saving(QObject):
             self.place.parts.focus_problems()
             return
         if action == "compare":
-            drafts = [one.hash for one in kept_versions(opened.file) if one.origin == "draft"]
+            drafts = [version.hash for version in kept_versions(opened.file) if version.origin == "draft"]
             self.compare_asked.emit(FILE if _changed_outside(opened) or not drafts else drafts[-1])
             return
         if action == "close":
@@ -183,9 +183,9 @@ class Saving(QObject):
 
     def _ask(self, opened: Document, standing: Standing) -> None:
         run = newest(self.runs.known)
-        found = Comparison() if run is None else compare(version_of(opened, run), opened.study)
+        comparison = Comparison() if run is None else compare(version_of(opened, run), opened.study)
         problems = len(opened.study.faults)
-        self.card = card = SaveCard(standing, self.runs.known, found, problems)
+        self.card = card = SaveCard(standing, self.runs.known, comparison, problems)
         card.save_asked.connect(self.save_as_version)
         card.another_asked.connect(self.save_as_another)
         card.changes_asked.connect(self.place.close_prompt)

@@ -50,13 +50,13 @@ def version_chip(standing: Standing, known: Iterable[Run]) -> VersionChip:
     tip = "\n".join(f"Version {run.version}: {counts(run)}" for run in known)
     save = f"Save {standing.version} …" if standing.asks else "Save"
     if not standing.was:
-        words = "Piloted" if any(run.pilots for run in known) else "Rehearsed" if known else "Not run yet"
+        text = "Piloted" if any(run.pilots for run in known) else "Rehearsed" if known else "Not run yet"
         return VersionChip(
-            tone="neutral", icon="ring", words=words, tip=tip or "No session was run with this study", save=save
+            tone="neutral", icon="ring", words=text, tip=tip or "No session was run with this study", save=save
         )
     if standing.sessions:
-        words = f"{standing.version}, run by {standing.sessions}"
-        return VersionChip(tone="ok", icon="check", words=words, tip=tip, save=save)
+        text = f"{standing.version}, run by {standing.sessions}"
+        return VersionChip(tone="ok", icon="check", words=text, tip=tip, save=save)
     return VersionChip(tone="accent", icon="pen", words=f"{standing.version}, was {standing.was}", tip=tip, save=save)
 
 
@@ -73,29 +73,29 @@ def version_choices(
 
     ``file`` is what is said of the file, "" where it does not differ from the study; ``now`` is for "Today 14:02".
     """
-    found = [(FILE, file)] if file else []
+    choices = [(FILE, file)] if file else []
     ran = {run.hash for run in known}
-    found += [(run.hash, f"{run.version}: {counts(run)}, last {_when(run.last, now)}") for run in reversed(known)]
-    saved = [one for one in kept if one.hash not in ran][-MOST_KEPT:]
-    found += [(one.hash, _kept_words(one, now)) for one in reversed(saved)]
-    return tuple(found)
+    choices += [(run.hash, f"{run.version}: {counts(run)}, last {_when(run.last, now)}") for run in reversed(known)]
+    saved = [version for version in kept if version.hash not in ran][-MOST_KEPT:]
+    choices += [(version.hash, _kept_words(version, now)) for version in reversed(saved)]
+    return tuple(choices)
 
 
-def _kept_words(one: Kept, now: datetime) -> str:
-    when = _when(one.at, now)
-    if one.origin == "draft":
+def _kept_words(version: Kept, now: datetime) -> str:
+    when = _when(version.at, now)
+    if version.origin == "draft":
         return f"Unsaved edits of another window, {when}"
-    stated = _STATED.search((kept_content(one.hash) or b"").decode("utf-8", "replace"))
-    how = "saved" if one.origin == "saved" else "in the file before it was saved"
+    stated = _STATED.search((kept_content(version.hash) or b"").decode("utf-8", "replace"))
+    how = "saved" if version.origin == "saved" else "in the file before it was saved"
     return f"{stated[1] if stated else 'No version'}: {how} {when}"
 
 
 def _when(moment: str, now: datetime) -> str:
     try:
-        words = started_words(datetime.fromisoformat(moment).astimezone(now.tzinfo), now)
+        text = started_words(datetime.fromisoformat(moment).astimezone(now.tzinfo), now)
     except ValueError:
         return "at an unknown time"
-    return f"{words[:1].lower()}{words[1:]}"
+    return f"{text[:1].lower()}{text[1:]}"
 
 
 NAMED_AT_MOST: Final = 3
@@ -111,10 +111,10 @@ def edited_words(saved: str, draft: str, folder: Path) -> str:
     """Return the elements in which a draft differs from its file, in words: ": Water, Welcome and 2 more"."""
     study = Study(draft, folder)
     try:
-        found = document_differences(tomllib.loads(saved), tomllib.loads(draft))
+        differences = document_differences(tomllib.loads(saved), tomllib.loads(draft))
     except ValueError:  # the text of one of them is not TOML
         return ""
-    places = (one.place[:2] for one in found)
+    places = (difference.place[:2] for difference in differences)
     titles = dict.fromkeys(
         label_of(path[1]) if path[0] == "study" else title_of(study.document, element_of(study, path))
         for path in places

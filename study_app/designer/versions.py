@@ -81,10 +81,10 @@ class KnownRuns(QObject):
         self.known, self.items, self.chip = (), {}, VersionChip()
         self.look()
 
-    def _take(self, found: tuple[str, tuple[Run, ...], Mapping[tuple[str, str], int]]) -> None:
-        if self.editing.opened is not None and self.editing.opened.name == found[0]:
-            fresh = found[1:] != (self.known, self.items)
-            _, self.known, self.items = found
+    def _take(self, answer: tuple[str, tuple[Run, ...], Mapping[tuple[str, str], int]]) -> None:
+        if self.editing.opened is not None and self.editing.opened.name == answer[0]:
+            fresh = answer[1:] != (self.known, self.items)
+            _, self.known, self.items = answer
             self._stand()
             if fresh:
                 self.changed.emit()
@@ -98,10 +98,10 @@ class KnownRuns(QObject):
 
 
 def _read(results: Path, study: str, file: Path) -> tuple[str, tuple[Run, ...], Mapping[tuple[str, str], int]]:
-    found = runs_of_study(results, study)
+    known = runs_of_study(results, study)
     with contextlib.suppress(StoreError):  # a draft that cannot be written says so
-        keep_run_content(file, found)
-    return study, found, recorded_items(found)
+        keep_run_content(file, known)
+    return study, known, recorded_items(known)
 
 
 NOTHING = "There is no version to compare with: no session was run, and nothing was saved before."
@@ -156,10 +156,10 @@ class SaveCard(Prompt):
         self.difference.setVisible(bool(difference.lines))
         are = "it is" if problems == 1 else "they are"
         wrong = f"{counted(problems, 'problem')}: new sessions are refused until {are} solved." if problems else ""
-        for icon, ink, words in (("info", "text2", difference.note), ("warning", "warn", wrong)):
-            if words:
+        for icon, ink, text in (("info", "text2", difference.note), ("warning", "warn", wrong)):
+            if text:
                 sign = Icon(icon, ink, 18)  # type: ignore[arg-type]  # an ink
-                add_layout(self.column, hbox(sign, (label(words, "label", wraps=True), 1), spacing=8))
+                add_layout(self.column, hbox(sign, (label(text, "label", wraps=True), 1), spacing=8))
         self.version = _field("Version to save as", standing.version, 110)
         self.name = _field("Short name of the other study", "", 220)
         self.name.setPlaceholderText("small letters and digits")
@@ -198,8 +198,8 @@ class SaveCard(Prompt):
 
     def _say(self) -> None:
         self.refuse("")
-        words = "Save the new study" if self._naming else f"Save {self.version.text().strip()}"
-        self.save.show_action("save", words)
+        text = "Save the new study" if self._naming else f"Save {self.version.text().strip()}"
+        self.save.show_action("save", text)
 
     def _save(self) -> None:
         if self._naming:
@@ -348,17 +348,17 @@ class Changes(Card):
         if (self._choices, self.chosen) != before:
             with QSignalBlocker(self.version):
                 self.version.clear()
-                for key, words in self._choices:
-                    self.version.addItem(words, key)
+                for key, title in self._choices:
+                    self.version.addItem(title, key)
                 self.version.setCurrentIndex(self.version.findData(self.chosen) if self.chosen else -1)
         version = self._version(opened, self.chosen) if self.chosen else Version(None)
-        found = compare(version, opened.study) if self.chosen else Comparison()
+        comparison = compare(version, opened.study) if self.chosen else Comparison()
         self.top.setVisible(bool(keys))
         self.nothing.setVisible(not keys)
-        self.note.setText(found.note)
-        self.note.setVisible(bool(found.note))
-        self.difference.setVisible(bool(found.lines))
-        self.difference.show_lines(found.lines)
+        self.note.setText(comparison.note)
+        self.note.setVisible(bool(comparison.note))
+        self.difference.setVisible(bool(comparison.lines))
+        self.difference.show_lines(comparison.lines)
         self.restore.setEnabled(not opened.read_only and version.text not in {None, opened.study.text})
 
     def _found_choices(self, opened: Document) -> tuple[tuple[str, str], ...]:
@@ -381,7 +381,7 @@ class Changes(Card):
     def _version(self, opened: Document, key: str) -> Version:
         if key == FILE:
             return file_version(opened.file)
-        run = next((one for one in self._known() if one.hash == key), None)
+        run = next((run for run in self._known() if run.hash == key), None)
         return kept_version(key) if run is None else version_of(opened, run)
 
     def _restore(self) -> None:

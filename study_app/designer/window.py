@@ -91,21 +91,21 @@ class RightPane(QWidget):
         self.show_tab(page.name if first else self.tab or page.name)
 
     def show_tab(self, name: str) -> None:
-        page = next(one for one in self.pages if one.name == name)
+        page = next(page for page in self.pages if page.name == name)
         changed, self.tab = name != self.tab, name
-        self.tabs.tips = {one.name: one.tip for one in self.pages}
-        self.tabs.show_values([(one.name, one.words) for one in self.pages], name)
+        self.tabs.tips = {page.name: page.tip for page in self.pages}
+        self.tabs.show_values([(page.name, page.words) for page in self.pages], name)
         self._stack.setCurrentWidget(page.body)
-        for one in self.pages:
-            if one.aside is not None:
-                one.aside.setVisible(one is page)
+        for tab_page in self.pages:
+            if tab_page.aside is not None:
+                tab_page.aside.setVisible(tab_page is page)
         self.make_room()
         if changed:
             self.tab_shown.emit(name)
 
     def _place_aside(self) -> None:
         """Put the controls of the page at the right of the tabs, or below them where there is no room."""
-        page = next((one for one in self.pages if one.name == self.tab), None)
+        page = next((page for page in self.pages if page.name == self.tab), None)
         if page is not None and page.aside is not None:
             room = self.width() - 2 * SHADOW - self.tabs.sizeHint().width() - ASIDE_GAP
             row = self._asides if page.aside.sizeHint().width() <= room else self._below
@@ -119,7 +119,7 @@ class RightPane(QWidget):
     def make_room(self) -> None:
         """Place the controls; hide the facts where the window is too low for them, or the page takes their place."""
         self._place_aside()
-        page = next((one for one in self.pages if one.name == self.tab), None)
+        page = next((page for page in self.pages if page.name == self.tab), None)
         height = self.window().height()
         room = not self.isVisible() or self.height() >= FACTS_FROM_OWN
         facts = page is not None and page.with_facts and height >= FACTS_FROM and room
@@ -142,11 +142,11 @@ FORM_SHARE = 44
 class Crumb(PressedByEnter):
     """A step of the path; its words end in "…" where its room is too small."""
 
-    def __init__(self, words: str, least_px: int) -> None:
-        super().__init__(words)
-        self.whole, self._least_px = words, least_px
-        self.setAccessibleName(words)
-        self.setToolTip(words)
+    def __init__(self, text: str, least_px: int) -> None:
+        super().__init__(text)
+        self.whole, self._least_px = text, least_px
+        self.setAccessibleName(text)
+        self.setToolTip(text)
         self.setProperty("role", "plain")
         self.setProperty("dense", "true")
         self.setFont(font("label"))
@@ -208,13 +208,15 @@ def stops(part: QWidget) -> Iterator[QWidget]:
     """Yield what Tab goes to in a part: from top to bottom, parts beside each other from left to right."""
     if part.focusPolicy() & Qt.FocusPolicy.TabFocus and part.focusProxy() is None and part.isEnabled():
         yield part
-    inner = (one for one in part.children() if isinstance(one, QWidget) and one.isVisible() and not one.isWindow())
-    for one in sorted(inner, key=cmp_to_key(_read_before)):
-        yield from stops(one)
+    inner = (
+        child for child in part.children() if isinstance(child, QWidget) and child.isVisible() and not child.isWindow()
+    )
+    for child in sorted(inner, key=cmp_to_key(_read_before)):
+        yield from stops(child)
 
 
-def _read_before(one: QWidget, other: QWidget) -> int:
-    first, second = one.geometry(), other.geometry()
+def _read_before(part: QWidget, other: QWidget) -> int:
+    first, second = part.geometry(), other.geometry()
     if first.bottom() < second.top() or second.bottom() < first.top():
         return first.top() - second.top()
     return first.left() - second.left()
@@ -258,7 +260,7 @@ class Arrangement(QWidget):
 
     def arrange(self, width: int) -> None:
         self._width = width
-        one, drawer = width < ONE_PANE_BELOW, width < DRAWER_BELOW
+        single, drawer = width < ONE_PANE_BELOW, width < DRAWER_BELOW
         if drawer != self.drawer:
             self.drawer = drawer
             if drawer:
@@ -273,12 +275,12 @@ class Arrangement(QWidget):
                 self.outline.show()
         self.path.setVisible(drawer)
         self.top.setVisible(drawer)
-        (self._right if one else self._left).insertWidget(0, self.top)
-        self.sides.setVisible(one)
+        (self._right if single else self._left).insertWidget(0, self.top)
+        self.sides.setVisible(single)
         self.sides.show_values((("form", "Form"), ("pane", "Views")), self.side)
-        self.form.setVisible(not one or self.side == "form")
+        self.form.setVisible(not single or self.side == "form")
         self._across.setStretch(0, FORM_SHARE if self.form.isVisibleTo(self) else 0)  # an empty layout would take room
-        self.pane.setVisible(not one or self.side == "pane")
+        self.pane.setVisible(not single or self.side == "pane")
         self.pane.make_room()
 
     def focus_outline(self) -> None:
@@ -382,7 +384,7 @@ class Arrangement(QWidget):
     def _focus_page(self) -> None:
         self.show_side("pane")
         pane = self.pane
-        page = next(one for one in pane.pages if one.name == pane.tab)
+        page = next(page for page in pane.pages if page.name == pane.tab)
         (page.body.focusProxy() or page.body).setFocus(SHORTCUT)
 
     def show_tab(self, name: str) -> None:
@@ -474,7 +476,7 @@ class DesignerPlace(Place):
         outline.form_asked.connect(self.parts.focus_form)
         outline.element_clicked.connect(lambda: self.parts.focus_form() if self.parts.drawer else None)
         outline.tree.dropped.connect(lambda entry, to: self.asked.emit(MoveTo(entry, index_of(to))))
-        self.adding.chosen.connect(lambda one: self._take_asked(one.asks))
+        self.adding.chosen.connect(lambda entry: self._take_asked(entry.asks))
         self.parts.path.open_asked.connect(partial(self.finish, "select"))
         form.asked.connect(self._take_asked)
         form.head.id_typed.connect(partial(self.ask, "judge id"))
@@ -490,7 +492,9 @@ class DesignerPlace(Place):
 
     def _take_keys(self) -> None:
         head, tree = self.form.head, self.outline.tree
-        runs = {one.id: (one.within, partial(one.run, self)) for one in COMMANDS if one.run is not None}
+        runs = {
+            command.id: (command.within, partial(command.run, self)) for command in COMMANDS if command.run is not None
+        }
         own = add_commands(tree, {name: run for name, (within, run) in runs.items() if within})
         self.commands = own | add_commands(self, {name: run for name, (within, run) in runs.items() if not within})
         for name, button in (
@@ -556,8 +560,8 @@ class DesignerPlace(Place):
         if self.outline.rows:
             self.outline.mark(view.form.path)
 
-    def show_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
-        self.problems.show_repairs(row, words)
+    def show_repairs(self, row: ProblemRow, sentences: tuple[str, ...]) -> None:
+        self.problems.show_repairs(row, sentences)
         self.form.show_repairs(self.problems.repairs)
 
     def begin_study(self) -> None:
@@ -676,10 +680,10 @@ class DesignerPlace(Place):
         if row.line is not None:
             self.file.editor.go_to(row.line - 1)
 
-    def _repair(self, row: ProblemRow, words: str) -> None:
+    def _repair(self, row: ProblemRow, sentence: str) -> None:
         """Make a repair and go to its field."""
         self.problems.set_current(row)
-        self.finish("repair", row, words)
+        self.finish("repair", row, sentence)
         if row not in self.problems.problems:
             self.parts.focus_field(row.fault.path)
 
@@ -701,17 +705,21 @@ class DesignerPlace(Place):
         """Let Tab go through what is seen, as it is read, then to the beginning of the window, or Shift+Tab back."""
         self.flush()
         QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)  # parts made just now have their places
-        found, here = list(stops(self)), self.window().focusWidget()
-        if here not in found:
-            if not (forward and found and here is not None and here.isAncestorOf(self.stack)):  # the place itself
+        in_order, here = list(stops(self)), self.window().focusWidget()
+        if here not in in_order:
+            if not (forward and in_order and here is not None and here.isAncestorOf(self.stack)):  # the place itself
                 return super().focusNextPrevChild(forward)
             at = -1
         else:
-            at = found.index(here)
+            at = in_order.index(here)
         if not forward and at == 0:
             return super().focusNextPrevChild(forward)
         reason = Qt.FocusReason.TabFocusReason if forward else Qt.FocusReason.BacktabFocusReason
-        to = found[at + (1 if forward else -1)] if at + 1 < len(found) or not forward else next(stops(self.window()))
+        to = (
+            in_order[at + (1 if forward else -1)]
+            if at + 1 < len(in_order) or not forward
+            else next(stops(self.window()))
+        )
         to.setFocus(reason)
         return True
 

@@ -45,8 +45,8 @@ def switched(study: Study, path: Path, kind: str | None) -> tuple[Edit, ...]:
     node = table_of((named[kind],), {})
     if node is None:
         raise Refused(f"{kind} is not a kind of table")
-    found = value_at(study.document, path)
-    table = found if isinstance(found, Mapping) else {}
+    value = value_at(study.document, path)
+    table = value if isinstance(value, Mapping) else {}
     edits: list[Edit] = [Unset((*path, name)) for name in table if name != key and name not in node["properties"]]
     if kind is not None:
         edits.insert(0, Set((*path, key), kind))
@@ -59,34 +59,34 @@ def switched(study: Study, path: Path, kind: str | None) -> tuple[Edit, ...]:
 
 def with_language(study: Study, code: str) -> tuple[Edit, ...]:
     """Return the edits that add a language: plain texts become tables, whose new texts are missing."""
-    there = languages_of(study.document)
-    if code in there:
+    codes = languages_of(study.document)
+    if code in codes:
         raise Refused(f"the study is in {language_name(code)} already")
     if code not in LANGUAGES:
         raise Refused(f'the program has no words in "{code}": there are {", ".join(LANGUAGES)}')
-    tables = (Set(path, {there[0]: text}) for path, text in texts_of(study) if isinstance(text, str))
-    return (Set(("study", "languages"), [*there, code]), *tables)
+    tables = (Set(path, {codes[0]: text}) for path, text in texts_of(study) if isinstance(text, str))
+    return (Set(("study", "languages"), [*codes, code]), *tables)
 
 
 def without_language(study: Study, code: str) -> tuple[Edit, ...]:
     """Return the edits that remove a language and its texts."""
-    there = languages_of(study.document)
-    if code not in there or len(there) == 1:
+    codes = languages_of(study.document)
+    if code not in codes or len(codes) == 1:
         raise Refused("a study has at least one language")
     gone = (Unset((*path, code)) for path, text in texts_of(study) if isinstance(text, Mapping) and code in text)
-    return (*gone, Set(("study", "languages"), [one for one in there if one != code]))
+    return (*gone, Set(("study", "languages"), [other for other in codes if other != code]))
 
 
 def filled_in(study: Study, code: str) -> tuple[Edit, ...]:
     """Return the edits that copy the first language's texts to missing texts of a language."""
     first = languages_of(study.document)[0]
-    found: list[Edit] = []
+    edits: list[Edit] = []
     for path, text in texts_of(study):
         if isinstance(text, Mapping) and code not in text and first in text:
-            found.append(Set((*path, code), (list(text[first]) if isinstance(text[first], tuple) else text[first])))
+            edits.append(Set((*path, code), (list(text[first]) if isinstance(text[first], tuple) else text[first])))
         elif isinstance(text, str):
-            found.append(Set(path, {first: text, code: text}))
-    return tuple(found)
+            edits.append(Set(path, {first: text, code: text}))
+    return tuple(edits)
 
 
 def texts_of(study: Study) -> Iterator[tuple[Path, Any]]:
@@ -147,8 +147,8 @@ def followed(study: Study, path: Path, language: str, text: str) -> tuple[Edit, 
 
 
 def _in(value: Any, language: str) -> str | None:
-    found = value.get(language) if isinstance(value, Mapping) else value
-    return found if isinstance(found, str) else None
+    text = value.get(language) if isinstance(value, Mapping) else value
+    return text if isinstance(text, str) else None
 
 
 _HALVINGS: Final = 12
@@ -174,9 +174,9 @@ def removes(study: Study, fault: Fault, repair: Repair) -> bool:
         after, _ = study.edited(*repair.edits)
     except Refused:
         return False
-    known = {(one.path, one.message) for one in study.faults}
-    found = {(one.path, one.message) for one in after.faults}
-    return (fault.path, fault.message) not in found and len(found) <= len(known)
+    known = {(problem.path, problem.message) for problem in study.faults}
+    problems_after = {(problem.path, problem.message) for problem in after.faults}
+    return (fault.path, fault.message) not in problems_after and len(problems_after) <= len(known)
 
 
 def _stated(study: Study, fault: Fault) -> Iterator[Repair]:
@@ -190,10 +190,10 @@ def _stated(study: Study, fault: Fault) -> Iterator[Repair]:
         return
     if isinstance(now, int | float) and isinstance(value, int | float) and now < 0 < value and path == fault.path:
         value = -now
-    words = f"Use {shown(value)}"
+    sentence = f"Use {shown(value)}"
     if path != fault.path:
-        words = f"Move to {value:g} mm" if isinstance(path[-1], int) else f"Use {path[-1]} = {shown(value)}"
-    yield Repair(words, (Set(path, value),))
+        sentence = f"Move to {value:g} mm" if isinstance(path[-1], int) else f"Use {path[-1]} = {shown(value)}"
+    yield Repair(sentence, (Set(path, value),))
 
 
 def _by_kind(study: Study, fault: Fault) -> Iterator[Repair]:
@@ -216,8 +216,8 @@ def _by_kind(study: Study, fault: Fault) -> Iterator[Repair]:
         yield Repair("Add to the session", (Insert(("sequence", max(len(sequence) - 1, 0)), path[-1]),))
     elif (lacking := fault.missing_language) and isinstance(value, Mapping) and value:
         first = next(iter(value))
-        words = f"Copy {language_name(first)} to {language_name(lacking)}"
-        yield Repair(words, (Set((*path, lacking), value[first]),))
+        sentence = f"Copy {language_name(first)} to {language_name(lacking)}"
+        yield Repair(sentence, (Set((*path, lacking), value[first]),))
 
 
 def _levels(study: Study, fault: Fault) -> Iterator[Repair]:
@@ -239,13 +239,13 @@ def _lowered(study: Study, stimulus: str, highest: float) -> dict[str, tuple[flo
     A method of another stimulus, too, keeps its levels.
     """
     blocks = () if study.formed is None else study.formed.blocks.values()
-    found: dict[str, tuple[float, ...]] = {}
+    lowered_levels: dict[str, tuple[float, ...]] = {}
     for name in {str(block.method) for block in blocks if block.stimulus == stimulus}:
         own = value_at(study.document, ("methods", name, "levels"))
         shared = any(block.method == name and block.stimulus != stimulus for block in blocks)
         if isinstance(own, tuple) and not shared and any(level > highest for level in own):
-            found[name] = tuple(dict.fromkeys(min(level, highest) for level in own))
-    return found
+            lowered_levels[name] = tuple(dict.fromkeys(min(level, highest) for level in own))
+    return lowered_levels
 
 
 def highest_level(study: Study, fault: Fault, low: float, high: float) -> float | None:
@@ -258,11 +258,11 @@ def highest_level(study: Study, fault: Fault, low: float, high: float) -> float 
     def passes(level: float) -> bool:
         stimulus = formed.stimuli[name].model_copy(update={"levels": (low, level)})
         lowered = _lowered(study, name, level).items()
-        methods = {one: formed.methods[one].model_copy(update={"levels": own}) for one, own in lowered}
+        methods = {name: formed.methods[name].model_copy(update={"levels": own}) for name, own in lowered}
         changed = formed.model_copy(
             update={"stimuli": {**formed.stimuli, name: stimulus}, "methods": {**formed.methods, **methods}}
         )
-        return not any(one.path == fault.path for one in paced(changed))
+        return not any(problem.path == fault.path for problem in paced(changed))
 
     least, most = low, high
     for _ in range(_HALVINGS):
@@ -306,7 +306,7 @@ def added(
     tried = {(fault.path, fault.message) for fault in study.faults}
     for _ in range(_ROUNDS):
         after, _splices = study.edited(first, *others)
-        fault = next((one for one in after.faults if (one.path, one.message) not in tried), None)
+        fault = next((problem for problem in after.faults if (problem.path, problem.message) not in tried), None)
         if fault is None:
             break
         tried.add((fault.path, fault.message))
@@ -322,7 +322,7 @@ def added(
         elif inner and fault.permitted:
             for word in fault.permitted:
                 _put(value, inner, word)
-                if fault.path not in {one.path for one in study.edited(first, *others)[0].faults}:
+                if fault.path not in {problem.path for problem in study.edited(first, *others)[0].faults}:
                     break
         else:
             others += _outside(after, fault)
@@ -334,12 +334,12 @@ def additions_for(study: Study, fault: Fault) -> tuple[Repair, ...]:
     name = value_at(study.document, fault.path)
     if fault.kind != "unknown name" or not isinstance(name, str):
         return ()
-    found: list[Repair] = []
+    repairs: list[Repair] = []
     for section in sections_at(fault.path):
         with suppress(Refused):
             check_id(name)
-            found.append(Repair(f'Add {singular(section)} "{name}"', added(study, (section,), name=name)[0]))
-    return tuple(one for one in found if removes(study, fault, one))
+            repairs.append(Repair(f'Add {singular(section)} "{name}"', added(study, (section,), name=name)[0]))
+    return tuple(repair for repair in repairs if removes(study, fault, repair))
 
 
 def duplicated(study: Study, path: Path, wanted: str = "") -> tuple[tuple[Edit, ...], Path]:
@@ -425,10 +425,10 @@ def _numbers(document: Mapping[str, Any], path: Path, deepest: int) -> Iterator[
 
 def number_row(document: Mapping[str, Any], path: Path, field: Path) -> Row:
     """Return the number of an element that differs in a series."""
-    found = next((row for row in number_rows(document, path) if row.path == field), None)
-    if found is None:
+    number = next((row for row in number_rows(document, path) if row.path == field), None)
+    if number is None:
         raise Refused("choose a number of this element")
-    return found
+    return number
 
 
 def check_values(document: Mapping[str, Any], row: Row, values: Sequence[float]) -> None:

@@ -89,7 +89,7 @@ def answered(study: Study, answers: Answers) -> Study:
     """
     for place, value in answers.values:
         study, _ = study.edited(Set(place, value))
-        fault = next((one for one in study.faults if one.path[: len(place)] == place), None)
+        fault = next((problem for problem in study.faults if problem.path[: len(place)] == place), None)
         if fault is not None:
             raise Refused(f"{fault.message}{f' ({fault.hint})' if fault.hint else ''}")
     if answers.title:
@@ -97,13 +97,13 @@ def answered(study: Study, answers: Answers) -> Study:
         by_language = isinstance(head, Mapping) and isinstance(head.get("title"), Mapping)
         place = ("study", "title", languages_of(study.document)[0]) if by_language else ("study", "title")
         study, _ = study.edited(Set(place, answers.title))
-    there = languages_of(study.document)
+    codes = languages_of(study.document)
     for code in answers.languages:
-        if code not in there:
+        if code not in codes:
             study, _ = study.edited(*with_language(study, code))
-    if answers.languages and set(there).isdisjoint(answers.languages):  # no text would be left
+    if answers.languages and set(codes).isdisjoint(answers.languages):  # no text would be left
         study, _ = study.edited(*filled_in(study, answers.languages[0]))
-    for code in there:
+    for code in codes:
         if answers.languages and code not in answers.languages:
             study, _ = study.edited(*without_language(study, code))
     return study
@@ -190,7 +190,7 @@ class Document:
     # steps
 
     def edit(
-        self, words: str, *edits: Edit, text: str | None = None, select: Place | None = None, key: object = None
+        self, name: str, *edits: Edit, text: str | None = None, select: Place | None = None, key: object = None
     ) -> None:
         """Replace the text, apply edits in their order, or both, as one step; if nothing changes, there is no step.
 
@@ -209,7 +209,7 @@ class Document:
             joined = self.done.pop()
             splices, before = (*joined.splices, *splices), joined.before
         self.study, self.undone, self.last = study, [], (key, time.monotonic())
-        self.done = [*self.done, DoneStep(words, splices, before, selected)][-MOST_STEPS:]
+        self.done = [*self.done, DoneStep(name, splices, before, selected)][-MOST_STEPS:]
 
     def rest(self) -> None:
         """Let the next edit be a step of its own."""
@@ -363,13 +363,13 @@ class Document:
                 raise Refused(f"{path} exists and holds another liquid: rename one of the two files")
             write_whole(path, text.encode())
         for name, digest in hashes_in(source).items():
-            if (there := file_hash(folder / name)) is None:
+            if (digest_here := file_hash(folder / name)) is None:
                 try:
                     (folder / name).parent.mkdir(parents=True, exist_ok=True)
                     shutil.copyfile(self.study.folder / name, folder / name)
                 except OSError as error:
                     raise cannot_write(folder / name, error) from error
-            elif there != digest:
+            elif digest_here != digest:
                 raise Refused(f"{folder / name} exists and holds another video: rename one of the two files")
         self.study = replace(self.study, folder=folder)
 

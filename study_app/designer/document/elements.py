@@ -108,13 +108,13 @@ def _called(document: Mapping[str, Any], value: Mapping[str, Any]) -> str:
     return text if isinstance(text, str) and text.strip() else ""
 
 
-def found(document: Mapping[str, Any], path: Path, words: str, *, named: bool = False) -> bool:
+def found(document: Mapping[str, Any], path: Path, sought: str, *, named: bool = False) -> bool:
     """Return whether title, id or any text of an element holds what is looked for, in any language.
 
     ``named`` leaves the texts out, but the title.
     """
     texts = () if named else _texts(value_at(document, path))
-    return any(words.casefold() in text.casefold() for text in (str(path[-1]), title_of(document, path), *texts))
+    return any(sought.casefold() in text.casefold() for text in (str(path[-1]), title_of(document, path), *texts))
 
 
 def _session(study: Study) -> Iterator[Element]:
@@ -132,7 +132,7 @@ def _session(study: Study) -> Iterator[Element]:
                     below.append(element(study, part, 1))
                 below += [replace(element(study, item, 2), step=item) for item in items]
             own = element(study, thing)
-            contained = sum(one.faults for one in below if one.depth == 1 and one.path != thing)
+            contained = sum(element.faults for element in below if element.depth == 1 and element.path != thing)
             yield replace(own, step=step, faults=own.faults + contained)
             yield from below
 
@@ -224,7 +224,7 @@ def brief(document: Mapping[str, Any], path: Path) -> str:
         return counted(len(items), "question")
     if path[0] != "tasks":
         return ""
-    numbers = {key: one for key, one in value.items() if isinstance(one, int | float)}
+    numbers = {key: number for key, number in value.items() if isinstance(number, int | float)}
     for least, most in (("min_s", "max_s"), ("duration_s", "duration_s")):
         if least in numbers and most in numbers:
             return exact_duration(numbers[least], numbers[most])
@@ -242,11 +242,11 @@ def used_by(document: Mapping[str, Any], path: Path) -> str:
         path
     }
     counts = Counter(user[-2] for user in users)
-    words = (
+    using = (
         counted(count, "step") if section == "sequence" else counted_elements(count, section)
         for section, count in sorted(counts.items())
     )
-    return f"used by {', '.join(words)}" if counts else "not used"
+    return f"used by {', '.join(using)}" if counts else "not used"
 
 
 SHORTEST: Final = 3
@@ -266,46 +266,46 @@ class FoundField:
     rank: int = LABEL
 
 
-def words_sought(words: str) -> list[str]:
+def words_sought(text: str) -> list[str]:
     """Return the words that are looked for, each without the "s" of a plural."""
-    return [part.removesuffix("s") if len(part) > SHORTEST else part for part in words.casefold().split()]
+    return [part.removesuffix("s") if len(part) > SHORTEST else part for part in text.casefold().split()]
 
 
-def found_fields(study: Study, words: str) -> tuple[FoundField, ...]:
+def found_fields(study: Study, text: str) -> tuple[FoundField, ...]:
     """Return the fields whose labels or choices have words that begin so, labels first.
 
     Choices that are not chosen count where no label and nothing that is chosen has the words; sentences count last.
     """
-    parts = words_sought(words)
-    if not parts or len(words.strip()) < SHORTEST:
+    parts = words_sought(text)
+    if not parts or len(text.strip()) < SHORTEST:
         return ()
-    found = [one for field in _fields(study) for one in _found_in(field, parts)]
-    best = min((one.rank for one in found), default=0)
-    return tuple(sorted((one for one in found if one.rank <= max(best, CHOSEN)), key=lambda one: one.rank))
+    fields = [match for field in _fields(study) for match in _found_in(field, parts)]
+    best = min((match.rank for match in fields), default=0)
+    return tuple(sorted((match for match in fields if match.rank <= max(best, CHOSEN)), key=lambda match: match.rank))
 
 
-def found_in_elements(study: Study, words: str) -> Mapping[Path, FoundField]:
+def found_in_elements(study: Study, text: str) -> Mapping[Path, FoundField]:
     """Return for each element the first field that was found in it."""
     first: dict[Path, FoundField] = {}
-    for one in found_fields(study, words):
-        first.setdefault(one.element, one)
+    for field in found_fields(study, text):
+        first.setdefault(field.element, field)
     return first
 
 
 @lru_cache(maxsize=2)
 def _fields(study: Study) -> tuple[tuple[Path, Row, str], ...]:
     shown = outline(study)
-    parts = [one.path for one in (*shown.session, *shown.parts) if len(one.path) > 1]
-    elements = dict.fromkeys((*parts, *(one.path for one in shown.study)))
+    parts = [element.path for element in (*shown.session, *shown.parts) if len(element.path) > 1]
+    elements = dict.fromkeys((*parts, *(element.path for element in shown.study)))
     blocks = entries(study.document, "blocks.*")
     main = (path for path, block in blocks if isinstance(block, Mapping) and block.get("phase", "main") == "main")
     whose = SEQUENCE if value_at(study.document, SEQUENCE) else next(main, None)  # groups have their own sequences
     of_blocks = () if whose is None else rows_of_blocks(study.document)  # not again elsewhere
-    found: dict[Path, tuple[Path, Row, str]] = {row.path: (whose or FIRST, row, row.label) for row in of_blocks}
+    fields: dict[Path, tuple[Path, Row, str]] = {row.path: (whose or FIRST, row, row.label) for row in of_blocks}
     for element in elements:
         for row, label in _of_table(study, element, ""):
-            found.setdefault(row.path, (element, row, label))
-    return tuple(found.values())
+            fields.setdefault(row.path, (element, row, label))
+    return tuple(fields.values())
 
 
 def _of_table(study: Study, path: Path, above: str, depth: int = 0) -> Iterator[tuple[Row, str]]:
@@ -329,8 +329,8 @@ def _found_in(field: tuple[Path, Row, str], parts: list[str]) -> Iterator[FoundF
         named = label_of(choice.value or "")
         whole = f"{label} {named} {choice.sentence}"
         if choice.value and _has(whole, parts):
-            there = row.default if row.value is None else row.value
-            of_name = CHOSEN if choice.value == there else OTHER
+            current = row.default if row.value is None else row.value
+            of_name = CHOSEN if choice.value == current else OTHER
             rank = of_name if any(_has(named, [part]) for part in parts) else SENTENCE
             yield FoundField(element, row.path, label, rank)
 
@@ -343,10 +343,10 @@ def _has(text: str, parts: list[str]) -> bool:
 
 def there(document: Mapping[str, Any], path: Path) -> Path:
     """Return a path, or as much of it as is in the document; a section may be left out; else the study's own table."""
-    found: Any = document
+    value: Any = document
     known = path[:1] if path and row_at(document, path[:1]) is not None else FIRST
     for length, step in enumerate(path):
-        if not has(found, step):
+        if not has(value, step):
             return path[:length] if length > 1 else known
-        found = found[step]
+        value = value[step]
     return path or FIRST

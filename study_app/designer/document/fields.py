@@ -54,8 +54,8 @@ def choices_at(document: Document, place: Path) -> tuple[str, ...] | None:
         if _matches(place, pattern):
             return tuple(name for section in _sections(document, pattern) for name in names(document, section))
     if any(_matches(place, pattern) for pattern in ITEM_REFERENCES):
-        found = (item for path, item in _items(document) if _in_reach(place, path))
-        return tuple(dict.fromkeys(str(item["id"]) for item in found))
+        items = (item for path, item in _items(document) if _in_reach(place, path))
+        return tuple(dict.fromkeys(str(item["id"]) for item in items))
     return None
 
 
@@ -136,7 +136,7 @@ def with_references(document: Document, thing: Path, needs: Callable[[Path], boo
             empty = all(_covered((*array, at), gone) for at in range(len(value_at(document, array))))
             if empty and len(array) > 2:
                 gone.append(array[:2] if needs(array) else array)
-    outermost = [one for one in gone[1:] if not _covered(one, (other for other in gone if other != one))]
+    outermost = [path for path in gone[1:] if not _covered(path, (other for other in gone if other != path))]
     return (*outermost[::-1], thing)
 
 
@@ -168,7 +168,7 @@ def _within(path: Path, outer: Path) -> bool:
 
 
 def _covered(path: Path, outer: Iterable[Path]) -> bool:
-    return any(_within(path, one) for one in outer)
+    return any(_within(path, outer_path) for outer_path in outer)
 
 
 def named_places(document: Document) -> Iterator[tuple[Path, Path]]:
@@ -240,7 +240,7 @@ def _in_reach(place: Path, item: Path) -> bool:
 
 def _matches(place: Path, pattern: str) -> bool:
     steps = pattern.split(".")
-    return len(steps) == len(place) and all(step in {"*", str(one)} for step, one in zip(steps, place, strict=True))
+    return len(steps) == len(place) and all(step in {"*", str(key)} for step, key in zip(steps, place, strict=True))
 
 
 Node: TypeAlias = Mapping[str, Any]
@@ -253,7 +253,7 @@ def node_at(document: Any, path: Path) -> tuple[Node, ...]:
     nodes: list[Node] = [schema()]
     for step in path:
         nodes = [child for node in (table_of(tuple(nodes), document),) if node for child in _children(node, step)]
-        nodes = [found for node in nodes for found in alternatives(node)]
+        nodes = [alternative for node in nodes for alternative in alternatives(node)]
         document = document[step] if has(document, step) else None
     return tuple(nodes)
 
@@ -282,26 +282,28 @@ def alternatives(node: Node) -> Iterator[Node]:
     """Yield the alternatives of a node except null, with references resolved and the node's common keys added."""
     around = {key: value for key, value in node.items() if key not in {"$ref", "anyOf", "oneOf", "discriminator"}}
     if "$ref" in node:
-        found = schema()["$defs"][node["$ref"].rsplit("/", 1)[-1]]
-        yield from (_joined(around, one) for one in alternatives(found))
+        definition = schema()["$defs"][node["$ref"].rsplit("/", 1)[-1]]
+        yield from (_joined(around, alternative) for alternative in alternatives(definition))
     elif branches := node.get("anyOf") or node.get("oneOf"):
         for branch in branches:
-            yield from (_joined(around, one) for one in alternatives(branch))
+            yield from (_joined(around, alternative) for alternative in alternatives(branch))
     elif node.get("type") != "null":
         yield node
 
 
-def _joined(around: Node, found: Node) -> Node:
+def _joined(around: Node, node: Node) -> Node:
     """Return a node with the words around the union that it is of; its own description is `OWN` then."""
-    own = {OWN: found["description"]} if "description" in found and OWN not in found else {}
-    return {**found, **own, **around}
+    own = {OWN: node["description"]} if "description" in node and OWN not in node else {}
+    return {**node, **own, **around}
 
 
 def _is_of(node: Node, tables: list[Node], value: Mapping[str, Any]) -> bool:
     key, named = tags(tuple(tables))
     if not key:
         return True
-    default = next((name for name, one in named.items() if one["properties"].get(key, {}).get("default") == name), None)
+    default = next(
+        (name for name, table in named.items() if table["properties"].get(key, {}).get("default") == name), None
+    )
     chosen = value.get(key, None if None in named else default)
     return (chosen is None or isinstance(chosen, str)) and named.get(chosen) is node
 
@@ -434,8 +436,8 @@ def rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
     properties = node.get("properties", {})
     written = tuple(value) if isinstance(value, Mapping) else ()
     keys = list(dict.fromkeys((*filter(None, [tags(nodes)[0]]), *properties, *written)))
-    found = (row_at(document, (*path, key)) for key in keys)
-    return tuple(row for row in found if row is not None)
+    found_rows = (row_at(document, (*path, key)) for key in keys)
+    return tuple(row for row in found_rows if row is not None)
 
 
 def sections_of(document: Mapping[str, Any], path: Path) -> tuple[tuple[str, tuple[str, ...]], ...]:
@@ -506,8 +508,8 @@ def _row(document: Mapping[str, Any], path: Path, nodes: tuple[Node, ...], value
     named = (*path, 0) if first.get("type") == "array" else path
     references = choices_at(document, named)
     kind = _kind(first, isinstance(references, tuple))
-    words = first.get("items", first) if kind == "choices" else first
-    names = references if kind in {"reference", "references"} and references is not None else _enum(words)
+    choices = first.get("items", first) if kind == "choices" else first
+    names = references if kind in {"reference", "references"} and references is not None else _enum(choices)
     sentences = _sentences(first.get("description", ""))
     options = tuple(Choice(name, sentences.get(name, "")) for name in names)
     limits = _numbers_in(first) if kind in {"vector", "numbers", "points"} else first
@@ -557,10 +559,10 @@ def _numbers_in(node: Node) -> Node:
 
 
 def _bounds(node: Node, numbers: Node) -> tuple[str, ...]:
-    words = [phrase.format(shown(numbers[key])) for key, phrase in _OF_NUMBERS.items() if key in numbers]
+    phrases = [phrase.format(shown(numbers[key])) for key, phrase in _OF_NUMBERS.items() if key in numbers]
     if "prefixItems" not in node:
-        words += [phrase.format(node[key]) for key, phrase in _OF_LENGTHS.items() if key in node]
-    return (*words, rule_of(node["pattern"])) if "pattern" in node else tuple(words)
+        phrases += [phrase.format(node[key]) for key, phrase in _OF_LENGTHS.items() if key in node]
+    return (*phrases, rule_of(node["pattern"])) if "pattern" in node else tuple(phrases)
 
 
 def why_not(document: Mapping[str, Any], row: Row, number: float) -> str:
@@ -661,19 +663,19 @@ def _initial(document: Mapping[str, Any], row: Row, node: Node) -> Any:
 
 def _tables(document: Mapping[str, Any], path: Path, node: Node) -> list[Any]:
     """Return the least number of tables of a list, each with its required keys; or of lists, as of sequences."""
-    found: list[Any] = []
+    tables: list[Any] = []
     for number in range(max(1, node.get("minItems", 1))):
         place = (*path, number)
         if node["items"].get("type") == "array":
-            found.append(initial(document, place))
+            tables.append(initial(document, place))
             continue
         table = table_of(node_at(document, place), {})
         required = () if table is None else table.get("required", ())
         name = f"{singular(path[-1])}_{number + 1}"
         text = _in_languages(document, label_of(name))
-        found.append({key: name if key == "id" else text if key == "text" else initial(document, (*place, key))
+        tables.append({key: name if key == "id" else text if key == "text" else initial(document, (*place, key))
                       for key in required})  # fmt: skip
-    return found
+    return tables
 
 
 def _text(document: Mapping[str, Any], path: Path, node: Node, *, localised: bool) -> Any:
@@ -685,13 +687,13 @@ def _text(document: Mapping[str, Any], path: Path, node: Node, *, localised: boo
         used = {letter for _, letter in entries(document, f"{path[0]}.*.{path[-1]}")}
         return next((letter for letter in string.ascii_uppercase if letter not in used), "Z")
     name = around.get("id", path[-2]) if isinstance(around, Mapping) else path[-2]
-    words = new_text(path[-3]) if isinstance(name, int) else f"New {label_of(str(name)).lower()}"
-    return _in_languages(document, words) if localised else words
+    text = new_text(path[-3]) if isinstance(name, int) else f"New {label_of(str(name)).lower()}"
+    return _in_languages(document, text) if localised else text
 
 
-def _in_languages(document: Mapping[str, Any], words: str) -> Any:
+def _in_languages(document: Mapping[str, Any], text: str) -> Any:
     languages = languages_of(document)
-    return dict.fromkeys(languages, words) if len(languages) > 1 else words
+    return dict.fromkeys(languages, text) if len(languages) > 1 else text
 
 
 def _number(node: Node, otherwise: float) -> float:

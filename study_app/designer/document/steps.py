@@ -151,16 +151,16 @@ class AddEntry(Request):
 
     def step(self, at: Situation) -> Step:
         row = row_at(at.study.document, self.path)
-        there = row.value if row is not None and isinstance(row.value, tuple) else ()
+        entries = row.value if row is not None and isinstance(row.value, tuple) else ()
         value = self.value
         if value is None:
             if row is None:
                 raise Refused("nothing can be added here")
             if row.kind == "list":
                 return Step(f"Add {singular(self.path[-1])}", added(at.study, self.path)[0])
-            first = initial({}, self.path) if not there else there[-1]
-            value = _listed(first[0] if not there and isinstance(first, list | tuple) else first)
-        edit: Edit = Insert((*self.path, len(there)), value) if there else Set(self.path, [value])
+            first = initial({}, self.path) if not entries else entries[-1]
+            value = _listed(first[0] if not entries and isinstance(first, list | tuple) else first)
+        edit: Edit = Insert((*self.path, len(entries)), value) if entries else Set(self.path, [value])
         return Step(f"Add to {label_of(self.path[-1])}", (edit,))
 
 
@@ -172,8 +172,8 @@ class SwitchKind(Request):
     kind: str | None
 
     def step(self, at: Situation) -> Step:
-        words = f"Switch to {label_of(self.kind or 'nothing').lower()}"
-        return Step(words, switched(at.study, self.path, self.kind))
+        title = f"Switch to {label_of(self.kind or 'nothing').lower()}"
+        return Step(title, switched(at.study, self.path, self.kind))
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,9 +234,9 @@ class AddInstrument(Request):
 
     def step(self, at: Situation) -> Step:
         table, scales = written_out(self.name, languages_of(at.study.document))
-        taken, there = names(at.study.document, "questionnaires"), names(at.study.document, "scales")
+        taken, scale_names = names(at.study.document, "questionnaires"), names(at.study.document, "scales")
         path = ("questionnaires", free_id(taken, self.name.replace("-", "_")))
-        edits = (Set(("scales", name), scale) for name, scale in scales.items() if name not in there)
+        edits = (Set(("scales", name), scale) for name, scale in scales.items() if name not in scale_names)
         return Step(f"Add {self.name}", (*edits, Set(path, table)), path)
 
 
@@ -248,9 +248,9 @@ class ChangeLanguage(Request):
     language: str
 
     def step(self, at: Situation) -> Step:
-        words = {"add": "Add", "copy": "Fill in", "remove": "Remove"}[self.how]
+        verb = {"add": "Add", "copy": "Fill in", "remove": "Remove"}[self.how]
         edits = {"add": with_language, "copy": filled_in, "remove": without_language}[self.how](at.study, self.language)
-        return Step(f"{words} {language_name(self.language)}", edits)
+        return Step(f"{verb} {language_name(self.language)}", edits)
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,8 +270,8 @@ class DuplicateElement(Request):
         else:
             copy = (*path[:-1], path[-1] + 1)
             edits = (Insert(copy, list(value) if isinstance(value, tuple) else value),)
-        words, edits = f"Duplicate {title_of(at.study.document, path)}", _beside(at.study, edits, path, copy)
-        return Step(words, edits) if self.stays else Step(words, edits, copy, fresh="copy")
+        title, edits = f"Duplicate {title_of(at.study.document, path)}", _beside(at.study, edits, path, copy)
+        return Step(title, edits) if self.stays else Step(title, edits, copy, fresh="copy")
 
 
 @dataclass(frozen=True, slots=True)
@@ -304,9 +304,9 @@ class MakeSeries(Request):
                     now, made = listed, (*made, listing)
             edits = (*edits, *made)
             paths.append(copy)
-        words = f"Make {counted_elements(len(self.values), self.path[0])} of {title_of(study.document, self.path)}"
-        said = ", ".join(title_of(now.document, one) for one in paths[1:])
-        return Step(words, edits, paths[1], said=said)
+        title = f"Make {counted_elements(len(self.values), self.path[0])} of {title_of(study.document, self.path)}"
+        said = ", ".join(title_of(now.document, path) for path in paths[1:])
+        return Step(title, edits, paths[1], said=said)
 
 
 @dataclass(frozen=True, slots=True)
@@ -369,18 +369,18 @@ class DeleteElement(Request):
 
     def step(self, at: Situation) -> Step:
         path, document = self.path, at.study.document
-        words = f"Delete {title_of(document, path)}"
+        title = f"Delete {title_of(document, path)}"
         if self.how == "other":
-            return Step(words, replaced(document, path, self.other), (*path[:-1], self.other))
+            return Step(title, replaced(document, path, self.other), (*path[:-1], self.other))
         if isinstance(path[-1], int):
             select: Path = path[:2]
         else:
             others = [name for name in names(document, str(path[0])) if name != path[1]]
             select = (path[0], others[0]) if others else path[:1]
         gone = (path,) if self.how == "gaps" else with_references(document, path, at.study.needs)
-        if any(select[: len(one)] == one for one in gone):
+        if any(select[: len(path)] == path for path in gone):
             select = ("study",)
-        return Step(words, deletions(gone), select)
+        return Step(title, deletions(gone), select)
 
 
 @dataclass(frozen=True, slots=True)
@@ -418,8 +418,8 @@ class Several(Request):
     def step(self, at: Situation) -> Step:
         edits: tuple[Edit, ...] = ()
         study = at.study
-        for one in self.requests:
-            step = one.step(replace(at, study=study))
+        for request in self.requests:
+            step = request.step(replace(at, study=study))
             study, _ = study.edited(*step.edits)
             edits += step.edits
         return Step(self.words, edits)
@@ -452,7 +452,7 @@ def with_path(asked: Any, before: Path, after: Path) -> Any:
     if isinstance(asked, tuple):
         if asked[: len(before)] == before:
             return (*after, *asked[len(before) :])
-        return tuple(with_path(one, before, after) for one in asked)
+        return tuple(with_path(part, before, after) for part in asked)
     if is_dataclass(asked) and not isinstance(asked, type):
         parts = {part.name: getattr(asked, part.name) for part in fields(asked)}
         return replace(asked, **{name: with_path(value, before, after) for name, value in parts.items()})
@@ -469,11 +469,11 @@ def _beside(study: Study, edits: tuple[Edit, ...], original: Path, copy: Path) -
     return edits if index_of(step) == to else (*edits, Move(step, to))
 
 
-def _moved(study: Study, thing: Path, entry: Path, to: int, words: str) -> Step:
+def _moved(study: Study, thing: Path, entry: Path, to: int, title: str) -> Step:
     edits, after = moved(study, entry, to)
     count = len(value_at(study.document, entry[:-1]))
     said = f"{title_of(study.document, thing)}, now {index_of(after) + 1} of {count}"
-    return Step(words, edits, after if thing == entry else thing, said=said)
+    return Step(title, edits, after if thing == entry else thing, said=said)
 
 
 def index_of(path: Path) -> int:

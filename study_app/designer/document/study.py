@@ -46,8 +46,8 @@ class Study:
         document, _, broken = self._read
         if document is None:
             return None, tuple(Fault((), problem.message, problem.hint) for problem in broken)
-        protocol, found = examined(document)
-        return protocol, tuple(found)
+        protocol, faults = examined(document)
+        return protocol, tuple(faults)
 
     @cached_property
     def document(self) -> Mapping[str, Any]:
@@ -99,8 +99,8 @@ class Study:
             raise Refused(_NOT_TOML)
         text, steps = self.text, list[Splices]()
         for edit in edits:
-            text, found = apply(text, edit)
-            steps += found
+            text, splices = apply(text, edit)
+            steps += splices
         return self._with(text), tuple(steps)
 
     def typed(self, text: str) -> tuple[Study, tuple[Splices, ...]]:

@@ -213,12 +213,12 @@ def _renamed(spans: Spans, piece: Piece, depth: int, name: str) -> str:
     for start, end in _key_parts(spans, piece.node.path[: depth + 1]):
         if piece.start <= start < piece.end:
             editor.replace(start, end, key_text(name))
-    found, at = "", piece.start
+    text, at = "", piece.start
     for splice in editor.splices:
-        found += spans.text[at : splice.at] + splice.after
+        text += spans.text[at : splice.at] + splice.after
         at = splice.at + len(splice.before)
-    found += spans.text[at : piece.end]
-    return found if piece.node.kind == "pair" or found.endswith("\n") else found + spans.newline
+    text += spans.text[at : piece.end]
+    return text if piece.node.kind == "pair" or text.endswith("\n") else text + spans.newline
 
 
 def _key_parts(spans: Spans, path: Path) -> Iterator[tuple[int, int]]:
@@ -356,8 +356,8 @@ def copy_entry(spans: Spans, edit: Editor, path: Path) -> None:
 
 
 def _lines(text: str, piece: Piece, newline: str) -> str:
-    found = text[piece.start : piece.end]
-    return found if found.endswith("\n") else found + newline
+    lines = text[piece.start : piece.end]
+    return lines if lines.endswith("\n") else lines + newline
 
 
 def move_entry(spans: Spans, edit: Editor, path: Path, to: int) -> None:
@@ -476,10 +476,10 @@ def apply(text: str, edit: Edit) -> tuple[str, tuple[Splices, ...]]:
             steps.append(editor.splices)
             text = applied(text, editor.splices)
     try:
-        found = _read(text)
+        edited = _read(text)
     except tomllib.TOMLDecodeError as error:
         raise WriterError(f"{edit} made a text that is not TOML: {error}") from error
-    if not same(found, meant) and not same(_pruned(copy.deepcopy(found), edit.path), _pruned(meant, edit.path)):
+    if not same(edited, meant) and not same(_pruned(copy.deepcopy(edited), edit.path), _pruned(meant, edit.path)):
         raise WriterError(f"{edit} made another document than the one meant")
     return text, tuple(steps)
 
@@ -492,24 +492,24 @@ def _read(text: str) -> Document:
 
 def meaning(document: Mapping[str, Any], edit: Edit) -> Document:
     """Return the document that an edit means; what it does not change is shared with the document before."""
-    found: Document = dict(document)
+    meant: Document = dict(document)
     *parent, last = edit.path
     if isinstance(edit, Set):
         _check_value(edit.value)
-        node = _own(found, parent, makes=True)
+        node = _own(meant, parent, makes=True)
         if isinstance(node, list) or isinstance(last, int):
             _at(node, last)
         elif not isinstance(node, dict):
             raise Refused(f"{_words(tuple(parent))} is not a table: it has no key {last}")
         node[last] = copy.deepcopy(edit.value)
-        return found
-    node = _own(found, parent)
+        return meant
+    node = _own(meant, parent)
     if isinstance(edit, Insert):
         _check_value(edit.value)
         if not isinstance(node, list) or not isinstance(last, int) or not 0 <= last <= len(node):
             raise Refused(f"{_words(tuple(parent))} has no place {last} for a new entry")
         node.insert(last, copy.deepcopy(edit.value))
-        return found
+        return meant
     value = _at(node, last)
     if isinstance(edit, Unset):
         del node[last]
@@ -520,8 +520,8 @@ def meaning(document: Mapping[str, Any], edit: Edit) -> Document:
             raise Refused(f"{_words(edit.path)} cannot move to place {edit.to + 1}")
         node.insert(edit.to, node.pop(last))
     else:
-        _rename(found, node, edit)
-    return found
+        _rename(meant, node, edit)
+    return meant
 
 
 def _own(document: Document, path: Iterable[str | int], *, makes: bool = False) -> Any:
@@ -535,13 +535,13 @@ def _own(document: Document, path: Iterable[str | int], *, makes: bool = False) 
     return node
 
 
-def same(one: Any, other: Any) -> bool:
+def same(first: Any, other: Any) -> bool:
     """Return whether two values are the same in TOML: 1, 1.0 and true differ."""
-    if isinstance(one, dict) and isinstance(other, dict):
-        return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
-    if isinstance(one, list | tuple) and isinstance(other, list | tuple):
-        return len(one) == len(other) and all(same(*pair) for pair in zip(one, other, strict=True))
-    return type(one) is type(other) and (one == other or (one != one and other != other))  # noqa: PLR0124 - NaN
+    if isinstance(first, dict) and isinstance(other, dict):
+        return first.keys() == other.keys() and all(same(first[key], other[key]) for key in first)
+    if isinstance(first, list | tuple) and isinstance(other, list | tuple):
+        return len(first) == len(other) and all(same(*pair) for pair in zip(first, other, strict=True))
+    return type(first) is type(other) and (first == other or (first != first and other != other))  # noqa: PLR0124 - NaN
 
 
 def _duplicate(node: Any, last: Any, value: Any, name: str) -> None:
@@ -552,13 +552,13 @@ def _duplicate(node: Any, last: Any, value: Any, name: str) -> None:
     node[name] = copy.deepcopy(value)
 
 
-def _rename(found: Document, node: Any, edit: Rename) -> None:
+def _rename(document: Document, node: Any, edit: Rename) -> None:
     if not isinstance(node, dict):
         raise Refused("entries of an array have no name")
     _check_free(node, edit.name)
     for *parent, last in edit.references:
-        _own(found, parent)[last] = edit.name
-    node = _own(found, edit.path[:-1])
+        _own(document, parent)[last] = edit.name
+    node = _own(document, edit.path[:-1])
     node[edit.name] = node.pop(edit.path[-1])
 
 

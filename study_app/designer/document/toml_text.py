@@ -55,12 +55,12 @@ class Editor:
     def splices(self) -> Splices:
         """What was collected, overlapping deletions joined."""
         joined: list[Splice] = []
-        for one in sorted(self._found, key=lambda splice: splice.at):
-            if joined and one.at < (end := joined[-1].at + len(joined[-1].before)):
+        for splice in sorted(self._found, key=lambda splice: splice.at):
+            if joined and splice.at < (end := joined[-1].at + len(joined[-1].before)):
                 last = joined.pop()
-                whole = self.text[last.at : max(end, one.at + len(one.before))]
-                one = Splice(last.at, whole, last.after + one.after)  # noqa: PLW2901
-            joined.append(one)
+                whole = self.text[last.at : max(end, splice.at + len(splice.before))]
+                splice = Splice(last.at, whole, last.after + splice.after)  # noqa: PLW2901
+            joined.append(splice)
         return tuple(joined)
 
 
@@ -90,11 +90,11 @@ def applied(text: str, splices: Iterable[Splice]) -> str:
 
 def reverted(splices: Splices) -> Splices:
     """Return the splices that undo these in the text that they produced."""
-    shift, found = 0, list[Splice]()
+    shift, undoing = 0, list[Splice]()
     for at, before, after in splices:
-        found.append(Splice(at + shift, after, before))
+        undoing.append(Splice(at + shift, after, before))
         shift += len(after) - len(before)
-    return tuple(found)
+    return tuple(undoing)
 
 
 _ENDS: Final = re.compile("\r\n|\r|\u2029")
@@ -179,13 +179,13 @@ class Spans:
 
         A table may be written as several headers and dotted keys, which need not be next to each other.
         """
-        found: list[Piece] = []
+        pieces: list[Piece] = []
         end = 0
         for node in self.nodes:
             if node.start >= end and node.path[: len(path)] == path:
-                found.append(self._piece(node))
-                end = found[-1].end
-        return found
+                pieces.append(self._piece(node))
+                end = pieces[-1].end
+        return pieces
 
     def _piece(self, node: Node) -> Piece:
         if node.kind in {"pair", "entry"}:
@@ -244,7 +244,7 @@ class Spans:
     def slots(self, path: Path) -> list[Slot]:
         """Return the entries of the array written at ``path``, each with its comments."""
         node = self._by_path[path]
-        floor, found = node.value + 1, list[Slot]()
+        floor, slots = node.value + 1, list[Slot]()
         index = 0
         while (entry := self._by_path.get((*path, index))) is not None:
             line = self._line_start(entry.start)
@@ -253,7 +253,7 @@ class Spans:
             comma = _COMMA.match(self.text, entry.end)
             after = comma.end() if comma else entry.end
             tail = _TAIL.match(self.text, after)
-            found.append(
+            slots.append(
                 Slot(
                     start=start,
                     entry=entry.start,
@@ -263,9 +263,9 @@ class Spans:
                     own_line=own,
                 )
             )
-            floor = found[-1].tail_end
+            floor = slots[-1].tail_end
             index += 1
-        return found
+        return slots
 
 
 WIDTH: Final = 120
@@ -338,5 +338,5 @@ def _string(value: str, like: str, newline: str) -> str:
 
 def _indent_in(array: str, indent: str) -> str:
     """Return by how much the entries of an array are indented."""
-    found = re.search(r"\n([ \t]*)[^\s#\]]", array)
-    return found.group(1).removeprefix(indent) if found else INDENT
+    match = re.search(r"\n([ \t]*)[^\s#\]]", array)
+    return match.group(1).removeprefix(indent) if match else INDENT

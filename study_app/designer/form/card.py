@@ -87,7 +87,7 @@ class EitherField(Field):
         super().show_row(row)
 
     def show_value(self) -> None:
-        values = [(at, KINDS.get(one.kind, one.kind)) for at, one in enumerate(self.row.either)]
+        values = [(at, KINDS.get(kind.kind, kind.kind)) for at, kind in enumerate(self.row.either)]
         self.kinds.show_values(values, self.row.number)
 
     def _chosen(self, row: FormRow) -> FormRow:
@@ -273,15 +273,15 @@ class RowWidget(Themed, QWidget):
     def say(self) -> None:
         self.remove.setVisible(self.row.removable and self.remove.parent() is not None)
         refused = [field.refusal for field in (self.field, *self.field.findChildren(Field)) if field.refusal]
-        found = [sentence for sentence in (self.refusal, *refused, *self.row.faults) if sentence]
-        times = Counter(found)
-        if found or "wrong" in self.__dict__:
-            said = (one if count == 1 else f"{count} × {one}" for one, count in times.items())
+        corrections = [sentence for sentence in (self.refusal, *refused, *self.row.faults) if sentence]
+        times = Counter(corrections)
+        if corrections or "wrong" in self.__dict__:
+            said = (sentence if count == 1 else f"{count} × {sentence}" for sentence, count in times.items())
             self.wrong.sentence.setText("\n".join(said))
-            self.wrong.setVisible(bool(found))
+            self.wrong.setVisible(bool(corrections))
         row = self.row
-        sentences = filter(None, (row.help, row.permitted, *found))
-        self.field.setAccessibleDescription(" ".join(f"{one.rstrip('.')}." for one in sentences))
+        sentences = filter(None, (row.help, row.permitted, *corrections))
+        self.field.setAccessibleDescription(" ".join(f"{sentence.rstrip('.')}." for sentence in sentences))
         some_missing = isinstance(self.field, LanguagesField) and self.field.some_missing
         for part in self.field.findChildren(QWidget):
             if not isinstance(part, TypedLine | TypedText):
@@ -294,18 +294,22 @@ class RowWidget(Themed, QWidget):
     def show_repairs(self, known: Mapping[ProblemRow, tuple[str, ...]]) -> None:
         """Offer the repairs of the problems of this row, of each the first; none that reads like another one."""
         path = self.row.path
-        offered = {one: words for one, words in known.items() if one.fault.path[: len(path)] == path and words}
+        offered = {
+            problem: sentences
+            for problem, sentences in known.items()
+            if problem.fault.path[: len(path)] == path and sentences
+        }
         if offered == self._offered:
             return
         self._offered = offered
         before, self.repairs = self.repairs, []
         held = next((button.text() for button in before if button.hasFocus()), None)
         several = len(offered) > 1
-        asked = [(one, word) for one, words in offered.items() for word in words[: 1 if several else 2]]
+        asked = [(problem, word) for problem, sentences in offered.items() for word in sentences[: 1 if several else 2]]
         times = Counter(word for _problem, word in asked)
-        for problem, word in [(one, word) for one, word in asked if times[word] == 1][:MOST_REPAIRS]:
+        for problem, word in [(problem, word) for problem, word in asked if times[word] == 1][:MOST_REPAIRS]:
             made = RepairButton(problem, word)
-            made.clicked.connect(lambda _on=False, one=problem, word=word: self.repair_asked.emit(one, word))
+            made.clicked.connect(lambda _on=False, row=problem, word=word: self.repair_asked.emit(row, word))
             made.typed.connect(self._type)
             name_bars(made)
             self._buttons.addWidget(made, 0, Qt.AlignmentFlag.AlignRight)
@@ -314,7 +318,7 @@ class RowWidget(Themed, QWidget):
         if held is not None and not self.repairs:
             self.field.take_keyboard()
         elif held is not None:  # the same words again, where they are still offered
-            min(self.repairs, key=lambda one: one.text() != held).setFocus(Qt.FocusReason.OtherFocusReason)
+            min(self.repairs, key=lambda button: button.text() != held).setFocus(Qt.FocusReason.OtherFocusReason)
         for button in before:
             remove_widget(button)
 
@@ -333,9 +337,9 @@ class RowWidget(Themed, QWidget):
         sentence = next((choice.sentence for choice in row.choices if choice.value == shown), "")
         reason = f" ({row.reason})" if row.reason else ""
         permitted = f"Permitted: {row.permitted}{reason}." if row.permitted and not row.choices else ""
-        words = " ".join(filter(None, (sentence or row.help, permitted)))
-        words = " ".join(words.replace("`", "").split())
-        return capitalised(words)
+        text = " ".join(filter(None, (sentence or row.help, permitted)))
+        text = " ".join(text.replace("`", "").split())
+        return capitalised(text)
 
 
 def special_editor_of(row: FormRow) -> SpecialEditor | None:
@@ -425,12 +429,12 @@ class FormHead(QWidget):
         self.down = IconButton("arrow_down", "Move down", size=34)
         self.copy = IconButton("copy", "Duplicate", size=34)
         self.delete = IconButton("trash", "Delete", f"{tip('delete')} in the outline", size=34, role="danger")
-        words = vbox(self.title, self.kind, spacing=0)
+        titles = vbox(self.title, self.kind, spacing=0)
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(8)
         grid.addWidget(self.tile, 0, 0)
-        add_layout(grid, words, 0, 1)
+        add_layout(grid, titles, 0, 1)
         add_layout(
             grid, hbox(self.ask, self.feel, self.series, self.up, self.down, self.copy, self.delete, spacing=8), 0, 2
         )
@@ -464,8 +468,8 @@ class FormHead(QWidget):
         self.used.show_text(form.used)
         self.ask.setVisible(bool(form.asks) and not read_only)
         self.asks.clear()
-        for words, asked in form.asks:
-            self.asks.addAction(words.replace("&", "&&")).triggered.connect(
+        for sentence, asked in form.asks:
+            self.asks.addAction(sentence.replace("&", "&&")).triggered.connect(
                 lambda _on=False, asked=asked: self.asked.emit(asked)
             )
         self.id_line.setVisible(form.id is not None)
@@ -546,10 +550,10 @@ class FormFoot(Themed, QWidget):
         above = hbox(self.title, (self.place, 1), self.glossary, spacing=8)
         vbox(above, self.words, spacing=3, margins=(12, 4, 4, 8), parent=self)
 
-    def show_help(self, title: str, place: str, words: str) -> None:
+    def show_help(self, title: str, place: str, text: str) -> None:
         self.title.setText(title)
         self.place.show_text(place)
-        self.words.setText(words)
+        self.words.setText(text)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = smooth_painter(self)
@@ -563,8 +567,8 @@ class AddKeys(QWidget):
         super().__init__()
         grid = grid_of(0, 0, margins=0, parent=self)
         self.buttons: dict[Path, QWidget] = {}
-        for at, (inner, words, help_) in enumerate(keys):
-            made = self.buttons[inner] = add_button(f"Add {words}", words)
+        for at, (inner, name, help_) in enumerate(keys):
+            made = self.buttons[inner] = add_button(f"Add {name}", name)
             made.setToolTip(help_)
             made.clicked.connect(lambda _checked=False, inner=inner: add(inner))
             grid.addWidget(made, at // ACROSS, at % ACROSS, Qt.AlignmentFlag.AlignLeft)
@@ -699,8 +703,8 @@ class FormCard(Card):
                 removable = section.path != form.path and not self.read_only
                 yield ("title", at), partial(self._heading, section, removable=removable), None
             if section.faults:
-                words = "\n".join(section.faults)
-                yield ("faults", at, words), partial(label, words, "label", "bad", wraps=True), None
+                sentences = "\n".join(section.faults)
+                yield ("faults", at, sentences), partial(label, sentences, "label", "bad", wraps=True), None
             heads: tuple[tuple[str, str], ...] = ()
             for row in section.rows:
                 beside = () if stacked(row) or is_wide(row) else row.languages
@@ -715,7 +719,7 @@ class FormCard(Card):
                 inner = row.path[len(form.path) :] if row.path[: len(form.path)] == form.path else row.path
                 yield (at, inner, structure_of(row)), partial(self._row, row), row
             if section.absent and not self.read_only:
-                added = tuple((one.path[len(form.path) :], one.label, one.help) for one in section.absent)
+                added = tuple((row.path[len(form.path) :], row.label, row.help) for row in section.absent)
                 yield ("adds", at, added), partial(AddKeys, added, self._add), None
 
     def _add(self, inner: Path) -> None:
@@ -771,15 +775,15 @@ class FormCard(Card):
 
         A key that the file does not have has a button that adds it instead.
         """
-        found = self._row_of(path)
-        if found is None:
+        row = self._row_of(path)
+        if row is None:
             if (button := self.adds.get(path)) is not None:
                 button.setFocus(Qt.FocusReason.OtherFocusReason)
                 self.area.ensureWidgetVisible(button)
             return button is not None
-        found.field.take_keyboard()
-        self._come(found)
-        self._reveal(found)
+        row.field.take_keyboard()
+        self._come(row)
+        self._reveal(row)
         return True
 
     def focus_first(self) -> None:
@@ -793,23 +797,23 @@ class FormCard(Card):
         """
         texts = [part for row in self.rows for part in row.field.findChildren(QWidget)]
         lines = [part for part in texts if isinstance(part, TypedLine | TypedText)]
-        words = [part for part in lines if isinstance(part.parent(), LanguagesField)]
+        text_lines = [part for part in lines if isinstance(part.parent(), LanguagesField)]
         empty = (part for part in lines if not filled and not part.words() and not part.placeholderText())
-        found = next(iter((*empty, *words)), None)
-        if found is None:
+        field = next(iter((*empty, *text_lines)), None)
+        if field is None:
             self.focus_first()
             return
-        found.setFocus(Qt.FocusReason.OtherFocusReason)
-        found.selectAll()
-        row = next(row for row in self.rows if row.isAncestorOf(found))
+        field.setFocus(Qt.FocusReason.OtherFocusReason)
+        field.selectAll()
+        row = next(row for row in self.rows if row.isAncestorOf(field))
         self._come(row)
         self._reveal(row)
 
     def refuse(self, path: Path, sentence: str) -> None:
         """Say at the field of a place why it was not changed."""
-        if (found := self._row_of(path)) is not None:
-            found.refusal = sentence
-            found.say()
+        if (row := self._row_of(path)) is not None:
+            row.refusal = sentence
+            row.say()
         else:
             self.own.setText(sentence)
             self.own.setVisible(True)

@@ -82,24 +82,24 @@ def level_axis(study: Study, row: Row) -> LevelAxis | None:
         stimulus = Stimulus.model_validate(value_at(study.document, row.path[:-1]))
     except ValidationError:
         return None
-    words = LevelWords(stimulus, default_design("2ifc"))
+    scale = LevelWords(stimulus, default_design("2ifc"))
     low, high = stimulus.levels
-    standard, limits = _limits(study, row, words)
+    standard, limits = _limits(study, row, scale)
     log = stimulus.spacing == "log"
     near = [
-        one.level
-        for one in limits.values()
-        if one.level <= (FARTHEST * high if log else high + FARTHEST * (high - low))
+        limit.level
+        for limit in limits.values()
+        if limit.level <= (FARTHEST * high if log else high + FARTHEST * (high - low))
     ]
     top = max(high, *near) if near else high
     least, most = (low / ROOM**2, top * ROOM) if log else (low - 0.1 * (top - low), top + 0.15 * (top - low))
     if not log and stimulus.level_kind != "value":
         least = max(0.0, least)
-    factor = words.factor
+    factor = scale.factor
     ticks = (log_ticks if log else even_ticks)(least * factor, most * factor, MOST_TICKS)
-    shown = {name: one for name, one in limits.items() if one.level <= most}
+    shown = {name: limit for name, limit in limits.items() if limit.level <= most}
     spacing = "in ratio" if log else "even"
-    beyond = "".join(f" {capitalised(one.words)}." for one in shown.values())
+    beyond = "".join(f" {capitalised(limit.words)}." for limit in shown.values())
     return LevelAxis(
         low=low,
         high=high,
@@ -108,32 +108,32 @@ def level_axis(study: Study, row: Row) -> LevelAxis | None:
         logarithmic=log,
         levels=stimulus.grid,
         factor=factor,
-        unit=words.unit,
-        caption=f"{words.kind}{f', {words.unit}' if words.unit else ''}, {'logarithmic' if log else 'linear'}",
+        unit=scale.unit,
+        caption=f"{scale.kind}{f', {scale.unit}' if scale.unit else ''}, {'logarithmic' if log else 'linear'}",
         standard=standard,
         limits=shown,
         ticks=tuple((value / factor, rounded(value)) for value in ticks),
-        sentence=f"{stimulus.steps} levels from {words.words(low)} to {words.words(high)}, {spacing}.{beyond}",
+        sentence=f"{stimulus.steps} levels from {scale.words(low)} to {scale.words(high)}, {spacing}.{beyond}",
     )
 
 
-def _limits(study: Study, row: Row, words: LevelWords) -> tuple[str, dict[Limit, AxisLimit]]:
+def _limits(study: Study, row: Row, scale: LevelWords) -> tuple[str, dict[Limit, AxisLimit]]:
     """Return the highest standard in words, and the limits of the block that presents the levels."""
     protocol = study.formed
     focus = focus_of(protocol, row.path[:-1])
     of = None if protocol is None or focus.block is None else level_block(protocol, focus.block)
     if of is None:
         return "", {}
-    standard = "" if of.standard is None else f"standard {rounded(of.standard)} {words.value_unit}".rstrip()
-    found: dict[Limit, AxisLimit] = {}
+    standard = "" if of.standard is None else f"standard {rounded(of.standard)} {scale.value_unit}".rstrip()
+    limits: dict[Limit, AxisLimit] = {}
     if of.limits is not None:
         values: dict[Limit, float | None] = {"norm": of.limits.force, "slope": of.limits.loop}
         for name, value in values.items():
             if value is not None:
-                level = words.stimulus.level_between(of.standard, value)
+                level = scale.stimulus.level_between(of.standard, value)
                 if math.isfinite(level) and level > 0:
-                    found[name] = AxisLimit(f"{LIMIT_NAMES[name]} {rounded(value)} {words.value_unit}".rstrip(), level)
-    return standard, found
+                    limits[name] = AxisLimit(f"{LIMIT_NAMES[name]} {rounded(value)} {scale.value_unit}".rstrip(), level)
+    return standard, limits
 
 
 HEIGHT, TRACK_Y, TRACK_PX, MARGIN = 104, 46.0, 12.0, 14
@@ -187,11 +187,11 @@ class AxisView(Extra, Themed, QWidget):
         painter.setFont(font("small", tabular=True))
         self._limits(painter, axis, track)
         painter.setPen(QColor(t.text3))
-        for level, words in axis.ticks:
+        for level, label in axis.ticks:
             x = self._x(level)
             painter.drawLine(QPointF(x, track.bottom() + 6), QPointF(x, track.bottom() + 10))
             room = QRectF(x - 30, track.bottom() + 11, 60, 16)
-            painter.drawText(room, Qt.AlignmentFlag.AlignHCenter, words)
+            painter.drawText(room, Qt.AlignmentFlag.AlignHCenter, label)
         below = QRectF(MARGIN, HEIGHT - 20, self.width() - 2 * MARGIN, 18)
         painter.setPen(QColor(t.text2))
         painter.drawText(below, Qt.AlignmentFlag.AlignLeft, axis.standard)
@@ -199,8 +199,8 @@ class AxisView(Extra, Themed, QWidget):
 
     def _limits(self, painter: QPainter, axis: LevelAxis, track: QRectF) -> None:
         """Paint where the limits begin, the name of the higher one above that of the lower one."""
-        found = [(limit, limit_colour(self.theme, name)) for name, limit in axis.limits.items()]
-        for row, (limit, ink) in enumerate(sorted(found, key=lambda pair: pair[0].level)):
+        limits = [(limit, limit_colour(self.theme, name)) for name, limit in axis.limits.items()]
+        for row, (limit, ink) in enumerate(sorted(limits, key=lambda pair: pair[0].level)):
             x, top = self._x(limit.level), 14.0 * (1 - row)
             painter.setPen(QPen(QColor(ink), 1.6, Qt.PenStyle.SolidLine if row == 0 else Qt.PenStyle.DashLine))
             painter.drawLine(QPointF(x, top + 2), QPointF(x, track.bottom()))
@@ -235,8 +235,8 @@ class Phase:
     @property
     def duration(self) -> str:
         exact = not self.about and bool(self.field) and str(self.field[-1]).endswith("_s")
-        found = exact_duration(self.duration_s, self.duration_s) if exact else duration(self.duration_s, tenths=True)
-        return f"{'about ' if self.about else ''}{found}"
+        text = exact_duration(self.duration_s, self.duration_s) if exact else duration(self.duration_s, tenths=True)
+        return f"{'about ' if self.about else ''}{text}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -272,8 +272,10 @@ def trial_strip(study: Study, row: Row) -> TrialStrip | None:
     for number in range(design.intervals):
         if number:
             phases.append(Phase("pause", label_of("pause_s"), "", design.pause_s, of_design("pause_s")))
-        words = ORDINALS[number] if design.intervals > 1 else ""
-        phases.append(Phase("interval", "Interval", words, task.expected_s, ("tasks", block.task, _length(task)), free))
+        ordinal = ORDINALS[number] if design.intervals > 1 else ""
+        phases.append(
+            Phase("interval", "Interval", ordinal, task.expected_s, ("tasks", block.task, _length(task)), free)
+        )
     method = method_of(protocol, block) if block.stimulus is not None else None
     if isinstance(method, Adjustment):
         field = ("methods", str(block.method), "most_s") if block.method in protocol.methods else ()
@@ -330,9 +332,9 @@ class PhaseButton(Themed, QAbstractButton):
             draw_icon(painter, "check", QRectF(middle.x() - 9, middle.y() - 9, 18, 18), t.ok, 2.2)
         painter.setFont(font("small"))
         metrics = painter.fontMetrics()
-        for ink, words, below in ((t.text, phase.name, 15), (t.text2, phase.duration, 30)):
+        for ink, text, below in ((t.text, phase.name, 15), (t.text2, phase.duration, 30)):
             painter.setPen(QColor(ink))
-            shown = metrics.elidedText(words, Qt.TextElideMode.ElideRight, self.width())
+            shown = metrics.elidedText(text, Qt.TextElideMode.ElideRight, self.width())
             painter.drawText(QPointF(0, picture.bottom() + below), shown)
 
     def _interval(self, painter: QPainter, phase: Phase, picture: QRectF) -> None:
@@ -419,10 +421,10 @@ class StripView(Extra, Themed, QWidget):
 def _widths(phases: tuple[Phase, ...], whole: float) -> list[float]:
     """Return how wide each phase is: wide enough for its words, and the longer it is, the wider."""
     metrics = QFontMetrics(font("small"))
-    words = [max(map(metrics.horizontalAdvance, (phase.name, phase.duration))) + GAP for phase in phases]
-    rest, total = max(0.0, whole - sum(words)), sum(phase.duration_s for phase in phases) or 1.0
-    share = min(1.0, whole / sum(words))
-    return [share * least + rest * phase.duration_s / total for least, phase in zip(words, phases, strict=True)]
+    least_widths = [max(map(metrics.horizontalAdvance, (phase.name, phase.duration))) + GAP for phase in phases]
+    rest, total = max(0.0, whole - sum(least_widths)), sum(phase.duration_s for phase in phases) or 1.0
+    share = min(1.0, whole / sum(least_widths))
+    return [share * least + rest * phase.duration_s / total for least, phase in zip(least_widths, phases, strict=True)]
 
 
 def _strip_below(field: Field) -> StripView:

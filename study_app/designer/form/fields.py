@@ -104,7 +104,7 @@ class _Typed(_Base):
 
         No key removes a text that is not.
         """
-        return self.at_end() and not any(one.words() for one in self.beside if one is not self)
+        return self.at_end() and not any(field.words() for field in self.beside if field is not self)
 
     def at_end(self) -> bool:
         """Return whether the caret is at the end of a text of which nothing or all is marked."""
@@ -457,8 +457,8 @@ class ChoiceField(Field):
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
-        words = [self.words(choice, None) for choice in row.choices]
-        few = 1 < len(words) <= MOST_SEGMENTS and sum(len(one) + 3 for one in words) <= SEGMENT_LETTERS
+        labels = [self.words(choice, None) for choice in row.choices]
+        few = 1 < len(labels) <= MOST_SEGMENTS and sum(len(text) + 3 for text in labels) <= SEGMENT_LETTERS
         few = few and row.kind != "reference"
         self.segments = Segments(row.label) if few or row.kind == "kind" else None
         self.list = None if few else dense(Choice(), row.label)
@@ -495,9 +495,9 @@ class ChoiceField(Field):
         if shown is not None and shown not in [value for value, _ in values]:
             values.append((shown, str(shown)))
         values += [(section, new_words(section)) for section in row.sections]
-        if [words for _, words in values] != [self.list.itemText(at) for at in range(self.list.count())]:
+        if [text for _, text in values] != [self.list.itemText(at) for at in range(self.list.count())]:
             self.list.clear()
-            self.list.addItems([words for _, words in values])
+            self.list.addItems([text for _, text in values])
             for at, choice in enumerate(row.choices):
                 self.list.setItemData(at, choice.sentence, Qt.ItemDataRole.ToolTipRole)
         self._values = [value for value, _ in values]
@@ -578,9 +578,9 @@ class ChecksField(Field):
 
     def _take(self) -> None:
         row = self.row
-        there = [value for value in row.value or () if value in self.checks and self.checks[value].isChecked()]
-        there += [value for value, check in self.checks.items() if check.isChecked() and value not in there]
-        self.set_value(there)
+        chosen = [value for value in row.value or () if value in self.checks and self.checks[value].isChecked()]
+        chosen += [value for value, check in self.checks.items() if check.isChecked() and value not in chosen]
+        self.set_value(chosen)
 
 
 class UnknownField(Field):
@@ -596,9 +596,9 @@ class UnknownField(Field):
         self.value.show_text(written(self.row.value))
 
 
-def add_button(name: str, words: str = "") -> ActionButton:
+def add_button(name: str, accessible_name: str = "") -> ActionButton:
     """Return a quiet button with a plus."""
-    made = small_button("plus", words or name, role="plain", height=32)
+    made = small_button("plus", accessible_name or name, role="plain", height=32)
     made.setAccessibleName(name)
     return made
 

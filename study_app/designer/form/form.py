@@ -51,8 +51,8 @@ WITH_LIQUIDS = ("liquids", "conditions", "blocks")
 def form(study: Study, path: Path) -> Form:
     """Return the form of the element at ``path``."""
     if study.unreadable:
-        lines = [f"Line {one.line}: " if one.line else "" for one in study.problems]
-        said = [_sentence(one.message, one.hint) for one in study.problems]
+        lines = [f"Line {problem.line}: " if problem.line else "" for problem in study.problems]
+        said = [_sentence(problem.message, problem.hint) for problem in study.problems]
         why = tuple(map("".join, zip(lines, said, strict=True)))
         return Form(
             path=FIRST, title=title_of({}, FIRST), icon=icon_of(FIRST, {}), kind=UNREADABLE, faults=why, unreadable=True
@@ -73,9 +73,9 @@ def form(study: Study, path: Path) -> Form:
     shown = {row.path for section in sections for row in section.rows}
     shown |= {section.path for section in sections if section.path != path}
     within = [fault for fault in study.faults if fault.path[: len(path)] == path]
-    within = [fault for fault in within if not any(fault.path[: len(one)] == one for one in shown)]
-    own = tuple(_sentence(one.message, one.hint) for one in within if one.path != (*path, "id"))
-    of_id = tuple(_sentence(one.message, one.hint) for one in within if one.path == (*path, "id"))
+    within = [fault for fault in within if not any(fault.path[: len(path_shown)] == path_shown for path_shown in shown)]
+    own = tuple(_sentence(fault.message, fault.hint) for fault in within if fault.path != (*path, "id"))
+    of_id = tuple(_sentence(fault.message, fault.hint) for fault in within if fault.path == (*path, "id"))
     value = value_at(document, path)
     name = value.get("id") if isinstance(value, Mapping) else None
     if name is None and len(path) == 2 and isinstance(value, Mapping):
@@ -109,13 +109,13 @@ def asking(document: Mapping[str, Any], path: Path) -> Iterator[tuple[str, Reque
     steps = [((*place, at), str(step)) for place, listed in sequences_in(document) for at, step in enumerate(listed)]
     blocks = [step for step in steps if step[1] in names(document, "blocks")]
     main = [step for step in blocks if value_at(document, ("blocks", step[1], "phase")) in (None, "main")]
-    there = {place for place, step in steps if step == path[1]}
-    there |= set(_after(there))  # it cannot be asked twice in a row
+    asked_after = {place for place, step in steps if step == path[1]}
+    asked_after |= set(_after(asked_after))  # it cannot be asked twice in a row
 
-    def as_step(words: str, places: Iterable[Path]) -> Iterator[tuple[str, Request]]:
-        new = tuple(place for place in places if place not in there)
+    def as_step(sentence: str, places: Iterable[Path]) -> Iterator[tuple[str, Request]]:
+        new = tuple(place for place in places if place not in asked_after)
         if new and is_second(document):
-            yield words, AddToSession(path, new)
+            yield sentence, AddToSession(path, new)
 
     firsts = {place[:-1]: place for place, _ in reversed(blocks)}
     yield from as_step("Before the first block\tonce", firsts.values())
@@ -166,7 +166,11 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
                 if (inner := row_at(study.document, (*row.path, key))) is not None
             ]
         elif row.instead and not _given(other[row.instead]) and (_given(row) or faulty):
-            both = tuple((str(key), one.label) for key, one in other.items() if key in {row.path[-1], row.instead})
+            both = tuple(
+                (str(key), alternative.label)
+                for key, alternative in other.items()
+                if key in {row.path[-1], row.instead}
+            )
             shown.append(replace(_form_row(study, row, places), keys=both))
         elif (row.value is None and not faulty and row.path[-1] in refused) or (
             row.instead and _given(other[row.instead]) and not _given(row)
@@ -187,17 +191,17 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
         for fault in study.faults
         if depth
         and fault.path[: len(path)] == path
-        and not any(fault.path[: len(one)] == one for one in inside)
-        and not any(fault.path[: len(one)] == one for one in below)
+        and not any(fault.path[: len(path)] == path for path in inside)
+        and not any(fault.path[: len(path)] == path for path in below)
     )
     rest = (title, tuple(row.path[-1] for row in (*shown, *absent)))
-    for words, keys in (*sections_of(study.document, path), rest):
+    for heading, keys in (*sections_of(study.document, path), rest):
         own = tuple(row for key in keys for row in shown if row.path[len(path)] == key)
         missing = tuple(row for key in keys for row in absent if row.path[-1] == key)
         shown = [row for row in shown if row not in own]
         absent = [row for row in absent if row not in missing]
         if own or missing:
-            yield Section(path, words, own, missing, faults)
+            yield Section(path, heading, own, missing, faults)
             faults = ()
     for table in below:
         yield from _sections(study, table, places, depth + 1)
@@ -215,7 +219,7 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
     codes, is_text = languages_of(document), row.kind in {"localised", "paragraphs"}
     number = None
     if row.kind == "either":
-        number = next((index for index, one in enumerate(row.either) if _fits(one, row.value)), 0)
+        number = next((index for index, alternative in enumerate(row.either) if _fits(alternative, row.value)), 0)
     return FormRow(
         **values_of(row),
         place=place_words(path, places.line(path)),
@@ -241,9 +245,9 @@ def _entries(study: Study, row: Row) -> Iterator[Entry]:
     if row.path == STUDY_LANGUAGES:
         counts, copied = texts_by_language(study), copied_texts(study)
         for at, code in enumerate(row.value if isinstance(row.value, tuple) else ()):
-            (there, wanted), alike = counts.get(str(code), (0, 0)), copied.get(str(code), 0)
-            note = f"{there - alike} of {wanted} texts" + (f", {alike} to translate" if alike else "")
-            yield Entry((*row.path, at), language_name(str(code)), note, wanted - there)
+            (present, wanted), alike = counts.get(str(code), (0, 0)), copied.get(str(code), 0)
+            note = f"{present - alike} of {wanted} texts" + (f", {alike} to translate" if alike else "")
+            yield Entry((*row.path, at), language_name(str(code)), note, wanted - present)
     if row.kind in {"list", "tables", "references"} and isinstance(row.value, tuple | Mapping):
         keys = row.value if isinstance(row.value, Mapping) else range(len(row.value))
         for key in keys:

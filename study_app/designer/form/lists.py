@@ -60,18 +60,18 @@ def _line(study: Study, name: Any) -> ConditionLine:
     known = isinstance(named, str) and isinstance(liquids, Mapping) and named in liquids
     liquid: Path | None = ("liquids", str(named)) if known else None
     several = table.get("liquids")
-    words = [title_of(document, liquid)] if liquid is not None and named != name else []
+    details = [title_of(document, liquid)] if liquid is not None and named != name else []
     if isinstance(several, tuple):
-        words.append(f"{len(several)} liquids")
+        details.append(f"{len(several)} liquids")
     delay_ms = table.get("delay_ms", 0)
     if isinstance(delay_ms, int | float):
-        words.append(f"{delay_ms:g} ms late")
+        details.append(f"{delay_ms:g} ms late")
     valid = valid_part(study)
     protocol = valid.protocol if valid.forces else None
     if protocol is None or liquid is None or name not in protocol.conditions:
-        return ConditionLine(liquid, ", ".join(words), UNKNOWN)
-    found = steady_force(protocol.scene_for(str(name)))
-    return ConditionLine(liquid, ", ".join(words), f"{found.force_n:.2f} N", found.limit is not None)
+        return ConditionLine(liquid, ", ".join(details), UNKNOWN)
+    force = steady_force(protocol.scene_for(str(name)))
+    return ConditionLine(liquid, ", ".join(details), f"{force.force_n:.2f} N", force.limit is not None)
 
 
 RIGHT: Final = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
@@ -126,11 +126,11 @@ class Rows(QListWidget):
 class EntryRow(QFrame):
     """The frame of an entry, with its parts in a line."""
 
-    def __init__(self, words: str, parts: Iterable[QWidget | tuple[QWidget, int]], *, faulty: bool) -> None:
+    def __init__(self, name: str, parts: Iterable[QWidget | tuple[QWidget, int]], *, faulty: bool) -> None:
         super().__init__()
         self.setProperty("role", "entry")
         self.setProperty("state", "refused" if faulty else "")
-        self.setAccessibleName(words)
+        self.setAccessibleName(name)
         self.setFixedHeight(FIELD_PX + 2)
         self.line = hbox(*parts, spacing=2, margins=(12, 0, 2, 0), parent=self)
 
@@ -194,9 +194,9 @@ class EntryList(Field):
         if inside:
             self.take_keyboard()
 
-    def add_row(self, words: str, *parts: QWidget | tuple[QWidget, int], faulty: bool = False) -> EntryRow:
-        made, item = EntryRow(words, parts, faulty=faulty), QListWidgetItem(self.list)
-        item.setData(Qt.ItemDataRole.AccessibleTextRole, words)
+    def add_row(self, name: str, *parts: QWidget | tuple[QWidget, int], faulty: bool = False) -> EntryRow:
+        made, item = EntryRow(name, parts, faulty=faulty), QListWidgetItem(self.list)
+        item.setData(Qt.ItemDataRole.AccessibleTextRole, name)
         item.setSizeHint(QSize(0, FIELD_PX + 2))
         self.list.setItemWidget(item, made)
         self.rows.append(made)
@@ -260,8 +260,8 @@ class NamesList(Choice):
 
     def show_items(self, items: Iterable[tuple[str, Any]]) -> None:
         self.clear()
-        for words, data in items:
-            self.addItem(words, data)
+        for name, data in items:
+            self.addItem(name, data)
         self.setCurrentIndex(-1)
         self.setEnabled(bool(self.count()))
 
@@ -408,8 +408,8 @@ class LanguageListField(EntryList):
             title.show_text(entry.title)
             note.show_text(entry.note)
             note.setAlignment(RIGHT)
-            words = f"{entry.title}, {entry.note}, {at + 1} of {len(codes)}"
-            shown = self.add_row(words, title, note, faulty=bool(entry.faults))
+            description = f"{entry.title}, {entry.note}, {at + 1} of {len(codes)}"
+            shown = self.add_row(description, title, note, faulty=bool(entry.faults))
             if entry.faults and at:
                 made = self.copies[code] = add_button(f"Copy {first} where {entry.title} has no text", f"Copy {first}")
                 made.clicked.connect(partial(self.asked.emit, ChangeLanguage("copy", code)))
@@ -417,7 +417,7 @@ class LanguageListField(EntryList):
             if len(codes) > 1:
                 name = f"Remove {entry.title} from every text"
                 shown.add_button("cross", name, partial(self.asked.emit, ChangeLanguage("remove", code)))
-        self.names.show_items((one.sentence, one.value) for one in row.choices if one.value not in codes)
+        self.names.show_items((choice.sentence, choice.value) for choice in row.choices if choice.value not in codes)
 
 
 CONDITIONS: Final = SpecialEditor(

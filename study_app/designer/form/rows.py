@@ -55,7 +55,7 @@ def _line(
     kind, text = str(item.get("kind", STATEMENT)), item.get("text", "")
     texts = [text.get(code, "") for code in codes] if isinstance(text, Mapping) else [text, *[""] * (len(codes) - 1)]
     faults = sum(fault.path[: len(path)] == path for fault in study.faults)
-    shown = tuple(one.strip() if isinstance(one, str) else "" for one in texts)
+    shown = tuple(text.strip() if isinstance(text, str) else "" for text in texts)
     number = path[-1] + 1 if isinstance(path[-1], int) else 0
     return QuestionLine(
         path=path,
@@ -73,10 +73,10 @@ def _note(item: Mapping[str, Any], numbers: Mapping[str, int]) -> str:
     if not isinstance(rule, Mapping):
         return ""
     name, values = str(rule.get("item")), rule.get("is", ())
-    words = [label_of(str(value)) for value in (values if isinstance(values, tuple) else (values,))]
+    labels = [label_of(str(value)) for value in (values if isinstance(values, tuple) else (values,))]
     limits = [f"{label_of(key).lower()} {rule[key]:g}" for key in ("at_least", "at_most")
               if isinstance(rule.get(key), int | float)]  # fmt: skip
-    return f"shown if {numbers.get(name, name)} is {' or '.join(words) if words else ' and '.join(limits)}"
+    return f"shown if {numbers.get(name, name)} is {' or '.join(labels) if labels else ' and '.join(limits)}"
 
 
 STUDY_LANGUAGES: Final = ("study", "languages")
@@ -135,7 +135,7 @@ class FormRow(Row):
 
 def values_of(row: Row) -> dict[str, Any]:
     """Return the values of a row by their names."""
-    return {one.name: getattr(row, one.name) for one in fields(Row)}
+    return {field.name: getattr(row, field.name) for field in fields(Row)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,6 +202,6 @@ def choice_words(choice: Choice, default: object) -> str:
     if choice.value is None:
         return "Not set"
     package, _, name = str(choice.value).rpartition(":")
-    words = name if name.isdigit() else label_of(name)
-    words = f"{words} ({package})" if package else words
-    return f"{words} (default)" if choice.value == default else words
+    text = name if name.isdigit() else label_of(name)
+    text = f"{text} ({package})" if package else text
+    return f"{text} (default)" if choice.value == default else text

@@ -271,8 +271,8 @@ class PointsField(Field):
         self.show_value()
 
     def show_value(self) -> None:
-        for lines, words in zip(self.lines, self.row.facts.points, strict=True):
-            for line, text in zip(lines, words, strict=True):
+        for lines, texts in zip(self.lines, self.row.facts.points, strict=True):
+            for line, text in zip(lines, texts, strict=True):
                 line.show_text(text)
 
     def _written(self, code: str) -> int:
@@ -280,14 +280,14 @@ class PointsField(Field):
 
     def take(self, at: int, column: int, text: str) -> None:
         code = self.row.facts.languages[column][0]
-        path, there = (*self.row.path, code), self._written(code)
-        missing = [*((self.row.value or {}).get(code, ())), *[""] * (at - there), text]
-        changed = SetValue((*path, at), text, typing=True) if at < there else SetValue(path, missing, typing=True)
+        path, count = (*self.row.path, code), self._written(code)
+        missing = [*((self.row.value or {}).get(code, ())), *[""] * (at - count), text]
+        changed = SetValue((*path, at), text, typing=True) if at < count else SetValue(path, missing, typing=True)
         self.asked.emit(changed)
 
     def add_entry(self) -> None:
-        path, words = self.row.path, f"Point {len(self.lines) + 1}"
-        added = (AddEntry((*path, code), words) for code, _ in self.row.facts.languages if self._written(code))
+        path, label = self.row.path, f"Point {len(self.lines) + 1}"
+        added = (AddEntry((*path, code), label) for code, _ in self.row.facts.languages if self._written(code))
         self.asked.emit(Several("Add point", tuple(added)))
 
     def remove(self, at: int) -> None:
@@ -338,8 +338,10 @@ def order_of_blocks(study: Study, _row: Row) -> str:
     protocol = valid_part(study).protocol
     if protocol is None or len(protocol.main_blocks) < 2:
         return ""
-    words = {group: words.partition(": ")[2] for group, words in block_orders_by_group(protocol).items()}
-    return " ".join(f"{capitalised(f'{group}: {one}' if group else one)}." for group, one in words.items())
+    sentences = {group: sentences.partition(": ")[2] for group, sentences in block_orders_by_group(protocol).items()}
+    return " ".join(
+        f"{capitalised(f'{group}: {sentence}' if group else sentence)}." for group, sentence in sentences.items()
+    )
 
 
 def choice_sentences(_study: Study, row: Row) -> str:
@@ -385,20 +387,22 @@ class Compared:
 
     def others(self, every: tuple["Compared", ...]) -> tuple["Compared", ...]:
         """Return what it can be compared with: other blocks with a measure of its own, or what is in the same block."""
-        alike = (one for one in every if one.key == self.key and one.name != self.name)
-        return tuple(one for one in alike if self.shared(one) and (self.key == "blocks" or one.block == self.block))
+        alike = (item for item in every if item.key == self.key and item.name != self.name)
+        return tuple(item for item in alike if self.shared(item) and (self.key == "blocks" or item.block == self.block))
 
     def shared(self, other: "Compared") -> tuple[tuple[str, str], ...]:
         """Return the measures that both have."""
-        return tuple(one for one in self.measures if one in other.measures)
+        return tuple(measure for measure in self.measures if measure in other.measures)
 
 
 def compared(study: Study, _row: Row) -> tuple[Compared, ...]:
     """Return what hypotheses can compare, in the order of the file; blocks of one title are told apart by their ids."""
     every = tuple(_compared(study.document))
-    times = Counter(one.words for one in every)
-    every = tuple(replace(one, words=f"{one.words} ({one.block})") if times[one.words] > 1 else one for one in every)
-    return tuple(one for one in every if one.others(every))
+    times = Counter(item.words for item in every)
+    every = tuple(
+        replace(item, words=f"{item.words} ({item.block})") if times[item.words] > 1 else item for item in every
+    )
+    return tuple(item for item in every if item.others(every))
 
 
 def _compared(document: Mapping[str, Any]) -> Iterator[Compared]:
@@ -415,9 +419,9 @@ def _compared(document: Mapping[str, Any]) -> Iterator[Compared]:
         yield Compared(key="blocks", block=name, name=name, words=title, measures=measures)
         conditions = block.get("conditions") if "design" not in block else ()
         for key, inner in (("conditions", conditions), ("groups", names(document, "groups"))):
-            for one in inner if isinstance(inner, tuple | list) else ():
-                words = f"{title_of(document, (key, str(one)))} in {title}"
-                yield Compared(key=key, block=name, name=str(one), words=words, measures=measures)
+            for condition in inner if isinstance(inner, tuple | list) else ():
+                label = f"{title_of(document, (key, str(condition)))} in {title}"
+                yield Compared(key=key, block=name, name=str(condition), words=label, measures=measures)
 
 
 class Hypothesis(QWidget):
@@ -451,31 +455,31 @@ class Hypothesis(QWidget):
     def show_value(self, value: Mapping[str, Any], known: tuple[Compared, ...]) -> None:
         self.value, self.known = value, known
         key = next((key for key in ("conditions", "groups") if value.get(key)), "blocks")
-        listed = (value.get(one) for one in ("blocks", key))
-        blocks, named = (tuple(map(str, one)) if isinstance(one, tuple) else () for one in listed)
+        listed = (value.get(key) for key in ("blocks", key))
+        blocks, named = (tuple(map(str, entry)) if isinstance(entry, tuple) else () for entry in listed)
         at = [(key, name if key == "blocks" else next(iter(blocks), ""), name) for name in named]
-        found = [next((one for one in known if (one.key, one.block, one.name) == place), None) for place in at]
-        first, second = (*found, None, None)[:2]
+        items = [next((item for item in known if (item.key, item.block, item.name) == place), None) for place in at]
+        first, second = (*items, None, None)[:2]
         self.others = () if first is None else first.others(known)
         self.measures = MEASURES if first is None else first.measures if second is None else first.shared(second)
         measure, relation = value.get("measure", "threshold"), _relation(value)
-        one, two = (*named, "", "")[:2]
-        for box, word in ((self.measure, measure), (self.first, one), (self.second, two)):
+        first_name, two = (*named, "", "")[:2]
+        for box, word in ((self.measure, measure), (self.first, first_name), (self.second, two)):
             box.setPlaceholderText(str(word))  # shown where it is not among the choices
         self._fill(self.measure, self.measures, measure)
         self._fill(self.relation, RELATIONS, relation)
-        self._fill(self.first, tuple((one, one.words) for one in known), first)
-        self._fill(self.second, tuple((one, one.words) for one in self.others), second)
+        self._fill(self.first, tuple((item, item.words) for item in known), first)
+        self._fill(self.second, tuple((item, item.words) for item in self.others), second)
         self.bound.show_text("" if (bound := value.get("bound")) is None else written(bound))
         for part in (self.within, self.bound):
             part.setVisible(bound is not None)
 
     @staticmethod
     def _fill(box: Choice, values: tuple[tuple[Any, str], ...], chosen: Any) -> None:
-        words = [word for _, word in values]
-        if words != [box.itemText(at) for at in range(box.count())]:
+        labels = [word for _, word in values]
+        if labels != [box.itemText(at) for at in range(box.count())]:
             box.clear()
-            box.addItems(words)
+            box.addItems(labels)
         box.setCurrentIndex(next((at for at, (value, _) in enumerate(values) if value == chosen), -1))
 
     def _take(self) -> None:
@@ -569,9 +573,9 @@ class HypothesesField(Field):
             self.asked.emit(SetValue(path, value))
             return
         asked: list[Request] = [
-            SetValue((*path, key), one)
-            for key, one in value.items()
-            if (tuple(one) if isinstance(one, list) else one) != before.get(key)
+            SetValue((*path, key), entry)
+            for key, entry in value.items()
+            if (tuple(entry) if isinstance(entry, list) else entry) != before.get(key)
         ]
         asked += [RemoveKey((*path, key)) for key in before if key not in value]
         if asked:

@@ -134,13 +134,13 @@ class NumberPart(Card):
         set_ink(self.number, "text3" if waiting else "text")
         self.unit.setText(shown.unit)
         note: Verdict = ("neutral", "clock", waiting)
-        tone, icon, words = note if waiting else shown.note
+        tone, icon, text = note if waiting else shown.note
         self.icon.show_icon(icon or "info", INKS[tone])
-        self.note.setText(words)
+        self.note.setText(text)
         self.more.setText(shown.more)
         self.more.setVisible(bool(shown.more) and not waiting)
         also = f". {shown.more}" if self.more.isVisibleTo(self) else ""
-        self.setAccessibleName(f"{shown.title}: {shown.number} {shown.unit}, {words}{also}")
+        self.setAccessibleName(f"{shown.title}: {shown.number} {shown.unit}, {text}{also}")
         self._fit()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -167,8 +167,8 @@ class NumbersRow(QWidget):
 
     def show_numbers(self, shown: tuple[NumberCard, ...], waiting: str) -> None:
         self.setVisible(bool(shown))
-        for part, one in zip(self.parts, shown, strict=False):
-            part.show_card(one, waiting)
+        for part, card in zip(self.parts, shown, strict=False):
+            part.show_card(card, waiting)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -191,7 +191,7 @@ class Strip(Themed, QWidget):
         self.segments, self.opens = segments, opens
         self.setFixedHeight(14)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
-        listed = [one.words for one in segments]
+        listed = [segment.words for segment in segments]
         self.setAccessibleName("Session, in order: " + ", ".join(listed))
         self.setToolTip(plain_tip("\n".join((*listed, "Click a step to open it"))))
 
@@ -199,19 +199,19 @@ class Strip(Themed, QWidget):
         if event.button() != Qt.MouseButton.LeftButton:
             return
         x = 0.0
-        for one in self.segments:
-            x += one.share * self.width()
+        for segment in self.segments:
+            x += segment.share * self.width()
             if event.position().x() < x:
-                self.opens(one.path)
+                self.opens(segment.path)
                 return
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter, x = QPainter(self), 0.0
         painter.setPen(Qt.PenStyle.NoPen)
-        for one in self.segments:
-            width = one.share * self.width()
-            painter.setBrush(QColor(self.theme.accent if one.chosen else self.theme.ctl))
-            painter.setOpacity(1.0 if one.chosen else 0.45)
+        for segment in self.segments:
+            width = segment.share * self.width()
+            painter.setBrush(QColor(self.theme.accent if segment.chosen else self.theme.ctl))
+            painter.setOpacity(1.0 if segment.chosen else 0.45)
             painter.drawRect(QRectF(x, 0, max(1.0, width - 1.0), self.height()))
             x += width
 
@@ -259,14 +259,14 @@ class CardWidget(Card):
             row.addStretch()
         elif isinstance(part, Segments):
             notes = hbox(margins=0)
-            for at, words in enumerate(part.notes):
-                note = cut_text(words, "small", "text2")
+            for at, text in enumerate(part.notes):
+                note = cut_text(text, "small", "text2")
                 if at:
                     note.setAlignment(Qt.AlignmentFlag.AlignRight)
                 notes.addWidget(note)
             vbox(Strip(part.segments, self.opens), notes, spacing=8, margins=0, parent=made)
         elif isinstance(part[0], Table):
-            tables = ((_table(one), 0, Qt.AlignmentFlag.AlignTop) for one in part if isinstance(one, Table))
+            tables = ((_table(table), 0, Qt.AlignmentFlag.AlignTop) for table in part if isinstance(table, Table))
             hbox(*tables, STRETCH, spacing=18, margins=0, parent=made)
         else:
             return verdict_line(part)
@@ -275,10 +275,10 @@ class CardWidget(Card):
 
 def verdict_line(verdict: Verdict) -> QWidget:
     """Return a state as icon and words that wrap."""
-    tone, icon, words = verdict
+    tone, icon, text = verdict
     made = QWidget()
     sign = (Icon(icon or "info", INKS[tone], 16), 0, Qt.AlignmentFlag.AlignTop)
-    said = label(words, "small", "text" if tone != "neutral" else "text2", wraps=True)
+    said = label(text, "small", "text" if tone != "neutral" else "text2", wraps=True)
     hbox(sign, (said, 1), spacing=8, margins=0, parent=made)
     return made
 
@@ -327,15 +327,15 @@ def _lines(shown: Lines) -> QWidget:
         name.show_text(line.title)
         bar.show_share(line.share)
         number = figures(line.number, ink=ink)
-        tone, icon, words = line.verdict
-        number.setAccessibleName(f"{line.title}: {line.number}{f', {words}' if words else ''}")
+        tone, icon, text = line.verdict
+        number.setAccessibleName(f"{line.title}: {line.number}{f', {text}' if text else ''}")
         grid.addWidget(name, at, 0)
         grid.addWidget(bar, at, 1)
         grid.addWidget(number, at, 2, Qt.AlignmentFlag.AlignRight)
         if icon:
             mark = Icon(icon, INKS[tone], 16)
-            mark.setToolTip(plain_tip(words))
-            mark.setAccessibleName(f"{line.title}: {words}")
+            mark.setToolTip(plain_tip(text))
+            mark.setAccessibleName(f"{line.title}: {text}")
             grid.addWidget(mark, at, 3)
     if len(shown.lines) > MOST_LINES:
         grid.addWidget(label(f"and {len(shown.lines) - MOST_LINES} more", "small", "text2"), MOST_LINES, 0, 1, 2)

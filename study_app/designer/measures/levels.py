@@ -91,12 +91,12 @@ class LevelBlock:
     @property
     def standard(self) -> float | None:
         """The standard that is shown: the highest, whose forces are the strongest."""
-        return max((one.standard for one in self.levels if one.standard is not None), default=None)
+        return max((level.standard for level in self.levels if level.standard is not None), default=None)
 
     @property
     def shown(self) -> tuple[Level, ...]:
         """The levels of that standard."""
-        return tuple(one for one in self.levels if one.standard == self.standard)
+        return tuple(level for level in self.levels if level.standard == self.standard)
 
     @property
     def clipped_from(self) -> tuple[float, Limit] | None:
@@ -115,7 +115,7 @@ class LevelBlock:
     def as_asked(self) -> str:
         """That clipped levels are simulated as they are asked; "" where none is clipped, or as they are presented."""
         simulated = self.clipping is not None and self.clipping.paced
-        return "" if simulated or all(one.clipped_by is None for one in self.shown) else AS_ASKED
+        return "" if simulated or all(level.clipped_by is None for level in self.shown) else AS_ASKED
 
     @property
     def clipped_words(self) -> str:
@@ -136,12 +136,12 @@ def level_block(protocol: Protocol, block: Block, *, forces: bool = True) -> Lev
     """Return a block's levels; None where it varies nothing. Without ``forces`` its limits are not known."""
     if block.stimulus is None or block.design is None:
         return None
-    found = levels(protocol, block.id)
-    words = LevelWords(stimulus_of(protocol, block), design_of(protocol, block))
+    presented = levels(protocol, block.id)
+    wording = LevelWords(stimulus_of(protocol, block), design_of(protocol, block))
     if not forces:
-        return LevelBlock(protocol, block, words, found, None, None, forces)
+        return LevelBlock(protocol, block, wording, presented, None, None, forces)
     limits = level_limits(protocol, block)
-    return LevelBlock(protocol, block, words, found, limits, clipping(protocol, block, limits), forces)
+    return LevelBlock(protocol, block, wording, presented, limits, clipping(protocol, block, limits), forces)
 
 
 def limit_colour(theme: Theme, limit: Limit) -> str:
@@ -163,8 +163,8 @@ def log_ticks(low: float, high: float, most: int = MOST_TICKS) -> tuple[float, .
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     best: tuple[float, ...] = ()
     for steps in _BY_DECADE:
-        found = [step * 10.0**decade for decade in decades for step in steps]
-        inside = tuple(one for one in found if low * (1 - 1e-9) <= one <= high * (1 + 1e-9))
+        numbers = [step * 10.0**decade for decade in decades for step in steps]
+        inside = tuple(number for number in numbers if low * (1 - 1e-9) <= number <= high * (1 + 1e-9))
         if len(best) < len(inside) <= most:
             best = inside
     return best if len(best) > 1 else (low, high)
@@ -176,7 +176,9 @@ def even_ticks(low: float, high: float, most: int = MOST_TICKS) -> tuple[float, 
         return (low,)
     power = 10.0 ** math.floor(math.log10((high - low) / most))
     step = next(
-        power * one for one in (*_STEPS, 20) if math.floor(high / (power * one)) - math.ceil(low / (power * one)) < most
+        power * factor
+        for factor in (*_STEPS, 20)
+        if math.floor(high / (power * factor)) - math.ceil(low / (power * factor)) < most
     )
     first = math.ceil(low / step - 1e-9)
     return tuple(number * step for number in range(first, math.floor(high / step + 1e-9) + 1))

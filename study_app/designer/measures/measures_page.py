@@ -44,25 +44,25 @@ class Control(QWidget):
 
     entered = Signal(float)
 
-    def __init__(self, words: str, unit: str, step: float) -> None:
+    def __init__(self, text: str, unit: str, step: float) -> None:
         super().__init__()
         self._value, self._step = 0.0, step
-        self.words, self.unit = label(words, "small", "text2"), label(unit, "small", "text2")
+        self.words, self.unit = label(text, "small", "text2"), label(unit, "small", "text2")
         self.field = NumberField()
         self.field.setFixedWidth(FIELD_PX)
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Preferred)
         hbox(self.words, self.field, self.unit, spacing=6, margins=0, parent=self)
-        self.show_words(words, unit)
+        self.show_words(text, unit)
         self.field.entered.connect(self._take)
         self.field.unread.connect(self._refuse)
         self.field.abandoned.connect(lambda: self.field.show_state(""))
         self.field.stepped.connect(lambda steps: self.entered.emit(self._value + steps * self._step))
 
-    def show_words(self, words: str, unit: str) -> None:
-        self.words.setText(words.removeprefix("simulated "))
+    def show_words(self, text: str, unit: str) -> None:
+        self.words.setText(text.removeprefix("simulated "))
         self.unit.setText(unit)
         self.unit.setVisible(bool(unit))
-        self.field.setAccessibleName(f"{words}, {unit}" if unit else words)
+        self.field.setAccessibleName(f"{text}, {unit}" if unit else text)
 
     def _take(self, value: float) -> None:
         self.field.show_state("")
@@ -91,16 +91,16 @@ class MeasureControls(QWidget):
         self.participants = Control("participants", "", 1.0)
         hbox(STRETCH, self.threshold, self.lapses, self.participants, spacing=10, margins=0, parent=self)
 
-    def show_values(self, shown: Controls, words: LevelWords | None) -> None:
-        """Show other values; threshold and lapses only where observers are simulated, at levels with ``words``."""
+    def show_values(self, shown: Controls, wording: LevelWords | None) -> None:
+        """Show other values; threshold and lapses only where observers are simulated, with the ``wording`` of the levels."""
         planned = "planned" if shown.planned == shown.participants else f"({shown.planned or 'none'} planned)"
         self.participants.show_words("participants", planned)
         self.participants.show_number(str(shown.participants))
-        self.threshold.setVisible(words is not None)
-        self.lapses.setVisible(words is not None)
-        if words is not None:
-            self.threshold.show_words(f"simulated {words.name}", words.unit)
-            self.threshold.show_number(words.number(shown.threshold))
+        self.threshold.setVisible(wording is not None)
+        self.lapses.setVisible(wording is not None)
+        if wording is not None:
+            self.threshold.show_words(f"simulated {wording.name}", wording.unit)
+            self.threshold.show_number(wording.number(shown.threshold))
             self.lapses.show_number(rounded(100 * shown.lapses))
 
 
@@ -154,12 +154,12 @@ class ForcesCard(Card):
     def show_levels(self, shown: MeasuresView) -> None:
         """Show the forces, unless they are not known or a level has none."""
         of = shown.levels
-        has_forces = of is not None and any(one.asked_n is not None for one in of.shown)
+        has_forces = of is not None and any(level.asked_n is not None for level in of.shown)
         if of is None or not has_forces or (of.forces and of.limits is None):
             self.hide()
             return
         self.show()
-        count, total = sum(one.clipped_by is not None for one in of.levels), len(of.levels)
+        count, total = sum(level.clipped_by is not None for level in of.levels), len(of.levels)
         verdicts: tuple[Verdict, ...] = (("ok", "check", f"{total - count} of {total} as asked"),)
         if of.limits is None:
             verdicts = (("neutral", "info", f"{UNKNOWN} of {total} as asked"),)
@@ -176,7 +176,7 @@ class ForcesCard(Card):
         warning = clipped_sentence(of)
         self.bar.setVisible(bool(warning))
         self.words.setText(warning)
-        self.offered = next(((row, words[0]) for row, words in shown.problems if words), (None, ""))
+        self.offered = next(((row, sentences[0]) for row, sentences in shown.problems if sentences), (None, ""))
         self.repair.setVisible(self.offered[0] is not None)
         self.repair.show_action("", self.offered[1])
         self.plot.show_levels(of)
@@ -187,7 +187,7 @@ def clipped_sentence(of: LevelBlock) -> str:
     if of.limits is None:
         return NO_FORCES
     messages = [fault.message for fault in clipped(of.protocol, [of.block], ASSUMED_TICKS)]
-    said = ". ".join(capitalised(one) for one in messages)
+    said = ". ".join(capitalised(message) for message in messages)
     return said or clipped_unpaced(of.protocol, [of.block]) or ""
 
 

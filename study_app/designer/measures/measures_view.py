@@ -102,7 +102,7 @@ def measures_view(
     block, plan = focus.block, focus.plan
     asked = hypotheses_card(protocol, path, controls, simulated)
     levels = None if block is None else level_block(protocol, block, forces=valid.forces)
-    words = None if plan is None else LevelWords(plan.stimulus, plan.design)
+    wording = None if plan is None else LevelWords(plan.stimulus, plan.design)
     of = None if block is None else ("stimuli", str(block.stimulus), "levels")
     own = tuple((row, repairs) for row, repairs in problems.items() if row.fault.path == of)
     if block is not None and levels is not None and plan is not None:
@@ -111,7 +111,7 @@ def measures_view(
         cards = [session_card(study, facts, path)]
     else:
         numbers, cards = (), _cards(study, facts, path, focus, controls, simulated)
-    return MeasuresView(controls, words, numbers, levels, simulated, own, tuple(cards), asked, earlier)
+    return MeasuresView(controls, wording, numbers, levels, simulated, own, tuple(cards), asked, earlier)
 
 
 def _cards(
@@ -120,19 +120,19 @@ def _cards(
     """Return the cards of an element without simulated tracks, those that concern it first."""
     valid, block = valid_part(study), focus.block
     protocol = valid.protocol
-    found: list[MeasureCard] = [session_card(study, facts, path)]
+    cards: list[MeasureCard] = [session_card(study, facts, path)]
     if protocol is None:
-        return found
+        return cards
     if block is not None:
-        found += balance_card(study, protocol, block, controls)
+        cards += balance_card(study, protocol, block, controls)
     if block is not None and focus.compares:
         known = simulated.detectable
         who = people(controls.participants if known is None else known.participants, controls.planned)
-        found.append(detectable_card(study, block, who, simulated))
-    found.append(force_card(study, facts, protocol, _liquids(protocol, path, block)))
+        cards.append(detectable_card(study, block, who, simulated))
+    cards.append(force_card(study, facts, protocol, _liquids(protocol, path, block)))
     if block is not None and path[0] == "blocks":
-        found.append(block_card(study, facts, protocol, block))
-    return found
+        cards.append(block_card(study, facts, protocol, block))
+    return cards
 
 
 def _liquids(protocol: Protocol, path: Path, block: Block | None) -> list[str]:
@@ -142,8 +142,8 @@ def _liquids(protocol: Protocol, path: Path, block: Block | None) -> list[str]:
     names = () if block is None else protocol.conditions_in(block.id)
     if path[0] == "conditions" and len(path) > 1 and path[1] in protocol.conditions:
         names = (str(path[1]),)
-    found = dict.fromkeys(liquid for name in names for liquid in protocol.conditions[name].liquid_ids)
-    return list(found) or list(protocol.liquids)
+    liquids = dict.fromkeys(liquid for name in names for liquid in protocol.conditions[name].liquid_ids)
+    return list(liquids) or list(protocol.liquids)
 
 
 def people(participants: int, planned: int | None) -> str:
@@ -175,54 +175,54 @@ def _unknown(title: str, unit: str, simulated: Simulated) -> NumberCard:
 
 
 def _range(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberCard:
-    title, found, words = (f"{capitalised(of.words.name)}s it can measure", simulated.measurable, of.words)
-    if found is None:
-        return _unknown(title, words.unit, simulated)
+    title, measurable, wording = (f"{capitalised(of.words.name)}s it can measure", simulated.measurable, of.words)
+    if measurable is None:
+        return _unknown(title, wording.unit, simulated)
     clipped = of.clipped_words
-    if found.ends is None:
-        if found.planted:
+    if measurable.ends is None:
+        if measurable.planted:
             return NumberCard(title, "none", unit="", note=("bad", "warning", "estimates are biased"), more=clipped)
         if of.clipping is None:
             return NumberCard(title, "none", unit="", note=("bad", "warning", "levels are too small"), more=TOO_SMALL)
         why = "the standard is clipped" if of.clipping.clips_standard else CLIPPED[2]
         return NumberCard(title, "none", unit="", note=("bad", "warning", why), more=clipped)
-    low, high = found.ends
-    note: Verdict = ("neutral", "info", f"of {words.number(of.words.stimulus.levels[1])} {words.unit} at most")
-    if words.stimulus.level_kind == "weber" and of.standard is not None:
+    low, high = measurable.ends
+    note: Verdict = ("neutral", "info", f"of {wording.number(of.words.stimulus.levels[1])} {wording.unit} at most")
+    if wording.stimulus.level_kind == "weber" and of.standard is not None:
         values = (rounded(level * of.standard, 2) for level in (low, high))
-        note = ("neutral", "info", f"{' to '.join(values)} {words.value_unit}")
+        note = ("neutral", "info", f"{' to '.join(values)} {wording.value_unit}")
     if not low * 0.999 <= controls.threshold <= high * 1.001:
-        note = ("warn", "warning", f"not {words.words(controls.threshold)}")
+        note = ("warn", "warning", f"not {wording.words(controls.threshold)}")
     return NumberCard(
-        title, f"{words.number(low, 2)} – {words.number(high, 2)}", unit=words.unit, note=note, more=clipped
+        title, f"{wording.number(low, 2)} – {wording.number(high, 2)}", unit=wording.unit, note=note, more=clipped
     )
 
 
 def _one_person(of: LevelBlock, simulated: Simulated) -> NumberCard:
-    found = simulated.observed
-    if found is None:
+    observed = simulated.observed
+    if observed is None:
         return _unknown("One person", "%", simulated)
-    if not of.measures(found.threshold):
+    if not of.measures(observed.threshold):
         return NumberCard("One person", UNKNOWN, unit="%", note=CLIPPED, more=of.clipped_words)
-    note: Verdict = ("neutral", "people", f"at a {of.words.name} of {of.words.words(found.threshold)}")
-    return NumberCard("One person", f"± {100 * found.error:.0f}", unit="%", note=note, more=of.as_asked)
+    note: Verdict = ("neutral", "people", f"at a {of.words.name} of {of.words.words(observed.threshold)}")
+    return NumberCard("One person", f"± {100 * observed.error:.0f}", unit="%", note=note, more=of.as_asked)
 
 
 def _people(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberCard:
-    found = simulated.group
-    if found is None:
+    precision = simulated.group
+    if precision is None:
         title = f"{people(controls.participants, controls.planned)} in ± {100 * controls.precision:g} %"
         return _unknown(title, "% of studies", simulated)
-    title = f"{people(found.participants, controls.planned)} in ± {100 * found.precision:g} %"
+    title = f"{people(precision.participants, controls.planned)} in ± {100 * precision.precision:g} %"
     if not of.measures(controls.threshold):
         return NumberCard(title, UNKNOWN, unit="% of studies", note=CLIPPED, more=of.clipped_words)
-    enough = found.share >= ENOUGH
+    enough = precision.share >= ENOUGH
     note: Verdict = ("ok", "check", "Enough") if enough else ("warn", "warning", "Not enough")
-    many = f"more than {found.most}" if found.enough is None else f"about {found.enough}"
+    many = f"more than {precision.most}" if precision.enough is None else f"about {precision.enough}"
     needed = f"{100 * ENOUGH:g} % are enough" if enough else f"Needed: {many} participants for {100 * ENOUGH:g} %"
-    more = f"{needed}; with {found.more_trials} trials: {100 * found.more_share:.0f} %"
+    more = f"{needed}; with {precision.more_trials} trials: {100 * precision.more_share:.0f} %"
     more = ". ".join(filter(None, (more, ON_AVERAGE if simulated.warnings else "", of.as_asked)))
-    return NumberCard(title, f"{100 * found.share:.0f}", unit="% of studies", note=note, more=more)
+    return NumberCard(title, f"{100 * precision.share:.0f}", unit="% of studies", note=note, more=more)
 
 
 def session_card(study: Study, facts: Facts, path: Path) -> MeasureCard:
@@ -243,7 +243,7 @@ def session_card(study: Study, facts: Facts, path: Path) -> MeasureCard:
         for step, step_s in facts.steps_s.items()
     )
     longest = sorted(facts.steps_s, key=lambda step: -facts.steps_s[step])[:2]
-    named = [chosen, *(one for one in longest if one != chosen)][:2] if chosen in facts.steps_s else longest
+    named = [chosen, *(step for step in longest if step != chosen)][:2] if chosen in facts.steps_s else longest
     notes = tuple(f"{_title(study, step)} {duration(facts.steps_s[step])}" for step in facts.steps_s if step in named)
     breaks = counted(facts.breaks, "break") if facts.breaks else ""
     least_to_most = duration_range(*facts.range_s)
@@ -253,17 +253,23 @@ def session_card(study: Study, facts: Facts, path: Path) -> MeasureCard:
 
 def _ruled(verdicts: Iterable[Verdict]) -> tuple[Part, ...]:
     """Return states below a rule; nothing where there are none."""
-    return (None, *found) if (found := tuple(verdicts)) else ()
+    return (None, *states) if (states := tuple(verdicts)) else ()
 
 
 def hypotheses_card(protocol: Protocol, path: Path, controls: Controls, simulated: Simulated) -> MeasureCard | None:
     """Return the hypotheses about a block, or at the session's order all, with what the participants show of each."""
     block = str(path[1]) if path[:1] == ("blocks",) and len(path) > 1 else ""
-    found = hypotheses_of(protocol, block) if block or path == SEQUENCE else ()
+    contrasts = hypotheses_of(protocol, block) if block or path == SEQUENCE else ()
     known, waiting = dict(simulated.hypotheses), simulated.failed or simulated.waiting or "liquid-study power plans it"
-    said = [f"{capitalised(one.described())}: {known.get(one.described(), waiting)}" for one in found]
+    said = [
+        f"{capitalised(contrast.described())}: {known.get(contrast.described(), waiting)}" for contrast in contrasts
+    ]
     who = people(controls.participants, controls.planned)
-    return MeasureCard("Hypotheses", who, tuple(("neutral", "flag", one) for one in said), wide=True) if said else None
+    return (
+        MeasureCard("Hypotheses", who, tuple(("neutral", "flag", sentence) for sentence in said), wide=True)
+        if said
+        else None
+    )
 
 
 def _word(count: int | None, word: str) -> str:
@@ -291,17 +297,19 @@ def text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
     missing = ", ".join(f"{count} in {language_name(code)}" for code, count in facts.missing.items())
     codes = languages_of(study.document)
     languages = " and ".join(language_name(code) for code in codes) if len(codes) < 3 else f"{len(codes)} languages"
-    found: list[Verdict] = [("bad", "warning", f"Missing texts: {missing}")]
+    verdicts: list[Verdict] = [("bad", "warning", f"Missing texts: {missing}")]
     if not missing:
-        found = [("ok", "check", f"Every text in {languages}")]
+        verdicts = [("ok", "check", f"Every text in {languages}")]
     if copied := ", ".join(f"{count} in {language_name(code)}" for code, count in copied_texts(study).items()):
-        found = [*(found if missing else ()), ("neutral", "info", f"Texts to translate: {copied}")]
+        verdicts = [*(verdicts if missing else ()), ("neutral", "info", f"Texts to translate: {copied}")]
     if (protocol := valid_part(study).protocol) is not None:
         revealed = revealing(study, protocol)
         named = f"{revealed[0].element}: “{revealed[0].word}” reveals a condition" if revealed else ""
         more = f", and {len(revealed) - 1} more" if len(revealed) > 1 else ""
-        found.append(("warn", "warning", named + more) if revealed else ("ok", "check", "No text reveals a condition"))
-    return found
+        verdicts.append(
+            ("warn", "warning", named + more) if revealed else ("ok", "check", "No text reveals a condition")
+        )
+    return verdicts
 
 
 def balance_card(study: Study, protocol: Protocol, block: Block, controls: Controls) -> list[MeasureCard]:
@@ -330,8 +338,8 @@ def balance_card(study: Study, protocol: Protocol, block: Block, controls: Contr
     if len(evenness.codes) > MOST_CODES:
         cells = [count for line in evenness.positions for count in line]
         after = evenness.after_another
-        words = f"positions {min(cells)} to {max(cells)} times, carry-over {min(after)} to {max(after)} times"
-        return [MeasureCard("Balance", aside, ((*verdict[:2], f"{verdict[2]}; {words}"),))]
+        summary = f"positions {min(cells)} to {max(cells)} times, carry-over {min(after)} to {max(after)} times"
+        return [MeasureCard("Balance", aside, ((*verdict[:2], f"{verdict[2]}; {summary}"),))]
     shown, codes = evenness.positions[:MOST_ROWS], evenness.codes
     places = tuple(str(number + 1) for number in range(len(shown)))
     tables = Table("position", codes, places, shown), Table("comes after", codes, codes, evenness.follows)
@@ -344,8 +352,8 @@ def lines_card(
     title: str, aside: str, lines: Iterable[Line], sentences: Iterable[Verdict] = (), waiting: str = ""
 ) -> MeasureCard:
     """Return lines with bars, and sentences below them; grey lines where others are simulated (``waiting``)."""
-    there, said = tuple(lines), tuple(sentences)
-    parts = (Lines(there, grey=bool(waiting)), *_ruled(said)) if there else said
+    rows, said = tuple(lines), tuple(sentences)
+    parts = (Lines(rows, grey=bool(waiting)), *_ruled(said)) if rows else said
     return MeasureCard(title, waiting or aside, parts)
 
 
@@ -364,8 +372,12 @@ def force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[s
         lines.append(
             Line(_title(study, name, "liquids"), f"{it.force_n:.2f} N", min(1.0, it.force_n / limit_n), verdict)
         )
-    alike = [one for one in facts.warnings if "hard to tell apart" in one and any(name in one for name in names)]
-    sentences: tuple[Verdict, ...] = tuple(("warn", "warning", f"{capitalised(one)}.") for one in alike)
+    alike = [
+        warning
+        for warning in facts.warnings
+        if "hard to tell apart" in warning and any(name in warning for name in names)
+    ]
+    sentences: tuple[Verdict, ...] = tuple(("warn", "warning", f"{capitalised(warning)}.") for warning in alike)
     if not sentences and len(names) > 1:
         sentences = (("ok", "check", "No pair is hard to tell apart"),)
     return lines_card("Force of each liquid", f"0.1 m/s, {LIMIT_NAMES['norm']} {limit_n:g} N", tuple(lines), sentences)
@@ -373,23 +385,23 @@ def force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[s
 
 def detectable_card(study: Study, block: Block, who: str, simulated: Simulated) -> MeasureCard:
     """Return the smallest difference of each statement that studies of so many participants (``who``) show."""
-    title, found = "Smallest differences", simulated.detectable
+    title, detectable = "Smallest differences", simulated.detectable
     if not valid_part(study).forces:  # what is answered depends on them
         return lines_card(title, who, (), (("neutral", "minus", NO_FORCES),))
-    if found is None and simulated.failed:
+    if detectable is None and simulated.failed:
         return lines_card(title, who, (), (FAILED, ("neutral", "info", simulated.failed)))
-    if found is None:
+    if detectable is None:
         return lines_card(title, who, (), (("neutral", "clock", "Studies are simulated."),), simulated.waiting)
     items = study.document.get("questionnaires", {}).get(block.questionnaire, {}).get("items", ())
     places = {item.get("id"): at for at, item in enumerate(items)}
     lines = []
-    for one in found.findings:
-        path: Path = ("questionnaires", str(block.questionnaire), "items", places.get(one.item, 0))
+    for finding in detectable.findings:
+        path: Path = ("questionnaires", str(block.questionnaire), "items", places.get(finding.item, 0))
         name = title_of(study.document, path)
-        lines.append(Line(name, one.number, (one.detectable or 0.0) / (found.points - 1)))
+        lines.append(Line(name, finding.number, (finding.detectable or 0.0) / (detectable.points - 1)))
     model = (
-        f"The smallest difference, in points of {found.points}, that 4 of 5 simulated studies show, if people are "
-        f"{found.kind} (range: consistent to noisy). The answers are a model's, not measured."
+        f"The smallest difference, in points of {detectable.points}, that 4 of 5 simulated studies show, if people are "
+        f"{detectable.kind} (range: consistent to noisy). The answers are a model's, not measured."
     )
     note: Verdict = ("neutral", "info", model)
     if not lines:
@@ -403,4 +415,4 @@ def _title(study: Study, name: str, section: str = "") -> str:
 
 def _path(study: Study, name: str, section: str = "") -> Path:
     sections = (section,) if section else ("blocks", "pages", "questionnaires")
-    return next((one for one in sections if name in study.document.get(one, {})), "blocks"), name
+    return next((key for key in sections if name in study.document.get(key, {})), "blocks"), name

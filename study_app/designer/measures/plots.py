@@ -56,12 +56,12 @@ class MeasurePlot(Plot):
             self.setAccessibleDescription(sentence)
             self._draw()
 
-    def show_observed(self, of: LevelBlock, found: Observed | None, *, grey: bool) -> None:
+    def show_observed(self, of: LevelBlock, observed: Observed | None, *, grey: bool) -> None:
         """Show what observers answered; None before the first answer."""
-        if found is None or not found.course:
+        if observed is None or not observed.course:
             self.show_plot("Not known yet.")
         else:
-            self.show_plot(self.sentence(of.words, found), of.words, found, of.clipped_from, grey=grey)
+            self.show_plot(self.sentence(of.words, observed), of.words, observed, of.clipped_from, grey=grey)
 
     def _draw(self) -> None:
         for item in self.drawn:
@@ -89,7 +89,7 @@ class MeasurePlot(Plot):
     def band(self, x: np.ndarray, low: np.ndarray, high: np.ndarray, opacity: float) -> None:
         colour = QColor(self.theme.ctl if self.grey else self.theme.accent)
         colour.setAlphaF(opacity)
-        curves = (pg.PlotCurveItem(x, one) for one in (low, high))
+        curves = (pg.PlotCurveItem(x, curve) for curve in (low, high))
         self.add(pg.FillBetweenItem(*curves, brush=QBrush(colour)), -5)
 
     def curve(self, x: object, y: object, colour: str, width: float = 2.0, *, dashed: bool = False) -> None:
@@ -125,29 +125,29 @@ class FunctionView(MeasurePlot):
         self.sentence = function_sentence
         self.apply_theme(LIGHT)
 
-    def draw(self, words: LevelWords, found: Observed, clipped_from: tuple[float, Limit] | None) -> None:
+    def draw(self, wording: LevelWords, observed: Observed, clipped_from: tuple[float, Limit] | None) -> None:
         """Draw bands, function, mark and bars; places along x are in the coordinate of the levels, y in percent."""
-        theme, x = self.theme, np.array([words.at(level) for level in found.levels])
+        theme, x = self.theme, np.array([wording.at(level) for level in observed.levels])
         left, right = float(x[0]), float(x[-1])
-        planted, quantiles = 100 * np.array(found.planted), [100 * np.array(one) for one in found.found]
-        low = 10.0 * math.floor(10.0 * min(found.planted[0], *(one[0] for one in found.found)) + 1e-9)
+        planted, quantiles = 100 * np.array(observed.planted), [100 * np.array(quantile) for quantile in observed.found]
+        low = 10.0 * math.floor(10.0 * min(observed.planted[0], *(quantile[0] for quantile in observed.found)) + 1e-9)
         bottom, top = low - 1.0, 101.5
         self.band(x, quantiles[-1], quantiles[0], 0.18)
         self.band(x, quantiles[-2], quantiles[1], 0.30)
         self.curve(x, planted, theme.ctl if self.grey else theme.accent, 2.4)
-        at, percent = words.at(found.threshold), 100 * found.at_threshold
+        at, percent = wording.at(observed.threshold), 100 * observed.at_threshold
         for xs, ys in (([left, at], [percent, percent]), ([at, at], [bottom, percent])):
             self.curve(xs, ys, theme.text, 1.2, dashed=True)
         dot = pg.ScatterPlotItem([at], [percent], size=9, pen=pen(theme.text, 2), brush=QBrush(QColor(theme.surface)))
         self.add(dot, 4)
         before = at > (left + right) / 2
-        self.words(words.words(found.threshold), at, percent, theme.text, (1.08, 1.0) if before else (-0.08, 0.0))
-        asked = np.array([(words.at(level), share) for level, share in found.asked]).reshape(-1, 2)
+        self.words(wording.words(observed.threshold), at, percent, theme.text, (1.08, 1.0) if before else (-0.08, 0.0))
+        asked = np.array([(wording.at(level), share) for level, share in observed.asked]).reshape(-1, 2)
         self._bars(asked[:, 0], asked[:, 1], right - left, (bottom, top), clipped_from)
         if clipped_from is not None and clipped_from[0] < right:
             self.zone(clipped_from[1], max(left, clipped_from[0]), right, upright=True)
-        self.show_ticks("left", [(one, f"{one:g}") for one in even_ticks(low, 100.0, 7)])
-        self.show_ticks("bottom", list(words.ticks()))
+        self.show_ticks("left", [(percent, f"{percent:g}") for percent in even_ticks(low, 100.0, 7)])
+        self.show_ticks("bottom", list(wording.ticks()))
         beyond = 0.03 * (right - left)
         self.box.setXRange(left - beyond, right + beyond, padding=0)
         self.box.setYRange(bottom, top, padding=0)
@@ -185,30 +185,30 @@ class TrackView(MeasurePlot):
         self.sentence = track_sentence
         self.apply_theme(LIGHT)
 
-    def draw(self, words: LevelWords, found: Observed, clipped_from: tuple[float, Limit] | None) -> None:
+    def draw(self, wording: LevelWords, observed: Observed, clipped_from: tuple[float, Limit] | None) -> None:
         """Draw bands, median, planted threshold and trials; places along y are in the coordinate of the levels."""
-        theme, bottom, top = self.theme, words.at(found.levels[0]), words.at(found.levels[-1])
-        last, planted = _last_trial(found), words.at(found.threshold)
-        x = np.array([number for number, _ in found.course], float)
-        quantiles = np.array([[words.at(level) for level in one] for _, one in found.course]).T
+        theme, bottom, top = self.theme, wording.at(observed.levels[0]), wording.at(observed.levels[-1])
+        last, planted = _last_trial(observed), wording.at(observed.threshold)
+        x = np.array([number for number, _ in observed.course], float)
+        quantiles = np.array([[wording.at(level) for level in levels] for _, levels in observed.course]).T
         self.band(x, quantiles[0], quantiles[-1], 0.18)
         self.band(x, quantiles[1], quantiles[-2], 0.30)
         self.curve(x, quantiles[len(quantiles) // 2], theme.ctl if self.grey else theme.accent, 2.4)
         self.curve([0, last], [planted, planted], theme.text, 1.2, dashed=True)
         ink = QColor(theme.ctl if self.grey else theme.trace_y)
-        for track in sorted({one.track for one in found.one}):
+        for track in sorted({asked.track for asked in observed.one}):
             for success in (True, False):
-                some = [one for one in found.one if one.track == track and one.success == success]
+                some = [asked for asked in observed.one if asked.track == track and asked.success == success]
                 points = pg.ScatterPlotItem(
-                    [one.trial for one in some], [words.at(one.level) for one in some], size=7,
+                    [asked.trial for asked in some], [wording.at(asked.level) for asked in some], size=7,
                     symbol=SYMBOLS[(track - 1) % len(SYMBOLS)], pen=pen(ink.name(), 1.2),
                     brush=QBrush(ink) if success else QBrush(QColor(theme.surface)),
                 )  # fmt: skip
                 self.add(points, 3)
         if clipped_from is not None and clipped_from[0] < top:
             self.zone(clipped_from[1], max(bottom, clipped_from[0]), top, upright=False)
-        self.show_ticks("left", list(words.ticks()))
-        self.show_ticks("bottom", [(one or 1, f"{one or 1:g}") for one in even_ticks(0, last, 7)])
+        self.show_ticks("left", list(wording.ticks()))
+        self.show_ticks("bottom", [(trial or 1, f"{trial or 1:g}") for trial in even_ticks(0, last, 7)])
         beyond = 0.04 * (top - bottom)
         self.box.setXRange(-0.03 * last, 1.07 * last, padding=0)
         self.box.setYRange(bottom - beyond, top + beyond, padding=0)
@@ -224,14 +224,14 @@ class ForcesView(MeasurePlot):
 
     def show_levels(self, of: LevelBlock) -> None:
         """Show the levels of the highest standard; nothing where no force is known."""
-        shown = [one for one in of.shown if one.asked_n is not None]
+        shown = [level for level in of.shown if level.asked_n is not None]
         if not shown or of.limits is None:
             self.show_plot(forces_sentence(of))
             return
         bars = list(shown) if of.standard is None else [standard_of(of.protocol, of.block.id, of.standard), *shown]
-        values = [*([] if of.standard is None else [of.standard]), *(one.comparison for one in shown)]
+        values = [*([] if of.standard is None else [of.standard]), *(level.comparison for level in shown)]
         limits: dict[Limit, float] = {"norm": of.protocol.device.force_limit_n}
-        if clipped := [one.sent_n or 0.0 for one in shown if one.clipped_by == "slope"]:
+        if clipped := [level.sent_n or 0.0 for level in shown if level.clipped_by == "slope"]:
             limits["slope"] = min(clipped)
         self.show_plot(forces_sentence(of), tuple(bars), tuple(values), limits, of.standard is not None)
 
@@ -243,7 +243,7 @@ class ForcesView(MeasurePlot):
         forces = [(bar.asked_n or 0.0, bar.sent_n or 0.0) for bar in bars]
         top = max(limits["norm"], *(asked for asked, _ in forces))
         step = max(1, math.ceil(count / MOST_LABELS))
-        self.show_ticks("left", [(one, f"{one:g}") for one in even_ticks(0.0, 1.02 * top, 5)])
+        self.show_ticks("left", [(force_n, f"{force_n:g}") for force_n in even_ticks(0.0, 1.02 * top, 5)])
         self.show_ticks("bottom", [(float(at), rounded(values[at])) for at in range(0, count, step)])
         for at, (bar, (asked, sent)) in enumerate(zip(bars, forces, strict=True)):
             if bar.clipped_by and asked > sent:
@@ -255,7 +255,7 @@ class ForcesView(MeasurePlot):
         inks = [limit_colour(theme, bar.clipped_by) if bar.clipped_by else theme.accent for bar in bars]
         inks[:1] = [theme.ctl] if has_standard else inks[:1]
         for ink in dict.fromkeys(inks):
-            places = [at for at, one in enumerate(inks) if one == ink]
+            places = [at for at, bar_ink in enumerate(inks) if bar_ink == ink]
             bars = pg.BarGraphItem(
                 x=places, y0=0.0, height=[forces[at][1] for at in places], width=0.62,
                 brush=QBrush(QColor(ink)), pen=QPen(Qt.PenStyle.NoPen),
@@ -263,59 +263,59 @@ class ForcesView(MeasurePlot):
             self.add(bars, 0)
         room = count * LIMITS_PX / max(LIMITS_PX + 1.0, self.box.width() - LIMITS_PX)
         for name, force_n in limits.items():
-            ink, words = limit_colour(theme, name), f"{LIMIT_NAMES[name]} {force_n:.3g} N"
+            ink, text = limit_colour(theme, name), f"{LIMIT_NAMES[name]} {force_n:.3g} N"
             above = 0.5 if len(limits) == 1 else 1.0 if name == "norm" else 0.0  # the limits may be nearly equal
             self.curve([-0.7, count - 0.3], [force_n, force_n], ink, 1.5, dashed=True)
-            self.words(words, count - 0.2, force_n, ink, (0.0, above), over=True)
+            self.words(text, count - 0.2, force_n, ink, (0.0, above), over=True)
         self.box.setXRange(-0.8, count - 0.2 + room, padding=0)
         self.box.setYRange(0.0, 1.16 * top, padding=0)
 
 
-def function_sentence(words: LevelWords, found: Observed) -> str:
+def function_sentence(scale: LevelWords, seen: Observed) -> str:
     """Return the psychometric function in a sentence."""
-    most, _ = max(found.asked, key=lambda pair: pair[1], default=(0.0, 0.0))
-    low, high = _middle(found)
+    most, _ = max(seen.asked, key=lambda pair: pair[1], default=(0.0, 0.0))
+    low, high = _middle(seen)
     return (
-        f"Share of answers that are {words.success}, over the {words.kind}: {100 * found.planted[0]:.0f} % at "
-        f"{words.words(found.levels[0])} to {100 * found.planted[-1]:.0f} % at {words.words(found.levels[-1])}, "
-        f"{100 * found.at_threshold:.0f} % at the simulated {words.name} of {words.words(found.threshold)}. "
-        f"Half of {found.observers} observers are estimated between {words.number(low)} and {words.words(high)}. "
-        f"The level presented most often is {words.words(most)}."
+        f"Share of answers that are {scale.success}, over the {scale.kind}: {100 * seen.planted[0]:.0f} % at "
+        f"{scale.words(seen.levels[0])} to {100 * seen.planted[-1]:.0f} % at {scale.words(seen.levels[-1])}, "
+        f"{100 * seen.at_threshold:.0f} % at the simulated {scale.name} of {scale.words(seen.threshold)}. "
+        f"Half of {seen.observers} observers are estimated between {scale.number(low)} and {scale.words(high)}. "
+        f"The level presented most often is {scale.words(most)}."
     )
 
 
-def track_sentence(words: LevelWords, found: Observed) -> str:
+def track_sentence(scale: LevelWords, seen: Observed) -> str:
     """Return the expected track in a sentence."""
-    low, high = _middle(found)
+    low, high = _middle(seen)
     return (
-        f"Estimates of the {words.name} over {_last_trial(found)} trials: after the last one half of the observers are "
-        f"between {words.number(low)} and {words.words(high)}, the simulated value is {words.words(found.threshold)}. "
-        f"One of them answered {sum(one.success for one in found.one)} of {len(found.one)} trials with success."
+        f"Estimates of the {scale.name} over {_last_trial(seen)} trials: after the last one half of the observers are "
+        f"between {scale.number(low)} and {scale.words(high)}, the simulated value is {scale.words(seen.threshold)}. "
+        f"One of them answered {sum(asked.success for asked in seen.one)} of {len(seen.one)} trials with success."
     )
 
 
 def forces_sentence(of: LevelBlock) -> str:
     """Return the force at each level of the highest standard in a sentence."""
-    shown = [one for one in of.shown if one.asked_n is not None]
+    shown = [level for level in of.shown if level.asked_n is not None]
     if not shown or of.limits is None:
         return NO_FORCES
-    clipped = sum(one.clipped_by is not None for one in of.levels)
+    clipped = sum(level.clipped_by is not None for level in of.levels)
     least = shown[0].comparison if of.standard is None else of.standard
-    slope_n = min((one.sent_n or 0.0 for one in shown if one.clipped_by == "slope"), default=None)
+    slope_n = min((level.sent_n or 0.0 for level in shown if level.clipped_by == "slope"), default=None)
     slope = "" if slope_n is None else f", the {LIMIT_NAMES['slope']} {slope_n:.2f} N"
     return (
         f"Force at {len(shown)} levels from {rounded(least)} to {rounded(shown[-1].comparison)} "
-        f"{of.words.value_unit}: at most {max(one.asked_n or 0.0 for one in shown):.2f} N are requested; the "
+        f"{of.words.value_unit}: at most {max(level.asked_n or 0.0 for level in shown):.2f} N are requested; the "
         f"{LIMIT_NAMES['norm']} is {of.protocol.device.force_limit_n:g} N{slope}. {len(of.levels) - clipped} of "
         f"{len(of.levels)} levels are as requested, {clipped} are clipped."
     )
 
 
-def _middle(found: Observed) -> tuple[float, float]:
+def _middle(observed: Observed) -> tuple[float, float]:
     """Return the 25 and 75 % quantiles of the estimates after all trials."""
-    quantiles = found.course[-1][1]
+    quantiles = observed.course[-1][1]
     return quantiles[1], quantiles[3]
 
 
-def _last_trial(found: Observed) -> int:
-    return max((one.trial for one in found.one), default=1)
+def _last_trial(observed: Observed) -> int:
+    return max((asked.trial for asked in observed.one), default=1)

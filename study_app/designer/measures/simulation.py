@@ -189,22 +189,22 @@ def observe(plan: ThresholdPlan, threshold: float, lapses: float, check: Check =
         check()
         answered = plan.answers(np.full(AT_ONCE, u), random, (_lapsing(plan, lapses),))
         medians.append(plan.estimates(answered).medians)
-        presented += [one.levels[~np.isnan(one.levels)] for one in answered.tracks]
+        presented += [track.levels[~np.isnan(track.levels)] for track in answered.tracks]
         if first is None:
             first, course = answered, _course(plan, answered, check)
     assert first is not None  # noqa: S101 - there is a first one
-    found, planted = np.concatenate(medians), replace(first.observers, thresholds=np.array(u), moves=0.0)
-    errors = (found - u) * math.log(10) if stimulus.spacing == "log" else (found - u) / u
+    estimates, planted = np.concatenate(medians), replace(first.observers, thresholds=np.array(u), moves=0.0)
+    errors = (estimates - u) * math.log(10) if stimulus.spacing == "log" else (estimates - u) / u
     at = np.linspace(*stimulus.domain, POINTS)
-    quantiles = np.quantile(found, SHARES)
+    quantiles = np.quantile(estimates, SHARES)
     return Observed(
         threshold=threshold,
         lapses=lapses,
-        observers=len(found),
+        observers=len(estimates),
         at_threshold=float(planted.probability(u)),
-        levels=tuple(stimulus.level_of(float(one)) for one in at),
+        levels=tuple(stimulus.level_of(float(place)) for place in at),
         planted=tuple(planted.probability(at).tolist()),
-        found=tuple(tuple(_function(first, float(one), at)) for one in quantiles),
+        found=tuple(tuple(_function(first, float(quantile), at)) for quantile in quantiles),
         asked=_asked(plan, np.concatenate(presented)),
         course=course or (),
         one=tuple(_one(plan, first)),
@@ -228,7 +228,7 @@ def measurable(
     is called between batches and raises to end the simulation.
     """
     stimulus, random = plan.stimulus, np.random.default_rng(SEED)
-    found: list[Planted] = []
+    measured: list[Planted] = []
     planted = [(u, stimulus.level_of(u)) for u in np.linspace(*stimulus.domain, PLANTED).tolist()]
     planted = [(u, threshold) for u, threshold in planted if least <= threshold <= most and threshold > 0]
     for u, threshold in planted:
@@ -237,19 +237,19 @@ def measurable(
             check()
             answered = plan.answers(np.full(AT_ONCE, u), random, (_lapsing(plan, lapses),))
             estimates = plan.estimates(answered)
-            levels += [stimulus.level_of(one) for one in estimates.medians.tolist()]
+            levels += [stimulus.level_of(median) for median in estimates.medians.tolist()]
             held.append((estimates.lows <= u) & (u <= estimates.highs))
         bias = float(np.mean(levels)) / threshold - 1.0
-        found.append(Planted(threshold=threshold, bias=bias, coverage=float(np.mean(np.concatenate(held)))))
-    return Measurable(_longest(found), tuple(found))
+        measured.append(Planted(threshold=threshold, bias=bias, coverage=float(np.mean(np.concatenate(held)))))
+    return Measurable(_longest(measured), tuple(measured))
 
 
-def _longest(found: list[Planted]) -> tuple[float, float] | None:
+def _longest(planted: list[Planted]) -> tuple[float, float] | None:
     """Return the ends of the longest row of thresholds that are measurable."""
     best: list[Planted] = []
     run: list[Planted] = []
-    for one in found:
-        run = [*run, one] if one.measurable else []
+    for threshold in planted:
+        run = [*run, threshold] if threshold.measurable else []
         best = run if len(run) > len(best) else best
     return (best[0].threshold, best[-1].threshold) if best else None
 
@@ -257,8 +257,8 @@ def _longest(found: list[Planted]) -> tuple[float, float] | None:
 def _function(answered: ObserverAnswers, u: float, at: Floats) -> list[float]:
     """Return the function of an observer with threshold ``u`` at some levels [u], were they presented in full."""
     observer = replace(answered.observers, thresholds=np.array(u), moves=0.0, presented=None)
-    found: list[float] = observer.probability(at).tolist()
-    return found
+    probabilities: list[float] = observer.probability(at).tolist()
+    return probabilities
 
 
 def _asked(plan: ThresholdPlan, presented: Floats) -> tuple[tuple[float, float], ...]:
@@ -273,27 +273,27 @@ def _asked(plan: ThresholdPlan, presented: Floats) -> tuple[tuple[float, float],
 
 def _course(plan: ThresholdPlan, answered: ObserverAnswers, check: Check) -> tuple[tuple[int, Values], ...]:
     """Return the quantiles of the estimates after some numbers of trials."""
-    each, tracks = answered.tracks[0].levels.shape[1], len(answered.tracks)
-    found: list[tuple[int, Values]] = []
-    for number in sorted({round(one) for one in np.geomspace(1, each, min(COURSE, each))}):
+    trials, tracks = answered.tracks[0].levels.shape[1], len(answered.tracks)
+    course: list[tuple[int, Values]] = []
+    for number in sorted({round(trial) for trial in np.geomspace(1, trials, min(COURSE, trials))}):
         check()
         medians = plan.estimates(answered, most=number).medians
-        quantiles = (plan.stimulus.level_of(one) for one in np.quantile(medians, SHARES).tolist())
-        found.append((number * tracks, tuple(quantiles)))
-    return tuple(found)
+        quantiles = (plan.stimulus.level_of(median) for median in np.quantile(medians, SHARES).tolist())
+        course.append((number * tracks, tuple(quantiles)))
+    return tuple(course)
 
 
 def _one(plan: ThresholdPlan, answered: ObserverAnswers) -> list[Asked]:
     tracks = len(answered.tracks)
-    each = answered.tracks[0].levels.shape[1]
-    found = []
+    trials = answered.tracks[0].levels.shape[1]
+    asked = []
     for track, answers in enumerate(answered.tracks):
         for at, u in enumerate(answers.levels[0].tolist()):
             if math.isnan(u):
                 continue
-            place = at * tracks + track if plan.method.order == "interleaved" else track * each + at
-            found.append(Asked(place + 1, track + 1, plan.stimulus.level_of(u), bool(answers.successes[0, at])))
-    return sorted(found, key=lambda one: one.trial)
+            place = at * tracks + track if plan.method.order == "interleaved" else track * trials + at
+            asked.append(Asked(place + 1, track + 1, plan.stimulus.level_of(u), bool(answers.successes[0, at])))
+    return sorted(asked, key=lambda trial: trial.trial)
 
 
 def balance_of(protocol: Protocol, block: Block, participants: int) -> tuple[str, Evenness, int | None] | None:
@@ -302,10 +302,14 @@ def balance_of(protocol: Protocol, block: Block, participants: int) -> tuple[str
     None where the block has one code.
     """
     for judged in balances(protocol, numbered(participants), SEED):
-        for one in judged.blocks:
-            if one.id == block.id:
-                rows = row_count(one.order, len(one.evenness.codes)) if one.order in ("williams", "latin") else None
-                return one.order, one.evenness, rows
+        for judged_block in judged.blocks:
+            if judged_block.id == block.id:
+                rows = (
+                    row_count(judged_block.order, len(judged_block.evenness.codes))
+                    if judged_block.order in ("williams", "latin")
+                    else None
+                )
+                return judged_block.order, judged_block.evenness, rows
     return None
 
 
@@ -363,10 +367,10 @@ def focus_of(protocol: Protocol | None, path: Path) -> Focus:
         return Focus()
     block = protocol.blocks.get(str(path[1])) if path[0] == "blocks" else None
     if path == SEQUENCE:  # the block of the first hypothesis is simulated
-        block = next((protocol.blocks.get(one.blocks[0]) for one in hypotheses_of(protocol)), None)
+        block = next((protocol.blocks.get(contrast.blocks[0]) for contrast in hypotheses_of(protocol)), None)
     if (key := _NAMED_BY.get(str(path[0]))) is not None:
-        users = [one for one in protocol.blocks_in_order if getattr(one, key) == path[1]]
-        block = next((one for one in users if one.phase == "main"), next(iter(users), None))
+        users = [user for user in protocol.blocks_in_order if getattr(user, key) == path[1]]
+        block = next((user for user in users if user.phase == "main"), next(iter(users), None))
     if block is None:
         return Focus()
     questionnaire = protocol.questionnaire_of(block.id)
@@ -378,7 +382,7 @@ def focus_of(protocol: Protocol | None, path: Path) -> Focus:
 def hypotheses_of(protocol: Protocol, block: str = "") -> tuple[Contrast, ...]:
     """Return the hypotheses of a study, or those that compare a block."""
     every = () if protocol.analysis is None else protocol.analysis.contrasts
-    return tuple(one for one in every if block in {"", *one.blocks})
+    return tuple(contrast for contrast in every if block in {"", *contrast.blocks})
 
 
 @dataclass(frozen=True, slots=True)
@@ -466,12 +470,12 @@ def carry_out(order: Simulation, _send: Send, stop: Stop) -> Simulated:
         if stop():
             raise Stopped("the study was edited")
 
-    protocol, controls, found = order.protocol, order.controls, Simulated()
+    protocol, controls, simulated = order.protocol, order.controls, Simulated()
     focus = focus_of(protocol, ("blocks", order.block))
     if (plan := focus.plan) is not None and focus.block is not None:
         clips = plan.clipping or clipping(protocol, focus.block)
         most = math.inf if clips is None else clips.highest(plan.stimulus)
-        found = Simulated(
+        simulated = Simulated(
             observe(plan, controls.threshold, controls.lapses, check),
             measurable(plan, controls.lapses, least_of(protocol, plan), check, most),
             _group(plan, controls, check),
@@ -479,11 +483,11 @@ def carry_out(order: Simulation, _send: Send, stop: Stop) -> Simulated:
     shown = tuple(_ratios(protocol, order.block, controls.participants, check)) if order.block else ()
     if focus.compares:
         detectable, powers = _detectable(order, check)
-        found, shown = replace(found, detectable=detectable), (*shown, *powers)
-    found = replace(found, hypotheses=shown)
+        simulated, shown = replace(simulated, detectable=detectable), (*shown, *powers)
+    simulated = replace(simulated, hypotheses=shown)
     if advises(protocol):
-        found = replace(found, warnings=_warnings(replace(order, block="", controls=Controls())))
-    return found
+        simulated = replace(simulated, warnings=_warnings(replace(order, block="", controls=Controls())))
+    return simulated
 
 
 @lru_cache(maxsize=1)
@@ -495,13 +499,13 @@ def _warnings(order: Simulation) -> tuple[str, ...]:
 def _group(plan: ThresholdPlan, controls: Controls, check: Check) -> GroupPrecision:
     people, precision = controls.participants, controls.precision
     more = plan.with_trials(round(MORE * plan.trials))
-    shares = [_studies(one, (people,), check).within(0, precision) for one in (plan, more)]
+    shares = [_studies(part, (people,), check).within(0, precision) for part in (plan, more)]
     enough = people if shares[0] >= ENOUGH else None
     last = people
     while enough is None and last < MOST_PEOPLE:
         sizes = range(last + 1, min(2 * last, MOST_PEOPLE) + 1)
-        found, last = _studies(plan, sizes, check), sizes[-1]
-        enough = next((size for place, size in enumerate(sizes) if found.within(place, precision) >= ENOUGH), None)
+        precisions, last = _studies(plan, sizes, check), sizes[-1]
+        enough = next((size for place, size in enumerate(sizes) if precisions.within(place, precision) >= ENOUGH), None)
     most = max(MOST_PEOPLE, people)
     return GroupPrecision(
         participants=people,
@@ -539,24 +543,24 @@ def _ratios(protocol: Protocol, block: str, people: int, check: Check) -> Iterat
     from study_app.analysis.planning.simulated_studies import group_shares  # noqa: PLC0415 - the same
     from study_app.analysis.planning.threshold_studies import Case, log_bound, study_batch  # noqa: PLC0415 - the same
 
-    for one in hypotheses_of(protocol, block):
-        plans = [threshold_plan(protocol, protocol.blocks[name]) for name in one.blocks]
-        groups = [int(people * share + 1e-9) for share in group_shares(protocol, one) or (1.0,)]
+    for contrast in hypotheses_of(protocol, block):
+        plans = [threshold_plan(protocol, protocol.blocks[name]) for name in contrast.blocks]
+        groups = [int(people * share + 1e-9) for share in group_shares(protocol, contrast) or (1.0,)]
         spreads = []
-        for plan in plans if one.measure == "threshold" and min(groups) > 1 else ():
+        for plan in plans if contrast.measure == "threshold" and min(groups) > 1 else ():
             check()
             if plan is not None:
-                found = study_batch(Case("", plan, (SEED, 0, plan.trials, 0)), (max(people, SPREAD_OF),))
-                spreads.append(found.spread / math.sqrt(plan.standards))
+                batch = study_batch(Case("", plan, (SEED, 0, plan.trials, 0)), (max(people, SPREAD_OF),))
+                spreads.append(batch.spread / math.sqrt(plan.standards))
         if len(spreads) == len(plans) and all(map(math.isfinite, spreads)):
             spread, alpha = math.hypot(math.log(BETWEEN_PEOPLE), *spreads), decisions(protocol).alphas[-1]
-            if one.bound is None:
-                tail = alpha / len(hypotheses_of(protocol)) / (2 if one.expected is None else 1)
+            if contrast.bound is None:
+                tail = alpha / len(hypotheses_of(protocol)) / (2 if contrast.expected is None else 1)
                 apart = spread * detectable(*groups, tail=tail)[1]
-                yield one.described(), f"80 % of studies of {people} show a ratio of {math.exp(apart):.2f}"
-            elif (bound := log_bound(protocol, one)) is not None:
+                yield contrast.described(), f"80 % of studies of {people} show a ratio of {math.exp(apart):.2f}"
+            elif (bound := log_bound(protocol, contrast)) is not None:
                 share = shown_equal(bound / spread, *groups, alpha=alpha)
-                yield one.described(), EQUALITY.format(f"{share:.0%}", people)
+                yield contrast.described(), EQUALITY.format(f"{share:.0%}", people)
 
 
 def _detectable(order: Simulation, check: Check) -> tuple[Detectable | None, tuple[tuple[str, str], ...]]:
@@ -584,13 +588,13 @@ def _detectable(order: Simulation, check: Check) -> tuple[Detectable | None, tup
     power = powers(planned, (people,), STUDIES, STUDIES, SEED, counts)
 
     def difference_of(curve: Curve) -> str:
-        return with_range([difference_text(one.points(0), 1) for one in power.among_kinds(curve)])
+        return with_range([difference_text(detections.points(0), 1) for detections in power.among_kinds(curve)])
 
     findings = [
-        Finding(one.item, one.points(0), difference_of(one))
-        for one in power.curves
-        if one.block == order.block and one.item is not None and one.question in ("settings differ", "trend")
-        and one.item not in planned.unknown
+        Finding(curve.item, curve.points(0), difference_of(curve))
+        for curve in power.curves
+        if curve.block == order.block and curve.item is not None and curve.question in ("settings differ", "trend")
+        and curve.item not in planned.unknown
     ]  # fmt: skip
     findings.sort(key=lambda one: (one.detectable is None, one.detectable or 0.0))
     shares = {
@@ -601,13 +605,13 @@ def _detectable(order: Simulation, check: Check) -> tuple[Detectable | None, tup
     stated = [(one.described(), one.bound) for one in hypotheses_of(order.protocol, order.block)]
     shown = tuple(
         (
-            one,
-            SHOWN.format(shares[one], people)
+            sentence,
+            SHOWN.format(shares[sentence], people)
             if bound is None
-            else EQUALITY.format(shares[f"{one}, {IF_EQUAL}"], people),
+            else EQUALITY.format(shares[f"{sentence}, {IF_EQUAL}"], people),
         )
-        for one, bound in stated
-        if one in shares
+        for sentence, bound in stated
+        if sentence in shares
     )
     detectable = Detectable(
         participants=people, studies=STUDIES, points=HIGHEST, findings=tuple(findings), kind=next(iter(power.kinds))
@@ -623,7 +627,7 @@ def _features(order: Simulation, check: Check) -> ConditionFeatures:
     from study_app.session.simulated.rehearsal import condition_features  # noqa: PLC0415 - the compiler: only here
 
     if order.depends not in _features_of:
-        found = condition_features(order.protocol, seed=SEED, progress=lambda _words: check())
+        features = condition_features(order.protocol, seed=SEED, progress=lambda _words: check())
         _features_of.clear()
-        _features_of[order.depends] = found
+        _features_of[order.depends] = features
     return _features_of[order.depends]

@@ -52,12 +52,12 @@ def texts_by_language(study: Study) -> dict[str, tuple[int, int]]:
             counted[code][1] += 1
             text = value.get(code) if isinstance(value, Mapping) else value if place == 0 else ""
             counted[code][0] += bool(text.strip() if isinstance(text, str) else text)
-    return {code: (there, wanted) for code, (there, wanted) in counted.items()}
+    return {code: (present, wanted) for code, (present, wanted) in counted.items()}
 
 
 def missing_texts(study: Study) -> dict[str, int]:
     """Return how many texts each language lacks; none where it lacks none."""
-    return {code: wanted - there for code, (there, wanted) in texts_by_language(study).items() if there < wanted}
+    return {code: wanted - present for code, (present, wanted) in texts_by_language(study).items() if present < wanted}
 
 
 def copied_texts(study: Study) -> dict[str, int]:
@@ -72,23 +72,23 @@ def to_translate(study: Study) -> tuple[str, ...]:
 
 def revealing(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:
     """Return the texts that name a liquid, a condition or a delay which participants must not know."""
-    words = Telltales(_words(protocol))
+    telltales = Telltales(_words(protocol))
     debriefs = {name for name, page in protocol.pages.items() if page.kind == "debrief"}
-    found = []
+    revealing = []
     for path, value in texts_of(study):
         if path[0] not in READ or (path[0] == "pages" and path[1] in debriefs):
             continue
         texts = value.values() if isinstance(value, Mapping) else (value,)
-        words_there = [word for text in texts if isinstance(text, str) for word in words.in_text(text.casefold())]
+        words_there = [word for text in texts if isinstance(text, str) for word in telltales.in_text(text.casefold())]
         if words_there:
             element = title_of(study.document, path[:2])
-            found.append(Revealing(path=path, element=element, key=label_of(path[-1]), word=words_there[0]))
-    return tuple(found)
+            revealing.append(Revealing(path=path, element=element, key=label_of(path[-1]), word=words_there[0]))
+    return tuple(revealing)
 
 
 def _words(protocol: Protocol) -> set[str]:
     """Return the names of what main blocks compare, and their delays with the unit."""
-    found: set[str] = set()
+    telltales: set[str] = set()
     for block in protocol.main_blocks:
         names = protocol.conditions_in(block.id)
         if len(names) < 2 and block.stimulus is None:
@@ -96,10 +96,10 @@ def _words(protocol: Protocol) -> set[str]:
         for name in names:
             condition = protocol.conditions[name]
             ids = {name, *condition.liquid_ids}
-            found |= {one.replace("_", " ").casefold() for one in ids if len(one) >= SHORTEST}
+            telltales |= {name.replace("_", " ").casefold() for name in ids if len(name) >= SHORTEST}
             if condition.delay_ms:
-                found.add(f"{condition.delay_ms:g} ms")
-    return found
+                telltales.add(f"{condition.delay_ms:g} ms")
+    return telltales
 
 
 @cache
@@ -184,7 +184,7 @@ def _restored(document: Any, fault: Fault, before: Mapping[str, Any]) -> tuple[P
     if fault.kind == "alike":  # each place gets its number of marks: the text looks the same and reads as no other
         marks = _MARK * (1 + max((step for step in path if isinstance(step, int)), default=0))
         texts = value.items() if isinstance(value, Mapping) else ()
-        return path, {code: f"{one}{marks}" for code, one in texts} or f"{value}{marks}"
+        return path, {code: f"{text}{marks}" for code, text in texts} or f"{value}{marks}"
     named = named_at(before, path) if fault.kind == "unknown name" and sound == value else None
     if named is not None and value_at(document, named[:1]) is not None:
         return named, value_at(before, named)
@@ -193,17 +193,19 @@ def _restored(document: Any, fault: Fault, before: Mapping[str, Any]) -> tuple[P
 
 def _path_before(document: Any, path: Path, before: Any) -> Path:
     """Return where an element of a document was before: a question is found by its id, not by its number."""
-    found: list[str | int] = []
+    path_before: list[str | int] = []
     for step in path:
         document = document[step] if has(document, step) else None
         name = document.get("id") if isinstance(document, Mapping) and path[-1] != "id" else None
         if isinstance(step, int) and name is not None:
             entries_before = before if isinstance(before, list | tuple) else ()
-            same = (at for at, one in enumerate(entries_before) if isinstance(one, Mapping) and one.get("id") == name)
+            same = (
+                at for at, entry in enumerate(entries_before) if isinstance(entry, Mapping) and entry.get("id") == name
+            )
             step = next(same, len(entries_before))  # noqa: PLW2901 - the step of the other document
-        found.append(step)
+        path_before.append(step)
         before = before[step] if has(before, step) else None
-    return tuple(found)
+    return tuple(path_before)
 
 
 def _place(fault: Fault) -> tuple[str, ...]:

@@ -110,26 +110,26 @@ def first_step(shown: Preview, path: Path) -> int | None:
     """Return the index of the first step that shows an element, or a place within it; None where no step does."""
     graph = graph_of(shown.protocol.model_dump())
     tables = (_shown_by(shown, step, graph) for step in shown.schedule.steps)
-    return next((at for at, found in enumerate(tables) if path[:2] in found), None)
+    return next((at for at, tables_of_step in enumerate(tables) if path[:2] in tables_of_step), None)
 
 
 def graph_of(document: Mapping[str, object]) -> Graph:
     """Return what each table of a study names."""
-    found: dict[Path, set[Path]] = {}
+    names: dict[Path, set[Path]] = {}
     for place, named in named_places(document):
-        found.setdefault(place[:2], set()).add(named[:2])
-    return {table: frozenset(named) for table, named in found.items()}
+        names.setdefault(place[:2], set()).add(named[:2])
+    return {table: frozenset(named) for table, named in names.items()}
 
 
 def reached(graph: Graph, first: Iterable[Path]) -> frozenset[Path]:
     """Return tables and all that they name, directly or not."""
-    found = dict.fromkeys(first)
-    todo = list(found)
+    tables = dict.fromkeys(first)
+    todo = list(tables)
     for table in todo:  # grows while it is read
-        new = [named for named in graph.get(table, ()) if named not in found]
-        found |= dict.fromkeys(new)
+        new = [named for named in graph.get(table, ()) if named not in tables]
+        tables |= dict.fromkeys(new)
         todo += new
-    return frozenset(found)
+    return frozenset(tables)
 
 
 def _shown_by(shown: Preview, step: Step, graph: Graph) -> frozenset[Path]:
@@ -223,7 +223,7 @@ def same_step(study: Protocol, name: str, trial: int, session: str) -> Found | N
 def step_of(shown: Preview, name: str, trial: int) -> int | None:
     """Return the index of the step of a name, of a block the trial of that index or its last; None without one."""
     named = [(at, step) for at, step in enumerate(shown.schedule.steps) if step_name(step) == name]
-    exact = (one for one in named if isinstance(one[1], Trial) and one[1].index == trial)
+    exact = (pair for pair in named if isinstance(pair[1], Trial) and pair[1].index == trial)
     return next((at for at, _ in (*exact, *(named[::-1] if trial > 1 else named))), None)
 
 
@@ -278,19 +278,23 @@ def playable(study: Study, path: Path, position: StepPosition | None = None) -> 
         raise NotPlayableError(study.problems)
     language = position.language or languages_of(study.document)[0]
     filled = tuple(_filled_texts(study, language))
-    found = study.edited(*filled)[0] if filled else study
-    if found.protocol is None:
+    completed = study.edited(*filled)[0] if filled else study
+    if completed.protocol is None:
         known = {(problem.place, problem.message): problem for problem in study.problems}
-        own = tuple(one for problem in found.problems if (one := known.get((problem.place, problem.message))))
-        raise NotPlayableError(own or found.problems)
-    shown = preview(found.protocol, position.seed)
+        own = tuple(
+            known_problem
+            for problem in completed.problems
+            if (known_problem := known.get((problem.place, problem.message)))
+        )
+        raise NotPlayableError(own or completed.problems)
+    shown = preview(completed.protocol, position.seed)
     step = first_step(shown, path) or 0
     if position.name:
         step = step_of(shown, position.name, position.trial) or 0
     return Playable(
-        with_liquid_files(found.text.encode(), found.folder),
-        found.folder,
-        found.protocol,
+        with_liquid_files(completed.text.encode(), completed.folder),
+        completed.folder,
+        completed.protocol,
         step,
         step_words(shown, shown.schedule.steps[step], language),
         StepPosition(position.name, position.trial, language, position.seed),
@@ -393,8 +397,8 @@ class Feeling(QObject):
         self.returned.emit()
         shared = [name for name in setting.changed_names() if name.partition(".")[0] in OF_THE_STUDY]
         if shared:
-            words = ", ".join(parameter(setting.scene, name).label.lower() for name in shared)
-            self.place.message.emit(f"{title} was put back", f"The study has these once for all liquids: {words}.")
+            names = ", ".join(parameter(setting.scene, name).label.lower() for name in shared)
+            self.place.message.emit(f"{title} was put back", f"The study has these once for all liquids: {names}.")
 
 
 def _liquids(protocol: Protocol, path: Path) -> tuple[str, ...]:
@@ -403,8 +407,8 @@ def _liquids(protocol: Protocol, path: Path) -> tuple[str, ...]:
     if section == "liquids":
         return (name,)
     conditions = protocol.conditions_in(name) if section == "blocks" else (name,)
-    found = (liquid for condition in conditions for liquid in protocol.conditions[condition].liquid_ids)
-    return tuple(dict.fromkeys(found))[:2]
+    ids = (liquid for condition in conditions for liquid in protocol.conditions[condition].liquid_ids)
+    return tuple(dict.fromkeys(ids))[:2]
 
 
 def _values(liquid: Liquid) -> dict[str, Any]:
@@ -431,7 +435,7 @@ def _edits(
 def _plain(value: Any) -> Any:
     """Return a value as it is written: lists, and whole numbers without a decimal point."""
     if isinstance(value, Mapping):
-        return {key: _plain(one) for key, one in value.items()}
+        return {key: _plain(entry) for key, entry in value.items()}
     if isinstance(value, tuple):
-        return [_plain(one) for one in value]
+        return [_plain(entry) for entry in value]
     return int(value) if isinstance(value, float) and value.is_integer() else value

@@ -239,7 +239,8 @@ class LivePage(Coloured, QGraphicsView):
             return None
         focused = page.window().focusWidget()
         return next(
-            (one.view.id for one in page.fields if focused and (one is focused or one.isAncestorOf(focused))), None
+            (field.view.id for field in page.fields if focused and (field is focused or field.isAncestorOf(focused))),
+            None,
         )
 
     def _go_to(self, question: str | None) -> None:
@@ -247,7 +248,7 @@ class LivePage(Coloured, QGraphicsView):
             self._scene.setFocusItem(self._proxy)
         page = None if self.page_window is None else self.page_window.widget
         if question is not None and isinstance(page, QuestionsPage):
-            field = next((one for one in page.asked if one.view.id == question), None)
+            field = next((field for field in page.asked if field.view.id == question), None)
             if field is not None:
                 page.go_to(field)
                 if not self._fits:
@@ -316,11 +317,11 @@ class LivePage(Coloured, QGraphicsView):
             inset = whole.adjusted(1, 1, -1, -1)
             painter.drawRoundedRect(inset, RADIUS_CONTROL, RADIUS_CONTROL)
             painter.setFont(font("small", weight=600))
-            words = QRectF(painter.fontMetrics().boundingRect(LEAVES)).adjusted(-10, -4, 10, 4)
-            words.moveBottomLeft(inset.bottomLeft() + QPointF(6, -6))
-            fill_rounded(painter, words, RADIUS_CONTROL, self.theme.accent)
+            label = QRectF(painter.fontMetrics().boundingRect(LEAVES)).adjusted(-10, -4, 10, 4)
+            label.moveBottomLeft(inset.bottomLeft() + QPointF(6, -6))
+            fill_rounded(painter, label, RADIUS_CONTROL, self.theme.accent)
             painter.setPen(QColor(self.theme.on_accent))
-            painter.drawText(words, Qt.AlignmentFlag.AlignCenter, LEAVES)
+            painter.drawText(label, Qt.AlignmentFlag.AlignCenter, LEAVES)
         painter.end()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -435,12 +436,12 @@ class ParticipantPreview(Card):
     def position(self) -> StepPosition | None:
         """Where the preview is; None where it shows nothing, or a page that is not in the first session."""
         self._update()
-        found = self._found
-        if found is None or found.session:
+        shown = self._found
+        if shown is None or shown.session:
             return None
-        step = found.shown.schedule.steps[found.index]
+        step = shown.shown.schedule.steps[shown.index]
         trial = step.index if isinstance(step, Trial) else 1
-        return StepPosition(step_name(step), trial, self._language, found.shown.schedule.seed)
+        return StepPosition(step_name(step), trial, self._language, shown.shown.schedule.seed)
 
     # what is asked for
 
@@ -468,11 +469,11 @@ class ParticipantPreview(Card):
         self._show()
 
     def go(self, by: int) -> None:
-        if (found := self._found) is None:
+        if (shown := self._found) is None:
             return
-        index = found.index + by
-        if 0 <= index < len(found.shown.schedule.steps):
-            self._found = Found(found.shown, index, found.session)
+        index = shown.index + by
+        if 0 <= index < len(shown.shown.schedule.steps):
+            self._found = Found(shown.shown, index, shown.session)
             self._moment = None
             self._show()
 
@@ -495,13 +496,13 @@ class ParticipantPreview(Card):
             self._go_on()
 
     def _go_on(self) -> None:
-        if (found := self._found) is None:
+        if (shown := self._found) is None:
             return
-        pages = pages_of_step(found.shown, found.index)
+        pages = pages_of_step(shown.shown, shown.index)
         at = pages.index(self._moment) if self._moment in pages else 0
         if at + 1 < len(pages):
             self.show_moment(pages[at + 1])
-        elif found.index + 1 < len(found.shown.schedule.steps):
+        elif shown.index + 1 < len(shown.shown.schedule.steps):
             self._side = "tank"
             self.go(1)
 
@@ -549,46 +550,48 @@ class ParticipantPreview(Card):
         if self._protocol is None:
             self._found = None
         elif selected != self._selected or self._found is None:
-            found = showing(self._protocol, selected)
-            if found is None and self._found is None:
+            step = showing(self._protocol, selected)
+            if step is None and self._found is None:
                 shown = preview(self._protocol)
-                found = Found(shown, 0) if shown.schedule.steps else None
-            if found is not None:
-                self._found = found if not self._is_shown(found) else self._found
+                step = Found(shown, 0) if shown.schedule.steps else None
+            if step is not None:
+                self._found = step if not self._is_shown(step) else self._found
             if (side := side_of(selected)) is not None and selected != self._selected:
                 self._side, self._moment = side, None
             self._selected = selected
         if self._protocol is not None and self._language not in self._protocol.study.languages:
             self._language = self._protocol.study.languages[0]
 
-    def _is_shown(self, found: Found) -> bool:
+    def _is_shown(self, step: Found) -> bool:
         """Return whether the shown step is of the same block, so that another element of it keeps the trial."""
         now = self._found
-        if now is None or now.session != found.session or found.session == STANDALONE:
+        if now is None or now.session != step.session or step.session == STANDALONE:
             return False
-        one, other = (here.shown.schedule.steps[here.index] for here in (now, found))
+        old, other = (here.shown.schedule.steps[here.index] for here in (now, step))
         whole = self._selected[:1] in {("questionnaires",), ("blocks",), ("scales",)}
-        return step_name(one) == step_name(other) and (not isinstance(one, Trial) or whole)
+        return step_name(old) == step_name(other) and (not isinstance(old, Trial) or whole)
 
-    def _again(self, found: Found) -> Found | None:
+    def _again(self, previous: Found) -> Found | None:
         assert self._protocol is not None  # noqa: S101 - the caller has looked
-        step = found.shown.schedule.steps[found.index]
-        if found.session == STANDALONE:
+        step = previous.shown.schedule.steps[previous.index]
+        if previous.session == STANDALONE:
             return showing(self._protocol, self._selected)
-        return same_step(self._protocol, step_name(step), step.index if isinstance(step, Trial) else 1, found.session)
+        return same_step(
+            self._protocol, step_name(step), step.index if isinstance(step, Trial) else 1, previous.session
+        )
 
     # what is shown
 
     def _show(self) -> None:
         self._update()
-        study, found = self._study, self._found
+        study, place = self._study, self._found
         if study is None:
             return
-        if found is None:
+        if place is None:
             problem = str(study.problems[0]) if study.problems else "there is no step"
             self.show_view(ParticipantView(note=f"The page cannot be shown: {problem}"))
             return
-        shown, index = found.shown, found.index
+        shown, index = place.shown, place.index
         pages = pages_of_step(shown, index)
         if self._moment not in pages:
             of_side = [moment for moment in pages if (moment.kind == "tank") == (self._side == "tank")]
@@ -598,8 +601,8 @@ class ParticipantPreview(Card):
             self._place_ball(page, presented_condition(shown, index))
         now = shown.schedule.steps[index]
         step = step_words(shown, now, shown.protocol.study.languages[0])
-        if found.session and found.session != STANDALONE:
-            step = f"{step} ({found.session})"
+        if place.session and place.session != STANDALONE:
+            step = f"{step} ({place.session})"
         self.show_view(
             ParticipantView(
                 page=page,
@@ -611,7 +614,7 @@ class ParticipantPreview(Card):
                 moments=moment_words(pages),
                 moment=self._moment,
                 focused=self._question(study),
-                note=self._note(study, found),
+                note=self._note(study, place),
                 photodiode=self._photodiode,
             )
         )
@@ -630,13 +633,13 @@ class ParticipantPreview(Card):
         name = item.get("id") if isinstance(item, Mapping) else None
         return name if isinstance(name, str) else None
 
-    def _note(self, study: Study, found: Found) -> str:
+    def _note(self, study: Study, step: Found) -> str:
         """Return what is not shown as it is written, in the language of the page."""
-        first = found.shown.protocol.study.languages[0]
+        first = step.shown.protocol.study.languages[0]
         faults = [fault for fault in study.faults if fault.concerns(self._language, first)]
         count = len(study.problems) - len(study.faults) + len(faults)
         if not count:
-            return "This page is in no session." if found.session == STANDALONE else ""
+            return "This page is in no session." if step.session == STANDALONE else ""
         values = "only valid parts" if self._valid is None else "the last valid values"
         own = next((fault for fault in faults if fault.path[: len(self._selected)] == self._selected), None)
         if own is None:
