@@ -48,7 +48,7 @@ class Catch(Table):
     )
 
     def count(self, trials: int) -> int:
-        """Return how many catch trials there are among so many others."""
+        """Return the number of catch trials among so many others."""
         return int(trials * self.share + ROUNDING)
 
     def stretch(self, number: int) -> range:

@@ -51,7 +51,7 @@ GROUP_WORDS = {
 
 
 def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force: str = "") -> str:
-    """Return the whole study in words, in its first language.
+    """Describe the whole study in its first language.
 
     Forces act ``delay_ticks`` ticks late; ``without_force`` is the name of the device that sessions use, if it gives
     none.
@@ -85,7 +85,7 @@ def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force
 
 
 def describe_scenes(scenes: Mapping[str, Scene]) -> str:
-    """Return the liquids of a file that holds no study in words; ``scenes`` are by their names."""
+    """Describe the liquids of a file without a study; ``scenes`` are by name."""
     scene = next(iter(scenes.values()))
     ball_mm = scene.body.diameter_m * 1000
     rows = [
@@ -100,7 +100,7 @@ def describe_scenes(scenes: Mapping[str, Scene]) -> str:
 
 
 def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Yield rows as lines whose columns begin under each other."""
+    """Yield rows as lines with aligned columns."""
     widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
     for row in rows:
         yield "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
@@ -134,7 +134,7 @@ def _head(protocol: Protocol, language: str) -> Iterable[str]:
 
 
 def spread(numbers: Sequence[int]) -> str:
-    """Return the number that all kinds of sessions have, or the least and the largest."""
+    """Return the number that all kinds of sessions share, or the least and the largest."""
     least, largest = min(numbers), max(numbers)
     return f"{least}" if least == largest else f"{least} to {largest}"
 
@@ -192,7 +192,7 @@ def _block(protocol: Protocol, block: Block, language: str, delay_ticks: int) ->
 
 
 def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator[tuple[str, str]]:
-    """Yield the rows that describe the design of a block, its levels and its comparisons."""
+    """Yield the rows about a block's design, levels and comparisons."""
     design = design_of(protocol, block)
     kind = design.kind.upper()
     intervals = "1 interval" if design.intervals == 1 else f"{design.intervals} intervals, {design.pause_s:g} s apart"
@@ -265,7 +265,7 @@ def _order(block: Block) -> str:
 
 
 def _beside_the_trials(protocol: Protocol, block: Block, language: str) -> Iterator[tuple[str, str]]:
-    """Yield how rows are assigned, and when there are breaks."""
+    """Yield the rows about the assignment of square rows and about breaks."""
     if block.order in ("williams", "latin") and len(block.conditions) > 1:
         of_id = "assigned by the number in the participant's id (P007 is number 7), not by the seed"
         yield "Rows", "assigned by the participant's place in the group, not by the seed" if protocol.groups else of_id
@@ -293,7 +293,7 @@ def _liquids(protocol: Protocol) -> list[tuple[str, ...]]:
 
 
 def _drawn(condition: Condition) -> Iterator[str]:
-    """Yield what is unusual of how a condition is drawn, and its force sent."""
+    """Yield notes on how a condition is drawn and its force sent, if unusual."""
     if condition.delay_ms:
         yield f"seen {condition.delay_ms:g} ms late"
     if condition.shows_video:
@@ -330,7 +330,7 @@ def _statements(protocol: Protocol, name: str, language: str) -> Iterable[str]:
 
 
 def _kind(item: Question, context: Context) -> str:
-    """Return what kind of question it is, with its answers or their bounds."""
+    """Return the kind of a question with its answers or bounds."""
     levels, bounds = item.levels(context), item.bounds(context)
     if levels:
         answers = f" ({', '.join(levels)})" if item.value_type == "text" else f" of {len(levels)} points"
@@ -341,7 +341,7 @@ def _kind(item: Question, context: Context) -> str:
 
 
 def limit_rows(protocol: Protocol) -> list[tuple[str, str]]:
-    """Return the limits up to which a trial is valid: each value, and what it is of."""
+    """Return the limits of a valid trial: each value with its meaning."""
     units, rows = {"ms": " ms", "percent": " %"}, []
     for key, field in Limits.model_fields.items():
         label = re.sub(r" \[.*|; .*|\.$", "", field.description or "")

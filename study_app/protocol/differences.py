@@ -30,12 +30,12 @@ class Difference(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """The place as people read it, entries counted from 1, and how it differs."""
+        """The place as people read it, entries counted from 1, and the difference."""
         return f"{'.'.join(str(step + 1) if isinstance(step, int) else step for step in self.place)}: {self.words}"
 
 
 def differences(old: Protocol | Mapping[str, Any], new: Protocol | Mapping[str, Any]) -> tuple[str, ...]:
-    """Return a sentence for each place where two protocols differ; nothing if they are alike.
+    """Return a sentence for each difference between two protocols; empty if they are equal.
 
     A mapping is a protocol as a receipt holds it: JSON values, without conditions, blocks with their codes. Conditions
     are compared as far as both sides have them: add ``conditions`` and ``liquids`` from the opened key, or compare
@@ -51,12 +51,12 @@ def differences(old: Protocol | Mapping[str, Any], new: Protocol | Mapping[str, 
 
 
 def document_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> tuple[Difference, ...]:
-    """Return each place where two documents differ, conditions included; arrays are lists."""
+    """Return the differences between two documents, conditions included; arrays are lists."""
     return tuple(_differences((), old, new))
 
 
 def _tables(protocol: Protocol | Mapping[str, Any]) -> dict[str, Any]:
-    """Return the tables as JSON values in dictionaries of our own, blocks with their codes."""
+    """Return the tables as JSON values in new dictionaries, blocks with their codes."""
     if isinstance(protocol, Protocol):
         tables = protocol.model_dump(mode="json")
         for name, block in protocol.blocks.items():
@@ -68,7 +68,7 @@ def _tables(protocol: Protocol | Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _drop_unknown_comparisons(before: dict[str, Any], after: dict[str, Any]) -> None:
-    """Take out what a block compares where one side, a receipt of an earlier version, does not say it."""
+    """Drop a block's comparison if one side, a receipt of an earlier version, does not state it."""
     for name in before["blocks"].keys() & after["blocks"].keys():
         sides = before["blocks"][name], after["blocks"][name]
         if not all("compares" in block for block in sides):
@@ -77,7 +77,7 @@ def _drop_unknown_comparisons(before: dict[str, Any], after: dict[str, Any]) -> 
 
 
 def _take_hidden(tables: dict[str, Any]) -> dict[str, Any]:
-    """Take out what blinding hides, and return it by its place."""
+    """Remove the values that blinding hides and return them by place."""
     hidden = {name: tables.pop(name) for name in _HIDDEN if name in tables}
     for name, block in tables["blocks"].items():
         if "conditions" in block:
@@ -86,7 +86,7 @@ def _take_hidden(tables: dict[str, Any]) -> dict[str, Any]:
 
 
 def _differences(place: Place, old: Any, new: Any) -> Iterator[Difference]:
-    """Yield the differences below a place; a key that is None is as good as missing."""
+    """Yield the differences below a place; a key that is None counts as missing."""
     if _by_id(old) and _by_id(new):
         yield from _listed(place, old, new)
     elif isinstance(old, Mapping) and isinstance(new, Mapping):
@@ -108,7 +108,7 @@ def _differences(place: Place, old: Any, new: Any) -> Iterator[Difference]:
 
 
 def _by_id(value: Any) -> bool:
-    """Whether it is a list of tables with ids, each of which is there once."""
+    """Return whether a value is a list of tables with unique ids."""
     if not isinstance(value, list):
         return False
     ids = [entry.get("id") if isinstance(entry, Mapping) else None for entry in value]
@@ -116,7 +116,7 @@ def _by_id(value: Any) -> bool:
 
 
 def _listed(place: Place, old: Sequence[Mapping[str, Any]], new: Sequence[Mapping[str, Any]]) -> Iterator[Difference]:
-    """Compare tables with ids by their ids, and then the order of those that stayed."""
+    """Yield the differences between tables matched by id, then between the orders of those in both."""
     before, after = ({entry["id"]: entry for entry in entries} for entries in (old, new))
     yield from _differences(place, before, after)
     stayed = before.keys() & after.keys()

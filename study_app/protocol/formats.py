@@ -31,7 +31,7 @@ LEVEL_LIMITS: Final = {
 
 
 def _later(table: type[Table]) -> list[str]:
-    """Return the keys of a table that format 1 lacks, sorted."""
+    """Return the sorted keys of a table that format 1 lacks."""
     return sorted(name for name, field in table.model_fields.items() if field.exclude_if is not None)
 
 
@@ -71,18 +71,18 @@ DENSITY_KG_M3: Final = 1000.0
 
 
 def is_later(document: Mapping[str, Any]) -> bool:
-    """Return whether a file is of a format that this program does not know: then nothing else in it can be judged."""
+    """Return whether a file has a format that this program does not know: nothing else in it can be judged."""
     stated = document.get("format")
     return isinstance(stated, int) and stated > LATEST
 
 
 def is_second(document: Mapping[str, Any]) -> bool:
-    """Return whether a file is of format 2."""
+    """Return whether a file has format 2."""
     return bool(document.get("format") == 2 and not isinstance(document["format"], bool))
 
 
 def newer_keys(document: Mapping[str, Any]) -> Iterator[Fault]:
-    """Yield a fault for everything in a file of format 1 that belongs to format 2."""
+    """Yield a fault for every part of a format 1 file that belongs to format 2."""
     for pattern in NEW_KEYS:
         for path, _ in entries(document, pattern):
             yield Fault(path, "belongs to format 2", HINT, kind="surplus")
@@ -97,14 +97,14 @@ def newer_keys(document: Mapping[str, Any]) -> Iterator[Fault]:
 
 
 def upgraded(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
-    """Return a study's file with what format 2 fills in, and what in a file of format 1 is newer."""
+    """Return a study's document with the defaults of format 2, and faults for newer keys in format 1."""
     if is_second(document):
         return completed(document), []
     return dict(document), [] if is_later(document) else list(newer_keys(document))
 
 
 def completed(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a file of format 2 with what it leaves out; what is broken stays as it is."""
+    """Return a format 2 document with its omitted keys; invalid parts stay as they are."""
     completed = dict(document)
     head = completed.get("study", {})
     if isinstance(head, dict):
@@ -131,7 +131,7 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def with_scene_defaults(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a file of format 2 with the estimator and the densities of dampers that it leaves out."""
+    """Return a format 2 document with the omitted estimator and densities of dampers."""
     completed = dict(document)
     completed["scene"] = _with(completed.get("scene", {}), velocity={"kind": ESTIMATOR})
     if isinstance(liquids := completed.get("liquids", {}), dict):
@@ -140,7 +140,7 @@ def with_scene_defaults(document: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def needed_by(scene: Scene) -> int:
-    """Return the format that a scene file needs."""
+    """Return the format in which a scene file must be written."""
     newer = any(
         liquid.drag.law == "linear" or "unsteady_drag" in liquid.effects or liquid.non_newtonian is not None
         for liquid in scene.liquids
@@ -158,7 +158,7 @@ OMITTED: Final = {
 
 
 def relax(schema: dict[str, Any]) -> None:
-    """Let a protocol's JSON Schema ask for the keys of `OMITTED` in format 1 alone."""
+    """Require the keys of `OMITTED` in a protocol's JSON Schema for format 1 only."""
     tables = {"study": "StudyHead", "device": "DeviceNeeds", "blocks": "Block"}
     asked: dict[str, Any] = {}
     for section, keys in OMITTED.items():
@@ -185,7 +185,7 @@ def _languages(document: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _with_density(liquid: Any) -> Any:
-    """Give a liquid that is a linear damper and nothing else a density, which does not matter."""
+    """Add a density, which does not matter, to a liquid that is only a linear damper."""
     if not isinstance(liquid, dict):
         return liquid
     drag = liquid.get("drag")
@@ -194,7 +194,7 @@ def _with_density(liquid: Any) -> Any:
 
 
 def _with_numbers(blocks: Mapping[str, Any], tasks: tuple[str, ...], languages: tuple[str, ...]) -> dict[str, Any]:
-    """Return the blocks, the main ones numbered and with the next free letters, each and its trials named."""
+    """Return the blocks with numbers and free letters for the main ones, and names for all and their trials."""
     taken = [table.get("code_prefix") for table in blocks.values() if isinstance(table, Mapping)]
     letters = (letter for letter in string.ascii_uppercase if letter not in taken)
     numbered: dict[str, Any] = {}

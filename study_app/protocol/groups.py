@@ -49,7 +49,7 @@ def sequences_in(document: Any) -> Iterator[tuple[Path, tuple[Any, ...]]]:
 
 
 def next_group(shares: Mapping[str, int], sizes: Mapping[str, int]) -> str:
-    """Return the group that is furthest behind its share, the first of several; `sizes` may lack empty groups."""
+    """Return the group furthest behind its share, the first of several; `sizes` may omit empty groups."""
     return min(shares, key=lambda name: sizes.get(name, 0) / shares[name])
 
 
@@ -70,12 +70,12 @@ def sessions_differ(protocol: HasSteps) -> bool:
 
 
 def session_count(protocol: HasSteps, group: str | None) -> int | None:
-    """Return how many sessions a participant of a group has; None: as many as wanted, all with the same steps."""
+    """Return the number of sessions of a group's participant; None: unlimited, all with the same steps."""
     return len(_sequences(protocol, group)) or None
 
 
 def steps_of(protocol: HasSteps, group: str | None, session: int) -> Steps:
-    """Return the steps of a session (from 1) of a participant of a group; StudyError if the participant has fewer."""
+    """Return the steps of a session (from 1) of a group's participant; StudyError if there are fewer sessions."""
     sequences = _sequences(protocol, group)
     if not sequences:
         own = () if group is None else protocol.groups[group].sequence
@@ -91,13 +91,13 @@ def _sequences(protocol: HasSteps, group: str | None) -> Sequences:
 
 
 def beyond_last(session: int, last: int) -> StudyError:
-    """Return the error of a session number beyond the last session."""
+    """Return the error about a session number beyond the last session."""
     permitted = "1, the only session" if last == 1 else f"1 to {last}"
     return StudyError(f"session {session}: a participant of this study has {last} (sequences); permitted: {permitted}")
 
 
 def refuse_beyond_last(protocol: HasSteps, session: int) -> None:
-    """Refuse, as StudyError, a session that no group has."""
+    """Raise StudyError if no group has this session."""
     counts = [session_count(protocol, group) for group in protocol.groups or (None,)]
     known = [count for count in counts if count is not None]
     if len(known) == len(counts) and session > max(known):
@@ -105,7 +105,7 @@ def refuse_beyond_last(protocol: HasSteps, session: int) -> None:
 
 
 def every_step(protocol: HasSteps) -> Steps:
-    """Return the steps of all groups and sessions, each once, in order of first use; of one sequence as they are."""
+    """Return the steps of all groups and sessions, each once, in order of first use; one sequence unchanged."""
     if not sessions_differ(protocol):
         return protocol.sequence
     of_groups = (_of_group(protocol, group) for group in protocol.groups or (None,))
@@ -115,7 +115,7 @@ def every_step(protocol: HasSteps) -> Steps:
 def follows(
     protocol: HasSteps, form: str, blocks: Container[str], exchanged: Container[str] = ()
 ) -> tuple[str | None, ...]:
-    """Return the blocks that a form comes after, None before the first; empty if no session has the form twice.
+    """Return the blocks before each use of a form, None before the first; empty if no session has it twice.
 
     After one of the blocks that are ``exchanged`` any of them that a session has can come.
     """
@@ -135,7 +135,7 @@ def follows(
 
 
 def groups_with(protocol: HasSteps, step: str) -> tuple[str, ...]:
-    """Return the groups in which a step comes; none in a study without groups."""
+    """Return the groups whose sessions contain a step; empty in a study without groups."""
     return tuple(group for group in protocol.groups if step in _of_group(protocol, group))
 
 
@@ -144,7 +144,7 @@ def _of_group(protocol: HasSteps, group: str | None) -> Steps:
 
 
 def numbered_parts(steps: Iterable[str], parts: Mapping[str, int | None]) -> dict[str, int]:
-    """Return the number of each block's part in a session with these steps: 1, 2 … in order of first appearance."""
+    """Return the part number of each block in a session with these steps: 1, 2 … in order of appearance."""
     numbers: dict[int, int] = {}
     part_numbers: dict[str, int] = {}
     for step in steps:

@@ -33,7 +33,7 @@ class _Generator(GenerateJsonSchema):
         return to_jsonable_python(dft)
 
     def get_defs_ref(self, core_mode_ref: CoreModeRef) -> DefsRef:
-        """Return the name of a definition; one of a plug-in has its module's, too."""
+        """Return the name of a definition, with the module's name for a plug-in's."""
         ref = super().get_defs_ref(core_mode_ref)
         if not core_mode_ref[0].startswith("study_app."):
             del self._prioritized_defsref_choices[ref][:2]
@@ -42,7 +42,7 @@ class _Generator(GenerateJsonSchema):
 
 @cache
 def schema(of: type[BaseModel] = Protocol) -> dict[str, Any]:
-    """Return the JSON Schema of a protocol file: what each key may be, and what it means."""
+    """Return the JSON Schema of a protocol file with the meaning of each key."""
     described = of.model_json_schema(schema_generator=_Generator)
     for node in described["properties"].values():
         if "patternProperties" in node:
@@ -63,7 +63,7 @@ def schema(of: type[BaseModel] = Protocol) -> dict[str, Any]:
 
 
 def editor_schema() -> dict[str, Any]:
-    """Return the JSON Schema for editors that complete and check while one writes.
+    """Return the JSON Schema for editors with completion and checks.
 
     Unlike `schema` it asks for whole questions only where no instrument supplies what a study leaves out of them.
     """
@@ -108,7 +108,7 @@ def format_markdown() -> str:
 
 
 def _places(root: Node) -> dict[str, list[str]]:
-    """Return where each model stands in the file, in the order of the file, such as ``blocks.NAME.catch``."""
+    """Return the places of each model in the file, in file order, such as ``blocks.NAME.catch``."""
     places: dict[str, list[str]] = {}
 
     def visit(node: Node, place: str) -> None:
@@ -137,7 +137,7 @@ def _models(node: Node, place: str) -> Iterator[tuple[str, str]]:
 
 
 def _headings(root: Node, places: Mapping[str, list[str]]) -> dict[str, str]:
-    """Return the heading of each model: its first place, with what tells it from others at that place."""
+    """Return the heading of each model: its first place, with a distinguishing value if several share it."""
     firsts = [paths[0] for paths in places.values()]
     return {
         name: paths[0] if firsts.count(paths[0]) == 1 else f"{paths[0]}, {_apart(root['$defs'][name])}"
@@ -211,7 +211,7 @@ def _default(key: str, part: Node, node: Node) -> str:
 
 
 def _meaning(part: Node, root: Node) -> str:
-    """Return the description of a key, or of its only alternative to null, or of the only model that it holds."""
+    """Return the description of a key, of its only alternative to null, or of the only model that it holds."""
     alternatives = [branch for branch in part.get("anyOf", ()) if branch.get("type") != "null"]
     meant = (part, *alternatives) if len(alternatives) == 1 else (part,)
     described = next((meaning for meaning in meant if "description" in meaning), None)
@@ -222,6 +222,6 @@ def _meaning(part: Node, root: Node) -> str:
 
 
 def _plain(text: str) -> str:
-    """Return a description without the marks of reStructuredText, safe in a cell of a table."""
+    """Return a description without reStructuredText marks, safe in a table cell."""
     text = re.sub(r":\w+:`([^`]+)`", r"`\1`", text).replace("``", "`").replace("\n", " ")
     return text.replace("|", "\\|").replace("*", "\\*").replace("<", "\\<").replace("[", "\\[")

@@ -71,7 +71,7 @@ class SceneFile(Table):
 
 
 def load(name_or_path: str | File, *, delay_ticks: int = ASSUMED_TICKS) -> Protocol:
-    """Return the protocol of a file, or of a name (see ``files.find``); ProtocolError lists every problem of the file.
+    """Return the protocol of a file or known name (see ``files.find``); ProtocolError lists every problem of the file.
 
     Levels are checked for a device whose forces act ``delay_ticks`` ticks late.
 
@@ -87,7 +87,7 @@ def load(name_or_path: str | File, *, delay_ticks: int = ASSUMED_TICKS) -> Proto
 
 
 def parse(source: bytes, name: str, *, delay_ticks: int = ASSUMED_TICKS) -> Protocol:
-    """Return the protocol written in ``source``; ``name`` is what messages call it, the rest is as in `load`."""
+    """Return the protocol in ``source``; messages call it ``name``, the rest is as in `load`."""
     document, places = read_document(source, name)
     protocol, faults = examined(document, delay_ticks=delay_ticks)
     if protocol is None or faults:
@@ -122,7 +122,7 @@ def examined(document: dict[str, Any], *, delay_ticks: int = ASSUMED_TICKS) -> t
 
 
 def _outside(broken: Iterable[Path], faults: Iterable[Fault]) -> list[Fault]:
-    """Return the faults that are not within places that are broken already."""
+    """Return the faults outside the places that are already broken."""
     known = list(broken)
     return [fault for fault in faults if not any(fault.path[: len(path)] == path for path in known)]
 
@@ -141,7 +141,7 @@ def load_scene(name_or_path: str | File, liquid_id: str) -> Scene:
 
 
 def load_scenes(name_or_path: str | File) -> dict[str, Scene]:
-    """Return a scene of each liquid of a protocol or scene file by its name, those of no condition too."""
+    """Return a scene for each liquid of a protocol or scene file by name, including unused liquids."""
     name = str(name_or_path)
     source = source_bytes(name_or_path)
     document, places = read_document(source, name)
@@ -155,7 +155,7 @@ def load_scenes(name_or_path: str | File) -> dict[str, Scene]:
 
 
 def _sound_scene(document: dict[str, Any], name: str, places: Places) -> dict[str, Any]:
-    """Return the document of a scene file, completed; raises what is wrong with it."""
+    """Return the completed document of a scene file; raise ProtocolError if it is invalid."""
     faults: list[Fault] = []
     if formats.is_second(document):
         document = formats.with_scene_defaults(document)
@@ -176,7 +176,7 @@ def is_scene_file(name_or_path: str | File) -> bool:
 
 
 def _with_liquids_of_files(document: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
-    """Return a study's document with the liquids of its liquid files in their places, and what is wrong with these."""
+    """Return a study's document with the liquids of its liquid files, and the faults of these."""
     liquids = document.get("liquids")
     if not isinstance(liquids, Mapping):
         return document, []
@@ -199,7 +199,7 @@ def _with_liquids_of_files(document: dict[str, Any]) -> tuple[dict[str, Any], li
 
 
 def _with_footage(document: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
-    """Return a study's document with the SHA-256 of each condition's footage, and which files are missing."""
+    """Return a study's document with the SHA-256 of each condition's footage, and faults for missing files."""
     stated = [
         Fault(path, "unknown key", "the program computes it")
         for path, _ in entries(document, "conditions.*.footage_sha256")
@@ -224,7 +224,7 @@ class _LiquidFileFault(Exception):
 
 
 def _liquid_of_file(file: Any, texts: Mapping[str, str]) -> dict[str, Any]:
-    """Return the one liquid of a liquid file as a study's table, with the file's ball as its own."""
+    """Return the only liquid of a liquid file as a study's table, with the file's ball."""
     if not isinstance(file, str):
         raise _LiquidFileFault("must be a string", "the path of a liquid file, relative to this file")
     if file not in texts:
@@ -248,7 +248,7 @@ def _holds_study(document: Mapping[str, Any]) -> bool:
 
 
 def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
-    """Return the tables of a text, arrays as tuples, and the lines they stand on (ProtocolError if it is no TOML)."""
+    """Return their tables of a text, arrays as tuples, and their lines they stand on (ProtocolError if it is no TOML)."""
     check_size(source, name)
     if is_utf16(source):
         raise ProtocolError(name, (Problem("file", "is UTF-16 text", hint="save it as UTF-8"),))
@@ -274,7 +274,7 @@ def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
 
 
 def _validated(model: type[M], document: Mapping[str, Any]) -> tuple[M | None, list[Fault]]:
-    """Return the validated document, None if it is invalid, and the faults that its models find."""
+    """Return the validated document, None if it is invalid, and the faults found by its models."""
     if formats.is_later(document):
         known = f"this program reads formats 1 to {formats.LATEST}"
         return None, [Fault(("format",), f"is {document['format']}, {known}", "use a newer version of liquid-study")]

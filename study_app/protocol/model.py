@@ -158,7 +158,7 @@ class SceneDefaults(Table):
 
 
 def compared(conditions: Sequence[Condition]) -> Compared:
-    """Return what these conditions differ in: where they have one liquid, views or else delays if these differ."""
+    """Return the quantity in which conditions differ; with one liquid, views or else delays if these differ."""
     liquids, delays, views = (
         {getattr(condition, name) for condition in conditions} for name in ("liquid_ids", "delay_ms", "seen")
     )
@@ -210,14 +210,14 @@ class StudyLiquid(Liquid):
         return Liquid.model_validate({name: value for name, value in self if name != "body"})
 
     def body_in(self, scene: SceneDefaults) -> Body:
-        """Return the ball in this liquid."""
+        """Return the liquid's ball."""
         return (
             scene.body if self.body is None else scene.body.model_copy(update=self.body.model_dump(exclude_none=True))
         )
 
 
 def scene_with(scene: SceneDefaults, device: DeviceNeeds, liquids: Sequence[StudyLiquid], form: Literal[1, 2]) -> Scene:
-    """Return a scene of some liquids, of a file's format; they have one ball (`checks.consistency.liquids`)."""
+    """Return a scene with these liquids, in a file's format; they share one ball (`checks.consistency.liquids`)."""
     return Scene(
         **dict(scene) | {"body": liquids[0].body_in(scene)},
         rate_hz=device.rate_hz,
@@ -291,7 +291,7 @@ class Published(Table):
     source: Brief = Field(default="", description="Where it was published.")
 
     def described(self) -> str:
-        """Return it in words."""
+        """Return the value in words."""
         about = (
             "" if self.standard is None else f", standard {self.standard:g}",
             "" if self.percent is None else f", at {self.percent:g} % correct",
@@ -340,7 +340,7 @@ class Contrast(Table):
 
     @property
     def compared(self) -> tuple[str, str]:
-        """The ids of what is compared: blocks, conditions or groups."""
+        """The ids of the two sides: blocks, conditions or groups."""
         first, second = self.conditions or self.groups or self.blocks
         return first, second
 
@@ -350,7 +350,7 @@ class Contrast(Table):
         return self.measure.replace("_", " ") if self.measure in OF_LEVELS else f"agreement with “{self.measure}”"
 
     def words(self, conditions: Mapping[str, str | None]) -> tuple[str, str]:
-        """Return what is compared: blocks with the conditions of their stimuli, by block, where these differ."""
+        """Return the labels of the two sides; blocks get the conditions of their stimuli if these differ."""
         first, second = self.compared
         of = [conditions.get(block) for block in self.blocks]
         return (f"{first} ({of[0]})", f"{second} ({of[1]})") if len(set(of)) > 1 and None not in of else (first, second)
@@ -423,7 +423,7 @@ class Analysis(Table):
         return self
 
     def described(self, named_by: Sequence[str]) -> Iterator[tuple[str, str]]:
-        """Yield a row in words for each decision; ``named_by`` says which item names each condition."""
+        """Yield a row for each decision; ``named_by`` maps conditions to the items that name them."""
         bound = self.equivalence_bound
         points = "point" if bound == 1 else "points"
         yield "Significant", f"p of at most {self.alpha:g}"
@@ -452,7 +452,7 @@ T = TypeVar("T")
 
 
 def _named(tables: Any) -> Any:
-    """Give each table its name as ``id``, so that it can be used without the dictionary that held it."""
+    """Set each table's name as its ``id``."""
     if not isinstance(tables, Mapping):
         return tables
     return {name: {**table, "id": name} if isinstance(table, Mapping) else table for name, table in tables.items()}
@@ -514,7 +514,7 @@ class Protocol(Table):
 
     @property
     def shares(self) -> dict[str, int]:
-        """The share of each group, by name; empty without groups."""
+        """The share of each group by name; empty without groups."""
         return {name: group.share for name, group in self.groups.items()}
 
     @property
@@ -529,28 +529,28 @@ class Protocol(Table):
 
     @property
     def assigns_rows(self) -> bool:
-        """Whether blocks, or trials of one, are in the order of a square, whose rows are assigned to participants."""
+        """Whether blocks, or trials of one, follow a square whose rows are assigned to participants."""
         squares = any(block.order in ("williams", "latin") for block in self.blocks_in_order)
         return squares or self.study.block_order == "balanced"
 
     @property
     def forms(self) -> dict[str, Questionnaire]:
-        """The questionnaires that are presented on their own, by name, in the order of the session."""
+        """The questionnaires outside blocks by name, in the order of the session."""
         return {step: self.questionnaires[step] for step in self.steps if step in self.questionnaires}
 
     @property
     def parts(self) -> int:
-        """How many parts the study has."""
+        """The number of parts."""
         return max((block.part or 0 for block in self.blocks_in_order), default=0)
 
     def questionnaire_of(self, block_id: str) -> Questionnaire | None:
-        """Return what is answered after each trial of a block: its questionnaire, or what its design asks."""
+        """Return the questions after each trial of a block: its questionnaire, or its design's."""
         name = self.blocks[block_id].questionnaire
         return self.design_questions.get(block_id) if name is None else self.questionnaires[name]
 
     @cached_property
     def design_questions(self) -> dict[str, Questionnaire]:
-        """What is asked in each block with a design, by the block's id."""
+        """The questions of each block with a design, by the block's id."""
         designs = {
             block.id: self.designs.get(block.design) or default_design(block.design)
             for block in self.blocks.values()
@@ -559,27 +559,27 @@ class Protocol(Table):
         return {name: question_of(design, self.study.languages) for name, design in designs.items()}
 
     def compared_in(self, block_id: str) -> Compared | None:
-        """Return what a main block compares, as it says or as follows from its conditions; of other blocks None."""
+        """Return the quantity that a main block compares, as stated or inferred; None for other blocks."""
         block = self.blocks[block_id]
         if block.phase != "main":
             return None
         return block.compares or compared([self.conditions[name] for name in self.conditions_in(block_id)])
 
     def conditions_in(self, block_id: str) -> tuple[str, ...]:
-        """Return the conditions that a block presents, with a number varied or as they are."""
+        """Return the conditions that a block presents, with or without a varied number."""
         block = self.blocks[block_id]
         if block.stimulus is None:
             return block.conditions
         return (self.stimuli[block.stimulus].condition or next(iter(self.conditions)),)
 
     def scene_for(self, condition_id: str) -> Scene:
-        """Return what is felt in a condition."""
+        """Return the scene of a condition."""
         return self.scene_of(*self.conditions[condition_id].liquid_ids)
 
     def scene_of(self, *liquid_ids: str) -> Scene:
-        """Return a scene of some of the liquids, those of no condition too."""
+        """Return a scene with some of the liquids, including unused ones."""
         return scene_with(self.scene, self.device, [self.liquids[name] for name in liquid_ids], self.format)
 
     def delay_s(self, condition_id: str) -> float:
-        """Return by how much everything drawn in the tank is late [s]."""
+        """Return the visual delay of a condition [s]."""
         return self.conditions[condition_id].delay_ms / 1000

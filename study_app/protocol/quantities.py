@@ -86,7 +86,7 @@ QUANTITIES: Final = _OF_THE_SCENE | {it.name: it for effect in EFFECTS for it in
 
 
 def quantity(name: str) -> Parameter:
-    """Return what a stimulus varies: ``table.field``, or a field alone, that of the first table that has it."""
+    """Return the varied quantity: ``table.field``, or a field alone of the first table that has it."""
     for known, row in QUANTITIES.items():
         if name in {known, known.partition(".")[2]}:
             return row

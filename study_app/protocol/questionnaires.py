@@ -50,7 +50,7 @@ class Score(Table):
 def score(
     rule: Score, answers: Mapping[str, float | str], bounds: Mapping[str, tuple[float, float] | None]
 ) -> float | None:
-    """Return a score; None where an answer that it needs is missing.
+    """Return a score; None if a required answer is missing.
 
     ``answers`` are by item the number it was answered with, or the option that was chosen; ``bounds`` its smallest and
     largest answer, for reversed items.
@@ -97,11 +97,11 @@ class Questionnaire(Table):
         return tuple(item for item in self.items if isinstance(item, Statement))
 
     def item(self, item_id: str) -> Question:
-        """Return the item of that id (KeyError if there is none)."""
+        """Return the item with an id (KeyError if there is none)."""
         return {item.id: item for item in self.items}[item_id]
 
     def context(self, scales: Mapping[str, Scale], language: str) -> Context:
-        """Return what its items are asked with."""
+        """Return the context of its items: scales and language."""
         return Context(scales, self.scale, language)
 
 
@@ -116,13 +116,13 @@ def instruments() -> tuple[str, ...]:
 
 @cache
 def instrument(name: str) -> Mapping[str, Any]:
-    """Return a standard questionnaire as its file holds it (OSError if there is none)."""
+    """Return the file's content of a standard questionnaire (OSError if there is none)."""
     table: Mapping[str, Any] = frozen(tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8")))
     return table
 
 
 def with_instruments(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
-    """Return a study's document with what is known of its standard questionnaires, and what is missing of them.
+    """Return a study's document with the known parts of standard questionnaires, and faults for missing parts.
 
     What the study writes replaces what is known, key by key, and texts language by language.
     """
@@ -146,7 +146,7 @@ def with_instruments(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[
 
 
 def written_out(of: str, languages: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the table that a study writes of an instrument, and its scales: all that is known, where texts lack."""
+    """Return the table and the scales that a study writes for an instrument: everything known if texts are missing."""
     table: dict[str, Any] = {"instrument": of}
     filled, lacking = _filled((), table, languages, {})
     if not lacking:
@@ -160,14 +160,14 @@ def written_out(of: str, languages: tuple[str, ...]) -> tuple[dict[str, Any], di
 
 
 def scale_name(of: str, scale: str) -> str:
-    """Return what a study calls a scale of a standard questionnaire."""
+    """Return the study's name for a scale of a standard questionnaire."""
     return f"{of.replace('-', '_')}_{scale}"
 
 
 def _filled(
     place: Path, table: Mapping[str, Any], languages: tuple[str, ...], scales: dict[str, Any]
 ) -> tuple[dict[str, Any], list[Fault]]:
-    """Return a questionnaire with what its instrument knows, and what is missing; adds its scales to ``scales``."""
+    """Return a questionnaire with the known parts of its instrument, and faults; adds its scales to ``scales``."""
     of = str(table["instrument"])
     source = instrument(of)
     known = {item["id"]: item for item in source["items"]}
@@ -248,7 +248,7 @@ def _filled(
 
 
 def _merged(known: Mapping[str, Any], own: Mapping[str, Any], languages: tuple[str, ...]) -> dict[str, Any]:
-    """Return what is known of a table in these languages, replaced by what the study writes of it."""
+    """Return the known part of a table in these languages, overridden by the study's own keys."""
     made = dict(known)
     for key in made.keys() & set(_TEXTS):
         made[key] = {language: known[key][language] for language in languages if language in known[key]}
@@ -258,7 +258,7 @@ def _merged(known: Mapping[str, Any], own: Mapping[str, Any], languages: tuple[s
 
 
 def _by_id(table: Mapping[str, Any], key: str) -> dict[str, tuple[Path, Mapping[str, Any]]]:
-    """Return the tables of a list that have an id, with their places."""
+    """Return the tables of a list that have an id, with their paths."""
     return {
         entry["id"]: (path, entry)
         for path, entry in entries(table, f"{key}.*")
@@ -267,7 +267,7 @@ def _by_id(table: Mapping[str, Any], key: str) -> dict[str, tuple[Path, Mapping[
 
 
 def _unpublished(path: Path, of: str, language: str, lacks: Sequence[tuple[str, str]]) -> Fault:
-    """Return the fault of texts that neither the program nor the study has in a language: it names each of them."""
+    """Return the fault about texts in a language that neither program nor study has; it names each."""
     keys: dict[str, list[str]] = {}
     for key, thing in dict.fromkeys(lacks):
         keys.setdefault(thing, []).append(key)

@@ -65,7 +65,7 @@ class ShowIf(Table):
 
     @property
     def permitted(self) -> tuple[int | float | str, ...]:
-        """The answers that show the question; empty where bounds do."""
+        """The answers that show the question; empty if bounds do."""
         return self.values if isinstance(self.values, tuple) else () if self.values is None else (self.values,)
 
     def holds(self, answer: Value) -> bool:
@@ -85,7 +85,7 @@ class ShowIf(Table):
 
 
 def shown(items: Iterable[Question | ItemView], answers: Mapping[str, Value]) -> tuple[str, ...]:
-    """Return the ids of the items that are shown, in their order; ``answers`` are those given so far.
+    """Return the ids of the shown items in order; ``answers`` are those given so far.
 
     Answers to items that are not shown count for nothing.
     """
@@ -125,15 +125,15 @@ class ItemView:
 
     @property
     def keys(self) -> str:
-        """The keys that answer the question, as labelled on the keyboard."""
+        """The keys that answer the question, as printed on the keyboard."""
         raise NotImplementedError
 
     def simulated(self, opinion: float, draw: Draw) -> Value:
-        """Return the answer of a simulated observer whose opinion is from 1 to 7, or a little beyond."""
+        """Return the answer of a simulated observer with an opinion from 1 to 7, or slightly beyond."""
         raise NotImplementedError
 
     def nearby(self, answer: Value) -> Value:
-        """Return an answer that is chosen first by who then changes their mind; the same where there is none."""
+        """Return the first answer of a person who then changes it; the same one if there is no other."""
         return answer
 
 
@@ -176,39 +176,39 @@ class Question(Table):
         raise NotImplementedError
 
     def problem(self, answer: Value, context: Context) -> str | None:
-        """Return why a value is not an answer to it, as a sentence; None where it is one."""
+        """Return why a value is not a valid answer, as a sentence; None if it is."""
         raise NotImplementedError
 
     def bounds(self, context: Context) -> tuple[float, float] | None:
-        """Return the smallest and the largest number that it can be answered with; None where it has none."""
+        """Return the smallest and the largest answer; None without bounds."""
         return None
 
     def levels(self, context: Context) -> dict[str, str]:
-        """Return all answers in their order, where these are few: as a table holds them, with their words."""
+        """Return all possible answers in order, if there are few: table value and label."""
         return {}
 
     @property
     def names_several(self) -> bool:
-        """Whether an answer names several of `levels`, with spaces between them in a table."""
+        """Whether a table holds several of `levels` in one answer, separated by spaces."""
         return False
 
     def counted(self, response: str) -> tuple[str, ...]:
-        """Return which of `levels` an answer counts for, as a table holds it: of a ranking, say, the first alone."""
+        """Return the `levels` for which a table's answer counts: for a ranking only the first, for example."""
         return tuple(response.split()) if self.names_several else (response,)
 
     def _shown(self, kind: type[V], number: int, context: Context, **own: Any) -> V:
-        """Return its view: the fields that all kinds have, and those of its kind."""
+        """Return its view with the common fields and those of its kind."""
         return kind(self.id, number, context.text(self.text), self.required, show_if=self.show_if, **own)
 
 
 def plain_number(value: float) -> int | float:
-    """Return a number without the digits that binary fractions add, whole ones as integers."""
+    """Return a number without the digits of binary fractions; whole numbers as integers."""
     rounded = round(value, 9)
     return int(rounded) if rounded == int(rounded) else rounded
 
 
 def kind_id(kind: type[Question]) -> str:
-    """Return the id of a kind; a question without a field ``kind`` is a statement."""
+    """Return the id of a kind; a question without ``kind`` is a statement."""
     field_ = kind.model_fields.get("kind")
     return "statement" if field_ is None else str(field_.default)
 
@@ -383,7 +383,7 @@ class NumberView(ItemView):
         )
 
     def simulated(self, opinion: float, draw: Draw) -> Value:
-        """Return a number within its bounds, or within 0 to 100 where it has none."""
+        """Return a number within its bounds, or within 0 to 100 without bounds."""
         least = self.least if self.least is not None else min(0.0, self.most if self.most is not None else 0.0)
         most = self.most if self.most is not None else least + 100.0
         share = min(1.0, max(0.0, (opinion - 1) / (OPINION_POINTS - 1)))
@@ -451,7 +451,7 @@ class SliderView(ItemView):
 
     @property
     def steps(self) -> int:
-        """How many steps lead from end to end."""
+        """The number of steps from end to end."""
         return round((self.most - self.least) / self.step)
 
     def at(self, step: int) -> int | float:
@@ -598,7 +598,7 @@ else:
 
 
 def question_of(table: Mapping[str, Any]) -> Question:
-    """Return a question of a receipt (KeyError if no kind has its name, ValueError if it is none of its kind).
+    """Return a receipt's question (KeyError: unknown kind, ValueError: invalid for its kind).
 
     One of a plug-in that is not here is a `RecordedQuestion`.
     """

@@ -17,7 +17,7 @@ _COMMENT_LETTERS: Final = 110
 
 
 def scene_text(scene: Scene, *, said: Sequence[str] = (), notes: Mapping[Place, str] | None = None) -> str:
-    """Return a scene as a scene file, which cannot say that velocities are given.
+    """Return a scene as a scene file; the file cannot state that velocities are given.
 
     Paragraphs ``said`` stand above it as comments; ``notes`` are comments of single keys by their place, such as
     ``("liquids", "water", "density_kg_m3")``.
@@ -34,12 +34,12 @@ def scene_text(scene: Scene, *, said: Sequence[str] = (), notes: Mapping[Place, 
 
 
 def for_new_file(scene: Scene) -> Scene:
-    """Return a scene as the program presents and writes it where no file decides: "kalman" for the usual "ewma"."""
+    """Return a scene as the program presents and writes it without a file: "kalman" in place of "ewma"."""
     return scene.model_copy(update={"velocity": Kalman()}) if scene.velocity == Ewma() else scene
 
 
 def _liquid(liquid: Liquid) -> Mapping[str, Any]:
-    """Return what a scene file says of a liquid: without tables that mean nothing and say nothing new."""
+    """Return a liquid's table for a scene file, without tables that have no effect and add nothing."""
     idle = {
         effect.name
         for effect in EFFECTS

@@ -54,13 +54,13 @@ class Constraint:
     min_distance: int | None = None
 
     def holds(self, order: Sequence[object]) -> bool:
-        """Return whether an order keeps it."""
+        """Return whether an order satisfies the constraint."""
         nearest = shortest_distance(order)
         near = nearest is not None and nearest < (self.min_distance or 1)
         return not near and (self.max_repeats is None or longest_run(order) <= self.max_repeats)
 
     def impossible(self, codes: int, repetitions: int) -> tuple[str, str] | None:
-        """Return which key no order of ``codes`` codes, each ``repetitions`` times, can keep, and what it could."""
+        """Return the key that makes every order impossible and a phrase with the possible values; None without one."""
         if repetitions == 1:
             return None
         if self.min_distance is not None and self.min_distance > codes:
@@ -73,7 +73,7 @@ class Constraint:
 
 
 def longest_run(order: Sequence[object]) -> int:
-    """Return how many of a kind come in a row at most."""
+    """Return the longest run of one kind."""
     longest = run = 0
     for index, code in enumerate(order):
         run = run + 1 if index and code == order[index - 1] else 1
@@ -82,7 +82,7 @@ def longest_run(order: Sequence[object]) -> int:
 
 
 def shortest_distance(order: Sequence[object]) -> int | None:
-    """Return the least number of trials from one of a kind to the next; None if all are different."""
+    """Return the shortest distance between two of one kind [trials]; None if all differ."""
     latest: dict[object, int] = {}
     distances = []
     for index, code in enumerate(order):
@@ -96,12 +96,12 @@ Square: TypeAlias = Literal["williams", "latin"]
 
 
 def row_count(square: Square, codes: int) -> int:
-    """Return how many rows there are: as many participants fill a round."""
+    """Return the number of rows of a square: so many participants complete a round."""
     return 2 * codes if square == "williams" and codes % 2 and codes > 1 else codes
 
 
 def row(square: Square, codes: int, number: int, repetitions: int = 1) -> tuple[int, ...]:
-    """Return row ``number`` (from 0): codes as numbers from 0, each once in every repetition."""
+    """Return row ``number`` (from 0): codes as numbers from 0, each once per repetition."""
     if codes == 1:
         return (0,) * repetitions
     reversed_square, shift = divmod(number, codes)
@@ -119,19 +119,19 @@ def row(square: Square, codes: int, number: int, repetitions: int = 1) -> tuple[
 
 
 def borders_even(codes: int, repetitions: int) -> bool:
-    """Return whether a Williams design's carry-over is even across the borders of its repetitions too."""
+    """Return whether a Williams design's carry-over is even across the borders of its repetitions, too."""
     period = (codes - 1) // 2 if codes % 2 else codes - 1
     return codes == 1 or (repetitions - 1) % period == 0
 
 
 def enrolment(participant: str) -> int | None:
-    """Return the number in a participant's id, the last one if there are several; None if there is none."""
+    """Return the last number in a participant's id; None if there is none."""
     numbers = re.findall(r"[0-9]+", participant)
     return int(numbers[-1]) if numbers else None
 
 
 def assigned_row(study: str, block: str, rows: int, participant: str, place: int | None = None) -> int:
-    """Return the row (from 0) that a participant takes in a block of a study.
+    """Return the row (from 0) of a participant in a block of a study.
 
     ``place`` is the number that assigns it (from 1); None: the number in the participant's id.
     """
@@ -151,7 +151,7 @@ _STEEPEST = 6
 
 
 def arrange(codes: Sequence[T], repetitions: int, constraint: Constraint, draw: Draw) -> tuple[T, ...]:
-    """Return every code ``repetitions`` times in a random order that keeps a constraint.
+    """Return every code ``repetitions`` times in a random order that satisfies a constraint.
 
     ``draw`` gives uniform numbers in [0, 1); at most (len(codes) · repetitions + 1) · ``PROPOSALS`` + len(codes) of
     them are drawn. ValueError says that no order keeps the constraint.
@@ -167,7 +167,7 @@ def arrange(codes: Sequence[T], repetitions: int, constraint: Constraint, draw: 
 
 
 def propose(codes: int, repetitions: int, constraint: Constraint, draw: Draw) -> Proposal | None:
-    """Draw an order from left to right, and return it with one over its chance; None in a dead end."""
+    """Draw an order from left to right and return it with the inverse of its probability; None in a dead end."""
     apart = max(constraint.min_distance or 1, 2 if constraint.max_repeats == 1 else 1)
     left = Remaining(codes, repetitions, apart, constraint.max_repeats or codes * repetitions)
     steepness = _steepness(codes, repetitions, apart)
@@ -189,7 +189,7 @@ def propose(codes: int, repetitions: int, constraint: Constraint, draw: Draw) ->
 
 
 def _steepness(codes: int, repetitions: int, apart: int) -> int:
-    """Return the power of what is left that weighs the codes; any is right, a good one needs few proposals.
+    """Return the exponent that weights the remaining codes; any is correct, a good one needs few proposals.
 
     The nearer the distance to the number of codes, the less may one code get ahead of another. In the long run the
     ratio of the variances of a code's gaps, free to constrained, is n (n − 1) / ((n − d) (n − d + 1)); half way between
@@ -215,7 +215,7 @@ class Remaining:
         self._slack = [k * (codes - apart) for k in range(repetitions + 1)]
 
     def may_come(self) -> list[int]:
-        """Return the codes that may come next without making the rest impossible."""
+        """Return the codes that may come next without a dead end."""
         if self._apart > 1:
             recent = self.taken[-(self._apart - 1) :]
             # of the largest k whose last k · apart trials need all that is left of every code with up to k
@@ -227,7 +227,7 @@ class Remaining:
         return [code for code in urgent or range(len(self.count)) if self.count[code] and code not in spent]
 
     def take(self, code: int) -> None:
-        """Let a code come."""
+        """Use a code as the next one."""
         self._in_a_row = self._in_a_row + 1 if self.taken[-1:] == [code] else 1
         for k in range(self.count[code], len(self._slack)):
             self._slack[k] -= 1

@@ -27,7 +27,7 @@ Draw: TypeAlias = Callable[[], float]
 
 
 def stream(seed: int, name: str) -> random.Random:
-    """Return the random stream of that name under that seed; use only its ``.random()``."""
+    """Return the random stream with a name under a seed; use only its ``.random()``."""
     digest = hashlib.sha256(f"{seed}\n{name}".encode()).digest()
     return random.Random(int.from_bytes(digest, "big"))  # noqa: S311 - reproducible, not secret
 
@@ -65,7 +65,7 @@ SECRET_BYTES: Final = 32
 
 
 def draw_secret(draw: Draw) -> bytes:
-    """Return a secret drawn with ``draw`` (uniform numbers in [0, 1)); a rehearsal's comes from its seed."""
+    """Return a secret drawn with ``draw`` (uniform numbers in [0, 1)); a rehearsal draws it from its seed."""
     return bytes(int(draw() * 256) for _ in range(SECRET_BYTES))
 
 
@@ -75,12 +75,12 @@ def sub_key(secret: bytes, name: str) -> bytes:
 
 
 def secret_stream(secret: bytes, name: str) -> random.Random:
-    """Return the stream of that name; use only its ``.random()``."""
+    """Return the stream with a name; use only its ``.random()``."""
     return random.Random(int.from_bytes(sub_key(sub_key(secret, "levels"), name), "big"))  # noqa: S311 - seeded by a MAC
 
 
 def own_code(codes: Sequence[str], secret: bytes, participant: str, block: str, code: str) -> str:
-    """Return a participant's own code of what ``code`` stands for; ``codes`` are those of the block, in any order."""
+    """Return a participant's own code for ``code``; ``codes`` are those of the block, in any order."""
     known = sorted(codes)
     mixed = shuffle(known, secret_stream(secret, f"codes/{participant}/{block}").random)
     return mixed[known.index(code)]
@@ -96,7 +96,7 @@ def group_of(shares: Mapping[str, int], secret: bytes, entry: int) -> str:
 
 
 def place_in_group(shares: Mapping[str, int], secret: bytes, entry: int) -> tuple[str, int]:
-    """Return the group of participant ``entry``, as `group_of`, and which participant of that group it is, from 1."""
+    """Return the group of participant ``entry``, as `group_of`, and the participant's number in it, from 1."""
     groups = [name for name in sorted(shares) for _ in range(shares[name])]
     block, at = divmod(entry - 1, len(groups))
     drawn = shuffle(groups, secret_stream(secret, f"groups/{block + 1}").random)

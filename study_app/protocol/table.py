@@ -51,7 +51,7 @@ _TAGS: Final = range(0xE0020, 0xE0080)  # that follow a flag
 
 
 def characters(text: str) -> list[str]:
-    """Return a text's characters as a person sees them: with accents, an emoji with all that belongs to it.
+    """Return a text's characters as a person sees them: letters with accents, whole emoji.
 
     This is Unicode's rule for extended grapheme clusters without Korean letters written in parts.
 
@@ -96,7 +96,7 @@ def _tidied(text: str) -> str:
 
 
 def unprintable(text: str, permitted: str = "") -> str | None:
-    """Return the first character that cannot be printed, or hides or reorders the others; ``permitted`` ones may."""
+    """Return the first character that cannot be printed, hides or reorders others; ``permitted`` ones may."""
     hidden = (
         character for character in text if unicodedata.category(character) in UNPRINTABLE or character in DIRECTIONS
     )
@@ -104,7 +104,7 @@ def unprintable(text: str, permitted: str = "") -> str | None:
 
 
 def _printable(text: str) -> str:
-    """Return ``text`` if a person can read it: something visible, and nothing that hides or reorders what is there."""
+    """Return ``text`` if it is legible: something visible, and nothing that hides or reorders other characters."""
     if (letter := unprintable(text, "\t\n\r")) is not None:
         raise invalid(f"holds the character U+{ord(letter):04X}, which cannot be printed: take it out")
     if not any(unicodedata.category(letter)[0] in VISIBLE for letter in text):
@@ -158,7 +158,7 @@ NOT_WITH: Final = "not with"
 def invalid(
     message: str, key: str = "", hint: str = "", use: tuple[str, Any] | None = None, kind: str = ""
 ) -> PydanticCustomError:
-    """Return the error of a table that is not valid: a sentence, the key that it is about, and what to do.
+    """Return the error about an invalid table: a sentence, its key, and the remedy.
 
     ``use`` is a key of the table with a value that repairs it, ``kind`` that of the `Fault`.
     """

@@ -31,7 +31,7 @@ class Track:
 
 
 def tracks_of(protocol: Protocol, block: Block) -> tuple[Track, ...]:
-    """Return the tracks of a block with a design, in the order in which they are written."""
+    """Return the tracks of a block with a design, in file order."""
     design = design_of(protocol, block)
     if block.stimulus is None:
         return tuple(Track(name, None, name, block.repetitions) for name in block.conditions if name != block.standard)
@@ -48,12 +48,12 @@ def tracks_of(protocol: Protocol, block: Block) -> tuple[Track, ...]:
 
 
 def track_of(protocol: Protocol, block: Block, name: str) -> Track:
-    """Return the track of that name (StopIteration if there is none)."""
+    """Return the track with a name (StopIteration if there is none)."""
     return next(track for track in tracks_of(protocol, block) if track.name == name)
 
 
 def standards_of(protocol: Protocol, block: Block) -> tuple[float | None, ...]:
-    """Return the standards that a block presents; a single None where a level is the value of the only interval."""
+    """Return the standards of a block; a single None if a level is the value of the only interval."""
     stimulus = stimulus_of(protocol, block)
     if stimulus.level_kind == "value" and design_of(protocol, block).intervals == 1:
         return (None,)
@@ -61,7 +61,7 @@ def standards_of(protocol: Protocol, block: Block) -> tuple[float | None, ...]:
 
 
 def present_value(protocol: Protocol, stimulus: Stimulus) -> float:
-    """Return the value that the varied number has in the protocol (StudyError if the condition has none)."""
+    """Return the varied number's value in the protocol (StudyError if the condition has none)."""
     name = condition_of(protocol, stimulus)
     condition = protocol.conditions[name]
     if stimulus.vary in OF_CONDITION:
@@ -70,19 +70,19 @@ def present_value(protocol: Protocol, stimulus: Stimulus) -> float:
 
 
 def design_of(protocol: Protocol, block: Block) -> Design:
-    """Return how a block's trials are built: a table of the file, or a kind with its defaults."""
+    """Return a block's design: a table of the file, or a kind with its defaults."""
     name = str(block.design)
     return protocol.designs[name] if name in protocol.designs else default_design(name)
 
 
 def method_of(protocol: Protocol, block: Block) -> Method:
-    """Return how a block's levels are chosen: a table of the file, or a kind with its defaults."""
+    """Return a block's method: a table of the file, or a kind with its defaults."""
     name = str(block.method)
     return protocol.methods[name] if name in protocol.methods else default_method(name)
 
 
 def adjusting_of(protocol: Protocol, block: Block, standard: float | None, start: float) -> Adjusting | None:
-    """Return the setting that starts at a level; None where participants set no level."""
+    """Return the setting that starts at a level; None if participants do not set levels."""
     method = None if block.stimulus is None else method_of(protocol, block)
     if not isinstance(method, Adjustment):
         return None
@@ -90,7 +90,7 @@ def adjusting_of(protocol: Protocol, block: Block, standard: float | None, start
 
 
 def has_correct_answer(design: Design, stimulus: Stimulus | None) -> bool:
-    """Return whether an answer can be correct.
+    """Return whether answers can be correct.
 
     A level that is a value may be above or below the standard: then an interval can still be the odd one, or the same
     as another, but a forced choice between more and less has no correct answer.
@@ -100,16 +100,16 @@ def has_correct_answer(design: Design, stimulus: Stimulus | None) -> bool:
 
 
 def success_name(design: Design, stimulus: Stimulus | None) -> str:
-    """Return what a share of answers is of: "correct", "yes", or "comparison chosen" where no answer is correct."""
+    """Return the name of a success: "correct", "yes", or "comparison chosen" if no answer is correct."""
     unlike_others = design.has_correct_answer and not has_correct_answer(design, stimulus)
     return "comparison chosen" if unlike_others else design.success_name
 
 
 def stimulus_of(protocol: Protocol, block: Block) -> Stimulus:
-    """Return what a block varies."""
+    """Return the stimulus of a block."""
     return protocol.stimuli[str(block.stimulus)]
 
 
 def condition_of(protocol: Protocol, stimulus: Stimulus) -> str:
-    """Return the condition whose number is varied."""
+    """Return the condition whose number varies."""
     return stimulus.condition or next(iter(protocol.conditions))

@@ -21,7 +21,7 @@ _PATTERNS: Final = tuple(
 
 
 def without_force(protocol: Protocol) -> Protocol:
-    """Return a study whose pages, introductions and instructions do not speak of force.
+    """Return a study whose pages, introductions and instructions do not mention force.
 
     It is to be shown, never to be kept or hashed.
     """

@@ -68,7 +68,7 @@ class Draft(BaseModel):
     sessions_differ: bool = False
 
     def scene_of(self, condition: Condition) -> Scene | None:
-        """Return what is felt in a condition, if all of it is sound."""
+        """Return the scene of a condition; None unless all of its parts are valid."""
         liquids = [self.liquids[name] for name in condition.liquid_ids if name in self.liquids]
         if (
             self.device is None
@@ -80,7 +80,7 @@ class Draft(BaseModel):
 
 
 def draft(document: Mapping[str, Any], broken: Iterable[Path], valid: Protocol | None) -> Draft:
-    """Return the sound entries of ``document``; ``broken`` are the paths of the problems already found."""
+    """Return the valid entries of ``document``; ``broken`` are the paths of the problems already found."""
     differ = bool(document.keys() & {"groups", "sequences"})
     if valid is not None:
         return Draft.model_construct(**dict(valid), sessions_differ=differ)
@@ -97,7 +97,7 @@ def draft(document: Mapping[str, Any], broken: Iterable[Path], valid: Protocol |
 
 
 def check(document: Mapping[str, Any], broken: Iterable[Path], valid: Protocol | None) -> Iterator[Fault]:
-    """Yield every problem between the tables of ``document``, whose ``broken`` places are known already.
+    """Yield every problem between the tables of ``document``; its ``broken`` places are already known.
 
     ``valid`` is the validated document if nothing is broken, so that its tables are not validated again.
     """
@@ -202,7 +202,7 @@ def equal_conditions(parts: Draft) -> Iterator[Fault]:
 
 
 def compares(parts: Draft) -> Iterator[Fault]:
-    """Check that the conditions of a main block differ in one thing, which is what the block says that it compares.
+    """Check that a main block's conditions differ in one thing, the one that the block states.
 
     Where it says views, delays may differ as well: those that make the views equally late.
     """
@@ -238,7 +238,7 @@ def blocks(parts: Draft) -> Iterator[Fault]:
 
 
 def counted_parts(parts: Draft) -> Iterator[Fault]:
-    """Check that parts count 1, 2, … in the order of the sequence, and that something is analysed.
+    """Check that parts count 1, 2, … in the order of the sequence, and that at least one block is analysed.
 
     Where sessions differ each numbers its parts anew (`own_protocol`).
     """
@@ -259,7 +259,7 @@ def counted_parts(parts: Draft) -> Iterator[Fault]:
 
 
 def force_n(scene: Scene, stroke: Stroke) -> float:
-    """Return about how much a scene exerts at most in a stroke [N]: the sum of its strongest liquid's effects."""
+    """Return an upper estimate of a scene's force in a stroke [N]: the sum of its strongest liquid's effects."""
     motion = MotionBox(
         speed_mps=_in_range(scene.scale * stroke.speed_mps),
         acceleration_mps2=_in_range(scene.scale * stroke.acceleration_mps2),
@@ -278,7 +278,7 @@ def _in_range(value: float) -> float:
 
 
 def within_tank(liquid: Liquid, scene: SceneDefaults, device: DeviceNeeds) -> bool:
-    """Return whether the ball's centre meets a liquid somewhere in the tank."""
+    """Return whether the ball's centre meets the liquid somewhere in the tank."""
     region = liquid.region
     if isinstance(region, Everywhere):
         return True
@@ -292,7 +292,7 @@ def within_tank(liquid: Liquid, scene: SceneDefaults, device: DeviceNeeds) -> bo
 
 
 def numbers(liquid: Liquid) -> dict[str, Any]:
-    """Return what makes a liquid feel as it does: all but its name, and the tables of effects it does not call for."""
+    """Return the values that decide how a liquid feels: all but its name and the tables of unused effects."""
     said = liquid.model_dump(exclude={"id"})
     if liquid.effects != "auto":
         said["effects"] = sorted(liquid.effects)

@@ -98,7 +98,7 @@ def _twice(listed: Sequence[tuple[Path, Any]]) -> Iterator[Fault]:
 
 
 def references(document: Document) -> Iterator[Fault]:
-    """Check that every name that stands for a table names one."""
+    """Check that every reference to a table names an existing one."""
     for pattern, section in REFERENCES.items():
         known, kind = names(document, section), "stimulus" if section == "stimuli" else section.removesuffix("s")
         for path, name in entries(document, pattern):
@@ -106,7 +106,7 @@ def references(document: Document) -> Iterator[Fault]:
 
 
 def sequence(document: Document) -> Iterator[Fault]:
-    """Check that each sequence names pages, blocks and forms, and that none is left out but pages of breaks.
+    """Check that each sequence names pages, blocks and forms, and that only break pages are left out.
 
     Blocks and forms come once in a sequence. `groups` checks that no block is left out of a study with groups.
     """
@@ -144,14 +144,14 @@ def sequence(document: Document) -> Iterator[Fault]:
 
 
 def repeats(document: Document) -> Iterator[Fault]:
-    """Check that no list names a thing twice."""
+    """Check that no list contains a name twice."""
     for pattern in WITHOUT_REPEATS:
         for path, listed in entries(document, pattern):
             yield from _twice([((*path, *at), entry) for at, entry in entries(listed, "*")])
 
 
 def items(document: Document) -> Iterator[Fault]:
-    """Check that an item's id is its own, and the same statement wherever two questionnaires share one."""
+    """Check that item ids are unique within a questionnaire, and name the same statement in all questionnaires."""
     statements: dict[str, Any] = {}
     seen: set[tuple[Any, str]] = set()
     for path, name in entries(document, "questionnaires.*.items.*.id"):
@@ -166,7 +166,7 @@ def items(document: Document) -> Iterator[Fault]:
 
 
 def alike(document: Document) -> Iterator[Fault]:
-    """Check that statements of a questionnaire, their short names and the points of a scale differ."""
+    """Check that a questionnaire's statements, their short names and a scale's points differ."""
     for name in names(document, "questionnaires"):
         for key in ("text", "short"):
             yield from _alike(list(entries(document, f"questionnaires.{name}.items.*.{key}")), "item")
@@ -178,7 +178,7 @@ def alike(document: Document) -> Iterator[Fault]:
 
 
 def _alike(located_texts: list[tuple[Path, Any]], kind: str) -> Iterator[Fault]:
-    """Yield a fault for every text that reads as an earlier one does; an entry may hold a text per language.
+    """Yield a fault for every text that reads like an earlier one; an entry may hold a text per language.
 
     People do not tell texts apart by case, width or white space, nor Latin letters from Cyrillic or Greek ones that
     look the same.
@@ -198,13 +198,13 @@ LOOKALIKES = str.maketrans("аеіјорсухѕһοαρνικ", "aeijopcyxshoap
 
 
 def as_read(text: str) -> str:
-    """Return what a reader sees of a text: without marks of format, case, width and alphabet."""
+    """Return the visible content of a text: without marks of format, case, width and alphabet."""
     visible = "".join(letter for letter in text if unicodedata.category(letter) != "Cf")
     return " ".join(unicodedata.normalize("NFKC", visible).casefold().translate(LOOKALIKES).split())
 
 
 def languages(document: Document) -> Iterator[Fault]:
-    """Check that every text exists in every language of the study and in no other."""
+    """Check that every text exists in exactly the study's languages."""
     written = [(path, name) for path, name in entries(document, "study.languages.*") if isinstance(name, str)]
     for path, name in written:
         if name not in LANGUAGES:
@@ -252,7 +252,7 @@ def groups(document: Mapping[str, Any]) -> Iterator[Fault]:
 
 
 def decisions(document: Document) -> Iterator[Fault]:
-    """Check that what is decided is about statements there are, each once, and that liquids are named by such items."""
+    """Check that decisions name existing statements, each once, and that such items name the liquids."""
     questions = (item for _, item in entries(document, "questionnaires.*.items.*") if isinstance(item, Mapping))
     items = {item["id"] for item in questions if isinstance(item.get("id"), str) and "kind" not in item}
     decided = {key: list(entries(document, f"analysis.{key}.*")) for key in DECIDED_LISTS}
@@ -270,7 +270,7 @@ def decisions(document: Document) -> Iterator[Fault]:
 
 
 def questions(document: Document) -> Iterator[Fault]:
-    """Check the items of every questionnaire: their scales, when they are shown, and what is computed of them."""
+    """Check the items of every questionnaire: scales, display conditions and scores."""
     scales = {
         str(path[1]): scale
         for path, table in entries(document, "scales.*")
@@ -306,7 +306,7 @@ def questions(document: Document) -> Iterator[Fault]:
 
 
 def _sound(read: Callable[[Any], T], table: Any) -> T | None:
-    """Return a scale or a question that is sound by itself."""
+    """Return a valid scale or question, None if it is invalid."""
     try:
         return read(table) if isinstance(table, Mapping) else None
     except (KeyError, ValidationError):

@@ -40,7 +40,7 @@ LEAST_SHARE: Final = 1e-6
 
 
 def kinds(document: Mapping[str, Any]) -> Iterator[Fault]:
-    """Check that every block's design and method names a table, or a kind that has a default for every key."""
+    """Check that every block's design and method names a table, or a kind whose keys all have defaults."""
     sections: tuple[tuple[str, str, Mapping[str, type[Table]]], ...] = (
         ("design", "designs", DESIGN_KINDS),
         ("method", "methods", METHOD_KINDS),
@@ -58,7 +58,7 @@ def kinds(document: Mapping[str, Any]) -> Iterator[Fault]:
 
 
 def designs(protocol: Protocol) -> Iterator[Fault]:
-    """Yield what is wrong with the blocks that have a design, and with what they vary."""
+    """Yield the faults of blocks with a design and of their stimuli."""
     faults = [fault for name, stimulus in protocol.stimuli.items() for fault in _varied(protocol, name, stimulus)]
     if faults:
         yield from faults
@@ -197,7 +197,7 @@ def _varied(protocol: Protocol, name: str, stimulus: Stimulus) -> Iterator[Fault
 
 
 def _levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
-    """Check that every level of a block can be presented with each of its standards."""
+    """Check that a block can present every level with each of its standards."""
     stimulus = protocol.stimuli[str(block.stimulus)]
     method = method_of(protocol, block)
     place = ("methods", str(block.method))
@@ -229,7 +229,7 @@ def _levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
 
 
 def _standard(protocol: Protocol, block: Block, stimulus: Stimulus, standard: float, level: float) -> Fault | None:
-    """Return why a standard cannot be presented, or does not differ from a comparison at the smallest level."""
+    """Return a fault if a standard cannot be presented or equals the comparison at the smallest level."""
     place = ("stimuli", str(block.stimulus))
     if stimulus.vary in OF_CONDITION and not 0 <= standard <= OF_CONDITION[stimulus.vary]:
         permitted = f"from 0 to {OF_CONDITION[stimulus.vary]:g}"
@@ -244,7 +244,7 @@ def _standard(protocol: Protocol, block: Block, stimulus: Stimulus, standard: fl
 
 
 def _beyond(block: Block, stimulus: Stimulus, standard: float | None, level: float) -> Fault:
-    """Return that a number of the condition, such as a visual delay, is beyond what can be presented."""
+    """Return a fault: a number of the condition, such as a visual delay, is out of range."""
     place, value = ("stimuli", str(block.stimulus), "levels"), stimulus.comparison(standard, level)
     name, limit = stimulus.vary, OF_CONDITION[stimulus.vary]
     unit = " ms" if name.endswith("_ms") else ""
@@ -269,7 +269,7 @@ def _presented(protocol: Protocol, stimulus: Stimulus, value: float) -> str | No
 
 
 def misfits(protocol: Protocol, block: Block) -> Iterator[Fault]:
-    """Yield that a design without a method, or a method without a design, is about settings."""
+    """Yield faults for a design without a method or a method without a design."""
     design, place = design_of(protocol, block), ("blocks", block.id)
     if block.stimulus is None:
         if design.adjusts:
@@ -285,7 +285,7 @@ def misfits(protocol: Protocol, block: Block) -> Iterator[Fault]:
 
 
 def adjustable(protocol: Protocol, block: Block) -> Iterator[Fault]:
-    """Yield why a number cannot be set while it is presented, or a standard not be matched."""
+    """Yield why a number cannot be adjusted while it is presented, or a standard not be matched."""
     design, stimulus = design_of(protocol, block), stimulus_of(protocol, block)
     if not design.adjusts:
         return
@@ -310,7 +310,7 @@ def adjustable(protocol: Protocol, block: Block) -> Iterator[Fault]:
 
 
 def _can_change(protocol: Protocol, condition: str, vary: str, values: list[float]) -> bool:
-    """Return whether the servo can go on from each of the values to the next, with the state that it has.
+    """Return whether the servo can change between successive values and keep its state.
 
     Of a force that is late it cannot: the forces on the way are those of the delay before.
     """

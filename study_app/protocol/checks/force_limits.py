@@ -51,7 +51,7 @@ _IS: Final = ("is", "are")
 
 
 def paced(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS) -> Iterator[Fault]:
-    """Yield what is wrong with tasks of kind "follow", and with balls that are hidden where a hand must aim.
+    """Yield the faults of tasks of kind "follow", and of hidden balls where the hand must aim.
 
     The study is sound but for this; a force acts ``delay_ticks`` ticks late.
     """
@@ -70,7 +70,7 @@ def paced(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS) -> Iterator[Faul
 
 
 def _lagging(protocol: Protocol) -> Iterator[Fault]:
-    """Check that the velocity estimator passes a damper at the frequency of each target."""
+    """Check that the velocity estimator passes a damper's force at the frequency of each target."""
     velocity, rate_hz = protocol.scene.velocity, protocol.device.rate_hz
     of_task: dict[str, list[Scene]] = {}
     for block in protocol.blocks.values():
@@ -90,7 +90,7 @@ def _lagging(protocol: Protocol) -> Iterator[Fault]:
 
 
 def by_stimulus(protocol: Protocol) -> list[list[Block]]:
-    """Return the blocks of levels, those that present one stimulus together."""
+    """Return the blocks with levels, grouped by stimulus."""
     blocks_of: dict[str, list[Block]] = {}
     for block in protocol.blocks.values():
         if block.stimulus is not None:
@@ -99,7 +99,7 @@ def by_stimulus(protocol: Protocol) -> list[list[Block]]:
 
 
 def beyond_slope_limit(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> Fault | None:
-    """Return that dampings of blocks with one stimulus exceed the slope limit for a delay [ticks]; None: none does."""
+    """Return a fault if dampings of one stimulus exceed the slope limit for a delay [ticks], else None."""
     stimulus = stimulus_of(protocol, blocks[0])
     extremes = [extreme for block in blocks for extreme in ends(protocol, block)]
     if not extremes:
@@ -120,7 +120,7 @@ def beyond_slope_limit(protocol: Protocol, blocks: Sequence[Block], delay_ticks:
 
 
 def clipped(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> Iterator[Fault]:
-    """Yield which levels each limit clips; a level that both clip counts as one of the slope limit.
+    """Yield the levels that each limit clips; a level that both clip counts for the slope limit.
 
     The blocks have one stimulus; in those whose task sets no pace, only damping has a limit (`clipped_unpaced`).
     A force acts ``delay_ticks`` ticks late.
@@ -157,7 +157,7 @@ def clipped(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> It
 
 
 def _every(protocol: Protocol, blocks: Sequence[Block]) -> dict[Level, Block]:
-    """Return each level of blocks with one stimulus once: where its force is the largest, with its block."""
+    """Return each level of one stimulus once, with the block in which its force is the largest."""
     levels_by_value: dict[tuple[float, float], tuple[Level, Block]] = {}
     for block in blocks:
         for level in levels(protocol, block.id):
@@ -168,7 +168,7 @@ def _every(protocol: Protocol, blocks: Sequence[Block]) -> dict[Level, Block]:
 
 
 def clipped_unpaced(protocol: Protocol, blocks: Sequence[Block]) -> str | None:
-    """Return which levels are clipped in fast motions of a task without a pace, as a warning; None where none is.
+    """Return a warning about levels clipped in fast motions of a task without a pace, or None.
 
     The blocks have one stimulus and one task.
     """
@@ -185,7 +185,7 @@ def clipped_unpaced(protocol: Protocol, blocks: Sequence[Block]) -> str | None:
 
 
 def clipped_at_pace(protocol: Protocol, block: Block, scene: Scene, what: str, place: Path) -> Iterator[Fault]:
-    """Yield how much of a scene's force the force limit clips at the pace of a block, and what would not be clipped.
+    """Yield a fault if the force limit clips a scene at a block's pace, with the share and the remedy.
 
     ``what`` is the subject of the sentence with its verb: "standard 32 at level 0.6 is".
     """
@@ -210,20 +210,20 @@ def clipped_at_pace(protocol: Protocol, block: Block, scene: Scene, what: str, p
 
 
 def floored(value: float, digits: int) -> float:
-    """Return a value rounded down, with room for the rounding of what it was computed from."""
+    """Return a value rounded down, with a margin for rounding errors of the value itself."""
     step = math.pow(10, digits)
     return math.floor(value * step + 1e-6) / step
 
 
 def _loop(scene: Scene, delay_ticks: int) -> tuple[float, str]:
-    """Return the slope limit [N·s/m] of a scene's loop, and what it is called."""
+    """Return the slope limit of a scene's loop [N·s/m] and its name."""
     limit_nspm = slope_limit(1 / scene.rate_hz, delay_ticks, scene.velocity)
     ticks = counted(delay_ticks, "tick")
     return limit_nspm, f"the slope limit ({scene.rate_hz:g} Hz, {scene.velocity.kind}, {ticks})"
 
 
 def _within_limit(stimulus: Stimulus, standard: float | None, level: float, limit_nspm: float) -> str:
-    """Return what keeps a damping within its limit."""
+    """Return the remedy that keeps a damping within its limit."""
     if standard is None or stimulus.level_kind == "value":
         return f"levels to {floored(limit_nspm, 1):g}"
     if standard >= limit_nspm:
@@ -236,7 +236,7 @@ def _within_limit(stimulus: Stimulus, standard: float | None, level: float, limi
 
 
 def _highest_in_full(protocol: Protocol, block: Block, standard: float | None) -> str:
-    """Return up to which level of a standard no limit clips the force, "" where not even the lowest."""
+    """Return the highest level of a standard that no limit clips; "" if all are clipped."""
     stimulus, limits = stimulus_of(protocol, block), level_limits(protocol, block)
     if limits is None or not limits.lowest:
         return ""
@@ -245,14 +245,14 @@ def _highest_in_full(protocol: Protocol, block: Block, standard: float | None) -
 
 
 def _named(every: Sequence[Level], some: Sequence[Level], verbs: tuple[str, str]) -> str:
-    """Return some levels as the subject of a sentence, with its verb: "levels 40 and 60 give up to"."""
+    """Return levels as the subject of a sentence with its verb: "levels 40 and 60 give up to"."""
     subject = _listed(every, some)
     several = subject.startswith("levels") or len({level.standard for level in some}) > 1
     return f"{subject} {verbs[several]}{' up to' * (len(some) > 1)}"
 
 
 def _listed(every: Sequence[Level], some: Sequence[Level]) -> str:
-    """Return some levels by their standards; of many in a row the first and the last."""
+    """Return levels by standard; of many in a row only the first and the last."""
     phrases = []
     for standard in dict.fromkeys(level.standard for level in some):
         own = [level for level in every if level.standard == standard]
@@ -273,7 +273,7 @@ def _listed(every: Sequence[Level], some: Sequence[Level]) -> str:
 
 
 def passed_share(velocity: Velocity, rate_hz: float, frequency_hz: float) -> float:
-    """Return Re V/(jωX), the estimated velocity over the true one in a swing of ``frequency_hz``, sampled evenly.
+    """Return Re V/(jωX), the estimated over the true velocity in a swing of ``frequency_hz``, sampled evenly.
 
     Of "ewma" from the recursion, of "kalman" from its lag.
     """
@@ -281,7 +281,7 @@ def passed_share(velocity: Velocity, rate_hz: float, frequency_hz: float) -> flo
 
 
 def fastest_hz(velocity: Velocity, rate_hz: float, share: float) -> float:
-    """Return the highest frequency [Hz] up to which an estimator passes this share, to 1 mHz; at most 20 Hz."""
+    """Return the highest frequency up to which an estimator passes this share [Hz], to 1 mHz; at most 20 Hz."""
     mhz = range(1, 20_000)
     return (
         bisect_left(mhz, True, key=lambda frequency_mhz: passed_share(velocity, rate_hz, frequency_mhz / 1000) < share)
@@ -290,7 +290,7 @@ def fastest_hz(velocity: Velocity, rate_hz: float, share: float) -> float:
 
 
 def returned(protocol: Protocol) -> Iterator[Fault]:
-    """Yield the blocks of levels in a paced motion whose late force returns more than the limit."""
+    """Yield faults for blocks of levels in a paced motion whose delayed force returns too much energy."""
     strokes = (
         (block, task.fastest_stroke(protocol.device.workspace_m))
         for block in protocol.blocks.values()
@@ -300,7 +300,7 @@ def returned(protocol: Protocol) -> Iterator[Fault]:
 
 
 def _returned(protocol: Protocol, block: Block, stroke: Stroke) -> Fault | None:
-    """Return the level of a block at which its force returns most, if that is beyond the limit."""
+    """Return a fault if a block's force returns more energy than the limit, with the level that returns most."""
     stimulus = stimulus_of(protocol, block)
     condition = condition_of(protocol, stimulus)
     if len(protocol.conditions[condition].liquid_ids) > 1:
@@ -327,14 +327,14 @@ def damping_nspm(scene: Scene, stroke: Stroke) -> float:
 
 
 def returned_j(damping: float, stroke: Stroke, delay_s: float) -> float:
-    """Return what a damper [N·s/m] that is late returns to the hand at each reversal of a stroke [J]."""
+    """Return the energy that a delayed damper [N·s/m] returns to the hand at each reversal of a stroke [J]."""
     omega = 2 * math.pi * stroke.frequency_hz
     angle = omega * delay_s
     return damping * stroke.speed_mps**2 / (2 * omega) * (math.sin(angle) - angle * math.cos(angle))
 
 
 def longest_ms(damping: float, stroke: Stroke) -> float:
-    """Return the longest delay at which a damper [N·s/m] returns no more than the limit [whole ms]."""
+    """Return the longest delay at which a damper [N·s/m] returns no more energy than the limit [whole ms]."""
     beyond = (
         delay_ms for delay_ms in range(MOST_DELAY_MS + 1) if returned_j(damping, stroke, delay_ms / 1000) > LIMIT_J
     )

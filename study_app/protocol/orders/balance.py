@@ -42,22 +42,22 @@ class Evenness:
 
     @property
     def positions_even(self) -> bool:
-        """Whether each code came in each position equally often."""
+        """Whether each code comes in each position equally often."""
         return len({count for line in self.positions for count in line}) <= 1
 
     @property
     def after_another(self) -> tuple[int, ...]:
-        """How often each code followed each other one."""
+        """The counts of how often each code follows each other one."""
         return tuple(count for at, line in enumerate(self.follows) for then, count in enumerate(line) if at != then)
 
     @property
     def follows_even(self) -> bool:
-        """Whether each code followed each other one equally often."""
+        """Whether each code follows each other one equally often."""
         return len({*self.after_another}) <= 1
 
     @property
     def balanced(self) -> bool:
-        """Whether both are so."""
+        """Whether positions and carry-over are both even."""
         return self.positions_even and self.follows_even
 
 
@@ -85,7 +85,7 @@ class Balance:
 
 
 def numbered(count: int, first: str = "P001") -> tuple[str, ...]:
-    """Return so many ids from the first one on; StudyError if that does not end in a number."""
+    """Return so many participant ids from ``first`` on; StudyError if that does not end in a number."""
     match = re.fullmatch(r"([A-Za-z0-9]*?)([0-9]+)", first)
     if match is None:
         raise StudyError(f"{first!r} is no first participant: give letters and digits that end in a number, as P061")
@@ -93,7 +93,7 @@ def numbered(count: int, first: str = "P001") -> tuple[str, ...]:
 
 
 def evenness(codes: Sequence[str], orders: Iterable[Sequence[str]]) -> Evenness:
-    """Count ``orders`` of ``codes``, planned or as they were run; all of one length."""
+    """Count the positions and successions in ``orders`` of ``codes``, planned or run, all of one length."""
     place = {code: index for index, code in enumerate(codes)}
     shown = [[place[code] for code in order] for order in orders]
     positions = [[0] * len(place) for _ in range(max(map(len, shown), default=0))]
@@ -116,7 +116,7 @@ def evenness(codes: Sequence[str], orders: Iterable[Sequence[str]]) -> Evenness:
 def balance(
     protocol: Protocol, participants: Sequence[str], seed: int, session: str = "", *, in_group: bool = False
 ) -> Balance:
-    """Return how even the orders of ``participants`` (ids) would be, all of them under ``seed``.
+    """Return how even the orders of ``participants`` (ids) are under ``seed``.
 
     In a study each session has a seed of its own; orders from a square do not depend on the seed. ``in_group`` says
     that these are the participants of a group, whose places in it assign the rows of squares. Without participants it
@@ -164,7 +164,7 @@ def balances(protocol: Protocol, participants: Sequence[str], seed: int) -> Iter
 
 
 def planned_participants(protocol: Protocol, group: str | None) -> int | None:
-    """Return how many participants are planned for a group (None: for the study), rounded down; None: not decided."""
+    """Return the planned participants of a group (None: of the study), rounded down; None if undecided."""
     planned = None if protocol.analysis is None else protocol.analysis.participants
     if planned is None or group is None:
         return planned
@@ -172,7 +172,7 @@ def planned_participants(protocol: Protocol, group: str | None) -> int | None:
 
 
 def block_orders_by_group(protocol: Protocol) -> dict[str, str]:
-    """Return in which order the main blocks come in each group; under "" if all groups are alike or there are none."""
+    """Return the order of the main blocks in each group; one entry "" if all groups are alike or there are none."""
     orders_by_group = {
         variant.group or "": block_order_words(
             variant.protocol, planned_participants(protocol, variant.group), in_group=variant.group is not None
@@ -184,7 +184,7 @@ def block_orders_by_group(protocol: Protocol) -> dict[str, str]:
 
 
 def block_order_words(protocol: Protocol, planned: int | None, *, in_group: bool = False) -> str:
-    """Return in which order the main blocks of a session come, and how even it is for so many ``planned`` participants.
+    """Return the order of a session's main blocks and its evenness for so many ``planned`` participants.
 
     ``protocol`` is that of the session; ``in_group`` says that the planned participants are those of one group.
     """
@@ -208,14 +208,14 @@ def block_order_words(protocol: Protocol, planned: int | None, *, in_group: bool
 
 
 def _of_blocks(orders: Orders, placed: Iterable[tuple[str, int | None]], seed: int) -> Evenness:
-    """Return how even the orders of the main blocks are; ``placed`` are ids with the numbers that assign their rows."""
+    """Return the evenness of the main blocks' orders; ``placed`` are ids with the numbers that assign their rows."""
     names = [block.id for block in orders.blocks if block.phase == "main"]
     shown = (blocks_in_order(orders, who, seed, place) for who, place in placed)
     return evenness(names, ([names[number] for number in order] for order in shown))
 
 
 def describe_balance(judged: Balance) -> str:
-    """Return the tables of every block, and what they mean."""
+    """Return the tables of every block with their interpretation."""
     people = "1 participant" if judged.participants == 1 else f"{judged.participants} participants"
     whose = f", {judged.session}" if judged.session else ""
     head = f"{judged.study}{whose}: the orders of {people}, each with seed {judged.seed}"
@@ -240,7 +240,7 @@ def _section(block: BlockBalance) -> Iterator[str]:
 
 
 def _table(corner: str, names: Sequence[object], codes: Sequence[str], counts: Table) -> Iterator[str]:
-    """Yield a table of counts, a row for each name and a column for each code."""
+    """Yield a table of counts with a row for each name and a column for each code."""
     width = max(len(str(cell)) for cell in (*codes, *(count for line in counts for count in line)))
     first = len("position")
     yield f"  {corner:<{first}}  {'  '.join(f'{code:>{width}}' for code in codes)}"
@@ -265,7 +265,7 @@ def _verdict(counted: Evenness) -> Iterator[str]:
 
 
 def _advice(block: BlockBalance) -> Iterator[str]:
-    """Yield what the order can promise, and what to change for more."""
+    """Yield what the order guarantees, and how to improve it."""
     codes, repetitions = len(block.evenness.codes), block.repetitions
     match block.order:
         case "fixed":
@@ -285,7 +285,7 @@ def _advice(block: BlockBalance) -> Iterator[str]:
 
 
 def _rounds(block: BlockBalance, rows: int) -> Iterator[str]:
-    """Yield whether the participants fill whole rounds of rows, and how many would."""
+    """Yield whether the participants complete rounds of rows, and how many would."""
     codes, people = len(block.evenness.codes), block.evenness.orders
     if block.unnumbered:
         yield f"No number in the id: {', '.join(block.unnumbered)}. Their rows are drawn, even on average only."

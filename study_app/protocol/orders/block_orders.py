@@ -39,12 +39,12 @@ class BlockOrder:
 
     @property
     def trials(self) -> int:
-        """How many trials a participant does at most."""
+        """The maximum number of trials."""
         return sum(self.slots) if self.slots else len(self.codes) * self.repetitions
 
     @property
     def breaks(self) -> int:
-        """How many breaks come between its trials."""
+        """The number of breaks between its trials."""
         return 0 if self.break_every is None else (self.trials - 1) // self.break_every
 
 
@@ -75,13 +75,13 @@ class Orders:
 
     @property
     def answers(self) -> int:
-        """How many answers a complete session holds at most, practice and forms included."""
+        """The maximum number of answers in a complete session, practice and forms included."""
         forms = (step for step in self.steps if isinstance(step, FormOrder))
         return sum(block.trials * len(block.items) for block in self.blocks) + sum(len(form.items) for form in forms)
 
 
 def block_codes(protocol: Protocol, block: Block) -> tuple[str, ...]:
-    """Return the codes of a block's conditions or tracks: L1, L2, … in a main block, the phase's name elsewhere."""
+    """Return the codes of a block's conditions or tracks: L1, L2, … in a main block, else the phase's name."""
     count = len(block.conditions) if block.design is None else len(tracks_of(protocol, block))
     if block.code_prefix is None and count == 1:
         return (block.phase,)
@@ -89,7 +89,7 @@ def block_codes(protocol: Protocol, block: Block) -> tuple[str, ...]:
 
 
 def orders_of(protocol: Protocol) -> Orders:
-    """Return what scheduling needs of a protocol."""
+    """Return the part of a protocol that scheduling needs."""
     steps: dict[str, BlockOrder | FormOrder] = {
         name: FormOrder(name, **_items(form)) for name, form in protocol.forms.items()
     }
@@ -99,7 +99,7 @@ def orders_of(protocol: Protocol) -> Orders:
 
 
 def order_of(protocol: Protocol, block: Block) -> BlockOrder:
-    """Return a block as scheduling sees it."""
+    """Return the part of a block that scheduling needs."""
     order: CodeOrder = block.order
     slots: tuple[int, ...] = ()
     if block.design is not None:
@@ -120,12 +120,12 @@ class _KeptSteps(BaseModel):
 
 
 def every_step_of(protocol: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the steps of all groups and sessions of the protocol in a receipt, each once (ValueError: it has none)."""
+    """Return the steps of all groups and sessions of a receipt's protocol, each once (ValueError: it has none)."""
     return tuple(dict.fromkeys(every_step(_KeptSteps.model_validate(protocol))))
 
 
 def follows_in(protocol: Mapping[str, Any], form: str) -> tuple[str | None, ...]:
-    """Return what `follows` returns, of the protocol in a receipt."""
+    """Return the same as `follows` for the protocol in a receipt."""
     blocks = protocol["blocks"]
     main = [name for name, block in blocks.items() if block.get("phase", "main") == "main"]
     exchanged = main if protocol["study"].get("block_order", "fixed") != "fixed" else ()
@@ -133,7 +133,7 @@ def follows_in(protocol: Mapping[str, Any], form: str) -> tuple[str | None, ...]
 
 
 def _items(questions: Questionnaire | None) -> dict[str, Any]:
-    """Return the ids of what is asked, and their order."""
+    """Return the ids of the questions, and their order."""
     if questions is None:
         return {"items": (), "item_order": "fixed"}
     return {"items": tuple(item.id for item in questions.items), "item_order": questions.item_order}

@@ -14,7 +14,7 @@ from study_app.protocol.trials.tasks import AnyTask
 
 
 def own_protocol(protocol: Protocol, group: str | None, session: int) -> Protocol:
-    """Return the protocol of a session of a participant of ``group``, which has one sequence and no groups.
+    """Return the protocol of one session of a participant in ``group``, with one sequence and no groups.
 
     Parts are numbered in the order of this session. A study whose sessions do not differ is returned as it is.
     StudyError says that the participant has fewer sessions.
@@ -63,13 +63,13 @@ statement, choose an interval."""
 
 
 def expected_duration_s(protocol: Protocol) -> float:
-    """Return how long a session will take [s], between the shortest and the longest it can be."""
+    """Return the expected duration of a session [s], between the shortest and the longest."""
     language = protocol.study.languages[0]
     return sum(step_duration_s(protocol, step, language) for step in protocol.steps)
 
 
 def duration_range_s(protocol: Protocol) -> tuple[float, float]:
-    """Return how long the shortest and the longest session will take [s]: tasks end early, or by their limit."""
+    """Return the shortest and the longest duration of a session [s]: tasks end early, or at their limit."""
 
     def session_s(own: Protocol, task_s: Callable[[AnyTask], float]) -> float:
         return sum(step_duration_s(own, step, own.study.languages[0], task_s) for step in own.steps)
@@ -84,7 +84,7 @@ def duration_range_s(protocol: Protocol) -> tuple[float, float]:
 def step_duration_s(
     protocol: Protocol, step: str, language: str, of_task: Callable[[AnyTask], float] | None = None
 ) -> float:
-    """Return how long a page, form or block will take [s], read in one of the study's languages."""
+    """Return the duration of a page, form or block [s], read in one of the study's languages."""
     if step in protocol.pages:
         return _reading_s(protocol, step, language)
     if step in protocol.forms:
@@ -93,7 +93,7 @@ def step_duration_s(
 
 
 def recordings_of(protocol: Protocol) -> Iterator[tuple[int, float]]:
-    """Yield how many recordings a session has of each block, and how long each of them is expected to take [s]."""
+    """Yield the number of a block's recordings in a session and the expected duration of each [s]."""
     for block in (protocol.blocks[step] for step in protocol.steps if step in protocol.blocks):
         method = method_of(protocol, block) if block.stimulus is not None else None
         intervals = 1 if block.design is None else design_of(protocol, block).intervals
@@ -102,7 +102,7 @@ def recordings_of(protocol: Protocol) -> Iterator[tuple[int, float]]:
 
 
 def answering_s(questionnaire: Questionnaire) -> float:
-    """Return how long a questionnaire takes each time it is asked [s]."""
+    """Return the time to answer a questionnaire once [s]."""
     return PAGE_S + ANSWER_S * len(questionnaire.items)
 
 
@@ -114,7 +114,7 @@ def _reading_s(protocol: Protocol, page_id: str, language: str) -> float:
 def block_duration_s(
     protocol: Protocol, block: Block, language: str, of_task: Callable[[AnyTask], float] | None = None
 ) -> float:
-    """Return how long a block will take [s]; ``of_task`` says how long one of its tasks takes, if not as expected."""
+    """Return the duration of a block [s]; ``of_task`` gives a task's duration if it is not the expected one."""
     questionnaire = protocol.questionnaire_of(block.id)
     answering = 0.0 if questionnaire is None else answering_s(questionnaire)
     order = order_of(protocol, block)

@@ -153,7 +153,7 @@ def build_schedule(protocol: Protocol | Orders, participant: str, seed: int, pla
 
 
 def _placed(orders: Orders, participant: str, seed: int, place: int | None) -> tuple[str | BlockOrder | FormOrder, ...]:
-    """Return the steps with the main blocks in the participant's order; each takes the part of its place."""
+    """Return the steps with the main blocks in the participant's order; each takes the part number of its place."""
     places = [at for at, step in enumerate(orders.steps) if isinstance(step, BlockOrder) and step.phase == "main"]
     steps = list(orders.steps)
     for at, number in zip(places, blocks_in_order(orders, participant, seed, place), strict=True):
@@ -164,7 +164,7 @@ def _placed(orders: Orders, participant: str, seed: int, place: int | None) -> t
 
 
 def blocks_in_order(orders: Orders, participant: str, seed: int, place: int | None = None) -> tuple[int, ...]:
-    """Return the numbers (from 0, as written) of the main blocks of a session in the order of ``participant``."""
+    """Return the numbers (from 0, in file order) of a session's main blocks in the order of ``participant``."""
     count = sum(block.phase == "main" for block in orders.blocks)
     if orders.block_order == "random":
         return shuffle(range(count), stream(seed, f"blocks/{participant}").random)
@@ -175,7 +175,7 @@ def blocks_in_order(orders: Orders, participant: str, seed: int, place: int | No
 
 
 def codes_of(study: str, block: BlockOrder, participant: str, seed: int, place: int | None = None) -> tuple[str, ...]:
-    """Return the codes of a block's trials, in the order in which ``participant`` meets them."""
+    """Return the codes of a block's trials in the order of ``participant``."""
     codes, times = block.codes, block.repetitions
     match block.order:
         case "fixed":
@@ -202,7 +202,7 @@ def codes_of(study: str, block: BlockOrder, participant: str, seed: int, place: 
 
 
 def _shuffled(step: BlockOrder | FormOrder, seed: int, name: str) -> tuple[str, ...]:
-    """Return the ids of what is asked in the order of presentation."""
+    """Return the ids of the questions in the order of presentation."""
     return step.items if step.item_order == "fixed" else shuffle(step.items, stream(seed, f"items/{name}").random)
 
 
@@ -252,7 +252,7 @@ def reproduce(
     complete: bool,
     place: int | None = None,
 ) -> tuple[str, ...]:
-    """Return how the trials that were run differ from those that protocol, seed and participant give.
+    """Return the differences between the recorded trials and those that protocol, seed and participant give.
 
     ``protocol`` is that of the session; ``recorded`` is what was run, in the order of time. A ``complete`` session went
     to its end, so that no trial may be missing. ``place`` is that of `build_schedule`.
@@ -267,7 +267,7 @@ def reproduce(
 
 
 def _against(planned: Trial | None, run: RecordedTrial) -> Iterator[str]:
-    """Yield how one recorded trial differs from the planned one of its number."""
+    """Yield the differences between a recorded trial and the planned one with its number."""
     if planned is None:
         yield f"trial {run.number}: recorded, but the seed gives no such trial"
         return
@@ -285,7 +285,7 @@ def _against(planned: Trial | None, run: RecordedTrial) -> Iterator[str]:
 
 
 def _progress(numbers: list[int], planned: dict[int, Trial], *, complete: bool, blocks: bool) -> Iterator[str]:
-    """Yield where the trials did not come one after the other, each attempt after the one before.
+    """Yield breaks in the order of trials and attempts.
 
     With ``blocks`` a resumed session presents the block again that it was within, from its first trial.
     """

@@ -28,7 +28,7 @@ from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stim
 
 
 def scene_of(protocol: Protocol, presented: Stimulated, link_seed: int = 0) -> Scene:
-    """Return what is felt; ``link_seed`` is that of jitter and loss of the force."""
+    """Return the scene of a presented condition; ``link_seed`` is the seed of the force's jitter and loss."""
     scene = protocol.scene_for(presented.condition)
     link = presented_condition(protocol, presented).link(link_seed)
     if link.acts:
@@ -39,14 +39,14 @@ def scene_of(protocol: Protocol, presented: Stimulated, link_seed: int = 0) -> S
 
 
 def presented_condition(protocol: Protocol, presented: Stimulated) -> Condition:
-    """Return the presented condition, with its varied number if that is one of its force link."""
+    """Return the presented condition, with the varied number if it belongs to the force link."""
     condition = protocol.conditions[presented.condition]
     varied = {presented.vary: presented.value} if presented.vary in OF_LINK else {}
     return condition.model_copy(update=varied)
 
 
 def link_words(delay_ms: float = 0.0, jitter_ms: float = 0.0, loss: float = 0.0) -> Iterator[str]:
-    """Yield what is unusual of how the force of a condition is sent: late [ms], with jitter [ms], with losses."""
+    """Yield what is unusual about a condition's force link: delay [ms], jitter [ms], losses."""
     if delay_ms:
         yield f"force {delay_ms:g} ms late"
     if jitter_ms:
@@ -56,24 +56,24 @@ def link_words(delay_ms: float = 0.0, jitter_ms: float = 0.0, loss: float = 0.0)
 
 
 def delays_force(protocol: Protocol) -> bool:
-    """Return whether a study sends any force late, with jitter or with loss."""
+    """Return whether any force of a study is sent with delay, jitter or loss."""
     varied = any(stimulus.vary in OF_LINK for stimulus in protocol.stimuli.values())
     return varied or any(condition.link().acts for condition in protocol.conditions.values())
 
 
 def link_seed(schedule_seed: int, participant: str, trial: int, attempt: int, interval: int | None) -> int:
-    """Return the seed of jitter and loss of the force in one attempt at a trial, or in one of its intervals."""
+    """Return the seed of the force's jitter and loss in an attempt at a trial, or in one of its intervals."""
     draw = stream(schedule_seed, f"force link/{participant}/{trial}/{attempt}/{interval or 1}")
     return int(draw.random() * 2**32)
 
 
 def delay_s_of(protocol: Protocol, presented: Stimulated) -> float:
-    """Return by how much the tank is drawn late [s]."""
+    """Return the visual delay of the tank [s]."""
     return presented.value / 1000 if presented.vary == DELAY else protocol.delay_s(presented.condition)
 
 
 def longest_delay_s(protocol: Protocol, block: Block) -> float:
-    """Return the longest delay that a block can present [s]: the same for all its trials, so that it reveals none."""
+    """Return the longest delay that a block can present [s]: the same in all its trials, so that it reveals none."""
     if block.stimulus is not None and (stimulus := stimulus_of(protocol, block)).vary == DELAY:
         standards = standards_of(protocol, block)
         compared = [stimulus.comparison(standard, level) for standard in standards for level in stimulus.levels]
@@ -82,12 +82,12 @@ def longest_delay_s(protocol: Protocol, block: Block) -> float:
 
 
 def arrangement_text(design: Design, arrangement: int) -> str:
-    """Return an arrangement as the journal writes it: S for the standard, C for the comparison, such as "SC"."""
+    """Return an arrangement for the journal: S for the standard, C for the comparison, such as "SC"."""
     return "".join("C" if holds else "S" for holds in design.arrangements[arrangement])
 
 
 def arrangement_of(design: Design, text: str) -> int:
-    """Return the arrangement that the journal writes so (ValueError if the design has none)."""
+    """Return the arrangement with this text in the journal (ValueError if the design has none)."""
     return design.arrangements.index(tuple(letter == "C" for letter in text))
 
 
@@ -113,7 +113,7 @@ class Presentation:
 def next_level(
     protocol: Protocol, key: Key, schedule: Schedule, trial: Trial, heard: Sequence[TrialResult]
 ) -> Presentation | None:
-    """Return what a trial presents; None where its track has ended or its block met its criterion: it is passed over.
+    """Return a trial's presentation; None to skip it, after the end of its track or the criterion of its block.
 
     The trial is of a block with a design; participant and seed of the schedule name the draws. Of the answered trials,
     ``heard``, in any order, only earlier ones count.
@@ -154,7 +154,7 @@ def next_level(
 
 
 def criterion_met(block: Block, schedule: Schedule, heard: Sequence[TrialResult]) -> bool:
-    """Return whether so many of a block's last answers among those ``heard`` were correct that it ends."""
+    """Return whether enough of a block's last answers among ``heard`` are correct to end it."""
     if block.until is None:
         return False
     numbers = {planned.number for planned in schedule.trials if planned.block == block.id}
@@ -181,12 +181,12 @@ class _Draws:
         return shuffle(twice, secret_stream(self.secret, f"{among}/{self.track}/{run}").random)[place]
 
     def catch(self, stretches: Sequence[range]) -> tuple[int, ...]:
-        """Return the slots of the catch trials, ascending: one of each stretch."""
+        """Return the slots of the catch trials in ascending order: one in each stretch."""
         draw = secret_stream(self.secret, f"catch/{self.track}").random
         return tuple(stretch[int(draw() * len(stretch))] for stretch in stretches)
 
     def noise(self, count: int, slots: int) -> tuple[int, ...]:
-        """Return the slots that present the standard alone, ascending."""
+        """Return the slots that present the standard alone, in ascending order."""
         order = shuffle(range(slots), secret_stream(self.secret, f"noise/{self.track}").random)
         return tuple(sorted(order[:count]))
 
@@ -197,7 +197,7 @@ class _Draws:
 def presentation_of(
     protocol: Protocol, block: Block, track: Track, arrangement: int, level: float | None, *, catch: bool = False
 ) -> Presentation:
-    """Return what a trial of a track presents at a level (None: conditions are compared), in an arrangement."""
+    """Return a track's presentation at a level (None: conditions are compared) in an arrangement."""
     presented = design_of(protocol, block).arrangements[arrangement]
     intervals = tuple(_interval(protocol, block, track, level if holds else None, holds) for holds in presented)
     return Presentation(level, track.standard, arrangement, intervals, catch)
@@ -216,7 +216,7 @@ def _interval(protocol: Protocol, block: Block, track: Track, level: float | Non
 def presented_by(
     protocol: Protocol, codes: Mapping[str, Mapping[str, str]], started: Mapping[str, Any]
 ) -> Presentation:
-    """Return what a trial presented, from the line on its beginning whose sealed fields are opened.
+    """Return a recorded trial's presentation from its first journal line with opened sealed fields.
 
     A line, or a key, that does not fit the study raises KeyError, ValueError (its arrangement) or StopIteration (its
     track).

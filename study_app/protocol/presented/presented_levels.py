@@ -62,7 +62,7 @@ class LevelLimits:
 
     @property
     def lowest(self) -> float | None:
-        """The value above which a limit clips the force; None where none does."""
+        """The value above which a limit clips the force; None without a limit."""
         return min((limit for limit in (self.force, self.loop) if limit is not None), default=None)
 
 
@@ -86,24 +86,24 @@ class Clipping:
 
     @property
     def named(self) -> str:
-        """The standard as one of several: " 52"; "" where there is no other."""
+        """The standard as one of several: " 52"; "" if it is the only one."""
         return f" {self.standard:g}" if self.others else ""
 
     def highest(self, stimulus: Stimulus) -> float:
-        """Return the highest level that is presented in full; infinite where higher ones have less force."""
+        """Return the highest level that is presented in full; infinite if higher ones have less force."""
         if self.standard is not None and stimulus.level_kind != "value" and stimulus.direction == "down":
             return 0.0 if self.clips_standard else math.inf
         return stimulus.level_between(self.standard, self.limit)
 
     def presented(self, stimulus: Stimulus, levels: Floats) -> Floats:
-        """Return levels (n,) as they are presented: between what limits leave of the standard and of the comparison."""
+        """Return levels (n,) as presented: between the clipped standard and the clipped comparison."""
         standard = None if self.standard is None else min(self.standard, self.limit)
         comparisons = np.minimum(stimulus.comparison(self.standard, levels), self.limit)
         return stimulus.level_between(standard, comparisons)
 
 
 def levels(protocol: Protocol, block_id: str) -> tuple[Level, ...]:
-    """Return every level that a block with a stimulus can present, standard by standard, the smallest first."""
+    """Return every level that a block with a stimulus can present, by standard, the smallest first."""
     block = protocol.blocks[block_id]
     if block.stimulus is None:
         return ()
@@ -144,7 +144,7 @@ def _level(stimulus: Stimulus, scene: Scene, hand_mps: float, standard: float | 
 
 
 def level_limits(protocol: Protocol, block: Block) -> LevelLimits | None:
-    """Return the limits of what a block varies; None where it varies no force of one liquid."""
+    """Return the limits of a block's varied number; None if it does not vary the force of one liquid."""
     if block.stimulus is None:
         return None
     stimulus, standards = stimulus_of(protocol, block), standards_of(protocol, block)
@@ -165,7 +165,7 @@ def level_limits(protocol: Protocol, block: Block) -> LevelLimits | None:
 
 
 def _last(beyond: Callable[[float], bool], most: float) -> float | None:
-    """Return the highest value, up to some times ``most``, that is not beyond a limit; None where none is."""
+    """Return the highest value up to a multiple of ``most`` that is within a limit; None if none is."""
 
     def holds(value: float) -> bool:
         try:
@@ -181,7 +181,7 @@ def _last(beyond: Callable[[float], bool], most: float) -> float | None:
 
 
 def clipping(protocol: Protocol, block: Block, limits: LevelLimits | None = None) -> Clipping | None:
-    """Return how limits clip a block's levels; None where they clip none, or no level follows from the limits.
+    """Return how limits clip a block's levels; None if they clip none, or levels do not follow from the limits.
 
     ``limits`` are those of `level_limits`, where they are known.
     """
@@ -199,13 +199,13 @@ def clipping(protocol: Protocol, block: Block, limits: LevelLimits | None = None
 
 
 def hand_mps_of(protocol: Protocol, block: Block) -> float:
-    """Return the speed of the hand at the fastest point of a block's task [m/s]."""
+    """Return the hand's speed at the fastest point of a block's task [m/s]."""
     task = protocol.tasks[block.task]
     return FASTER * task.fastest_stroke((0.0, 0.0, 0.0)).speed_mps if isinstance(task, Follow) else UNPACED_MPS
 
 
 def ends(protocol: Protocol, block: Block) -> Iterator[tuple[float | None, float, Scene]]:
-    """Yield standard, level and scene at the strongest and the weakest level of each standard, but for delays."""
+    """Yield standard, level and scene at the strongest and the weakest level of each standard, except for delays."""
     stimulus = stimulus_of(protocol, block)
     if stimulus.vary == DELAY:
         return

@@ -27,7 +27,7 @@ def has(node: Any, step: str | int) -> bool:
 
 
 def value_at(document: Any, path: Path) -> Any:
-    """Return the value at ``path``, None where there is none."""
+    """Return the value at ``path``, None if there is none."""
     for step in path:
         if not has(document, step):
             return None
@@ -36,7 +36,7 @@ def value_at(document: Any, path: Path) -> Any:
 
 
 def entries(document: Any, pattern: str) -> Iterator[tuple[Path, Any]]:
-    """Yield what is at the places of ``pattern`` with their paths: "blocks.*.conditions.*", where ``*`` is any."""
+    """Yield the values at the places of ``pattern`` with their paths: "blocks.*.conditions.*", where ``*`` is any."""
     nodes: list[tuple[Path, Any]] = [((), document)]
     for step in pattern.split("."):
         nodes = [
@@ -48,17 +48,17 @@ def entries(document: Any, pattern: str) -> Iterator[tuple[Path, Any]]:
 
 
 def _inside(node: Any) -> Iterable[tuple[str | int, Any]]:
-    """Return what is in a table or array, with its keys or indices."""
+    """Return the entries of a table or array with their keys or indices."""
     return node.items() if isinstance(node, _TABLE) else enumerate(node) if isinstance(node, tuple) else ()
 
 
 def names(document: Any, section: str) -> tuple[str, ...]:
-    """Return the names of the tables of a section, sound or not."""
+    """Return the names of the tables of a section, valid or not."""
     return tuple(str(path[1]) for path, _ in entries(document, f"{section}.*") if isinstance(path[1], str))
 
 
 def frozen(value: Any) -> Any:
-    """Return what ``tomllib`` read with its arrays as tuples (ValueError of whole numbers beyond 64 bits, TOML's)."""
+    """Return a ``tomllib`` value with arrays as tuples (ValueError: whole numbers beyond TOML's 64 bits)."""
     if isinstance(value, list):
         return tuple(frozen(entry) for entry in value)
     if isinstance(value, dict):
@@ -103,7 +103,7 @@ class Node(NamedTuple):
 
 @lru_cache(maxsize=2)
 def scan(text: str) -> tuple[Node, ...]:
-    """Return every header, key and array entry of a TOML text, in the order in which they begin."""
+    """Return every header, key and array entry of a TOML text, in order of position."""
     nodes = _Scan(text).nodes
     return tuple(sorted(nodes, key=attrgetter("start")))
 
@@ -206,7 +206,7 @@ class _Scan:
                 return tuple(keys), tuple(parts)
 
     def _skip_blank(self) -> bool:
-        """Go past white space and comments; False at the end of the text."""
+        """Skip white space and comments; return False at the end of the text."""
         if blank := _BLANK.match(self._text, self._at):
             self._at = blank.end()
         return self._at < len(self._text)
@@ -226,7 +226,7 @@ class Places:
 
     @cached_property
     def _lines(self) -> dict[Path, int]:
-        """The lines by path; a text without problems is not scanned for them."""
+        """The lines by path; only texts with problems are scanned for them."""
         line_starts = [0, *(match.end() for match in re.finditer("\n", self._source))]
         lines: dict[Path, int] = {}
         for node in scan(self._source):
@@ -246,5 +246,5 @@ class Places:
 
 @lru_cache(maxsize=2)
 def places_of(text: str) -> Places:
-    """Return the lines of a TOML text, which may end its lines as it likes."""
+    """Return the lines of a TOML text with any kind of line ends."""
     return Places(text.replace("\r\n", "\n"))

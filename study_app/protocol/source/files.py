@@ -34,17 +34,17 @@ DRAWN_OR_LIVE: Final = ("tank", "camera")
 
 
 def without_mark(content: bytes) -> bytes:
-    """Return a file's content without the byte order mark that some editors and spreadsheets write before UTF-8."""
+    """Return a file's content without the byte order mark that some editors write before UTF-8."""
     return content.removeprefix(codecs.BOM_UTF8)
 
 
 def is_utf16(content: bytes) -> bool:
-    """Return whether a text file is in UTF-16: it begins with a mark of UTF-16, or with a null byte beside a letter."""
+    """Return whether a text file is in UTF-16: it begins with that mark, or with a null byte beside a letter."""
     return content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or b"\0" in content[:2]
 
 
 def with_liquid_files(study: bytes, folder: Path) -> bytes:
-    """Return a study's source: its file ``study`` without a byte order mark, and the files it names in ``folder``.
+    """Return a study's source: its file without a byte order mark, and the files it names in ``folder``.
 
     One that cannot be read is left out; `load.parse` reports it. A source is returned as it is.
     """
@@ -58,7 +58,7 @@ def with_liquid_files(study: bytes, folder: Path) -> bytes:
 def bundled(
     study: bytes, text_of: Callable[[str], str | None], hashes: Mapping[str, str] = MappingProxyType({})
 ) -> bytes:
-    """Return a study's file followed by what it names.
+    """Return a study's file followed by the files that it names.
 
     ``text_of`` gives the text of a liquid file, None if it is lost; ``hashes`` are the SHA-256 of its footage, by name.
     """
@@ -67,7 +67,7 @@ def bundled(
 
 
 def unbundled(source: bytes) -> tuple[bytes, dict[str, str]]:
-    """Return the study's file in a source, and the texts of its liquid files by their names."""
+    """Return the study's file in a source, and the texts of its liquid files by name."""
     rest, texts = _split(source, _HEADER)
     return _split(rest, _FOOTAGE_HEADER)[0], texts
 
@@ -78,7 +78,7 @@ def hashes_in(source: bytes) -> dict[str, str]:
 
 
 def _split(source: bytes, header: bytes) -> tuple[bytes, dict[str, str]]:
-    """Return what stands before a header, and the table after it."""
+    """Return the bytes before a header, and the table after it."""
     before, separator, table = source.rpartition(header)
     return (before, tomllib.loads(table.decode())) if separator else (source, {})
 
@@ -92,22 +92,22 @@ def _table(header: bytes, texts: Mapping[str, str]) -> bytes:
 
 
 def file_of(liquid: Any) -> Any:
-    """Return what a liquid's table names as its file; None where it names none."""
+    """Return the file name in a liquid's table; None if it has none."""
     return liquid.get("file") if isinstance(liquid, Mapping) else None
 
 
 def footage_names(study: bytes) -> list[str]:
-    """Return the names of the footage of a study, sorted; none where it is not TOML (`load.parse` reports it)."""
+    """Return the sorted names of a study's footage; empty if it is not TOML (`load.parse` reports it)."""
     return [name for name in _values(study, "conditions", "view") if is_footage(name)]
 
 
 def is_footage(view: object) -> bool:
-    """Return whether a condition's view is a file of footage."""
+    """Return whether a condition's view is a footage file."""
     return isinstance(view, str) and view not in DRAWN_OR_LIVE
 
 
 def file_hash(path: Path) -> str | None:
-    """Return the SHA-256 of a file, in hexadecimal; None where it cannot be read."""
+    """Return the SHA-256 of a file in hexadecimal; None if it cannot be read."""
     try:
         held = path.stat()
         return _hash(path, held.st_size, held.st_mtime_ns) if path.is_file() else None
@@ -117,13 +117,13 @@ def file_hash(path: Path) -> str | None:
 
 @lru_cache(maxsize=64)
 def _hash(path: Path, size: int, changed_ns: int) -> str:
-    """Return the hash; ``size`` and ``changed_ns`` see to it that a changed file is read again."""
+    """Return the hash; ``size`` and ``changed_ns`` make the cache miss after a change."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _values(study: bytes, section: str, key: str) -> list[str]:
-    """Return the texts that the tables of a section hold under a key, each once, sorted; none where it is not TOML."""
+    """Return the sorted texts under a key in a section's tables, each once; empty if the study is not TOML."""
     if not re.search(rf"""\b{key}["']?[ \t]*=""".encode(), study):
         return []
     try:
@@ -164,29 +164,29 @@ _SHIPPED = (
 
 
 def _shipped_folder() -> Path:
-    """Return the protocols inside an installed package, or next to the package in a checkout."""
+    """Return the protocols' folder in an installed package, or beside the package in a checkout."""
     inside = _PACKAGE / "protocols"
     return inside if inside.is_dir() else _PACKAGE.parent / "protocols"
 
 
 def shipped() -> tuple[str, ...]:
-    """Return the names of the protocols that ship with the program, sorted."""
+    """Return the sorted names of the shipped protocols."""
     return tuple(name for name in _SHIPPED if shipped_file(name).is_file())
 
 
 def shipped_file(name: str) -> Path:
-    """Return the file of a protocol that ships with the program, even where the workspace has one of the same name."""
+    """Return the file of a shipped protocol, even if the workspace has one with the same name."""
     return _shipped_folder() / f"{name}.toml"
 
 
 def shipped_studies() -> tuple[Path, ...]:
-    """Return the files of all studies that ship with the program: protocols, and the templates of the designer."""
+    """Return the files of all shipped studies: protocols and the designer's templates."""
     templates = (_PACKAGE / "designer" / "templates").glob("*.toml")
     return (*(shipped_file(name) for name in shipped()), *sorted(templates))
 
 
 def at_hand() -> tuple[str, ...]:
-    """Return the names of the protocols in the workspace, then of those that ship with the program."""
+    """Return the names of the workspace's protocols, then of shipped ones."""
     return tuple(dict.fromkeys((*(path.stem for path in workspace().own_protocols()), *shipped())))
 
 
@@ -212,7 +212,7 @@ def _not_found(name_or_path: str | Path, message: str, hint: str) -> ProtocolErr
 
 
 def source_bytes(name_or_path: str | Path) -> bytes:
-    """Return a protocol's file, followed by the liquid files it names (`with_liquid_files`)."""
+    """Return a protocol's file followed by its liquid files (`with_liquid_files`)."""
     path = find(name_or_path)
     try:
         source = path.read_bytes()
@@ -230,5 +230,5 @@ def check_size(source: bytes, name: str) -> None:
 
 
 def protocol_hash(source: bytes) -> str:
-    """Return the SHA-256 of a protocol's source, in hexadecimal: of its file and the liquid files it names."""
+    """Return the SHA-256 of a protocol's source in hexadecimal: its file and liquid files."""
     return hashlib.sha256(source).hexdigest()

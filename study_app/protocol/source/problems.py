@@ -44,7 +44,7 @@ class Fault(NamedTuple):
     permitted: tuple[str, ...] = ()
 
     def concerns(self, language: str, first: str) -> bool:
-        """Return whether it is seen where texts are shown in a language; ``first`` is that of plain texts."""
+        """Return whether the fault is visible in texts of a language; plain texts are in ``first``."""
         return self.missing_language in ("", language) and not (self.kind == "one language" and language == first)
 
     def located(self, places: Places) -> Problem:
@@ -88,7 +88,7 @@ _LENGTHS = {
 
 
 def shown(value: Any) -> str:
-    """Return a value as it would be written in the file, shortened."""
+    """Return a value as the file would write it, shortened."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
@@ -99,7 +99,7 @@ def shown(value: Any) -> str:
 
 
 def rule_of(pattern: str) -> str:
-    """Return in words which texts a pattern permits."""
+    """Return the rule of a pattern in words."""
     return _PATTERNS.get(pattern, f"text that matches {pattern}")
 
 
@@ -113,7 +113,7 @@ def did_you_mean(word: str, permitted: Iterable[str]) -> str:
 
 
 def unknown(path: Path, message: str, word: str, permitted: Iterable[str], cutoff: float = 0.0) -> Fault:
-    """Return the fault of a word that names nothing: with the nearest permitted one, or the list of them."""
+    """Return the fault about an unknown name, with the nearest permitted one or the list of them."""
     known = sorted(permitted)
     nearest = difflib.get_close_matches(word, known, n=1, cutoff=cutoff)
     near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
@@ -122,13 +122,13 @@ def unknown(path: Path, message: str, word: str, permitted: Iterable[str], cutof
 
 
 def _quoted(path: Path, value: Any, message: str, permitted: str) -> Fault:
-    """Return the fault of a value that is none of some quoted words: with the one that is near."""
+    """Return the fault about a value that is not among quoted words, with the nearest one."""
     near = difflib.get_close_matches(str(value), re.findall('"([^"]*)"', permitted), n=1)
     return Fault(path, message, f'did you mean "{near[0]}"?', use=(path, near[0])) if near else Fault(path, message)
 
 
 def faults_of(error: ValidationError, document: Mapping[str, Any], schema: Schema) -> list[Fault]:
-    """Return pydantic's findings about ``document``; ``schema`` is the JSON Schema of what it should be."""
+    """Return pydantic's findings in ``document`` as faults; ``schema`` is its JSON Schema."""
     faults = [_fault(details, document, schema) for details in error.errors(include_url=False)]
     paths = [fault.path for fault in faults]
     return [  # where an entry of an array is broken, pydantic counts the sound ones only
@@ -189,7 +189,7 @@ def _tag_key(context: Mapping[str, Any]) -> str:
 
 
 def _path_in(document: Any, loc: tuple[str | int, ...], *, keep_last: bool) -> Path:
-    """Return ``loc`` without what is no key or index of the document: tags of unions, names of validators."""
+    """Return ``loc`` without parts that are not in the document: union tags and validator names."""
     path: list[str | int] = []
     node = document
     tagged: Any = None
@@ -206,7 +206,7 @@ def _path_in(document: Any, loc: tuple[str | int, ...], *, keep_last: bool) -> P
 
 
 def _nodes_at(document: Any, path: Path, schema: Schema) -> list[Schema]:
-    """Return what the schema says of the place at ``path``: several alternatives where it permits them."""
+    """Return the schema nodes at ``path``: several if it permits alternatives."""
     nodes = list(_alternatives(schema, schema, document))
     for step in path:
         document = document[step]
@@ -233,7 +233,7 @@ def _children(node: Schema, step: str | int) -> Iterator[Schema]:
 
 
 def _alternatives(node: Schema, schema: Schema, value: Any) -> Iterator[Schema]:
-    """Follow references and unions; of several tables those are left whose fixed keys (kind, law) are the value's."""
+    """Follow references and unions; among several tables keep those whose fixed keys (kind, law) match the value."""
     if "$ref" in node:
         yield from _alternatives(schema["$defs"][node["$ref"].rsplit("/", 1)[-1]], schema, value)
     elif branches := node.get("anyOf") or node.get("oneOf"):

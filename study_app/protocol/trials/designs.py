@@ -36,10 +36,10 @@ class Attention(Protocol):
 
     @property
     def smallest(self) -> bool:
-        """Whether the weaker one is asked for."""
+        """Whether the weaker interval is asked for."""
 
     def distinct(self, difference: float, about: float) -> bool:
-        """Return whether a difference between two around ``about`` is noticed."""
+        """Return whether a difference between two values around ``about`` is noticed."""
 
 
 class Modulus(Table):
@@ -109,7 +109,7 @@ class Design(Table):
 
     @property
     def wording(self) -> str:
-        """The name of its question among the program's own words."""
+        """The name of its question among the program's own texts."""
         return self.kind
 
     @property
@@ -117,7 +117,7 @@ class Design(Table):
         return len(self.arrangements[0])
 
     def noise(self, comparisons: int) -> int:
-        """Return how many slots present the standard alone, in addition to so many comparisons."""
+        """Return the number of slots with the standard alone, in addition to so many comparisons."""
         return 0
 
     def correct(self, arrangement: int) -> str | None:
@@ -130,46 +130,46 @@ class Design(Table):
         return None if correct is None else answer == correct
 
     def correct_of(self, answers: AnswerCounts) -> tuple[int, int]:
-        """Return how many answers were correct, and of how many."""
+        """Return the number of correct answers, and of all answers."""
         return sum(count for pair, count in answers.items() if self.is_correct(*pair)), sum(answers.values())
 
     def success(self, arrangement: int, answer: str) -> bool | None:
-        """Return what an answer counts as for a psychometric function; None where it does not enter one."""
+        """Return whether an answer is a success of the psychometric function; None if it does not count."""
         return self.is_correct(arrangement, answer)
 
     def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
-        """Return d′ and bias of one observer; None where the answers do not give them."""
+        """Return d′ and bias of one observer; None if the answers do not determine them."""
         return self._sensitivity(answers, "differencing" if roving else "independent")
 
     def _sensitivity(self, answers: AnswerCounts, model: Model) -> Sensitivity | None:
         return detection.from_correct(self.kind, *self.correct_of(answers)) if self.has_correct_answer else None
 
     def proportion_correct(self, d_prime: float, *, roving: bool) -> float:
-        """Return P(correct) of an unbiased observer at a d′ of 0 or more, where answers can be correct."""
+        """Return P(correct) of an unbiased observer at a d′ of 0 or more, if answers can be correct."""
         model = f" {'differencing' if roving else 'independent'}" if self.kind in {"abx", "samedifferent"} else ""
         return detection.proportion_correct(f"{self.kind}{model}", d_prime)
 
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
-        """Return the answer of a simulated observer, where the reply is a choice.
+        """Return the answer of a simulated observer, for designs with a choice.
 
         Each interval is ``perceived`` as a number; ``mean`` is that of all intervals of the block so far.
         """
         raise NotImplementedError
 
     def shows_feedback(self, practice: bool) -> bool:
-        """Return whether the participant sees if an answer was correct."""
+        """Return whether participants see if an answer was correct."""
         when = self.feedback or ("practice" if self.has_correct_answer else "never")
         return when == "always" or (when == "practice" and practice)
 
 
 def _counts(answers: AnswerCounts, arrangements: Collection[int], answer: str) -> tuple[int, int]:
-    """Return how often an answer was given to some arrangements, and how many answers they had."""
+    """Return how often an answer was given to some arrangements, and the number of their answers."""
     counts = {pair: count for pair, count in answers.items() if pair[0] in arrangements}
     return sum(count for (_, given), count in counts.items() if given == answer), sum(counts.values())
 
 
 def _one_differs(count: int, *, among: bool) -> tuple[Arrangement, ...]:
-    """Return the arrangements of ``count`` intervals of which one alone is ``among``."""
+    """Return the arrangements of ``count`` intervals in which exactly one is ``among``."""
     return tuple(tuple((at == odd) is among for at in range(count)) for odd in range(count))
 
 
@@ -283,7 +283,7 @@ class YesNo(Design):
         return self.answers[arrangement]
 
     def success(self, arrangement: int, answer: str) -> bool:
-        """Return whether the answer was yes, whatever was presented."""
+        """Return whether the answer was yes, to any presentation."""
         return answer == "yes"
 
     def _sensitivity(self, answers: AnswerCounts, model: Model) -> Sensitivity | None:
@@ -358,7 +358,7 @@ LEAST: Final = 1e-9
 
 
 def question_of(design: Design, languages: Sequence[str]) -> Questionnaire:
-    """Return what a design asks, in the program's own words where it has none."""
+    """Return the question of a design, in the program's own words if it has none."""
     text: Localised = design.question or {
         language: words(language).design_questions[design.wording] for language in languages
     }

@@ -108,58 +108,58 @@ class Method(Table):
 
     @property
     def paper_name(self) -> str:
-        """What a paper calls it, with its source."""
+        """Its name in a paper, with the source."""
         return self.kind
 
     @abstractmethod
     def presentations(self, stimulus: Stimulus) -> int:
-        """Return how many comparisons one track presents at most."""
+        """Return the maximum number of comparisons in one track."""
 
     @abstractmethod
     def levels_of(self, stimulus: Stimulus) -> tuple[float, ...]:
-        """Return levels that include the smallest and the largest that it can present."""
+        """Return levels that include the smallest and the largest it can present."""
 
     @abstractmethod
     def level(self, track: TrackSetting, number: int, heard: Sequence[TrialResult], draws: Sequence[Draw]) -> float:
-        """Return the level of a track's comparison ``number`` (from 0), where the track has not ended.
+        """Return the level of a track's comparison ``number`` (from 0); the track has not ended.
 
         ``heard`` are the track's earlier answers in the order of presentation, ``draws`` secret uniform numbers in
         [0, 1), one source per round of levels.
         """
 
     def assumed(self, stimulus: Stimulus, design: Design) -> Assumed:
-        """Return what is assumed about the psychometric function of its answers."""
+        """Return the assumed psychometric function of its answers."""
         return assumed_for(stimulus, design)
 
     def ended(self, track: TrackSetting, heard: Sequence[TrialResult]) -> bool:
-        """Return whether a track has ended with these answers, before its last trial."""
+        """Return whether a track ends with these answers, before its last trial."""
         return False
 
     def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
-        """Yield what is wrong with it for a stimulus: the key, a message and a hint."""
+        """Yield the faults of the method for a stimulus: key, message and hint."""
         return iter(())
 
     def warnings(self) -> Iterator[tuple[str, str]]:
-        """Yield what is permitted and may still be a mistake: the key and a sentence."""
+        """Yield valid settings that may be mistakes: key and sentence."""
         return iter(())
 
     def target(self, guess: float | None, success: str) -> str | None:
-        """Return in words which share of successes, such as "correct", its levels aim at; None: at none.
+        """Return the share of successes (such as "correct") at which its levels aim, in words; None without one.
 
         ``guess`` is the share of successes by guessing, 0 where no answer is correct; None: it is free.
         """
         return None
 
     def reversals(self, track: TrackSetting, answers: Sequence[Answer]) -> tuple[int, ...]:
-        """Return the places, from 0, of a track's answers at which its direction changed; none if it has no steps."""
+        """Return the indices (from 0) of answers at which a track's direction changed; empty without steps."""
         return ()
 
     def reversal_mean(self, track: TrackSetting, answers: Sequence[Answer]) -> float | None:
-        """Return the classical estimate of a track, a level; None where it has none."""
+        """Return the classical estimate of a track, a level; None if there is none."""
         return None
 
     def simulated(self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None) -> Answers:
-        """Return the answers of simulated observers to one track each, of a method whose levels answers can have.
+        """Return the answers of simulated observers to one track each; its levels depend on the answers.
 
         ``noise`` (tracks, noise trials) are the uniform numbers of the answers to noise trials. Levels are asked for
         one after the other here, as a session does; a kind that can compute all tracks at once does so, much faster.
@@ -183,7 +183,7 @@ class Method(Table):
         return observers.answers(draws, chosen())
 
     def rounds(self, stimulus: Stimulus) -> int:
-        """Return how many rounds of drawn levels a track has."""
+        """Return the number of rounds of drawn levels in a track."""
         return 0
 
 
@@ -220,7 +220,7 @@ class Adaptive(Method):
                 yield "begin", f"{level:g} is not within levels", hint
 
     def first(self, track: int) -> float | None:
-        """Return the first level of a track (from 1) as it is written; None: the method's own."""
+        """Return the first level of a track (from 1) as written; None: the method's own."""
         return self.begin[track - 1] if isinstance(self.begin, tuple) else self.begin
 
     def level(self, track: TrackSetting, number: int, heard: Sequence[TrialResult], draws: Sequence[Draw]) -> float:
@@ -264,7 +264,7 @@ class Adjustment(Method):
         return self.repetitions
 
     def level(self, track: TrackSetting, number: int, heard: Sequence[TrialResult], draws: Sequence[Draw]) -> float:
-        """Return the level at which setting ``number`` starts: earlier settings change nothing."""
+        """Return the start level of setting ``number``: earlier settings do not matter."""
         low, high = track.stimulus.domain
         first_at_low = draws[0]() < 0.5
         away = START_SHARE * (high - low) * draws[number]()
@@ -289,7 +289,7 @@ class Adjustment(Method):
         return Adjusting(stimulus=stimulus, standard=standard, start=start, step=step if high > low else -step)
 
     def step(self, stimulus: Stimulus) -> float:
-        """Return how far a step goes, in u."""
+        """Return the size of a step in u."""
         low, high = stimulus.domain
         return (high - low) / STEPS if self.step_size is None else stimulus.coordinate(self.step_size)
 
@@ -308,7 +308,7 @@ class Adjusting:
     step: float
 
     def moved(self, place: int, steps: int) -> int:
-        """Return the place that steps lead to: beyond the first place at an end there is none."""
+        """Return the place after steps: there is none beyond the first place at an end."""
         ends = [(end - self.stimulus.coordinate(self.start)) / self.step for end in self.stimulus.domain]
         least, most = math.floor(min(ends) + _ROUNDING), math.ceil(max(ends) - _ROUNDING)
         return min(max(place + steps, least), most)
@@ -323,7 +323,7 @@ class Adjusting:
         return self.stimulus.comparison(self.standard, self.level(place))
 
     def reached(self, steps: Iterable[int]) -> int:
-        """Return the place that a setting reached by these steps, in their order."""
+        """Return the place reached by these steps, in order."""
         place = 0
         for step in steps:
             place = self.moved(place, step)
@@ -425,14 +425,14 @@ class QuestPlus(Adaptive):
         return ratio_in_u(track.stimulus, *interval) <= self.stop.ratio
 
     def after(self, track: TrackSetting, heard: Sequence[TrialResult]) -> float:
-        """Return the level after these answers: their order does not matter."""
+        """Return the level after these answers, whose order does not matter."""
         levels = _levels(track)
         if all(result.noise for result in heard) and (first := self.first(track.number)) is not None:
             return levels[_nearest(_coordinates(track), track.stimulus.coordinate(first))]
         return levels[self._search(track).next(*self._counts(track, heard))]
 
     def simulated(self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None) -> Answers:
-        """Return the tracks of simulated observers; a track ends early only where levels have logarithms."""
+        """Return the tracks of simulated observers; a track ends early only if levels have logarithms."""
         draws = random.random((len(observers.thresholds), self.presentations(track.stimulus)))
         first, log = self.first(track.number), track.stimulus.spacing == "log"
         begin = None if first is None else _nearest(_coordinates(track), track.stimulus.coordinate(first))
@@ -440,7 +440,7 @@ class QuestPlus(Adaptive):
         return search_tracks(self._search(track), observers, draws, begin, noise, stop)
 
     def assumed(self, stimulus: Stimulus, design: Design) -> Assumed:
-        """Return the family and the prior on the width that its keys state, else the defaults."""
+        """Return the family and the prior on the width in its keys, else the defaults."""
         default = assumed_for(stimulus, design)
         return Assumed(
             self.family or default.family, self.widths or default.widths, self.width_prior or default.width_prior
@@ -460,7 +460,7 @@ class QuestPlus(Adaptive):
 
 
 def _levels(track: TrackSetting) -> tuple[float, ...]:
-    """Return the levels of a track's trials, ascending: the grid, after 0 where there are noise trials."""
+    """Return the levels of a track's trials in ascending order: the grid, after 0 if there are noise trials."""
     return (0.0, *track.stimulus.grid) if track.design.has_noise else track.stimulus.grid
 
 
@@ -469,7 +469,7 @@ def _coordinates(track: TrackSetting) -> tuple[float, ...]:
 
 
 def _nearest(coordinates: Sequence[float], u: float) -> int:
-    """Return the index of the coordinate that is nearest to ``u``; of two the lower."""
+    """Return the index of the coordinate nearest to ``u``, the lower of two."""
     if u == coordinates[0]:
         return 0  # also −∞, that of noise trials
     return min(range(len(coordinates)), key=lambda index: abs(coordinates[index] - u))
@@ -541,7 +541,7 @@ class UpDown(Adaptive):
         return len(answers) >= self.stop.after and len(reversals) >= self.stop.reversals
 
     def after(self, track: TrackSetting, heard: Sequence[TrialResult]) -> float:
-        """Return the level after these answers: a step from the last one, or that one again."""
+        """Return the level after these answers: a step from the last one, or the same."""
         low, high = track.stimulus.levels
         u = self.staircase(track.stimulus, track.number).next(_answers(track, heard))
         return min(max(track.stimulus.level_of(u), low), high)
@@ -555,7 +555,7 @@ class UpDown(Adaptive):
         return tuple(self.staircase(track.stimulus, track.number).reversals_at(_in_u(track.stimulus, answers)))
 
     def reversal_mean(self, track: TrackSetting, answers: Sequence[Answer]) -> float | None:
-        """Return the level of the mean of the last reversals; None where there are too few."""
+        """Return the level of the mean of the last reversals; None if there are too few."""
         staircase = self.staircase(track.stimulus, track.number)
         mean = staircase.mean_of_reversals(_in_u(track.stimulus, answers), self.average)
         return None if mean is None else track.stimulus.level_of(mean)
@@ -575,7 +575,7 @@ class UpDown(Adaptive):
 
 
 def _answers(track: TrackSetting, heard: Sequence[TrialResult]) -> list[Answer]:
-    """Return the answers to comparisons, with their levels in u: noise trials move no track."""
+    """Return the answers to comparisons with levels in u: noise trials do not move a track."""
     return _in_u(track.stimulus, [(result.level, bool(result.success)) for result in heard if not result.noise])
 
 

@@ -83,16 +83,16 @@ class Condition(Table):
 
     @property
     def shows_video(self) -> bool:
-        """Whether a video is seen, live or from a file, and not the drawn tank."""
+        """Whether it shows a video, live or from a file, in place of the drawn tank."""
         return self.view != "tank"
 
     @property
     def seen(self) -> tuple[str, str]:
-        """What is seen: the view, and whether ball and targets are drawn over it."""
+        """The view, and whether ball and targets are drawn over it."""
         return self.view, self.overlay
 
     def link(self, seed: int = 0) -> ForceLink:
-        """Return the link between force model and hand; ``seed`` is that of jitter and loss."""
+        """Return the link between force model and hand; ``seed`` is for jitter and loss."""
         return ForceLink(
             delay_s=self.force_delay_ms / 1000, jitter_s=self.force_jitter_ms / 1000, loss=self.force_loss, seed=seed
         )
@@ -131,7 +131,7 @@ class Stimulus(Table):
         return self.level or ("difference" if self.vary.endswith("_ms") else "weber")
 
     def comparison(self, standard: float | None, level: Level) -> Level:
-        """Return the comparison at a level (0 is the standard itself), in the unit of the varied number.
+        """Return the comparison at a level (0 is the standard itself), in the varied number's unit.
 
         ``standard`` is None where the level is the value itself.
         """
@@ -141,14 +141,14 @@ class Stimulus(Table):
         return standard + distance if self.direction == "up" else standard - distance
 
     def level_between(self, standard: float | None, comparison: Level) -> Level:
-        """Return the level at which a comparison lies; `comparison` inverted."""
+        """Return the level of a comparison, the inverse of `comparison`."""
         if standard is None or self.level_kind == "value":
             return comparison
         distance = comparison - standard if self.direction == "up" else standard - comparison
         return distance / standard if self.level_kind == "weber" else distance
 
     def coordinate(self, level: float) -> float:
-        """Return u of a level: log10 of it (−∞ of 0), or the level itself, as levels are spaced."""
+        """Return u of a level: its log10 (−∞ for 0) or the level itself, as levels are spaced."""
         if self.spacing == "linear":
             return level
         return math.log10(level) if level > 0 else -math.inf
@@ -243,7 +243,7 @@ class Assumed:
 
 
 def assumed_for(stimulus: Stimulus, design: Design) -> Assumed:
-    """Return what is assumed where the method states nothing else."""
+    """Return the default assumptions about the psychometric function."""
     low, high = stimulus.domain
     log, span = stimulus.spacing == "log", high - low
     # Weibull where a distance of zero must mean chance
@@ -261,7 +261,7 @@ def is_distance(stimulus: Stimulus) -> bool:
 
 
 def rises(stimulus: Stimulus, design: Design) -> bool:
-    """Return whether the share of successes can only rise with the level, so that it has a threshold.
+    """Return whether the share of successes only rises with the level, so that there is a threshold.
 
     It does not where a level is a value and the odd or the repeated interval is asked for: that is noticed above the
     standard and below it.
@@ -270,14 +270,14 @@ def rises(stimulus: Stimulus, design: Design) -> bool:
 
 
 def guesses_of(stimulus: Stimulus, design: Design) -> tuple[float, ...] | None:
-    """Return the guess rates of a design; None where no answer is correct: the guess rate is the lapse rate."""
+    """Return the guess rates of a design; None if no answer is correct: the guess rate is the lapse rate."""
     if design.has_standard and not is_distance(stimulus):
         return None
     return FREE_GUESSES if design.guess_rate is None else (design.guess_rate,)
 
 
 def running_grid(stimulus: Stimulus, design: Design, assumed: Assumed, lapses: tuple[float, ...]) -> Grid:
-    """Return the grid over which levels are chosen during a session.
+    """Return the grid for choosing levels during a session.
 
     All widths are equally likely, so that levels are at the threshold however wide a person's function is: with levels
     above it the threshold would depend on the prior.
@@ -294,7 +294,7 @@ def running_grid(stimulus: Stimulus, design: Design, assumed: Assumed, lapses: t
 
 
 def analysis_grid(stimulus: Stimulus, design: Design, assumed: Assumed, session_sd: float = SESSION_SD) -> Grid:
-    """Return the grid over which thresholds are estimated: finer, and beyond both ends of the levels.
+    """Return the grid for estimating thresholds: finer, and beyond both ends of the levels.
 
     ``session_sd`` is the standard deviation of a person's threshold about that of the answers [decades].
     """
@@ -316,6 +316,6 @@ def analysis_grid(stimulus: Stimulus, design: Design, assumed: Assumed, session_
 
 
 def ratio_in_u(stimulus: Stimulus, low: float, high: float) -> float:
-    """Return the ratio of two levels that are given in u; infinite where the lower is not above zero."""
+    """Return the ratio of two levels given in u; infinite if the lower is not above zero."""
     least = stimulus.level_of(low)
     return stimulus.level_of(high) / least if least > 0 else math.inf

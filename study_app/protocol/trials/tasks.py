@@ -80,29 +80,29 @@ class Task(Table):
 
     @property
     def expected_s(self) -> float:
-        """How long people take [s]."""
+        """The expected duration [s]."""
         return self.limit_s
 
     @property
     def shortest_s(self) -> float:
-        """How long it takes at least [s]."""
+        """The shortest duration [s]."""
         return self.limit_s if self.least_s is None else self.least_s
 
     @property
     def paced(self) -> bool:
-        """Whether a target moves, which the hand follows."""
+        """Whether the hand follows a moving target."""
         return self.target_m(0.0) is not None
 
     def target_m(self, t_s: float) -> Point | None:
-        """Return where the target that moves is ``t_s`` after the task began [m, hand frame]; None: none moves."""
+        """Return the moving target's position ``t_s`` after the task began [m, hand frame]; None: none moves."""
         return None
 
     def fastest_stroke(self, workspace_m: Point) -> Stroke:
-        """Return the fastest stroke that is likely, in a tank of these extents [m, hand frame]."""
+        """Return the fastest likely stroke in a tank of these extents [m, hand frame]."""
         return Stroke(SHAKE_HZ, min(SHAKE_M, workspace_m[0] / 2))
 
     def lasting(self, most_s: float) -> Self:
-        """Return the task that time alone ends: after ``most_s``, or the first whole swing of a target after it [s]."""
+        """Return the task ended by time alone: after ``most_s``, or at a target's first whole swing after that [s]."""
         return self
 
 
@@ -186,7 +186,7 @@ class Follow(Task):
 
     @property
     def rms_speed_mps(self) -> float:
-        """Root mean square of the target's speed over what is judged, A 2πf / √2 [m/s]."""
+        """Root mean square of the target's speed over the judged part, A 2πf / √2 [m/s]."""
         return 2 * math.pi * self.frequency_hz * self.amplitude_m / math.sqrt(2)
 
     def fastest_stroke(self, workspace_m: Point) -> Stroke:
@@ -197,7 +197,7 @@ class Follow(Task):
         return self.model_copy(update={"cycles": max(swings, self.cycles)})
 
     def target_m(self, t_s: float) -> Point:
-        """Return where the target is ``t_s`` after the task began, hand frame [m]; before it in the middle."""
+        """Return the target's position ``t_s`` after the task began, hand frame [m]; before it the middle."""
         ramp = 1.0 if t_s >= self.lead_s else (1 - math.cos(math.pi * max(t_s, 0.0) / self.lead_s)) / 2
         return self.amplitude_m * ramp * math.sin(2 * math.pi * self.frequency_hz * t_s), 0.0, 0.0
 
@@ -258,7 +258,7 @@ class Reach(Task):
         return self.duration_s or (self.count or 0) * (self.dwell_s + SHORTEST_MOVE_S)
 
     def fastest_stroke(self, workspace_m: Point) -> Stroke:
-        """Return the stroke between the two neighbours that are farthest apart."""
+        """Return the stroke between the two most distant neighbouring targets."""
         following = (*self.targets_m[1:], self.targets_m[0])
         way_m = max(math.dist(*pair) for pair in zip(self.targets_m, following, strict=True))
         return Stroke(0.5 / REACH_S, way_m / 2)

@@ -46,7 +46,7 @@ class Entry(NamedTuple):
 
 @cache
 def table() -> tuple[Entry, ...]:
-    """Return the table as it ships."""
+    """Return the shipped table."""
     with (resources.files("study_app.protocol.warnings") / "delayed_force.csv").open(encoding="utf-8") as file:
         return tuple(
             Entry(
@@ -62,7 +62,7 @@ def table() -> tuple[Entry, ...]:
 
 
 def longest_ms(liquid: str, estimator: str, hand: str = "light", withheld_percent: float = WITHHELD_PERCENT) -> float:
-    """Return up to which delay [ms] no more than ``withheld_percent`` of the force is withheld; -1 if at none."""
+    """Return the longest delay [ms] at which at most ``withheld_percent`` of the force is withheld; -1 if none."""
     rows = _rows(liquid, estimator, hand)
     if not rows:
         raise KeyError((liquid, estimator, hand))
@@ -71,7 +71,7 @@ def longest_ms(liquid: str, estimator: str, hand: str = "light", withheld_percen
 
 
 def _rows(liquid: str, estimator: str, hand: str) -> list[Entry]:
-    """Return what the table has of a liquid, the shortest delay first."""
+    """Return the table's rows of a liquid, the shortest delay first."""
     rows = (it for it in table() if (it.liquid, it.estimator, it.hand) == (liquid, estimator, hand))
     return sorted(rows, key=attrgetter("delay_ms"))
 
@@ -84,7 +84,7 @@ _load: Final = cache(load)
 
 
 def delay_warnings(protocol: Protocol) -> Iterator[str]:
-    """Yield the conditions that are presented with a force later than the passivity controller leaves it."""
+    """Yield the conditions whose force delay exceeds what the passivity controller delivers."""
     presented = {name for block in protocol.blocks.values() for name in protocol.conditions_in(block.id)}
     for name, condition in protocol.conditions.items():
         delay_ms = 1000 * condition.link().mean_delay_s(protocol.device.rate_hz)
@@ -99,7 +99,7 @@ def delay_warnings(protocol: Protocol) -> Iterator[str]:
 
 
 def _of_table(protocol: Protocol, name: str, liquid: str, delay_ms: float) -> str | None:
-    """Return what the stored table says of a shipped liquid, in a light hand; None if hardly anything is withheld."""
+    """Return the warning of the stored table for a shipped liquid and a light hand; None if little is withheld."""
     estimator = protocol.scene.velocity.kind if protocol.scene.velocity.kind == "kalman" else "ewma"
     most_ms = longest_ms(liquid, estimator)
     if delay_ms <= most_ms:
@@ -117,7 +117,7 @@ def _of_table(protocol: Protocol, name: str, liquid: str, delay_ms: float) -> st
 
 
 def _of_energy(protocol: Protocol, name: str, delay_ms: float) -> str | None:
-    """Return that a liquid that the table lacks returns more than the limit in the motion of its tasks."""
+    """Return a warning if a liquid outside the table returns more energy than the limit in its tasks' motion."""
     scene, workspace_m = protocol.scene_for(name), protocol.device.workspace_m
     tasks = [
         protocol.tasks[block.task] for block in protocol.blocks.values() if name in protocol.conditions_in(block.id)
@@ -137,7 +137,7 @@ def _of_energy(protocol: Protocol, name: str, delay_ms: float) -> str | None:
 
 
 def _in_table(protocol: Protocol, liquid: str) -> str | None:
-    """Return what the table calls a liquid; None if it has none with the same numbers at the same scale."""
+    """Return the table's name of a liquid; None if it has none with the same numbers and scale."""
     for study, prefix in SHIPPED:
         shipped = _load(study)
         if shipped.scene.scale != protocol.scene.scale:

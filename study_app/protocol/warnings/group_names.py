@@ -42,7 +42,7 @@ _WORDS: Final = re.compile(
 
 
 def suggests_attribute(name: str) -> bool:
-    """Return whether the name of a group suggests an attribute that participants already have."""
+    """Return whether a group's name suggests an attribute that participants already have."""
     name_parts = re.findall(r"[a-z]+", name.casefold())
     whole = name.casefold() in ("old", "oud", "alt", "vieux")
     return whole or any(_STEMS.match(word) or _WORDS.fullmatch(word) for word in name_parts)

@@ -35,7 +35,7 @@ NARROW = 1.3
 
 
 def warnings(protocol: Protocol, *, simulates: bool = True, without_force: str = "") -> tuple[str, ...]:
-    """Return what is permitted and may still be a mistake, a sentence each.
+    """Return valid parts of a study that may be mistakes, a sentence each.
 
     ``simulates`` says whether what takes simulated observers, up to a second a block, is among it; ``without_force`` is
     the name of the device that sessions use, if it gives no force.
@@ -80,7 +80,7 @@ def _alike(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
 
 
 def _liquids_of(protocol: Protocol, block: Block) -> dict[str, None]:
-    """Return the liquids that a block presents, each once."""
+    """Return the liquids of a block, each once."""
     conditions = (protocol.conditions[it] for it in protocol.conditions_in(block.id))
     return dict.fromkeys(name for condition in conditions for name in condition.liquid_ids)
 
@@ -96,7 +96,7 @@ def _clipped(felt: dict[str, Steady]) -> Iterator[str]:
 
 
 def _ignoring_viscosity(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
-    """Yield the liquids with a viscosity whose drag does not depend on it, and how wrong that is."""
+    """Yield liquids with a viscosity on which their drag does not depend, and the resulting error."""
     for name in protocol.liquids:
         scene = protocol.scene_of(name)
         (liquid,) = scene.liquids
@@ -118,7 +118,7 @@ def _ignoring_viscosity(protocol: Protocol, felt: dict[str, Steady]) -> Iterator
 
 
 def _practised(protocol: Protocol) -> Iterator[str]:
-    """Yield the liquids that are practised in and judged in another block; levels are practised for their task."""
+    """Yield liquids that are practised and judged in another block; levels are practised for their task."""
     used = {block.id: _liquids_of(protocol, block) for block in protocol.blocks_in_order}
     judged = {name: block.id for block in reversed(protocol.main_blocks) for name in used[block.id]}
     for block in protocol.blocks_in_order:
@@ -133,7 +133,7 @@ def _practised(protocol: Protocol) -> Iterator[str]:
 
 
 def _of_different_sizes(protocol: Protocol) -> Iterator[str]:
-    """Yield the blocks whose conditions show balls of different sizes, by which participants can tell them apart."""
+    """Yield blocks whose conditions show balls of different sizes, which tells them apart."""
     for block in protocol.main_blocks:
         sizes = {1000 * protocol.scene_for(it).body.diameter_m for it in protocol.conditions_in(block.id)}
         if len(sizes) > 1:
@@ -145,7 +145,7 @@ def _of_different_sizes(protocol: Protocol) -> Iterator[str]:
 
 
 def level_warnings(protocol: Protocol, *, simulates: bool = True) -> Iterator[str]:
-    """Yield what to think over of the blocks with a design; ``simulates``: also what takes simulated observers."""
+    """Yield warnings about blocks with a design; ``simulates``: also those that need simulated observers."""
     blocks = (block for block in protocol.blocks_in_order if block.design is not None)
     yield from dict.fromkeys(warning for block in blocks for warning in _of_block(protocol, block, simulates))
 
@@ -194,7 +194,7 @@ def _unpaced(protocol: Protocol, block: Block) -> Iterator[str]:
 
 
 def _unperceived(protocol: Protocol, without_force: str) -> Iterator[str]:
-    """Yield what nobody can perceive: a delay of what is not drawn, a force that there is not."""
+    """Yield settings that have no perceptible effect: a delay of an undrawn part, a missing force."""
     for block in protocol.blocks_in_order:
         conditions = {name: protocol.conditions[name] for name in protocol.conditions_in(block.id)}
         vary = None if block.stimulus is None else protocol.stimuli[block.stimulus].vary
@@ -221,7 +221,7 @@ def _unperceived(protocol: Protocol, without_force: str) -> Iterator[str]:
 
 
 def _unanswerable(protocol: Protocol) -> Iterator[str]:
-    """Yield why the study may not answer its question, whatever participants answer."""
+    """Yield why the study may not answer its question, regardless of the answers."""
     decided = protocol.analysis
     for block in protocol.main_blocks:
         if block.order == "fixed" and len(block.conditions) > 1:
@@ -250,7 +250,7 @@ def _unanswerable(protocol: Protocol) -> Iterator[str]:
 
 
 def _attributes(protocol: Protocol) -> Iterator[str]:
-    """Yield the randomised groups whose names suggest what participants already are."""
+    """Yield randomised groups whose names suggest attributes of participants."""
     for name in protocol.groups if protocol.randomises else ():
         if suggests_attribute(name):
             yield (
@@ -260,7 +260,7 @@ def _attributes(protocol: Protocol) -> Iterator[str]:
 
 
 def _pages_again(protocol: Protocol) -> Iterator[str]:
-    """Yield the pages that a session has several times and that are no breaks."""
+    """Yield pages other than breaks that a session shows several times."""
     for steps in (variant.protocol.steps for variant in variants(protocol)):
         for name, page in protocol.pages.items():
             if page.kind != "break" and (times := steps.count(name)) > 1:
@@ -268,7 +268,7 @@ def _pages_again(protocol: Protocol) -> Iterator[str]:
 
 
 def _order_of_blocks(protocol: Protocol) -> Iterator[str]:
-    """Yield contrasts of blocks that come in one order, and blocks that stay while others take their places."""
+    """Yield contrasts of blocks in a fixed order, and fixed blocks among changing ones."""
     for number, contrast in enumerate(() if protocol.analysis is None else protocol.analysis.contrasts):
         if len(contrast.blocks) == 2 and protocol.study.block_order == "fixed" and not protocol.groups:
             yield (
@@ -286,7 +286,7 @@ def _order_of_blocks(protocol: Protocol) -> Iterator[str]:
 
 
 def _of_conditions(protocol: Protocol, block: Block) -> Iterator[str]:
-    """Yield conditions that cannot be told apart, or that the name of a trial gives away."""
+    """Yield conditions that cannot be told apart, or that a trial's name reveals."""
     conditions = [protocol.conditions[name] for name in block.conditions]
     alone = block.design is None and block.questionnaire is not None and len(conditions) == 1
     if alone and len(protocol.main_blocks) > 1:
@@ -307,7 +307,7 @@ def _of_conditions(protocol: Protocol, block: Block) -> Iterator[str]:
 
 
 def _choices(protocol: Protocol, block: Block) -> Iterator[str]:
-    """Yield what is missing in a block of forced choices at levels."""
+    """Yield missing parts of a block of forced choices at levels."""
     if block.stimulus is None or block.design is None or block.method is None:
         return
     design, stimulus = design_of(protocol, block), stimulus_of(protocol, block)
@@ -325,7 +325,7 @@ def _choices(protocol: Protocol, block: Block) -> Iterator[str]:
 
 
 def _not_bracketed(protocol: Protocol, number: int, published: Published) -> Iterator[str]:
-    """Yield a published value that the study's own levels do not hold between them."""
+    """Yield a published value outside the study's own levels."""
     block = protocol.blocks[published.block]
     if published.measure == "exponent" or block.stimulus is None or block.method is None:
         return
@@ -338,7 +338,7 @@ def _not_bracketed(protocol: Protocol, number: int, published: Published) -> Ite
 
 
 def _incomplete(protocol: Protocol) -> Iterator[str]:
-    """Yield the reaching tasks whose trials are valid without any target reached; format 1 is frozen."""
+    """Yield reaching tasks whose trials are valid without a reached target; format 1 is frozen."""
     if protocol.format == 1 or protocol.limits.targets_percent is not None:
         return
     for name in dict.fromkeys(block.task for block in protocol.main_blocks):

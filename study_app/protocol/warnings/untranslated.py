@@ -50,12 +50,12 @@ class UntranslatedText(NamedTuple):
 
     @property
     def is_shown(self) -> bool:
-        """Whether participants read the text: short texts are for tables, the study's title is for the operator."""
+        """Whether participants read the text: short texts are for tables, the study's title for the operator."""
         return self.path[-1] != "short" and self.path != ("study", "title")
 
 
 def untranslated_texts(document: Mapping[str, Any]) -> tuple[UntranslatedText, ...]:
-    """Return the texts of a study's document that are in another language than the study states."""
+    """Return the texts of a document that are in another language than stated."""
     languages = languages_of(document)
     return tuple(
         text for pattern in TEXTS for path, value in entries(document, pattern)
@@ -66,7 +66,7 @@ def untranslated_texts(document: Mapping[str, Any]) -> tuple[UntranslatedText, .
 def untranslated_at(
     document: Mapping[str, Any], path: Path, value: Any, languages: Sequence[str]
 ) -> Iterator[UntranslatedText]:
-    """Yield the languages in which the text at ``path`` is not translated."""
+    """Yield the languages into which the text at ``path`` is not translated."""
     first = languages[0]
     texts = value if isinstance(value, Mapping) else {first: value}
     for code in languages:
@@ -82,7 +82,7 @@ def untranslated_at(
 
 
 def describe_untranslated(document: Mapping[str, Any], *, lists_places: bool) -> Iterator[str]:
-    """Yield a warning for each language with untranslated texts; ``lists_places`` adds where the first ones are."""
+    """Yield a warning for each language with untranslated texts; ``lists_places`` adds their first places."""
     texts, only_one = untranslated_texts(document), len(languages_of(document)) == 1
     for (language, source), count in Counter((text.language, text.source) for text in texts).items():
         stated, wanted = language_name(source), language_name(language)
@@ -95,12 +95,12 @@ def describe_untranslated(document: Mapping[str, Any], *, lists_places: bool) ->
 
 
 def untranslated_on_pages(document: Mapping[str, Any]) -> tuple[UntranslatedText, ...]:
-    """Return the untranslated texts that participants may read: they choose among all languages of the study."""
+    """Return the untranslated texts that participants may read in any of the study's languages."""
     return tuple(text for text in untranslated_texts(document) if text.is_shown)
 
 
 def check_translated(document: Mapping[str, Any]) -> None:
-    """Refuse (SessionError) sessions whose pages would show texts that ship with the program in another language."""
+    """Raise SessionError if pages would show shipped texts in another language."""
     shipped = [text for text in untranslated_on_pages(document) if text.ships]
     if texts := [text for text in shipped if text.language == shipped[0].language]:
         language, source = language_name(texts[0].language), language_name(texts[0].source)
@@ -112,7 +112,7 @@ def check_translated(document: Mapping[str, Any]) -> None:
 
 
 def listed_places(texts: Sequence[UntranslatedText]) -> str:
-    """Return where the first texts are in the file, and how many more there are."""
+    """Return the places of the first texts in the file, and the number of others."""
     names = [".".join(map(str, text.path)) for text in texts[:PLACES_LISTED]]
     more = len(texts) - len(names)
     return ", ".join(names) + (f" and {more} more" if more else "")
@@ -120,14 +120,14 @@ def listed_places(texts: Sequence[UntranslatedText]) -> str:
 
 @lru_cache(maxsize=4096)  # the texts of a study are compared after each edit: 1 to 2 ms instead of 10 to 40
 def _parts(text: Any) -> tuple[str, ...]:
-    """Return the paragraphs of a text, or the labels of a scale, as they are compared; those without a letter not."""
+    """Return a text's paragraphs or a scale's labels for comparison, without those that have no letter."""
     parts = text if isinstance(text, tuple) else _PARAGRAPHS.split(text) if isinstance(text, str) else ()
     read = (as_read(part) for part in parts if isinstance(part, str))
     return tuple(part for part in read if any(map(str.isalpha, part)))
 
 
 def _source(parts: Sequence[str], code: str, known: Mapping[str, frozenset[str]]) -> str | None:
-    """Return the language of the first part that is known in another language alone; None if there is none."""
+    """Return the language of the first part that is known only in another language; None if there is none."""
     for part in parts:
         if code != "en" and _PLACEHOLDER.fullmatch(part):
             return "en"
@@ -143,14 +143,14 @@ def _same_words(code: str) -> frozenset[str]:
 
 @cache
 def _shipped_texts() -> Mapping[str, frozenset[str]]:
-    """Return every text that ships with the program, with the languages in which it does."""
+    """Return every shipped text with its languages."""
     studies = ((_read_table(file), TEXTS) for file in shipped_studies())
     instruments = ((_read_table(file), _OF_INSTRUMENTS) for file in sorted(INSTRUMENTS.glob("*.toml")))
     return _languages_by_text((*studies, *instruments))
 
 
 def _workspace_texts(document: Mapping[str, Any]) -> Mapping[str, frozenset[str]]:
-    """Return the texts of the other studies of the workspace, with the languages that these state."""
+    """Return the texts of the workspace's other studies with their stated languages."""
     files = []
     for file in workspace().own_protocols():
         try:
@@ -182,7 +182,7 @@ def _read_table(file: File) -> Mapping[str, Any]:
 
 
 def _languages_by_text(tables: Sequence[tuple[Mapping[str, Any], Sequence[str]]]) -> Mapping[str, frozenset[str]]:
-    """Return the parts of all texts of documents, each with the languages that they are stated to be in."""
+    """Return the parts of all texts of documents with their stated languages."""
     languages: dict[str, set[str]] = {}
     for table, patterns in tables:
         first = languages_of(table)[0]

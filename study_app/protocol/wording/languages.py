@@ -49,7 +49,7 @@ class Words:
         return f"{', '.join(entries[:-1])} {self.and_} {entries[-1]}"
 
     def unclear_number(self, text: str) -> str:
-        """Return the sentence that asks again for a number that can be read in two ways; "" if it cannot."""
+        """Return the sentence that asks again for an ambiguous number; "" if it is not."""
         numbers = readings_of(text, self.decimal_sign)
         if len(numbers) < 2:
             return ""
@@ -57,11 +57,11 @@ class Words:
         return self.number_unclear.format(text=text.strip(), one=reading, other=other)
 
     def missing(self, numbers: Sequence[int]) -> str:
-        """Return the sentence that names the statements (by number, at least one) still without an answer."""
+        """Return the sentence that lists the unanswered statements by number, at least one."""
         return self._missing(numbers, self.one_missing, self.many_missing)
 
     def questions_missing(self, numbers: Sequence[int]) -> str:
-        """Return the sentence that names the questions of a form (by number) still without an answer."""
+        """Return the sentence that lists the unanswered questions of a form by number."""
         return self._missing(numbers, self.one_question_missing, self.many_questions_missing)
 
     def _missing(self, numbers: Sequence[int], singular: str, many: str) -> str:
@@ -81,23 +81,23 @@ LANGUAGES: Final = {
 
 
 def languages_of(document: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the languages that a study's document states; a file that states none is in English."""
+    """Return the languages that a study's document states; English if it states none."""
     return tuple(str(code) for _, code in entries(document, "study.languages.*")) or ("en",)
 
 
 def language_name(code: str) -> str:
-    """Return the English name of a language, its code where the program has no words in it."""
+    """Return the English name of a language, or its code if the program has no texts in it."""
     return LANGUAGES[code].english_name if code in LANGUAGES else code
 
 
 def missing_text(path: Path, language: str) -> Fault:
-    """Return the fault of a text that lacks a language of the study."""
+    """Return the fault about a text missing in one of the study's languages."""
     hint = f"add {language}: every text exists in every language of the study"
     return Fault(path, f"is missing in {language_name(language)}", hint, missing_language=language)
 
 
 def words(language: str) -> Words:
-    """Return the words of a language (StudyError if there are none in it)."""
+    """Return the texts of a language (StudyError if there are none)."""
     if language not in LANGUAGES:
         raise StudyError(f'no words for the participant\'s pages in "{language}" ({did_you_mean(language, LANGUAGES)})')
     return LANGUAGES[language]
