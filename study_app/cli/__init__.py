@@ -57,7 +57,7 @@ for command in (devices, outlets, plugins):  # what else their module holds belo
 
 
 def _shortened(message: str) -> str:
-    """Return a message with the first `SHOWN` letters of any longer word, such as a path, that it repeats."""
+    """Return a message in which words longer than `SHOWN` letters, such as paths, are cut."""
     return re.sub(rf"(\S{{{SHOWN}}})\S+", r"\1…", message)
 
 
@@ -71,7 +71,7 @@ def _leave(ended: list[int]) -> None:
 
 
 def main() -> None:
-    """Run a command; turn what the user can fix into one line and exit code 2, and log what else fails.
+    """Run a command; report a user's mistake in one line with exit code 2, and log any other failure.
 
     A program that was ended by a signal does not free Qt's objects and Python's modules: that takes seconds under load.
     """

@@ -70,7 +70,7 @@ def export(
 
 
 def _say(failed: list[str]) -> None:
-    """Say which sections of a report could not be computed; end with exit code 3 if there are any."""
+    """Print the sections of a report that failed; end with exit code 3 if there are any."""
     for line in failed:
         click.echo(line, err=True)
     end_if(failed)

@@ -48,7 +48,7 @@ def demo(context: click.Context, *, no_window: bool) -> None:
 
 
 def _run_sessions(study: Path) -> None:
-    """Bring the session of each participant to its end."""
+    """Run or resume the session of each participant up to its end."""
     from study_app.protocol.source.files import shipped_file
     from study_app.session.simulated.rehearsal import finish_session
     from study_app.store.folders import StudyFolder
@@ -65,7 +65,7 @@ def _run_sessions(study: Path) -> None:
 
 
 def _compile(protocol: Path) -> None:
-    """Compile driver and emulator here, the servo in another process: 36 s of processor time in a row, not 49 s."""
+    """Compile driver and emulator here and the servo in another process, which saves 13 s of processor time."""
     from study_app.workers.executors import Workers, open_executor
 
     with open_executor(Workers(1)) as executor:

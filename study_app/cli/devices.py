@@ -186,7 +186,7 @@ def bench(name: str, to: Path | None, device_options: dict[str, str | Path]) -> 
 
 
 def _ask_operator(terminal: Terminal) -> AskOperator:
-    """Return what asks at the terminal; only "let-go" is answered by Enter alone."""
+    """Return a function that asks at the terminal; only "let-go" is answered by Enter alone."""
     return lambda kind, question: terminal.ask(kind if kind == "let-go" else "reading", question)
 
 
@@ -266,7 +266,7 @@ class Terminal:
         threading.Thread(target=self._listen, daemon=True).start()
 
     def ask(self, kind: str, question: str) -> Callable[[], str | None]:
-        """Ask for an answer; the end of the input gives up. What was typed before the question does not count."""
+        """Ask a question and return a function that reads the answer; lines typed before it do not count."""
         if os.isatty(self._descriptor):
             with suppress(queue.Empty):
                 while self._lines.get_nowait() is not None:
@@ -295,7 +295,7 @@ class Terminal:
 
 
 def _ask_emulator(emulator: Emulator, weight_n: float) -> Ask:
-    """Let the emulated hand do what is asked for."""
+    """Return a function that answers for the emulated hand."""
 
     def ask(kind: str, question: str) -> Callable[[], str | None]:
         click.echo(question)

@@ -121,7 +121,7 @@ def _survey(file: str | None, to: Path | None) -> None:
 
 
 def _subjects(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scene | None, tuple[str, ...]]:
-    """Return the scene whose definition is followed, the one whose liquid is real, and what is missing."""
+    """Return the scene that defines the force, the scene of the real liquid, and notes on what is missing."""
     from study_app.protocol.load import load_scene, load_scenes
 
     if scene is None and liquid is None:
@@ -338,7 +338,7 @@ def stability(
 
 
 def _measure(part: str, executor: Executor, show: ShowProgress) -> Evidence:
-    """Return the evidence of one measurement of its own."""
+    """Return the evidence of one separate measurement."""
     from study_app.evidence.stability import delivered_force, velocity, withheld_force
 
     if part == "velocity":
@@ -453,13 +453,13 @@ def timing(
 
 
 def _choose_display() -> None:
-    """Without a display, show on none."""
+    """Use Qt's offscreen platform if there is no display."""
     if sys.platform == "linux" and not any(map(os.environ.get, ("QT_QPA_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY"))):
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
 
 
 def windows_thread(load: LoadName) -> WindowsThread | None:
-    """Return the windows' thread; None where there is no Qt and nothing is to be painted."""
+    """Return the windows' thread; None without Qt or if the load paints no windows."""
     try:
         from study_app.app.delay_session import WindowsThread
     except DisplayError:
@@ -471,7 +471,7 @@ def windows_thread(load: LoadName) -> WindowsThread | None:
 
 @contextmanager
 def ending_by_signal() -> Iterator[tuple[threading.Event, list[int]]]:
-    """Set an event on Ctrl+C and when asked to terminate, instead of breaking off; give it and the signals received."""
+    """Set an event on Ctrl+C or a request to terminate; yield it with the list of received signals."""
     ending = threading.Event()
     received: list[int] = []
 

@@ -86,7 +86,7 @@ class GroupedCommands(click.Group):
 
 
 def _renamed(word: str, old: str, new: str) -> str:
-    """Return a word of the command line with the present name of an option; without a name its value alone."""
+    """Return a word of the command line with the option's current name; without a name only the value."""
     option, equals, value = word.partition("=")
     return word if option != old else f"{new}{equals}{value}" if new else value
 
@@ -126,14 +126,14 @@ RESULTS = click.option(
 
 
 def exclude_each_other(**given: object) -> None:
-    """Refuse options, by name, of which more than one is given (neither None nor False)."""
+    """Raise a usage error if more than one of these options is given (neither None nor False)."""
     names = [f"--{name}" for name, value in given.items() if value is not None and value is not False]
     if len(names) > 1:
         raise click.UsageError(f"{' and '.join(names)} exclude each other: give one of them")
 
 
 def takes_study(function: Command) -> Command:
-    """Give a command RESULTS, or ``--results DIR`` instead; the function gets the study's folder as ``results``."""
+    """Add the argument RESULTS and ``--results DIR`` to a command; its function gets the study's folder ``results``."""
 
     @click.argument("named", metavar="[RESULTS]", required=False)
     @RESULTS
@@ -145,7 +145,7 @@ def takes_study(function: Command) -> Command:
 
 
 def takes_session(function: Command) -> Command:
-    """Give a command SESSION; the function gets the session's folder as ``session``."""
+    """Add the argument SESSION to a command; its function gets ``session``, the session's folder."""
 
     @click.argument("session", metavar="SESSION")
     @RESULTS
@@ -189,7 +189,7 @@ def session_at(named: str, results: Path | None) -> Path:
 
 
 def keep_offered_workspace() -> None:
-    """Make the offered workspace this machine's, and say so, where none was chosen: data are about to go there."""
+    """Store the offered workspace and print it, if none was chosen: data are about to be written there."""
     from study_app.store.workstation import keep_workspace
     from study_app.workspace import chosen_workspace, offered_workspace
 
@@ -227,7 +227,7 @@ class ShowProgress(Protocol):
 
 @contextmanager
 def progress(otherwise: Callable[[str], object] | None = None) -> Iterator[ShowProgress]:
-    """Show progress below what is printed, on standard error, and remove it at the end of the block.
+    """Show progress below the output, on standard error, and remove it at the end of the block.
 
     Print nothing on standard output inside the block.
     """
@@ -253,7 +253,7 @@ def progress(otherwise: Callable[[str], object] | None = None) -> Iterator[ShowP
 
 
 def takes_workers(function: Command) -> Command:
-    """Give a command ``--workers`` and ``--cluster``; the function gets ``workers``."""
+    """Add ``--workers`` and ``--cluster`` to a command; its function gets ``workers``."""
 
     @click.option(
         "--workers",
@@ -292,7 +292,7 @@ def _not_zero(_context: click.Context, _option: click.Parameter, value: int) -> 
 
 @contextmanager
 def executor_for(workers: Workers) -> "Iterator[Executor]":
-    """Open the executor of a command; a cluster without workers says so."""
+    """Open the executor of a command; report a cluster without workers."""
     with open_executor(workers) as executor:
         if not getattr(executor, "has_workers", True):
             click.echo(f"{workers.cluster} has no worker yet: the computation begins when one joins", err=True)

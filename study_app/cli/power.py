@@ -138,7 +138,7 @@ def power(
 def _of_statements(
     study: Protocol, sizes: tuple[int, ...], studies: int, seed: int, show: ShowProgress, executor: Executor
 ) -> Iterator[Powers]:
-    """Yield the power of the tests of statements, from ever more studies."""
+    """Yield the power of the statements' tests, from more and more studies."""
     from study_app.analysis.planning.power_curves import powers
     from study_app.analysis.planning.simulated_studies import plan, sweep
     from study_app.session.simulated.rehearsal import condition_features
@@ -158,7 +158,7 @@ def _of_thresholds(
     show: ShowProgress,
     executor: Executor,
 ) -> Iterator[Precisions]:
-    """Yield the precision of thresholds, from ever more studies."""
+    """Yield the precision of thresholds, from more and more studies."""
     from study_app.analysis.planning.threshold_studies import Precisions, sweep
 
     show("simulating observers")

@@ -26,7 +26,7 @@ DEVICE_KINDS = {"felt": "with force", "seen": "without force", "simulated": "sim
 
 
 def kinds_markdown() -> str:
-    """Return the kinds of everything that has a descriptor, as Markdown: a table for each."""
+    """Return a Markdown table for each kind that has a descriptor."""
     tables = (
         ("Questions", ("`kind`", "question", "its own keys", "value in tables"), _questions()),
         ("Standard questionnaires", ("`instrument`", "texts", "scores", "source; compared with"), _instruments()),
@@ -47,7 +47,7 @@ def kinds_markdown() -> str:
 
 
 def delayed_force_markdown() -> str:
-    """Return how much of a delayed force is left, and up to which delay at least 95 % are, by liquid and hand."""
+    """Return the delivered share of a delayed force and the longest delay with 95 %, by liquid and hand."""
     entries = [entry for entry in delayed_force.table() if entry.estimator == "kalman"]
     delays = [delay for delay in sorted({entry.delay_ms for entry in entries}) if delay >= LEAST_DELAY_MS]
     left = {(entry.liquid, entry.hand, entry.delay_ms): f"{entry.left_percent:.0f}" for entry in entries}

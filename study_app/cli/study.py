@@ -305,7 +305,7 @@ def sessions(named: str | None, results: Path | None) -> None:
 
 
 def _local_time(written: str | None) -> str:
-    """Return a time of a table as this computer's, to the minute with its offset; "" if it is not known."""
+    """Return a time of a table as local time, to the minute with its offset; "" if it is unknown."""
     from datetime import datetime
 
     return datetime.fromisoformat(written).astimezone().isoformat(" ", "minutes") if written else ""
