@@ -17,7 +17,7 @@ from study_app.gui.display.display_check import qt_imported
 
 @contextmanager
 def _uncollected() -> Iterator[None]:
-    """Import without garbage collections, which take a tenth of the start-up time and find nothing to free."""
+    """Import without garbage collection, which takes a tenth of the start-up time and frees nothing."""
     before = gc.isenabled()
     gc.disable()
     try:

@@ -120,7 +120,7 @@ def study_of_delays(seconds: float) -> bytes:
 
 
 def delays(seconds: float, load: LoadName, *, progress: Callable[[str], object] = lambda _line: None) -> Delayed:
-    """Show each delay for ``seconds`` on virtual screens, and on the real one if there is one; return what came of it.
+    """Show each delay for ``seconds`` on virtual screens, and on the real one if there is one; return the measurements.
 
     Parameters
     ----------
@@ -277,7 +277,7 @@ class WindowsThread(QObject):
         return self._painting.frames if self._painting is not None else 0
 
     def during(self, work: Callable[[], T]) -> T:
-        """Run ``work`` in another thread while windows live in this one; return what it returns, or raise its error."""
+        """Run ``work`` in another thread while the windows live in this one; return its result or raise its error."""
         loop, heart = QEventLoop(), QTimer()
         heart.timeout.connect(lambda: None)
         heart.start(HEARTBEAT_MS)
@@ -296,7 +296,7 @@ class WindowsThread(QObject):
         return future.result()
 
     def timer(self, period_ms: int, count: int, fire: Callable[[], object]) -> int:
-        """Call ``fire`` from a precise timer of Qt; return when it was started [ns]. For ``work``, in its thread."""
+        """Call ``fire`` from a precise Qt timer; return the start time [ns]. ``work`` calls this from its thread."""
         fired: Future[int] = Future()
         self._asked.emit(partial(self._begin, period_ms, count, fire, fired))
         return fired.result()
@@ -384,7 +384,7 @@ class Painting(QObject):
             timer.start()
 
     def end(self) -> None:
-        """Close the windows; their objects end here, in their thread."""
+        """Close the windows in the thread that made them."""
         for timer in self._timers:
             timer.stop()
         self._rig.stop()
@@ -401,7 +401,7 @@ class Painting(QObject):
         return timer
 
     def _frame(self) -> None:
-        """Let the hand go on for as long as the last frame took, and draw where it is."""
+        """Advance the hand by the time since the last frame and draw it."""
         now_ns = self._servo.now_ns()
         behind = (time.monotonic_ns() - self._began_ns) // 1_000_000 - now_ns // 1_000_000
         self._servo.advance(int(min(max(behind, 1), LONGEST_FRAME_TICKS)))

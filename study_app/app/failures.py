@@ -123,7 +123,7 @@ P = ParamSpec("P")
 
 
 def guarded(slot: Callable[Concatenate[F, P], None]) -> Callable[Concatenate[F, P], None]:
-    """Let no exception leave a slot: each one ends in zero force."""
+    """Decorate a slot: an exception in it ends in zero force."""
 
     @wraps(slot)
     def run(self: F, /, *arguments: P.args, **named: P.kwargs) -> None:
@@ -136,7 +136,7 @@ def guarded(slot: Callable[Concatenate[F, P], None]) -> Callable[Concatenate[F, 
 
 
 def guarded_session_slot(slot: Callable[Concatenate[F, P], None]) -> Callable[Concatenate[F, P], None]:
-    """As `guarded`, but drop an event that came too late (`SessionError`): it is no failure."""
+    """Decorate a slot as `guarded` does, but drop an event that arrives too late (`SessionError`): it is no failure."""
 
     @wraps(slot)
     def run(self: F, /, *arguments: P.args, **named: P.kwargs) -> None:
@@ -164,7 +164,7 @@ class CrashTrace:
             faulthandler.enable(self._file)
 
     def close(self) -> None:
-        """Write to the terminal again, if that was so before; it can be called again."""
+        """Restore the terminal as the target of crash traces; a second call does nothing."""
         file, self._file = self._file, None
         if file is None:
             return
@@ -190,12 +190,12 @@ class Patience:
 
     @property
     def left_s(self) -> float:
-        """What is left of it [s]; never negative."""
+        """The remaining time [s]; never negative."""
         return max(self._until_s - time.monotonic(), 0.0)
 
 
 def log_off_signal() -> SignalInstance:
-    """Return the signal by which the system asks to keep what is to be kept, before it ends the program."""
+    """Return the signal that the system emits before it ends the program, so that work can be saved."""
     application = QGuiApplication.instance()
     assert isinstance(application, QGuiApplication)  # noqa: S101 - whoever shows windows has made it
     return application.commitDataRequest
@@ -203,7 +203,7 @@ def log_off_signal() -> SignalInstance:
 
 @contextmanager
 def ended_from_outside(end: Callable[[int], None]) -> Iterator[None]:
-    """Let Ctrl+C, requests to terminate and a log-off call ``end`` with a signal's number, once.
+    """Call ``end`` once, with the signal's number, on Ctrl+C, a request to terminate or a log-off.
 
     Signals are heard from the event loop. A log-off waits for ``end``, and for nothing else. Ctrl-Z does nothing: what
     pushes would push on.

@@ -43,7 +43,7 @@ SMALLEST_N = 0.001
 
 
 def cost_rows(costs: Costs) -> tuple[CostRow, ...]:
-    """Return what each part of a tick takes, the most expensive first, then what is not there, and why."""
+    """Return the cost of each part of a tick, the most expensive first, then the absent parts with the reasons."""
     rows = [CostRow(NAMED[it.effect].label, it.ns) for it in costs.effects if it.ns is not None]
     rows.append(CostRow("Servo alone", costs.rest_ns))
     absent = (CostRow(NAMED[it.effect].label, None, it.why) for it in costs.effects if it.ns is None)
@@ -51,7 +51,7 @@ def cost_rows(costs: Costs) -> tuple[CostRow, ...]:
 
 
 def error_rows(errors: Errors) -> tuple[ErrorRow, ...]:
-    """Return how far a setting is from the definition."""
+    """Return the differences between a setting's force and its definition."""
     without = ", ".join(NAMED[it].label.lower() for it in errors.left_out)
     share = f"{errors.wake:.0e}".replace("e-0", "e−").replace("e-", "e−") if errors.wake else "0"
     wake, force = "no wake" if errors.wake is None else share, "no drag"
@@ -82,11 +82,11 @@ class Prices:
         self.waits = False
 
     def forget(self) -> None:
-        """Know nothing of a setting that was changed."""
+        """Discard the answers: the setting has changed."""
         self._asked, self.costs, self.errors, self.waits = -1, None, None, False
 
     def ask(self, scene: Scene) -> None:
-        """Ask about a setting; the answers come to `take`."""
+        """Request cost and error of a setting; `take` reads the answers."""
         self.forget()
         if self._appraiser is not None and not self._appraiser.works:
             self.close()
@@ -148,29 +148,29 @@ class LabOpening(QObject):
 
     @property
     def busy_with(self) -> str | None:
-        """The device that is being opened and still wanted; None where none is."""
+        """The name of the device that is being opened, or None."""
         return self._wanted
 
     @property
     def lasts_s(self) -> float:
-        """How long a device has been opened so far [s]; 0 where none is."""
+        """The time since the device began to open [s]; 0 if none is being opened."""
         return time.monotonic() - self._began_s if self._background.busy and self._wanted is not None else 0.0
 
     def want(self, name: str) -> None:
-        """Open a device; one that is being opened is given up first."""
+        """Open a device; cancel one that is still being opened."""
         self.cancel()
         self._wanted = name
         if not self._background.busy:
             self._start.start()
 
     def cancel(self) -> None:
-        """Want nothing any more: what is being opened is closed as soon as it is open."""
+        """Cancel the request: the device is closed as soon as it is open."""
         self._wanted = None
         self._start.stop()
         self._cancelled.set()
 
     def wait(self, patience_s: float = PATIENCE_S) -> None:
-        """Wait for what is being opened: it must be let go of in the windows' thread, not in its own."""
+        """Wait until the device is open or has failed: it must be closed in the windows' thread."""
         self._background.wait(patience_s)
         QCoreApplication.sendPostedEvents()
 
@@ -180,7 +180,7 @@ class LabOpening(QObject):
         self._background.run(partial(self._open, self._wanted, self._cancelled))
 
     def _open(self, name: str, cancelled: threading.Event) -> tuple[object, threading.Event]:
-        """Compile, open and start, in a thread of its own; return whatever comes of it for ``_end``."""
+        """Compile, open and start the device in its own thread; return the outcome for ``_end``."""
         try:
             loads = self._open_live is None
             if self._open_live is None:
@@ -195,7 +195,7 @@ class LabOpening(QObject):
         return made, cancelled
 
     def _end(self, done: tuple[object, threading.Event]) -> None:
-        """Hand over what was opened, or let go of it where it is not wanted any more."""
+        """Emit the opened device, or close it if it is no longer requested."""
         made, cancelled = done
         if not cancelled.is_set():
             self._wanted = None
@@ -235,7 +235,7 @@ class LabSaving(QObject):
         self._before.start()
 
     def open(self, path: Path) -> Choice:
-        """Have the liquids of a file at hand; return the first.
+        """Add the liquids of a file to those at hand; return the first.
 
         Raises
         ------
@@ -248,7 +248,7 @@ class LabSaving(QObject):
         return choices[0]
 
     def wait(self, patience_s: float = PATIENCE_S) -> None:
-        """Wait until everything is on the disk, and tell of it."""
+        """Wait until all presets are written and report the outcomes."""
         if self._before is not None:
             self._before.join(patience_s)
             QCoreApplication.sendPostedEvents(self)
@@ -338,7 +338,7 @@ class LabController(QObject):
 
     @guarded
     def _asked(self, what: str, details: tuple[Any, ...]) -> None:
-        """Do what is asked for in the place."""
+        """Carry out a request of the lab's window."""
         bench, live = self.bench, self.live
         match what, *details:
             case "enter", *_:
@@ -392,7 +392,7 @@ class LabController(QObject):
         return self._saving.liquids
 
     def leave(self) -> None:
-        """Let go of the hand: zero force, the servo's end, the device; then of everything else."""
+        """Release the hand: zero force, stop the servo, close the device, then everything else."""
         if not self._entered:
             return
         self._entered = False
@@ -409,13 +409,13 @@ class LabController(QObject):
             self.uncaught.remove()
 
     def end(self, patience: Patience) -> None:
-        """Leave, and wait for a preset that is being written, and for a device, so that it is let go of, too."""
+        """Leave, then wait for a preset that is being written and for a device that is being opened."""
         self.leave()
         self._saving.wait(patience.left_s)
         self._opening.wait(patience.left_s)
 
     def fail(self, error: BaseException) -> None:
-        """Zero force, then say what failed; the force can be faded in again, through a device opened anew.
+        """Send zero force, then show the failure; the force can be resumed once the device is opened again.
 
         A painter is at work for as long as something holds it, as a traceback does: Qt would paint nothing any more.
         """
@@ -482,7 +482,7 @@ class LabController(QObject):
         )
 
     def feel_of_study(self, a: Setting, b: Setting, study: str) -> None:
-        """Feel liquids of a study that is edited, which takes changes back; "" where it cannot."""
+        """Feel liquids of the study in the designer, which takes changes back; ``study`` is "" if it cannot."""
         self.study = study
         self.feel(Workbench(a, b), anew=True)
 
@@ -526,7 +526,7 @@ class LabController(QObject):
         self._try(lambda: self.bench.choose(side, displayed_name(choice.liquid), choice.scene), "")
 
     def _try(self, edit: Callable[[], Workbench], name: str) -> None:
-        """Make an edit, or keep why it was refused, for its parameter."""
+        """Make an edit; if it is refused, keep the reason for its parameter."""
         try:
             bench = edit()
         except StudyError as error:
@@ -538,7 +538,7 @@ class LabController(QObject):
         self.feel(bench)
 
     def feel(self, bench: Workbench, *, anew: bool = False) -> None:
-        """Let a workbench be felt at once, and be appraised once it has rested for a while."""
+        """Present a workbench at once, and measure its cost after a pause without edits."""
         before, self.bench, self._refused = self.bench, bench, None
         self._forget_trouble()
         if bench.in_hand.scene != before.in_hand.scene:
@@ -562,7 +562,7 @@ class LabController(QObject):
         self._saving.save(path, setting)
 
     def _open_preset(self, path: Path) -> None:
-        """Feel the first liquid of a file; its others are at hand from then on."""
+        """Feel the first liquid of a file; the file's other liquids become available."""
         try:
             first = self._saving.open(path)
         except StudyError as error:
@@ -572,13 +572,13 @@ class LabController(QObject):
 
     @guarded
     def _could_not_save(self, error: Exception) -> None:
-        """Show why a preset could not be written; the force continues. Any other exception is a bug and is raised."""
+        """Show why a preset could not be written; the force continues. Other exceptions are bugs and are raised."""
         if not isinstance(error, StudyError):
             raise error
         self.trouble = str(error)
 
     def _forget_trouble(self) -> None:
-        """Let what went wrong before be over, unless it says why no device is open."""
+        """Clear the last problem, unless it says why no device is open."""
         if self.live is not None:
             self.trouble = ""
 

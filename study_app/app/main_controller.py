@@ -82,12 +82,12 @@ class WorkstationController(QObject):
         self._keep(made)
 
     def remember_operator(self, operator: str) -> None:
-        """Offer these initials in the next session; this is not a setting, so undo ignores it."""
+        """Store these initials as the default of the next session; undo ignores this."""
         if operator and operator != self.settings.operator:
             self._keep(self.settings.model_copy(update={"operator": operator}))
 
     def remember_protocol(self, protocol: Path) -> None:
-        """Keep a protocol file among the recent ones; this is not a setting, so undo ignores it."""
+        """Store a protocol file among the recent ones; undo ignores this."""
         made = self.settings.with_recent(protocol)
         if made != self.settings:
             self._keep(made)
@@ -103,7 +103,7 @@ class WorkstationController(QObject):
 
     @property
     def undo_called(self) -> str:
-        """What can be taken back; nothing where nothing can."""
+        """The name of the change that undo takes back; "" if there is none."""
         return self._before[-1][0] if self._before else ""
 
     def _keep(self, settings: MachineSettings) -> None:
@@ -126,7 +126,7 @@ class WorkstationController(QObject):
 
 
 def load_modules() -> None:
-    """Load the modules of lab and designer, the compiler, and what the first page is computed from."""
+    """Load the modules of lab, designer and compiler, and those that the first page needs."""
     import study_app.app.lab_controller  # noqa: PLC0415
     import study_app.app.session.playing  # noqa: PLC0415
     import study_app.gui.watch.window  # noqa: PLC0415
@@ -220,7 +220,7 @@ class MainController(QObject):
         self._opened.timeout.connect(self.preload)
 
     def open(self) -> None:
-        """Show the window, no larger than the screen, and look at the machine once it stands."""
+        """Show the window, no larger than the screen, then look for devices."""
         place(self.window, self.window.screen(), corner=False)
         self.window.show()
         if self.machine.trouble:
@@ -233,7 +233,7 @@ class MainController(QObject):
         self._opened.start()
 
     def show_bug(self, error: BaseException) -> bool:
-        """Show an exception that no slot caught, once, unless a session shows it; return that it is printed, too."""
+        """Show an exception that no slot caught, once, unless a session shows it; return False: it is printed, too."""
         bug, said = bug_words(error), error is self.window.not_opened
         if self.live is None and self.window.isVisible() and not said and bug not in self._bugs:
             self._bugs.add(bug)
@@ -264,7 +264,7 @@ class MainController(QObject):
         return made
 
     def preload(self) -> None:
-        """Load the modules of lab and designer in the background, so that the first visit seldom waits for them."""
+        """Load the modules of lab and designer in the background, so that the first visit rarely waits."""
         self._loading.run(load_modules)
 
     def _lab(self) -> LabPlace:
@@ -309,14 +309,14 @@ class MainController(QObject):
         self._go_to_designer(lambda designer: designer.open(source))
 
     def show_version(self, session: SessionFacts) -> None:
-        """Go to the study designer, to what changed in a session's study since it was run."""
+        """Open the study designer at the changes since a session was run."""
         self._go_to_designer(
             lambda designer: designer.open(session.study),
             lambda designer: designer.changes.compare_with_session(session.study, session.folder),
         )
 
     def begin_study(self, source: str = "", name: str = "") -> None:
-        """Go to the study designer with what a new study can begin from; with a name begin it at once."""
+        """Open the page for new studies in the designer; with ``name`` create the study at once."""
         self._go_to_designer(lambda it: it.ask_for_new(source), lambda it: it.begin(source, name) if name else None)
 
     def _go_to_designer(self, *actions: Callable[[DesignerController], object]) -> None:
@@ -331,7 +331,7 @@ class MainController(QObject):
         self.lab.feel_of_study(liquids.a, liquids.b, liquids.study)
 
     def _forget_study(self) -> None:
-        """Let the lab offer no more to put its liquids back: another study is open in the designer."""
+        """Another study is open in the designer: the lab no longer offers to put liquids back."""
         if self.lab is not None:
             self.lab.study = ""
 
@@ -354,12 +354,12 @@ class MainController(QObject):
         return self.devices
 
     def _show_machine(self) -> None:
-        """Show the settings and the state of the preferred device on the home page."""
+        """Show settings and the state of the preferred device on the home page."""
         settings = self.machine.settings
         self._home_place.show_machine(settings, device_named(settings.device, self.devices.shown))
 
     def _machine_changed(self, settings: MachineSettings) -> None:
-        """Follow what is set for this machine, as far as nothing else was asked for by command."""
+        """Apply changed settings of this machine, except those that the command line set."""
         self.window.show_theme(theme_named(settings.theme))
         here = workspace()
         if self._follows_machine and here.results != self.results:
@@ -373,7 +373,7 @@ class MainController(QObject):
         self._show_machine()
 
     def _test_display(self) -> None:
-        """Open the display test; home has gone to the machine's place."""
+        """Open the display test on the machine page."""
         if self.machine.place is not None:
             self.machine.place.open_test()
 
@@ -407,7 +407,7 @@ class MainController(QObject):
         self.window.go("help")
 
     def end(self) -> None:
-        """Let go of what the places hold, and wait for what is under way in other threads: a device may be opening.
+        """Release everything that the pages hold, and wait for work in other threads: a device may be opening.
 
         After a signal the program waits for 2 s at most; a device that is still being opened then gets no force.
         """

@@ -28,7 +28,7 @@ class DeferredTask:
     took_ns: int = 0
 
     def waits_ns(self, now_ns: int) -> int:
-        """Return how long it is overdue; negative where it is not due."""
+        """Return the time since the task was due [ns]; negative before."""
         if self.done_ns is None:
             return self.period_ns
         return now_ns - self.done_ns - max(self.period_ns, round(self.took_ns / MOST_SHARE))
@@ -49,7 +49,7 @@ class FrameBudget:
         self._now_ns = now_ns
 
     def use(self, until_ns: int) -> None:
-        """Do what is due and will be done by ``until_ns``; of what has waited too long for that, one thing."""
+        """Run due tasks that will end by ``until_ns``; of tasks that are long overdue, one in any case."""
         hurried = False
         for work in self.tasks:
             now_ns = self._now_ns()
@@ -76,7 +76,7 @@ _session_runs = threading.Event()
 
 
 def collect_if_due() -> int | None:
-    """Collect the oldest generation that is due by the interpreter's own thresholds; return it, or None."""
+    """Collect the oldest generation that is due by the interpreter's thresholds; return it, or None."""
     due = [count > limit > 0 for count, limit in zip(gc.get_count(), gc.get_threshold(), strict=True)]
     if not any(due):
         return None
@@ -86,7 +86,7 @@ def collect_if_due() -> int | None:
 
 
 def _collect() -> None:
-    """Collect what is due; pass over all there is once that took long, up to a bound between sessions."""
+    """Collect what is due; after a long full collection skip all present objects, up to a bound between sessions."""
     began_s = time.thread_time()
     if collect_if_due() == OLDEST and time.thread_time() - began_s > LONG_S:
         gc.freeze()
@@ -105,7 +105,7 @@ def freeze_garbage() -> None:
 
 
 def unfreeze_garbage() -> None:
-    """Look at everything again when a collection is due."""
+    """Include all objects in later collections again."""
     _session_runs.clear()
     gc.unfreeze()
 
@@ -114,13 +114,13 @@ _ends_at_once = threading.Event()
 
 
 def end_at_once() -> None:
-    """Collect nothing more, for the program is ended from outside: to look at everything takes seconds under load."""
+    """Disable collection: the program ends, and a full collection takes seconds under load."""
     _ends_at_once.set()
 
 
 @contextmanager
 def collecting_here() -> Iterator[None]:
-    """Collect in this thread, which runs Qt's event loop, and in no other."""
+    """Run collections in this thread, which runs Qt's event loop, and in no other."""
     before = gc.isenabled()
     _ends_at_once.clear()
     gc.disable()
@@ -149,7 +149,7 @@ class ThreadPriority:
         self._before: int | None = None
 
     def raise_priority(self) -> bool:
-        """Let this thread go before those of other programs; return whether the system let it."""
+        """Raise this thread's priority above other programs'; return whether the system permitted it."""
         if sys.platform == "win32":
             return _prefer(ABOVE_NORMAL)
         if sys.platform == "darwin":

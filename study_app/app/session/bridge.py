@@ -98,7 +98,7 @@ class WatchedJournal:
         self._clock = clock
 
     def append(self, event: journal_events.Event, *, t_s: float | None = None, waits: bool = True) -> None:
-        """Put an event into the journal (StoreError: nothing has changed)."""
+        """Write an event to the journal (StoreError: nothing has changed)."""
         self._store.append(event, t_s=t_s, waits=waits)
         self.progress.process_line(replace(event, t_s=self._clock() if t_s is None else t_s))
 
@@ -107,14 +107,14 @@ class WatchedJournal:
         return self._store.fingerprint
 
     def check_flushed(self) -> None:
-        """Raise StoreError if lines that were not waited for could not be flushed."""
+        """Raise StoreError if lines written without waiting could not be flushed."""
         self._store.check_flushed()
 
     def write_tables(self) -> None:
         self._store.write_tables()
 
     def finish(self, status: str, reason: str = "") -> None:
-        """Close the session (StoreError: the last table or line could not be written; it counts as ended here)."""
+        """Close the session (StoreError: the last table or line could not be written; the session counts as ended)."""
         try:
             self._store.finish(status, reason)
         finally:
@@ -236,7 +236,7 @@ class SessionBridge(QObject):
         return self.frames.paced
 
     def present(self, page: Page) -> None:
-        """Put a page before the participant; the runner's port."""
+        """Show a page to the participant; a port of the runner."""
         self.participant.show_page(page)
         self._hand = self.parts.hand_for(page) if self.parts.hand_for is not None else None
         tank, videos = self.participant.tank, self.parts.videos
@@ -259,14 +259,14 @@ class SessionBridge(QObject):
         self.show_tiles()
 
     def leave_now(self) -> None:
-        """Zero force and no windows, without a question: the session stays unfinished and can be resumed."""
+        """Send zero force and close the windows without a question; the session can be resumed."""
         self.parts.servo.stop_force()
         if not self._gone and not self.runner.finished:
             self._break_off()
         self._leave()
 
     def watch_screens(self) -> None:
-        """From now on, pause if the participant's window comes to cover the operator's: a screen was removed."""
+        """From now on, pause when a screen is removed and both windows end up on the same one."""
         for window in (self.participant, self.operator):
             window.windowHandle().screenChanged.connect(
                 lambda _screen: QTimer.singleShot(SCREEN_SETTLES_MS, self, self._check_screens)
@@ -283,11 +283,11 @@ class SessionBridge(QObject):
 
     @guarded_session_slot
     def _break_off(self) -> None:
-        """Pause, so that a trial under way is journalled as interrupted."""
+        """Pause, so that the journal records the current trial as interrupted."""
         self._post(PauseRequested(self._now(), "program"))
 
     def fail(self, error: BaseException) -> None:
-        """Zero force, then say what failed: to the journal, if it still takes it, and to the operator."""
+        """Send zero force, then report the failure to the journal, if it still accepts lines, and to the operator."""
         self.parts.servo.stop_force()
         first = not self.trouble
         raised, error = error, explained(error)
@@ -319,7 +319,7 @@ class SessionBridge(QObject):
 
     @guarded_session_slot
     def _tell_of_thread(self, what: str) -> None:
-        """Tell the operator, and log it: from now on, the work of that thread is missing."""
+        """Log that a thread has ended with an exception, and tell the operator."""
         self.operator.show_message("A part of the program ended", f"{what}. All answers are kept.")
         self.record_note(f"a thread of the program ended: {what}")
 
@@ -330,13 +330,13 @@ class SessionBridge(QObject):
         self.runner.post(event)
 
     def draw_frame(self) -> None:
-        """Draw the tank, and with what time is left until the next frame the rest."""
+        """Draw the tank, then as much of the rest as fits before the next frame."""
         self._draw()
         self.budget.use(self.frames.next_ns)
 
     @guarded_session_slot
     def _draw(self) -> None:
-        """Look at the device, and draw the tank as late as the trial asks."""
+        """Read the device and draw the tank with the trial's visual delay."""
         self.runner.poll()
         view = self.runner.view(self.parts.servo.now_ns())
         if view is not None:
@@ -361,7 +361,7 @@ class SessionBridge(QObject):
 
     @guarded_session_slot
     def _painted(self, sample_ns: int) -> None:
-        """Keep when a frame was painted; on the servo's clock, which is not every system's monotonic one."""
+        """Record when a frame was painted, on the servo's clock."""
         painted_ns = self.parts.servo.now_ns()
         self.runner.frame_shown(painted_ns, sample_ns)
         self.health.frame(painted_ns)
@@ -372,7 +372,7 @@ class SessionBridge(QObject):
 
     @guarded_session_slot
     def show_forces(self) -> None:
-        """Draw the newest forces, where the operator may see them."""
+        """Draw the newest forces if the operator may see them."""
         if self.forces is not None:
             self.operator.show_forces(self.forces, self.parts.servo.now_ns())
 
@@ -383,7 +383,7 @@ class SessionBridge(QObject):
         self._show()
 
     def _changed(self) -> None:
-        """Show the news; at the end bring the operator's window back, should the participant's cover it."""
+        """Show the new state; at the end raise the operator's window above the participant's."""
         if (stalled := self.runner.stalled) != self._stalled:
             self._stalled = stalled
             log.warning("the disk accepts data again" if stalled is None else f"the session waits: {stalled}")
@@ -440,7 +440,7 @@ class SessionBridge(QObject):
 
     @guarded_session_slot
     def _asked(self, what: str, details: tuple[Any, ...]) -> None:
-        """Do what the operator asks for; zero force comes before anything that could fail or wait for the disk."""
+        """Carry out an operator's request; zero force comes before anything that may fail or wait for the disk."""
         post = self._post
         match what:
             case "stop":
@@ -479,7 +479,7 @@ class SessionBridge(QObject):
         self._post(ForceStopped(self._now(), "operator"))
 
     def _diagnose(self) -> None:
-        """Have the device examined: zero force and a pause first, for it must not push meanwhile."""
+        """Send zero force, pause, and have the device diagnosed."""
         self.parts.servo.stop_force()
         try:
             if not self.runner.finished:
@@ -488,7 +488,7 @@ class SessionBridge(QObject):
             self.diagnose_asked.emit()
 
     def _reconnect(self) -> None:
-        """Connect the device again, in the background; the force stays off until the operator resumes."""
+        """Reconnect the device in the background; the force stays off until the operator resumes."""
         if self.parts.reconnect is not None and self.runner.state.lost_device:
             if not self.reconnecting.busy:
                 self._reconnection = "Connecting the device …"
@@ -496,7 +496,7 @@ class SessionBridge(QObject):
             self._show()
 
     def record_note(self, text: str) -> None:
-        """Write a note to the journal while the session runs; after its end do nothing."""
+        """Write a note to the journal; after the session's end do nothing."""
         if not self.runner.finished:
             self._post(Note(self._now(), "note", text))
 
@@ -531,7 +531,7 @@ class SessionBridge(QObject):
             self.parts.press(buttons)
 
     def _close(self) -> None:
-        """Close the operator's window when all is over; else zero force and a question; asked again, leave."""
+        """Close the operator's window after the session; before, send zero force and ask; leave if asked again."""
         if self.runner.finished:
             self._leave()
             return
@@ -567,12 +567,12 @@ class SessionBridge(QObject):
 
 
 def _trace_of(error: BaseException) -> BaseException | None:
-    """Return the error for the log's traceback; None for an error that its sentence explains to the user."""
+    """Return the error if the log needs its traceback, None if its message explains it."""
     return None if isinstance(error, StudyError) else error
 
 
 def make_cockpit(chosen: NewSession, protocol: Protocol, rig: Rig, theme: Theme) -> OperatorWindow:
-    """Return the operator's window, not shown yet."""
+    """Return the operator's window, not yet shown."""
     described = descriptor_of(chosen.device)
     return OperatorWindow(
         protocol.study.name,
@@ -595,7 +595,7 @@ def make_participant_window(
     photodiode: bool,
     in_step: bool = True,
 ) -> ParticipantWindow:
-    """Return the participant's window, not shown yet.
+    """Return the participant's window, not yet shown.
 
     ``clock`` gives the session's time [s] once the session is on the disk; ``shares_screen`` is whether the operator's
     window is on the same screen, ``text_scale`` how much larger than designed the words must be at least,
@@ -615,7 +615,7 @@ def make_participant_window(
 
 
 def planned(chosen: NewSession, protocol: Protocol, store: SessionStore) -> tuple[Protocol, Schedule, Start]:
-    """Return what is run in a session that is on the disk, in what order, and where it begins or goes on."""
+    """Return protocol and schedule of a session that is on the disk, and where it begins or resumes."""
     protocol = store.as_recorded(protocol)
     protocol = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
     schedule, start = begun_schedule(protocol, start_of(store.lines), store.key), FIRST
@@ -637,7 +637,7 @@ def connect_windows(
     refresh_hz: float,
     videos: Videos | None = None,
 ) -> SessionBridge:
-    """Connect the operator's and the participant's window, made before; they are to be shown, and the bridge started.
+    """Connect both windows to the session; the caller shows them and starts the bridge.
 
     ``plan`` is what is run, in what order, and where it begins; ``refresh_hz`` how many frames a second there are.
     ``videos`` are open.
@@ -671,7 +671,7 @@ def connect_windows(
 def show_windows(
     bridge: SessionBridge, screens: Callable[[], tuple[QScreen, QScreen]], *, played: bool = False
 ) -> Iterator[None]:
-    """Show both windows on their screens, one after the other; of a session that is played the participant's alone.
+    """Show both windows on their screens, one after the other; for a played session only the participant's.
 
     ``screens`` returns the participant's and the operator's screen; it is called in each step.
 
@@ -694,7 +694,7 @@ def show_windows(
 
 
 def _reconnecting(rig: Rig, videos: Videos | None) -> Callable[[], dict[str, Any]]:
-    """Return what opens again what failed: device and servo, or videos and not a device that is well."""
+    """Return a function that reopens what failed: device and servo, or videos."""
 
     def reconnect() -> dict[str, Any]:
         if videos is None or rig.servo.fault is not None:
@@ -723,7 +723,7 @@ def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, rig: Rig)
 
 
 def _calibration(device: Device) -> tuple[tuple[str, str], ...]:
-    """Return what the operator should know of a device that can be calibrated."""
+    """Return the rows about the calibration of a device, empty if it cannot be calibrated."""
     used = device.describe().get("calibration")
     if used is None:
         return ()
@@ -731,7 +731,7 @@ def _calibration(device: Device) -> tuple[tuple[str, str], ...]:
 
 
 def _aim(hand: HandOrders | None, servo: Servo) -> Callable[[], Vector]:
-    """Return a function that tells where the hand is; for a simulated one its aim, since its lag reveals the liquid."""
+    """Return a function that gives the hand's position, or a simulated hand's aim: its lag would reveal the liquid."""
     if hand is not None:
         return lambda: hand.aim_m
 
@@ -743,7 +743,7 @@ def _aim(hand: HandOrders | None, servo: Servo) -> Callable[[], Vector]:
 
 
 def _hands(hand: HandOrders, chosen: NewSession, clock: Callable[[], float]) -> Callable[[Page], Hand | None]:
-    """Return what makes the simulated hand for a page; on a page without a task the hand rests."""
+    """Return a function that makes the simulated hand of a page; on pages without a task the hand rests."""
     draw = stream(chosen.seed, f"run/{chosen.participant}/hand").random
 
     def hand_on(page: Page) -> Hand | None:

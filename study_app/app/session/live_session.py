@@ -66,7 +66,7 @@ if TYPE_CHECKING:
 
 
 def load_windows() -> None:
-    """Load what a session's windows need while the note is shown: modules, and versions, read from the disk once."""
+    """Load modules and versions that the session's windows need while the opening window is shown."""
     import study_app.app.session.bridge  # noqa: PLC0415
     import study_app.app.session.preflight_controller  # noqa: PLC0415
     import study_app.gui.devices.diagnosis_dialog  # noqa: PLC0415
@@ -123,7 +123,7 @@ class LiveSession(QObject):
         self._compiled.connect(self._show_compiled, Qt.ConnectionType.QueuedConnection)
 
     def open(self) -> None:
-        """Show the note, and make device and servo ready; a mistake ends in order, with ``over``."""
+        """Show the opening window and prepare device and servo; an error closes the session and emits ``over``."""
         self._go_on(self._open)
 
     def _open(self) -> None:
@@ -141,17 +141,17 @@ class LiveSession(QObject):
 
     @property
     def opening(self) -> bool:
-        """Whether device and servo are being made ready, even for a session that was called off meanwhile."""
+        """Whether device and servo are being prepared, even if the session was cancelled meanwhile."""
         return self._opening.busy
 
     def wait(self, patience_s: float = OPENING_PATIENCE_S) -> None:
-        """Wait for what is being made ready: it must be let go of here, not in the thread that makes it."""
+        """Wait until the preparation has ended: its results must be released in this thread."""
         if self._opening.busy:
             self._opening.wait(patience_s)
             QApplication.processEvents()
 
     def end_by_signal(self, number: int) -> None:
-        """Leave the session, which stays unfinished, because the program is being ended from outside."""
+        """Leave the session unfinished: a signal ends the program."""
         self.code, self.patience_s = 128 + number, BY_SIGNAL_S
         if self._closed:
             return
@@ -161,7 +161,7 @@ class LiveSession(QObject):
             self._close()
 
     def _make_ready(self) -> Ready | Exception:
-        """Compile, open, start and measure, in a thread of its own; whatever comes of it goes to ``_begin``."""
+        """Compile, open, start and measure in a separate thread; return the parts for ``_begin``, or the exception."""
         rig: Rig | None = None
         outlets: Outlets | None = None
         videos: Videos | None = None
@@ -187,7 +187,7 @@ class LiveSession(QObject):
         return made
 
     def _begin(self, made: object) -> None:
-        """Ask the operator, or claim the session on the disk and open the two windows at once."""
+        """Show the pre-flight window, or claim the session on the disk and open its windows at once."""
         if isinstance(made, Ready):
             self.rig, self._outlets, self._videos = made.rig, made.outlets, made.videos
         if self._closed:
@@ -201,18 +201,18 @@ class LiveSession(QObject):
             self._open_windows(made)
 
     def _open_windows(self, made: object) -> None:
-        """Open the windows, step by step, with other events between the steps."""
+        """Open the windows step by step; other events are handled between the steps."""
         if self._steps is None or not isinstance(made, Ready):
             self._steps = self.open_windows(made)
             self._go_on(self._step)
 
     def _step(self) -> None:
-        """Take the next step, unless the session was closed meanwhile."""
+        """Run the next step, unless the session was closed meanwhile."""
         if not self._closed and self._steps is not None and next(self._steps, self) is None:
             QTimer.singleShot(1, self, lambda: self._go_on(self._step))  # 0 ms may be the same iteration of the loop
 
     def _go_on(self, step: Callable[[], None]) -> None:
-        """Take a step toward the first page; whatever it meets ends in order."""
+        """Run a step towards the first page; an error closes the session in order."""
         try:
             step()
         except Exception as raised:  # noqa: BLE001 - told; what is open must be closed in order
@@ -225,7 +225,7 @@ class LiveSession(QObject):
             self._close()
 
     def _ask(self, made: Ready) -> None:
-        """Show the operator what was found; the session begins when that is accepted."""
+        """Show the results of the checks to the operator, who starts the session."""
         from study_app.app.session.preflight_controller import Preflight  # noqa: PLC0415 - pyqtgraph: only once it is needed
 
         study, who = self.chosen.read_protocol(), self.chosen.who
@@ -238,7 +238,7 @@ class LiveSession(QObject):
         asked.open()
 
     def open_windows(self, made: object) -> Iterator[None]:
-        """Go on with what the thread made ready, or raise what it met; what comes up to a yield takes a few frames."""
+        """Continue with the prepared parts, or raise the error; each step up to a yield takes a few frames."""
         if not isinstance(made, Ready):
             raise made if isinstance(made, Exception) else TypeError(made)
         from study_app.app.session import bridge  # noqa: PLC0415 - pyqtgraph: only once it is needed
@@ -295,12 +295,12 @@ class LiveSession(QObject):
         return 0.0 if self._store is None else self._store.clock.seconds()
 
     def screens(self) -> tuple[QScreen, QScreen]:
-        """Return the participant's and the operator's screen: as chosen, or as set for this machine."""
+        """Return the participant's and the operator's screens, as chosen or as set for this machine."""
         chosen = self.chosen.screen
         return choose_screens(chosen if chosen is not None else screen_number(self.settings))
 
     def diagnose(self) -> None:
-        """Open the diagnosis of the haptic device over the operator's window; the bridge has stopped the force."""
+        """Open the diagnosis of the device above the operator's window; the bridge has stopped the force."""
         from study_app.gui.devices.diagnosis_dialog import diagnosis  # noqa: PLC0415 - the note comes before it
 
         assert self.bridge is not None  # noqa: S101 - it has just asked
@@ -351,7 +351,7 @@ class LiveSession(QObject):
             self._close()
 
     def _close(self) -> None:
-        """Let go of everything, in the order of safety, and say that it is over, once."""
+        """Close everything, in the order of safety, and emit ``over`` once."""
         if self._closed:
             return
         self._closed = True

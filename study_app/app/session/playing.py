@@ -74,7 +74,7 @@ class PlayedSession(LiveSession):
         return None if self.bridge is None else self.bridge.parts.journal.progress.ended
 
     def stop(self) -> None:
-        """Send zero force, end the session, and close its window; before it has begun, give it up."""
+        """Send zero force, end the session and close its window; before it has begun, cancel it."""
         bridge = self.bridge
         if self._closed:
             return
@@ -91,7 +91,7 @@ class PlayedSession(LiveSession):
             bridge.leave_now()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Take the closing of the participant's window as the end of the session."""
+        """End the session when the participant's window is closed."""
         closes = event.type() == QEvent.Type.Close and self.bridge is not None and watched is self.bridge.participant
         if not closes or self.bridge is None or self.bridge.participant.may_close:
             return super().eventFilter(watched, event)
@@ -106,7 +106,7 @@ class PlayedSession(LiveSession):
             QTimer.singleShot(END_SHOWN_MS, self, self._leave)
 
     def _stop_later(self) -> None:
-        """Stop once what is being handled now is over: it may be the window's own event."""
+        """Stop after the current event, which may be the window's own."""
         QTimer.singleShot(0, self, self.stop)
 
     def _leave(self) -> None:
@@ -180,7 +180,7 @@ class Playing(QObject):
         self._show_devices()
 
     def play(self) -> None:
-        """Play from here, unless something from here to the end is faulty; ask before a device is used."""
+        """Play from here, unless a part from here to the end is faulty; ask before a device is used."""
         self.place.flush()
         opened = self.editing.opened
         if opened is None or self.under_way:
@@ -201,7 +201,7 @@ class Playing(QObject):
             self._show(shown.asks_for_device(title_of(self.device), playable_part.words, has_force=has_force))
 
     def stop(self) -> None:
-        """Stop what is played: zero force first."""
+        """Stop the pilot: zero force first."""
         if self.pilot is not None and self.pilot.session is not None:
             self.pilot.session.stop()
         elif self._preparing.busy:
@@ -227,7 +227,7 @@ class Playing(QObject):
     # playing
 
     def _prepare(self) -> None:
-        """Simulate the steps before the first one that is shown, in the background."""
+        """Simulate the steps before the first shown one, in the background."""
         self._delete()
         part, self._asked = self._asked, None
         if part is None:
@@ -294,7 +294,7 @@ class Playing(QObject):
             self.pilot.session.end_by_signal(number)
 
     def end(self, patience: Patience) -> None:
-        """Stop, wait for devices that are being opened, and delete what was played."""
+        """Stop, wait for devices that are being opened, and delete the pilot's data."""
         self.stop()
         while self._preparing.busy and patience.left_s > 0:
             QApplication.processEvents()
@@ -325,7 +325,7 @@ class Playing(QObject):
 
 
 def _prepared(pilot: _Pilot) -> tuple[_Pilot, NewSession | StudyError]:
-    """Return the choices of a session that goes on where the pilot begins, or why there is none."""
+    """Return the choices of a session that starts at the pilot's first step, or the error."""
     part, study = pilot.what, pilot.what.protocol.study
     file = pilot.folder / f"{study.name}.toml"
     start = SessionStart(

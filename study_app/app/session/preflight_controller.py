@@ -79,7 +79,7 @@ class Appraisal:
         return (not self._waiting and self._last is None) or not self.appraiser.works
 
     def look(self) -> bool:
-        """Take the answers there are; return whether there is news."""
+        """Read the available answers; return whether there were any."""
         news = False
         for number, answer in self.appraiser.answers():
             if number != self._asked or self.over:
@@ -161,7 +161,7 @@ class Preflight(QObject):
         self.window.show()
 
     def close(self) -> None:
-        """Let go of window and processes; what is being measured uses the servo, and is seen off at once."""
+        """Close window and processes; wait for a measurement, which uses the servo."""
         self._timer.stop()
         self._ending.set()
         self.appraisal.close()
@@ -198,7 +198,7 @@ class Preflight(QObject):
         )
 
     def _look(self) -> None:
-        """Watch over the servo, which a device that is unplugged stops, and the screen; take what is said of scenes."""
+        """Check servo and screen, which may be unplugged, and read the appraiser's answers."""
         try:
             self._ready.rig.servo.check()
             self._screen()
@@ -215,7 +215,7 @@ class Preflight(QObject):
             self._show()
 
     def _again(self) -> None:
-        """Measure anew, in a thread of its own: it looks at the servo for two seconds."""
+        """Measure again in a thread of its own: the measurement takes two seconds."""
         if not self.measuring.busy:
             ready, sleep = self._ready, self._ending.wait
             self.measuring.run(lambda: measure_rig(ready.rig, self._chosen, ready.videos, sleep=sleep))
@@ -235,12 +235,12 @@ class Preflight(QObject):
 
 
 def _appraisal(protocol: Protocol, facts: Measurements) -> Appraisal:
-    """Return the appraisal of a study on the device that was measured."""
+    """Return the appraisal of a study on the measured device."""
     return Appraisal(study_scenes(protocol), _dynamics(facts, protocol), DeliveryQuestion(protocol, facts.delay_ticks))
 
 
 def _goes_on(chosen: NewSession, protocol: Protocol) -> tuple[tuple[str, str], ...]:
-    """Return where a session goes on and what is kept, nothing of a new one."""
+    """Return the rows that say where a session resumes and what is kept; empty for a new one."""
     if chosen.resumes is None:
         return ()
     own = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
@@ -249,20 +249,20 @@ def _goes_on(chosen: NewSession, protocol: Protocol) -> tuple[tuple[str, str], .
 
 
 def _largest(errors_n: list[float | None]) -> float | None:
-    """Return the largest error; None where one is not known, which may be the largest."""
+    """Return the largest error [N]; None if one is unknown, since it may be the largest."""
     known = [error for error in errors_n if error is not None]
     return max(known, default=None) if len(known) == len(errors_n) else None
 
 
 def _dynamics(facts: Measurements, protocol: Protocol) -> Dynamics:
-    """Return the device's dynamics, with the delay that the servo uses now where the device measures it."""
+    """Return the device's dynamics, with the servo's present delay if the device measures it."""
     if facts.dynamics.delay_s is None:
         return facts.dynamics
     return facts.dynamics._replace(delay_s=facts.delay_ticks / protocol.device.rate_hz)
 
 
 def study_scenes(protocol: Protocol) -> tuple[Asked, ...]:
-    """Return the study's scenes of one liquid, each once, with the fastest stroke of the tasks that it is felt in."""
+    """Return the study's scenes of one liquid, each once, with the fastest stroke of their tasks."""
     scenes: dict[Scene, Asked] = {}
     for block in protocol.blocks.values():
         stroke = protocol.tasks[block.task].fastest_stroke(protocol.device.workspace_m)
@@ -326,7 +326,7 @@ class ComputerCheck(QObject):
         return computer_checks(facts, study, backends(), cache=CACHE, compiled=counter.compiled)
 
     def _close(self) -> None:
-        """Go away, once nothing is measured any more: the thread still speaks to this object."""
+        """Delete the object once the measurement has ended: its thread still uses it."""
         self._closed = True
         if not self._background.busy:
             self.window.deleteLater()
