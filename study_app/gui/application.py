@@ -18,7 +18,7 @@ SWITCH_INTERVAL_S = 0.0005
 
 
 def application_here() -> QApplication:
-    """Return the application, made on first use."""
+    """Return the application; create it on first use."""
     instance = QApplication.instance()
     if isinstance(instance, QApplication):
         instance.setQuitOnLastWindowClosed(False)
@@ -37,5 +37,5 @@ def application_here() -> QApplication:
 
 
 def open_here(path: Path) -> None:
-    """Open a file or a folder with the program that the system has for it."""
+    """Open a file or folder with the system's program for it."""
     QDesktopServices.openUrl(QUrl.fromLocalFile(str(path.resolve())))

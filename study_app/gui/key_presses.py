@@ -57,7 +57,7 @@ class KeyPresses(QObject):
         self._watch(application.focusWindow())
 
     def begin_page(self, page: QWidget) -> None:
-        """Keep what was pressed before ``page`` appeared from acting on it: held keys, and clicks for 250 ms."""
+        """Ignore keys held and clicks made before ``page`` appeared; clicks for 250 ms."""
         self._receivers.clear()
         page.setAttribute(SHIELD)
         unshield = QTimer(page, singleShot=True, interval=CLICK_MS)
@@ -91,7 +91,7 @@ class KeyPresses(QObject):
         return False
 
     def _watch(self, window: QWindow | None) -> None:
-        """Filter the events of the window that has the keyboard now: no other one receives keys."""
+        """Filter the events of the focused window, which alone receives keys."""
         if window is not None and window is not self._window:
             window.removeEventFilter(self)  # one that comes back is filtered once
             window.installEventFilter(self)
@@ -102,7 +102,7 @@ class KeyPresses(QObject):
         return release is not None and release.key == key and release.event.timestamp() == event.timestamp()
 
     def _repeat(self, window: QObject, key: int, event: QKeyEvent) -> None:
-        """Send a repeat, marked as one, to the widget that received the press."""
+        """Send a repeat, marked as such, to the widget that received the press."""
         receiver = QGuiApplication.focusObject()
         if receiver is None or self._receivers.get(key) is not receiver:
             return
@@ -110,7 +110,7 @@ class KeyPresses(QObject):
             self._send(window, _marked_repeat(event))
 
     def _hold_back(self, event: QKeyEvent) -> bool:
-        """Keep a release until it is known to be real; one that no keyboard made is passed at once."""
+        """Hold a release until it is known to be real; pass on releases that no keyboard made."""
         if event.isAutoRepeat():
             return True
         self._settle()
@@ -126,7 +126,7 @@ class KeyPresses(QObject):
             self._settle()
 
     def _settle(self) -> None:
-        """Deliver the release that was held back: it is real."""
+        """Deliver the held release: it is real."""
         release, self._release = self._release, None
         if release is None:
             return
@@ -143,19 +143,19 @@ class KeyPresses(QObject):
 
 
 def key_presses() -> KeyPresses:
-    """Return the filter of the application, made on first use."""
+    """Return the application's filter, made on first use."""
     application = QGuiApplication.instance()
     assert isinstance(application, QGuiApplication)  # noqa: S101  # windows need one
     return application.findChild(KeyPresses) or KeyPresses(application)
 
 
 def ignores_clicks(page: QWidget) -> bool:
-    """Return whether ``page`` appeared so recently that a click was meant for the page before it."""
+    """Return whether ``page`` is so new that a click was meant for the previous page."""
     return page.testAttribute(SHIELD)
 
 
 def digit_of(event: QKeyEvent) -> int | None:
-    """Return the digit of a key, also of the digit row of a layout that types digits with Shift; None of others."""
+    """Return the digit of a key, also in layouts that type digits with Shift; None for other keys."""
     if Qt.Key.Key_0 <= event.key() <= Qt.Key.Key_9:
         return event.key() - Qt.Key.Key_0
     first = 2 if QGuiApplication.platformName() == "windows" else 10  # scan code of the key 1: PC, X11 and Wayland
@@ -164,7 +164,7 @@ def digit_of(event: QKeyEvent) -> int | None:
 
 
 def _physical_key(event: QKeyEvent) -> int:
-    """Return what identifies a key while modifiers change; the key's meaning if no keyboard made the event."""
+    """Return the scan code of a key, which modifiers do not change; the key code if no keyboard made the event."""
     return event.nativeScanCode() or -event.key()
 
 

@@ -130,7 +130,7 @@ class DiagnosisDialog(QDialog):
         self._look()
 
     def _look(self) -> None:
-        """Begin as soon as nothing else holds the device; then take what was said since."""
+        """Begin once nothing else uses the device; then read the diagnosis' answers."""
         if self._wanted and (self.leaving is None or self.leaving.ended):
             self._wanted = False
             self._examination = self._begin(self._name, options=self._options)
@@ -181,7 +181,7 @@ class DiagnosisDialog(QDialog):
         dialog.open()
 
     def save_support(self, path: Path) -> None:
-        """Write versions, settings, log, last error and the report to ``path``; say so, or why not."""
+        """Write versions, settings, log, last error and report to ``path``; show the path or the error."""
         try:
             write_support(path, self._written())
         except StoreError as error:
@@ -193,13 +193,13 @@ class DiagnosisDialog(QDialog):
         self.saved.show()
 
     def _let_go(self) -> None:
-        """Have the process end: it closes the device first, and nothing waits for that here."""
+        """Ask the process to end without waiting: it closes the device first."""
         if self._examination is not None:
             self._examination.close()
             self.leaving, self._examination = self._examination, None
 
     def done(self, result: int) -> None:
-        """End the examination, however the dialog is closed."""
+        """End the examination, whichever way the dialog is closed."""
         self._timer.stop()
         self._wanted = False
         self._let_go()
@@ -219,7 +219,7 @@ HELD = (
 def diagnosis(
     parent: QWidget, theme: Theme, name: str, settings: MachineSettings, *, held: bool = False
 ) -> DiagnosisDialog:
-    """Return the diagnosis of a device, begun; ``held`` where a session has it open."""
+    """Open the diagnosis of a device; ``held``: a session has the device open."""
     options = descriptor_of(name).window_values(settings.device_options)
     made = DiagnosisDialog(parent, theme, name, options=options, note=HELD if held else "")
     made.finished.connect(made.deleteLater)

@@ -146,11 +146,11 @@ class DevicesPlace(Place):
         vbox(self._area, margins=0, parent=self)
 
     def enter(self) -> None:
-        """Look at the machine again: something may have been plugged in."""
+        """Search for devices again: one may have been plugged in."""
         self.look()
 
     def leave(self) -> None:
-        """End an examination that is under way, so that it releases its device."""
+        """End a running examination, so that it releases its device."""
         self.end_diagnosis()
 
     def look(self) -> None:
@@ -159,12 +159,12 @@ class DevicesPlace(Place):
             self.looking.run(lambda: devices_shown(self.backends()))
 
     def end(self, patience_s: float = PATIENCE_S) -> None:
-        """Look no more, wait for a look that is under way, and show nothing of it: the windows go."""
+        """Stop searching, wait for the running search and ignore its result: the windows close."""
         self._ended = True
         self.looking.wait(min(patience_s, PATIENCE_S))
 
     def diagnose(self, name: str) -> None:
-        """Open the diagnosis of a device over the window; the preferred serial number counts."""
+        """Open the diagnosis of a device above the window, with the preferred serial number."""
         preferred = self._settings.device
         asked = preferred if preferred.partition(":")[0] == name else name
         self.end_diagnosis()
@@ -191,7 +191,7 @@ class DevicesPlace(Place):
             self.troubled.emit("This machine could not be examined", f"{error}.")
 
     def show_devices(self, shown: tuple[DeviceShown, ...]) -> None:
-        """Show devices; rows of those that are there already stay, with the keyboard in them."""
+        """Show devices; existing rows stay, with their keyboard focus."""
         self.shown = shown
         for device in shown:
             if device.name in self.rows:

@@ -22,7 +22,7 @@ NEEDS_NO_DISPLAY = "liquid-study rehearse, check, export and plot need no displa
 
 
 def check_display(environment: Mapping[str, str] = os.environ, platform: str = sys.platform) -> None:
-    """Find out whether Qt could open a window.
+    """Check whether Qt can open a window; raise DisplayError if not.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def check_display(environment: Mapping[str, str] = os.environ, platform: str = s
 
 
 def missing_for_windows() -> str:
-    """Return which system library Qt's X11 plugin lacks and what brings it, also without a display; "" if none."""
+    """Return the system library that Qt's X11 plugin lacks and its package, even without a display; "" if none."""
     try:
         if platform_is_linux():
             _load_plugin()
@@ -57,7 +57,7 @@ def missing_for_windows() -> str:
 
 
 def missing_library(error: OSError | ImportError) -> DisplayError:
-    """Return what to tell of a system library that Qt could not load."""
+    """Return the error about a system library that Qt could not load."""
     library = str(error).partition(":")[0]
     if platform_is_linux():
         return DisplayError(
@@ -69,7 +69,7 @@ def missing_library(error: OSError | ImportError) -> DisplayError:
 
 @contextmanager
 def qt_imported() -> Iterator[None]:
-    """Say which system library is missing where an import within it needs one.
+    """Name the missing system library if an import within the block needs one.
 
     Raises
     ------
@@ -83,12 +83,12 @@ def qt_imported() -> Iterator[None]:
 
 
 def platform_is_linux() -> bool:
-    """Return whether system libraries are Linux packages here."""
+    """Return whether system libraries come as Linux packages here."""
     return sys.platform == "linux"
 
 
 def _load_plugin() -> None:
-    """Load Qt's X11 plugin as Qt would, to hear which library is missing, if one is."""
+    """Load Qt's X11 plugin as Qt would, to find out which library is missing."""
     package = importlib.util.find_spec("PySide6")
     if package is None or package.origin is None:
         raise DisplayError("PySide6 is not installed: reinstall liquid-study with pip")

@@ -35,12 +35,12 @@ class ScreenShown:
 
 
 def screens_shown() -> tuple[ScreenShown, ...]:
-    """Return the screens there are, in their order."""
+    """Return the descriptions of all screens, in order."""
     return tuple(screen_shown(screen) for screen in QGuiApplication.screens())
 
 
 def screen_shown(screen: QScreen) -> ScreenShown:
-    """Return what the system tells of a screen."""
+    """Return a screen's description from the system."""
     size, physical = screen.size(), screen.physicalSize()
     return ScreenShown(
         number=QGuiApplication.screens().index(screen) + 1,
@@ -55,7 +55,7 @@ def screen_shown(screen: QScreen) -> ScreenShown:
 
 
 def choose_screens(number: int | None) -> tuple[QScreen, QScreen]:
-    """Return the participant's and the operator's screen; the same one where there is only one.
+    """Return the participant's and the operator's screens; the same one twice if there is only one.
 
     ``number`` is the participant's, from 1; None: the last one, where a second monitor usually is. Do not keep them for
     later: a screen can be removed, and PySide gives a screen up with the widget whose ``screen()`` returned it last.
@@ -87,7 +87,7 @@ def describe_screen(screen: QScreen) -> dict[str, Any]:
 
 
 def place(window: QWidget, screen: QScreen, *, corner: bool) -> None:
-    """Give ``window`` its size, or as much of it as ``screen`` has, in the middle or in the lower right corner.
+    """Give ``window`` its size, at most the screen's, and put it in the middle or the lower right corner.
 
     The system's frame is not known before the window is shown, and on a busy machine some time later: once it is, the
     window makes room for it.
@@ -100,7 +100,7 @@ def place(window: QWidget, screen: QScreen, *, corner: bool) -> None:
 
 
 def make_room_for_frame(window: QWidget, *, corner: bool = False) -> None:
-    """Bring ``window`` with its frame wholly onto its screen; its least size gives way to the frame."""
+    """Move ``window`` with its frame wholly onto its screen, below its minimum size if necessary."""
     room, outer, inner = window.screen().availableGeometry(), window.frameGeometry(), window.geometry()
     if window.isFullScreen() or window.isMaximized() or room.contains(outer):
         return
@@ -116,7 +116,7 @@ def make_room_for_frame(window: QWidget, *, corner: bool = False) -> None:
 
 
 def _inside(window: QWidget, room: QRect, *, corner: bool) -> QRect:
-    """Return where ``window`` stands in ``room``, from its upper left corner if it is larger."""
+    """Return the rectangle of ``window`` in ``room``, from its upper left corner if it is larger."""
     size = window.size().boundedTo(room.size()).expandedTo(window.minimumSize())
     share = 1.0 if corner else 0.5
     right, down = max(0, room.width() - size.width()), max(0, room.height() - size.height())
@@ -133,7 +133,7 @@ WITHOUT_OPENGL: Final = {"offscreen", "minimal", "vnc", "linuxfb"}
 
 @cache
 def renderer() -> str | None:
-    """Return what OpenGL draws with here, as it names itself; None where there is no OpenGL."""
+    """Return OpenGL's name for its renderer; None without OpenGL."""
     if QGuiApplication.platformName() in WITHOUT_OPENGL:
         return None
     context = QOpenGLContext()
@@ -150,7 +150,7 @@ def renderer() -> str | None:
 
 
 def has_card() -> bool:
-    """Return whether OpenGL draws with a graphics card here, and not in software."""
+    """Return whether OpenGL uses a graphics card and not software."""
     name = renderer()
     return name is not None and not any(word in name.lower() for word in IN_SOFTWARE)
 
@@ -199,7 +199,7 @@ class Frames(QObject):
         self._timer.stop()
 
     def swapped(self) -> None:
-        """Note that the surface has just swapped: from now on, a frame is drawn shortly before each swap."""
+        """Note a buffer swap: from now on, a frame is drawn shortly before each swap."""
         self._swapped_ns = self._now_ns()
         aim_ns = self._swapped_ns - min(LEAD_NS, self.period_ns // 2)
         half_ns = self.period_ns // 2
@@ -210,7 +210,7 @@ class Frames(QObject):
             self._arm()
 
     def _draw(self) -> None:
-        """Ask for a frame; the next is waited for already, so that a slow frame does not put it off."""
+        """Request a frame; the timer of the next one already runs, so that a slow frame does not delay it."""
         now_ns = self._drawn_ns = self._now_ns()
         missed = max(0, (now_ns - self._next_ns) // self.period_ns)
         self._next_ns += (missed + 1) * self.period_ns

@@ -69,7 +69,7 @@ class HelpEntry:
 
 @cache
 def entries() -> tuple[HelpEntry, ...]:
-    """Return the pages in the order of the sections, each section after its own page."""
+    """Return the pages in the order of the sections, each page followed by its sections."""
     rows = [HelpEntry(page=FIRST_PAGE, title="Start page", heads=True)]
     for section, pages in documentation.sections().items():
         rows.append(HelpEntry(page=section, title=plain(documentation.title(section)), heads=True))
@@ -78,7 +78,7 @@ def entries() -> tuple[HelpEntry, ...]:
 
 
 def found(text: str) -> tuple[HelpEntry, ...]:
-    """Return the pages that have the words, the best first, each at its best heading; all pages for no words."""
+    """Return the pages that contain the text, best first, each at its best heading; all pages for an empty text."""
     if not text.strip():
         return entries()
     titles = {entry.page: entry.title for entry in entries()}
@@ -112,14 +112,14 @@ CODE = (QTextFormat.Property.BlockCodeFence, QTextFormat.Property.BlockCodeLangu
 
 
 def heading_font(level: int) -> QFont:
-    """Return the font of a heading of a level from 1."""
+    """Return the font of a heading; levels count from 1."""
     made = font("title" if level == 1 else "card")
     made.setPixelSize(HEADING_SIZES[min(level, 4)])
     return made
 
 
 def code_font() -> QFont:
-    """Return the font of what is typed."""
+    """Return the font of code."""
     made = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
     made.setPixelSize(CODE_SIZE)
     return made
@@ -148,7 +148,7 @@ class PageReader(Coloured, QTextBrowser):
         self.anchorClicked.connect(self._follow)
 
     def show_page(self, name: str, anchor: str = "") -> None:
-        """Show a page from its beginning, or from the heading that an anchor names."""
+        """Show a page from its start, or from the heading with an anchor."""
         if name != self.page:
             self.page = name
             self._draw()
@@ -174,7 +174,7 @@ class PageReader(Coloured, QTextBrowser):
         return picture
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Draw the page again, since pictures are as wide as the text; what is read stays in sight."""
+        """Draw the page again, since pictures are as wide as the text; the text being read stays visible."""
         at = self.verticalScrollBar().value() / max(1, self.verticalScrollBar().maximum())
         super().resizeEvent(event)
         if self.page and event.size().width() != event.oldSize().width():
@@ -182,7 +182,7 @@ class PageReader(Coloured, QTextBrowser):
             self.verticalScrollBar().setValue(round(at * self.verticalScrollBar().maximum()))
 
     def _here(self, path: str) -> str:
-        """Return where a path of the page leads to, from the folder of the pages."""
+        """Return the target of a path on the page, relative to the folder of the pages."""
         return posixpath.normpath(posixpath.join(posixpath.dirname(self.page), path))
 
     def _draw(self) -> None:
@@ -323,7 +323,7 @@ class HelpPlace(Place):
         vbox(head, (body, 1), spacing=14, margins=(24, 24, 24, 18), parent=self)
 
     def open_page(self, name: str, anchor: str = "") -> None:
-        """Show a page, at a heading that an anchor names; a page that does not exist is not shown."""
+        """Show a page, at the heading with an anchor; an unknown page is ignored."""
         if name not in documentation.names():
             return
         if self.reader.page and self.reader.page != name:
@@ -333,7 +333,7 @@ class HelpPlace(Place):
         self._select(name)
 
     def open_from(self, place: str) -> None:
-        """Show the page about another place, to which *Back* leads; the first page where Help is asked for in Help."""
+        """Show the page about another place, to which *Back* returns; from Help itself, the first page."""
         if place not in PAGES_OF_PLACES:
             self.open_page(FIRST_PAGE)
             return
@@ -342,7 +342,7 @@ class HelpPlace(Place):
         self.back.setEnabled(True)
 
     def go_back(self) -> None:
-        """Show the page that was shown before; before the first one, the place where help was asked for."""
+        """Show the previous page; before the first one, the place where help was opened."""
         if self._before:
             name = self._before.pop()
             self.back.setEnabled(bool(self._before or self._came_from))
@@ -356,7 +356,7 @@ class HelpPlace(Place):
             self.go_asked.emit(self._came_from)
 
     def leave(self) -> None:
-        """Forget where help was asked for."""
+        """Forget where help was opened."""
         self._came_from = ""
         self.back.setEnabled(bool(self._before))
 
@@ -386,7 +386,7 @@ class HelpPlace(Place):
             self.open_page(item.data(PAGE), item.data(ANCHOR))
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Let arrows in the search field act on the list; the first one, and Enter, open its first page."""
+        """Let arrow keys in the search field move in the list; the first one, and Enter, open its first page."""
         if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent) and event.key() in (*MOVES, *ENTERS):
             if not self.list.selectedItems():
                 self.list.setCurrentRow(0)

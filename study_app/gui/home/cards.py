@@ -88,7 +88,7 @@ class LabCard(Card):
 
 
 def _paint_wake(painter: QPainter, water: QRectF) -> None:
-    """Paint a wake that thickens and brightens toward the ball at its newest end."""
+    """Paint a wake that becomes wider and brighter towards the ball."""
     points = [
         QPointF(
             water.left() + water.width() * (0.08 + 0.74 * share),
@@ -204,7 +204,7 @@ class SessionsCard(Card):
         return self.rows.shown
 
     def show_sessions(self, sessions: Sequence[SessionFacts], where: str, now: datetime) -> None:
-        """Show these sessions in place of those before; ``where`` names the results folder."""
+        """Show these sessions; ``where`` names the results folder."""
         self._found, self._now = tuple(sessions), now
         self.where.show_text(f"in {where}")
         self._show_kinds()
@@ -354,7 +354,7 @@ class CardGrid(QWidget):
 
     @property
     def row_height(self) -> int:
-        """The height of the first row of cards at the width that they have."""
+        """The height of the first row of cards at their present width."""
         wide = (self.width() - self._grid.contentsMargins().right() + GAP) // max(1, self._across) - GAP
         heights = (
             card.heightForWidth(wide) if card.hasHeightForWidth() else card.sizeHint().height()
@@ -385,7 +385,7 @@ class CardGrid(QWidget):
         return done
 
     def arrange(self, width: int) -> None:
-        """Place the cards for a window that leaves them ``width``; a lone card does not stretch over it."""
+        """Place the cards in a width; a single card is not stretched."""
         across = max(1, (width + GAP) // (self._least + GAP))
         if across == self._across:
             return

@@ -104,7 +104,7 @@ class RehearsalDialog(Work):
             self.worker.close()
 
     def _listen(self) -> None:
-        """Take the answers since; where the rehearsal is to stop, close once its process has ended."""
+        """Read the new answers; close the dialog once a stopped rehearsal's process has ended."""
         assert self.worker is not None  # noqa: S101 - listening begins with it
         if not self.back.isEnabled():
             if self.worker.ended:
@@ -127,7 +127,7 @@ class RehearsalDialog(Work):
                     self.show_refused(answer.sentence)
 
     def end(self) -> None:
-        """Stop the rehearsal and wait for it: the windows are gone."""
+        """Stop the rehearsal and wait for it: the windows are closed."""
         self._listening.stop()
         self.working = False
         if self.worker is not None:
@@ -161,7 +161,7 @@ class StudyFolderState:
 
 
 def read_study_folder_state(path: Path, protocol: Protocol) -> StudyFolderState:
-    """Read the folder of a study; a folder that cannot be used has a ``fault``."""
+    """Read a study's folder; ``fault`` says why it cannot be used."""
     folder, fault = StudyFolder(path), ""
     used = UsedIds(path, frozenset(), ())
     try:
@@ -325,7 +325,7 @@ class NewSessionDialog(QDialog):
         QTimer.singleShot(0, self, self._fit)  # once the parts have their style
 
     def _fit(self) -> None:
-        """Be as high as the questions are, but no higher than the screen: then they scroll, and the foot stays."""
+        """Make the dialog as high as its questions, at most the screen's height; then they scroll."""
         inside, whole = self._inside.layout(), self.layout()
         assert inside is not None and whole is not None  # noqa: S101, PT018 - laid out above
         wide = self.minimumWidth() - whole.contentsMargins().left() - whole.contentsMargins().right()
@@ -341,14 +341,14 @@ class NewSessionDialog(QDialog):
         self._check()
 
     def _suggest_folder(self) -> None:
-        """Keep pilots and a simulated hand's sessions apart, unless the operator chose a folder."""
+        """Suggest separate folders for pilots and simulated hands, unless the operator chose one."""
         if self._value("results") == self._suggested:
             study, device, pilot = self.facts.protocol.study.name, self._value("device"), self._value("pilot")
             self._suggested = str(study_results(self._all_results, study, device, pilot=pilot))
             self.editors["results"].show_value(self._suggested)
 
     def _choose_pilot(self) -> None:
-        """Put a pilot in a framed window and suggest its folder; restore both choices if it is no pilot."""
+        """Choose a framed window and the pilots' folder; restore both choices if it is no pilot."""
         pilot, windowed = self._value("pilot"), self.editors["windowed"]
         if pilot:
             self._windowed_without_pilot = windowed.value
@@ -361,7 +361,7 @@ class NewSessionDialog(QDialog):
         return self.editors[name].value
 
     def _check(self) -> None:
-        """Judge what stands there, and look outside the window's thread whether the folder has changed since."""
+        """Check the answers, and read the folder again outside the windows' thread."""
         self._show_verdict()
         if text := self._value("results"):
             self._reader.run(partial(read_study_folder_state, Path(text), self.facts.protocol))
@@ -372,7 +372,7 @@ class NewSessionDialog(QDialog):
             self._show_verdict()
 
     def _state_now(self) -> StudyFolderState:
-        """Return the study's folder as it was last read; one that was just chosen is read at once."""
+        """Return the last state of the study's folder; read a newly chosen folder at once."""
         path = Path(self._value("results") or ".")
         if self._state is None or self._state.path != path:
             self._state = read_study_folder_state(path, self.facts.protocol)
@@ -405,14 +405,14 @@ class NewSessionDialog(QDialog):
         self._fit()
 
     def _show_recorded_group(self, recorded: str | None) -> None:
-        """Show the group of a participant who has one, who cannot change it; otherwise it is chosen."""
+        """Show the recorded group of a participant, which cannot change; otherwise it can be chosen."""
         group = self.editors["group"]
         if recorded is not None or not group.isEnabled():
             group.show_value(recorded)
         group.setEnabled(recorded is None)
 
     def _refuse(self) -> None:
-        """Raise an error if this cannot begin; nothing is touched to find out."""
+        """Raise an error if the session cannot begin; nothing is changed."""
         if not self._value("results"):
             raise ValueError("choose a results folder")
         participant, session, state = self._value("participant"), self._value("session"), self._state_now()
@@ -438,7 +438,7 @@ class NewSessionDialog(QDialog):
         return {option.name for option in descriptor_of(self._value("device")).window_options}
 
     def chosen(self) -> NewSession:
-        """Return what was chosen; a ValueError says what is not permitted."""
+        """Return the chosen session; raise ValueError for values that are not permitted."""
         asked, options = self._asked(), {option.name for option in window_options()}
         values = {name: editor.value for name, editor in self.editors.items() if name in asked or name not in options}
         chosen = {name: values.pop(name) for name in asked}

@@ -164,7 +164,7 @@ NARROW_BELOW = 1680
 
 
 def bug_words(error: BaseException) -> str:
-    """Return what is said of an exception that no user can mend, unless a plug-in raised it."""
+    """Return the sentence about a bug of the program or a plug-in."""
     if isinstance(said := explained(error), StudyError):
         return f"{said}."
     return f"{type(error).__name__}: {error}. This is a bug: please report it, with what the terminal shows."
@@ -215,7 +215,7 @@ class MainWindow(Themed, QMainWindow):
         return self._here
 
     def place(self, name: str) -> Place:
-        """Return a place, made on first use; what making it raises is said, too."""
+        """Return a place, made on first use; show the error if that fails."""
         if name not in self._places:
             QGuiApplication.setOverrideCursor(Qt.CursorShape.WaitCursor)
             try:
@@ -234,7 +234,7 @@ class MainWindow(Themed, QMainWindow):
         return self._places[name]
 
     def go(self, name: str) -> None:
-        """Leave the place one is at and show another, which is made at its first visit."""
+        """Leave the present place and show another one, made at its first visit."""
         asked = self.place(name)
         if name != self._here or not asked.isVisible():
             if name != self._here:
@@ -247,7 +247,7 @@ class MainWindow(Themed, QMainWindow):
         self._lead_in(self.rail.buttons[name], asked)
 
     def _lead_in(self, button: QWidget, place: Place) -> None:
-        """Give a place the keyboard of its button in the rail: to the part that had it last, else to the first."""
+        """Move the keyboard focus from a rail button into its place: to the part that had it last, else the first."""
         if self.focusWidget() is not button:
             return
         if (last := last_focused(place)) is not None:
@@ -270,14 +270,14 @@ class MainWindow(Themed, QMainWindow):
         self._show_notice(notice)
 
     def rest(self) -> None:
-        """Leave the place one is at, and the screen: a session takes over."""
+        """Leave the present place and hide the window during a session."""
         self._places[self._here].leave()
         self._had_keyboard = self.focusWidget()
         self._resting = True
         self.hide()
 
     def come_back(self) -> None:
-        """Be there again, where one was.
+        """Show the window again, at the same place.
 
         A window that becomes the active one while it is hidden, as when the dialog before a session closes, gives the
         keyboard to the part after the one that had it.
@@ -291,13 +291,13 @@ class MainWindow(Themed, QMainWindow):
         self._places[self._here].enter()
 
     def show_message(self, title: str, sentence: str, *, of: str = "") -> None:
-        """Say what went wrong, with one button; what the place ``of`` has said is closed when one leaves it."""
+        """Show a message with one button; a message of the place ``of`` closes when the place is left."""
         self._show_notice(Question(self, self.theme, title, sentence), of)
 
     def ask_about_device(
         self, title: str, sentence: str, again: Callable[[], object], diagnose: Callable[[], object] | None
     ) -> None:
-        """Say that a device failed, and offer to try again, and to examine it, where it can be."""
+        """Show that a device failed; offer to try again and, if possible, to diagnose it."""
         go_on = ActionButton("repeat", "Try again", role="primary")
         other = None if diagnose is None else ActionButton("pulse", "Diagnose …")
         if other is not None and diagnose is not None:

@@ -68,7 +68,7 @@ class OpeningWindow(QWidget):
         self._bar.setValue(round(100 * share))
 
     def say(self, line: str) -> None:
-        """Show what the device asks for, from now on instead of what goes on."""
+        """Show what the device asks for instead of the progress."""
         self._said = True
         self.step.setText(line)
 
@@ -78,7 +78,7 @@ class OpeningWindow(QWidget):
         self.close()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Go back on Esc, tapped or held: whatever was opened so far is let go of, with zero force."""
+        """Cancel on Esc, tapped or held: everything opened so far is closed, with zero force."""
         if event.key() == Qt.Key.Key_Escape:
             self.close()
         else:

@@ -71,12 +71,12 @@ class StudyFacts:
 
     @property
     def name(self) -> str:
-        """The study's name, which its sessions carry."""
+        """The study's name, which its sessions state."""
         return self.protocol.study.name
 
     @property
     def file_name(self) -> str:
-        """The name of its file, without ending, which commands take."""
+        """The name of its file without suffix, which commands accept."""
         return Path(self.source).stem
 
 
@@ -101,14 +101,14 @@ class DraftFacts:
 
 
 def sources() -> tuple[str, ...]:
-    """Return the studies at hand: recent files, then names in the workspace, then those that ship; no liquid files."""
+    """Return the known studies: recent files, the workspace's, then shipped ones; no liquid files."""
     names = sorted(at_hand(), key=lambda name: (is_shipped(name), name != "rek2024", name == "demo", name))
     known = dict.fromkeys((*recent_protocols(), *names))
     return tuple(source for source in known if not holds_liquids_alone(source))
 
 
 def file_states(opened: Iterable[str]) -> frozenset[tuple[Path, int, int]]:
-    """Return path, time of change [ns] and size [bytes] of the files that studies come from, liquid files among them.
+    """Return path, modification time [ns] and size [bytes] of the studies' files, liquid files included.
 
     These are the workspace's files, recent ones and ``opened`` ones, and drafts.
     """
@@ -133,14 +133,14 @@ LoadWords: TypeAlias = Callable[[], DraftWords] | None
 
 
 def held_ns(session: Path) -> int:
-    """Return when a line was last written of a session in a folder [ns]; 0 where nobody knows."""
+    """Return the time of the last line of a session's journal [ns]; 0 if it is unknown."""
     with suppress(OSError):
         return (session / "journal.jsonl").stat().st_mtime_ns
     return 0
 
 
 def last_study(results: Path) -> str:
-    """Return the study of the session that was held last under ``results``, samples aside; "" where there is none."""
+    """Return the study of the latest session under ``results``, samples excluded; "" if there is none."""
     folders = results.glob("*/data/sub-*/ses-*")
     with suppress(StudyError, ValueError):
         last = max(
@@ -153,7 +153,7 @@ def last_study(results: Path) -> str:
 def read_studies(
     opened: Iterable[str], draft_words: LoadWords = None, results: Path | None = None
 ) -> tuple[StudyFacts | BrokenFacts | DraftFacts, ...]:
-    """Return what is said of each study at hand.
+    """Return the facts about each known study.
 
     Drafts come first, the newest first of all, then ``opened`` ones, then the study that was run last under
     ``results``; before the first session the demo.
@@ -184,7 +184,7 @@ def _of_draft(file: Path, draft_words: LoadWords) -> DraftFacts | None:
 
 
 def holds_liquids_alone(source: str) -> bool:
-    """Return whether a file holds liquids and no study; a file that cannot be read does not."""
+    """Return whether a file holds liquids and no study; False if it cannot be read."""
     try:
         path = find(source)
         state = path.stat()
@@ -202,7 +202,7 @@ def _holds_liquids_alone(path: Path, _changed_ns: int, _size: int) -> bool:
 
 
 def is_shipped(source: str) -> bool:
-    """Return whether a source is a study that ships with the program, not one of the same name in the workspace."""
+    """Return whether a source is a shipped study, not one of the same name in the workspace."""
     try:
         return source in shipped() and find(source).resolve() == shipped_file(source).resolve()
     except ProtocolError:
@@ -210,7 +210,7 @@ def is_shipped(source: str) -> bool:
 
 
 def origin_of(source: str) -> str:
-    """Return where a study is from: "Shipped study", "Copy of demo" or "Own study"."""
+    """Return the origin of a study: "Shipped study", "Copy of demo" or "Own study"."""
     if is_shipped(source):
         return SHIPPED
     with suppress(ProtocolError):
@@ -221,7 +221,7 @@ def origin_of(source: str) -> str:
 
 
 def study_facts(source: str, draft_words: LoadWords = None) -> StudyFacts | BrokenFacts:
-    """Load the protocol ``source`` and say what a researcher chooses by."""
+    """Load the protocol ``source`` and return the facts by which a researcher chooses."""
     try:
         protocol = load(source)
     except ProtocolError as error:
@@ -256,7 +256,7 @@ def study_facts(source: str, draft_words: LoadWords = None) -> StudyFacts | Brok
 
 
 def _draft_note(source: str, draft_words: LoadWords) -> DraftNote | None:
-    """Return what is said of a draft: "Draft of today 14:02, not saved: Water"; None where all of it is saved."""
+    """Return the note on a draft: "Draft of today 14:02, not saved: Water"; None if everything is saved."""
     with suppress(ProtocolError, OSError):
         file = find(source)
         draft, content = None if is_shipped(source) else draft_of(file), without_mark(file.read_bytes())
@@ -271,7 +271,7 @@ def _draft_note(source: str, draft_words: LoadWords) -> DraftNote | None:
 
 
 def time_words(moment: str) -> str:
-    """Return when a draft was kept: "today 14:02", "2026-11-20 14:02"."""
+    """Return the time of a draft: "today 14:02", "2026-11-20 14:02"."""
     if not (seconds := _seconds(moment)):
         return "an unknown time"
     kept, now = (datetime.fromtimestamp(at).astimezone() for at in (seconds, time.time()))
@@ -279,7 +279,7 @@ def time_words(moment: str) -> str:
 
 
 def _seconds(moment: str) -> float:
-    """Return a moment as seconds since 1970; 0 where it cannot be read."""
+    """Return a time as seconds since 1970; 0 if it cannot be read."""
     try:
         return datetime.fromisoformat(moment).timestamp()
     except ValueError:
@@ -300,7 +300,7 @@ class Interrupted:
 def interrupted(
     sessions: Iterable[SessionFacts], studies: Iterable[StudyFacts | BrokenFacts], now: datetime
 ) -> Interrupted | None:
-    """Return the newest session that can go on here, if any: unfinished, open in no program, of a protocol at hand.
+    """Return the newest session that can resume here: unfinished, not open in a program, with a known protocol.
 
     A protocol that cannot be used because its liquid file is lost still resumes: its liquids are sealed in the key.
     """
@@ -339,7 +339,7 @@ def interrupted(
 
 
 def place_words(protocol: Protocol, schedule: Schedule, step: int) -> str:
-    """Return where a session goes on, in the operator's words and without a condition: "in part 2, delay setting 3"."""
+    """Return where a session resumes, without a condition: "in part 2, delay setting 3"."""
     language = operator_language(protocol)
     if step >= len(schedule.steps):
         return "after the last page"
@@ -352,7 +352,7 @@ def place_words(protocol: Protocol, schedule: Schedule, step: int) -> str:
 
 
 def held(sessions: Iterable[SessionFacts], study: str) -> str:
-    """Return how many sessions of a study there are: "5 sessions, 3 complete, 1 incomplete, 1 excluded, 2 pilots"."""
+    """Return the numbers of a study's sessions: "5 sessions, 3 complete, 1 incomplete, 1 excluded, 2 pilots"."""
     of_study = [session for session in sessions if session.study == study]
     own = [session for session in of_study if not session.kind]
     pilots = sum(session.kind == "pilot" for session in of_study)

@@ -124,25 +124,25 @@ class HomePlace(Place):
         self.show_machine(DEFAULTS, looking(DEFAULTS.device))
 
     def show_machine(self, settings: MachineSettings, device: DeviceShown) -> None:
-        """Begin sessions with what is set for this machine; ``device`` is the preferred one as it was found."""
+        """Use these settings for new sessions; ``device`` is the state of the preferred device."""
         self.machine = settings
         self.device.show_device(device)
         self.device.show_screens(_screens(settings))
 
     def enter(self) -> None:
-        """Read protocols and results again, once the window stands; screens may have come and gone, too."""
+        """Read protocols and results again; screens may have changed, too."""
         self.device.show_screens(_screens(self.machine))
         QTimer.singleShot(0, self, self.read_changes)
         QTimer.singleShot(0, self, self.show_sessions)
 
     def event(self, event: QEvent) -> bool:
-        """Look for changed protocols when one comes back to the window, as from a text editor."""
+        """Check for changed protocols when the window becomes active, as after a text editor."""
         if event.type() == QEvent.Type.WindowActivate and self.isVisible() and not self._unread:
             self.read_changes()
         return super().event(event)
 
     def read_changes(self) -> None:
-        """Read the protocols again, outside the window's thread, where a file has changed."""
+        """Read the protocols again, outside the windows' thread, if a file has changed."""
         if file_states(self._opened) != self._files:
             self.show_studies()
 
@@ -183,7 +183,7 @@ class HomePlace(Place):
         self._keep_margin(bar=False)
 
     def _keep_margin(self, bar: bool) -> None:
-        """Put a bar that comes into the margin: it moves nothing."""
+        """Let an appearing scroll bar take the margin, so that nothing moves."""
         self._page.setContentsMargins(MARGIN, 20, MARGIN - BAR_PX * (1 + bar), 12)
 
     @property
@@ -191,12 +191,12 @@ class HomePlace(Place):
         return self._studies.busy or self._reader.busy
 
     def show_results(self, results: Path) -> None:
-        """Show the protocols of the workspace and the sessions of another folder from now on."""
+        """Show the workspace's protocols and the sessions of another folder from now on."""
         self.results = results
         self.show_studies()
 
     def show_studies(self) -> None:
-        """Read the protocols at hand, outside the window's thread; show a card for each, and the sessions."""
+        """Read the known protocols outside the windows' thread; show a card for each, and the sessions."""
         self.folder.show_text(f"Workspace: {workspace().folder}")
         self._files, self._unread = file_states(self._opened), False
         self._studies.run(partial(read_studies, tuple(self._opened), self._draft_words, self.results))
@@ -240,7 +240,7 @@ class HomePlace(Place):
             self._focus_card(*held)
 
     def _focused_card(self) -> tuple[int, str, int] | None:
-        """Return which card has the keyboard: its place, its study, and which of its buttons; None where none has."""
+        """Return place, study and button number of the focused card; None if none has the focus."""
         now = self.window().focusWidget() if self.isVisible() else None
         for at, card in enumerate(self.grid.cards):
             if isinstance(card, StudyCard | BrokenCard) and now in _buttons(card):
@@ -248,7 +248,7 @@ class HomePlace(Place):
         return None
 
     def _focus_card(self, at: int, source: str, button: int) -> None:
-        """Give the keyboard to the card of a study, which may be elsewhere now, else to the one at its place."""
+        """Focus the card of a study, which may have moved, else the card at its place."""
         cards = [card for card in self.grid.cards if isinstance(card, StudyCard | BrokenCard)]
         card = next(
             (candidate for candidate in cards if candidate.facts.source == source),
@@ -259,7 +259,7 @@ class HomePlace(Place):
             QTimer.singleShot(0, card, lambda: self.cards_area.ensureWidgetVisible(card))  # once it has its place
 
     def _order_focus(self) -> None:
-        """Let Tab go through the page as it is read: cards are made anew, and Qt would put them last."""
+        """Let Tab follow the reading order: Qt would put new cards last."""
         cards = [card for card in self.grid.cards if isinstance(card, StudyCard | BrokenCard)]
         sessions, device = self.sessions, self.device
         parts: tuple[QWidget, ...] = (
@@ -272,7 +272,7 @@ class HomePlace(Place):
             QWidget.setTabOrder(before, after)
 
     def show_sessions(self) -> None:
-        """Read the results folder again, outside the window's thread, once the studies are read."""
+        """Read the results folder again, outside the windows' thread, after the studies."""
         if not self._studies.busy:
             self._reader.run(partial(_read, self.results, self._facts))
 
@@ -286,7 +286,7 @@ class HomePlace(Place):
                 card.held.setText(held(sessions, card.facts.protocol.study.name))
 
     def _show_last(self, sessions: tuple[SessionFacts, ...]) -> None:
-        """Show the sessions of the kind that was held last, and its study first, once there is another one."""
+        """After a new session, show the sessions of its kind and move its study to the front."""
         last = max(
             (session for session in sessions if session.kind != "sample"),
             key=lambda session: held_ns(session.folder),
@@ -300,13 +300,13 @@ class HomePlace(Place):
         self._read_once = True
 
     def ask_for_session(self, facts: StudyFacts) -> None:
-        """Open the questions before a session; ``session_asked`` carries the answers."""
+        """Open the dialog for a new session; ``session_asked`` carries the answers."""
         dialog = NewSessionDialog(facts, self.results, machine=self.machine, theme=self.theme, parent=self)
         self._open(dialog)
         dialog.accepted.connect(lambda: self.session_asked.emit(dialog.chosen()))
 
     def _resume(self, session: Interrupted) -> None:
-        """Ask to go on with a session as it was begun, on the screens there are now."""
+        """Ask to resume a session as it was begun, on the present screens."""
         try:
             names = [screen.name for screen in screens_shown()]
             chosen = resumed_choices(
@@ -321,7 +321,7 @@ class HomePlace(Place):
             self.message.emit("The session cannot be resumed", f"{error}.")
 
     def ask_for_rehearsal(self, facts: StudyFacts) -> None:
-        """Open the questions before a rehearsal; the table shows what it left."""
+        """Open the rehearsal dialog; the table shows the results."""
         dialog = RehearsalDialog(facts, self.results, theme=self.theme, parent=self)
         self._open(dialog)
         dialog.finished.connect(self.show_sessions)
@@ -369,7 +369,7 @@ class HomePlace(Place):
         self._share_height()
 
     def _share_height(self) -> None:
-        """Let the cards have at least their first row; all they need where the page scrolls: one bar is enough."""
+        """Give the cards at least their first row; if the page scrolls, their whole height: one bar is enough."""
         if (whole := self.grid.whole_height) > 0:  # cards that came just now have no height yet
             others = self._page.totalMinimumSize().height() - self.cards_area.minimumHeight()
             least = min(whole, self.grid.row_height + NEXT_ROW_PX)
@@ -390,7 +390,7 @@ class HomePlace(Place):
 
 
 def _beside_bar(part: QWidget | QLayout) -> QHBoxLayout:
-    """Return a part in a row that leaves room for the scroll bar of the cards."""
+    """Return a row with room for the cards' scroll bar."""
     return hbox(part, margins=(0, 0, BAR_PX, 0))
 
 
@@ -399,7 +399,7 @@ def _buttons(card: StudyCard | BrokenCard) -> tuple[QWidget, ...]:
 
 
 def _read(results: Path, studies: tuple[Facts, ...]) -> tuple[Path, tuple[SessionFacts, ...], Interrupted | None]:
-    """Return the sessions in the results folder, and the one that can go on."""
+    """Return the sessions in the results folder, and the one that can resume."""
     counts = {it.name: set(extent_of(it.protocol).answers) for it in studies if isinstance(it, StudyFacts)}
     answers = {name: max(numbers) for name, numbers in counts.items() if len(numbers) == 1}
     known = sessions(results, answers)

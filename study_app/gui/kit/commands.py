@@ -37,11 +37,11 @@ class Command:
 
     @property
     def shown(self) -> tuple[str, ...]:
-        """Its keys as they are written on a keyboard: "Ctrl+Enter", "hold Esc"."""
+        """Its keys as printed on a keyboard: "Ctrl+Enter", "hold Esc"."""
         return tuple(f"{'hold ' * self.held}{key_words(keys)}" for keys in self.keys)
 
     def action(self, place: QWidget, run: Callable[[], object]) -> QAction:
-        """Return its action, added to a widget: its keys act anywhere in the window while the widget is shown."""
+        """Add its action to a widget and return it: the keys act anywhere in the window while the widget is shown."""
         made = QAction(self.words, place, toolTip=_with_keys(self), shortcutContext=Qt.ShortcutContext.WindowShortcut)
         made.setShortcuts([QKeySequence(keys) for keys in self.keys])
         made.triggered.connect(lambda _checked=False: run())
@@ -106,7 +106,7 @@ def add_commands(place: QWidget, runs: Mapping[str, Callable[[], object]]) -> di
 
 
 def press(button: QAbstractButton, action: QAction) -> None:
-    """Let a button do what an action does, with its tip; it is enabled while the action is."""
+    """Connect a button to an action, with its tip and enabled state."""
     button.setToolTip(action.toolTip())
     button.clicked.connect(action.trigger)
     action.enabledChanged.connect(button.setEnabled)
@@ -118,17 +118,17 @@ def keys_of(action: str) -> tuple[str, ...]:
 
 
 def key_words(keys: str) -> str:
-    """Return keys as they are written on a keyboard: "Ctrl+Enter"."""
+    """Return keys as printed on a keyboard: "Ctrl+Enter"."""
     return "+".join(_NAMES.get(key, key) for key in keys.split("+"))
 
 
 def key_cap(action: str) -> str:
-    """Return what the cap on the button of an action says: "Ctrl D"."""
+    """Return the key cap's text on an action's button: "Ctrl D"."""
     return _OF[action].shown[0].replace("+", " ")
 
 
 def with_key(text: str, action: str) -> str:
-    """Return words followed by the key of an action, for a tip: "Duplicate (Ctrl+D)"."""
+    """Return a tip with the key of an action: "Duplicate (Ctrl+D)"."""
     return _with_keys(_OF[action], text)
 
 
@@ -137,5 +137,5 @@ def _with_keys(command: Command, text: str = "") -> str:
 
 
 def tip(action: str) -> str:
-    """Return what an action does, with its key."""
+    """Return the tip of an action, with its key."""
     return with_key(_OF[action].words, action)

@@ -50,14 +50,14 @@ class DeviceShown:
 
 
 def devices_shown(backends: Sequence[Backend]) -> tuple[DeviceShown, ...]:
-    """Return what to show of each device, those that people use first; backends of one device are one."""
+    """Return the description of each device, common ones first; a device's backends are merged."""
     names = list(dict.fromkeys(backend.name for backend in backends))
     shown = [_shown(name, [backend for backend in backends if backend.name == name]) for name in names]
     return tuple(sorted(shown, key=lambda device: device.simulated))
 
 
 def device_named(name: str, shown: Iterable[DeviceShown]) -> DeviceShown:
-    """Return what to show of the preferred device; of one that was not looked at, its name alone."""
+    """Return the description of the preferred device; only its name if it was not searched for."""
     try:
         kind = descriptor_of(name).name
     except DeviceError as error:
@@ -78,7 +78,7 @@ def device_named(name: str, shown: Iterable[DeviceShown]) -> DeviceShown:
 
 
 def looking(name: str) -> DeviceShown:
-    """Return what to show of a device before anybody looked."""
+    """Return the description of a device before the search."""
     device = _descriptor(name)
     icon = "device" if device is None else device.icon
     return DeviceShown(
@@ -87,17 +87,17 @@ def looking(name: str) -> DeviceShown:
 
 
 def device_label(device: str) -> str:
-    """Return what to choose a device by."""
+    """Return the label of a device in lists."""
     return descriptor_of(device).label
 
 
 def device_choices() -> tuple[tuple[str, str], ...]:
-    """Return every device's name, and the words to choose it by."""
+    """Return name and label of every device."""
     return tuple((name, device_label(name)) for name in list_devices())
 
 
 def device_or_default(device: str) -> str:
-    """Return the device, or the default device if the registry does not know it."""
+    """Return the device's name, or the default device's if it is unknown."""
     try:
         descriptor_of(device)
     except DeviceError:
@@ -106,12 +106,12 @@ def device_or_default(device: str) -> str:
 
 
 def window_options() -> tuple[DeviceOption, ...]:
-    """Return the options of all devices that windows ask for, each name once."""
+    """Return the device options that windows offer, each name once."""
     return tuple({option.name: option for device in all_devices() for option in device.window_options}.values())
 
 
 def remembered_options() -> tuple[DeviceOption, ...]:
-    """Return the options that are remembered on this computer."""
+    """Return the options that this computer remembers."""
     return tuple(option for option in window_options() if option.name in REMEMBERED_OPTIONS)
 
 
@@ -138,7 +138,7 @@ def _shown(name: str, ways: Sequence[Backend]) -> DeviceShown:
 
 
 def _rank(backend: Backend) -> int:
-    """Return how far a backend is from being felt with; a driver that is ready has not found a device yet."""
+    """Return how close a backend is to being usable; a ready driver has not found a device yet."""
     if _connected(backend):
         return 0
     return {READY: 1, DRIVER_READY: 1, NONE: 2}.get(backend.state, 3)
@@ -161,7 +161,7 @@ def _state(backend: Backend, *, by_command: bool) -> tuple[Tone, str, str]:
 
 
 def _descriptor(name: str) -> DeviceDescriptor | None:
-    """Return the descriptor of a device; None of one that could not be loaded."""
+    """Return the descriptor of a device; None if its module could not be loaded."""
     return DEVICES.get(name.partition(":")[0])
 
 
@@ -170,7 +170,7 @@ def _sentence(text: str) -> str:
 
 
 def settings_here() -> tuple[MachineSettings, str]:
-    """Return the settings, and why they are the defaults if the file cannot be used ("" if it can)."""
+    """Return the settings, and why they are the defaults if the file cannot be read ("" if it can)."""
     settings, trouble = workstation.load_or_default()
     try:
         descriptor_of(settings.device)
@@ -180,7 +180,7 @@ def settings_here() -> tuple[MachineSettings, str]:
 
 
 def theme_named(name: str) -> Theme:
-    """Return the theme of the operator's windows by its name."""
+    """Return the theme with a name, for the operator's windows."""
     return DARK if name == DARK.name else LIGHT
 
 

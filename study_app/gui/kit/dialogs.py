@@ -22,7 +22,7 @@ REASON: Final = "Please enter a reason; it is recorded."
 
 
 def choose_protocol(parent: QWidget, title: str) -> str:
-    """Ask for a file in the workspace's folder of protocols; return its path, "" where none is chosen."""
+    """Ask for a file in the workspace's protocols; return its path, "" if the dialog was cancelled."""
     return QFileDialog.getOpenFileName(parent, title, str(workspace().protocols), "Protocols (*.toml)")[0]
 
 
@@ -101,16 +101,16 @@ class Question(QDialog):
         next((editor.control for editor in self.editors.values()), self.go_on).setFocus()
 
     def value(self, name: str) -> Any:
-        """Return what stands in a field."""
+        """Return the value of a field."""
         return self.editors[name].value
 
     def accept(self) -> None:
-        """Go on, unless something is missing."""
+        """Accept, unless an answer is missing."""
         if self.is_complete():
             super().accept()
 
     def is_complete(self) -> bool:
-        """Return whether nothing is missing or refused; what is, is said, and gets the keyboard."""
+        """Return whether no answer is missing or refused; else show and focus the first one."""
         for editor in self.editors.values():
             try:
                 _ = editor.value
@@ -148,13 +148,13 @@ class Work(Question):
         self.working = self.over = False
 
     def show_progress(self, sentence: str, share: float | None = None) -> None:
-        """Say what is being done, and which share of it is done (0 to 1), if that is known."""
+        """Show the present activity and the share that is done (0 to 1), if known."""
         self.said.setText(sentence)
         self.bar.setRange(0, 0 if share is None else STEPS)
         self.bar.setValue(round(STEPS * (share or 0.0)))
 
     def show_done(self, sentence: str, opens: str) -> None:
-        """Say what came of it; the button ``opens`` it."""
+        """Show the result; the button ``opens`` it."""
         self._end(sentence)
         self.over = True
         self.back.show_action("", "Close")
@@ -162,19 +162,19 @@ class Work(Question):
         self.go_on.setFocus()
 
     def show_refused(self, sentence: str) -> None:
-        """Say why nothing came of it; what was asked can be changed."""
+        """Show why the work was refused; the answers can be changed."""
         for editor in self.editors.values():
             editor.show()
         set_ink(self.said, "bad")
         self._end(sentence)
 
     def stopped(self) -> None:
-        """Close: the work was given up."""
+        """Close after the work was cancelled."""
         self.working = False
         super().reject()
 
     def accept(self) -> None:
-        """Begin, or lead to what came of it."""
+        """Begin the work, or open its result."""
         if self.over:
             self.opened.emit()
         elif not self.working and self.is_complete():
@@ -188,7 +188,7 @@ class Work(Question):
             self.begun.emit()
 
     def reject(self) -> None:
-        """Close; where something is worked on, have it given up first."""
+        """Close; cancel running work first."""
         if not self.working:
             super().reject()
         elif self.back.isEnabled():

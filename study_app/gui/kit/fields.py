@@ -50,14 +50,14 @@ class Field:
 
 
 def choice(name: str, label: str, options: Mapping[Any, str], aside: str = "") -> Field:
-    """Return the field of a choice between values with their words."""
+    """Return the field of a choice between values with labels."""
     return Field(name, label, "choice", tuple(options.items()), aside=aside)
 
 
 def number(
     name: str, label: str, unit: str, limits: tuple[float, float], decimals: int = 1, *, may_miss: bool = True
 ) -> Field:
-    """Return the field of a number within limits; None where it is empty, if it ``may_miss``."""
+    """Return the field of a number within limits; an empty field gives None if it ``may_miss``."""
     permitted = f"A number from {limits[0]:g} to {limits[1]:g} {unit}{'; leave empty if unknown' * may_miss}."
 
     def parse(text: str) -> float | None:
@@ -197,7 +197,7 @@ class Editor(QWidget):
 
     @property
     def value(self) -> Any:
-        """What stands in the control; a ValueError says why it is not permitted."""
+        """The value of the control; raises ValueError if it is not permitted."""
         match self.control:
             case Radios():
                 return self.control.value
@@ -214,7 +214,7 @@ class Editor(QWidget):
                 return self.field.parse(self.control.text().strip())
 
     def offer(self, options: Mapping[Any, str]) -> None:
-        """Offer other values to choose from, the first of them chosen."""
+        """Offer other values, with the first one chosen."""
         assert isinstance(self.control, QComboBox)  # noqa: S101 - only of a choice
         self._values = [*options]
         self.control.clear()
@@ -222,7 +222,7 @@ class Editor(QWidget):
             self.control.addItem(text, value)
 
     def show_value(self, value: Any, hint: str | None = None) -> None:
-        """Show a value, and a hint below; what is being typed stays."""
+        """Show a value with a hint below; text that is being typed stays."""
         self._hint = self.field.hint if hint is None else hint
         match self.control:
             case QAbstractButton():

@@ -119,7 +119,7 @@ class CurvePlot(Plot):
         return QSize(240, 120)
 
     def show_curves(self, t_s: Floats, values: tuple[Floats, ...], limit: float | None = None) -> None:
-        """Draw ``values``, each (n,), over ``t_s`` (n,), and a limit where there is one."""
+        """Draw ``values``, each (n,), over ``t_s`` (n,), and a limit if there is one."""
         peak = max((float(np.nanmax(it)) for it in values if len(it)), default=0.0)
         self._show_top(max(peak, limit or 0.0, self._least))
         for curve, it in zip(self.curves, values, strict=True):
@@ -141,7 +141,7 @@ class CurvePlot(Plot):
         self._lay_ticks()
 
     def _lay_ticks(self) -> None:
-        """Choose grid lines up to the peak, as many as there is room for."""
+        """Choose grid lines up to the peak, as many as fit."""
         ticks = max(2, min(MOST_TICKS, int(self.box.height() // TICK_PX)))
         step = next((it for it in STEPS if self._peak / it <= ticks), STEPS[-1])
         rows = max(1, int(np.ceil(self._peak / step - 1e-9)))
@@ -150,7 +150,7 @@ class CurvePlot(Plot):
         self._make_room()
 
     def _make_room(self) -> None:
-        """Keep half a number's height free above the highest grid line, however low the plot is."""
+        """Keep half a number's height free above the highest grid line."""
         share = min(LABEL_PX / max(1.0, self.box.height()), 0.3)
         self.box.setYRange(-0.02 * self._top, self._top / (1 - share), padding=0)
 
@@ -174,7 +174,7 @@ class ReadingCard(Card):
         add_layout(self.column, self.stack, 1)
 
     def show_blind(self, blind: bool) -> bool:
-        """Show the content, or that it is hidden; return which.
+        """Show the content, or that it is hidden; return whether it is hidden.
 
         Hidden content stays as it was before: its size would tell when another setting is felt.
         """
@@ -237,7 +237,7 @@ def _size(vectors: Floats) -> Floats:
 
 
 def thinned(t_s: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return of every so many samples the time of the newest and the largest value: no peak is missed."""
+    """Return the newest time and the largest value of each group of samples, so that no peak is lost."""
     step = max(1, len(t_s) // POINTS)
     first = len(t_s) % step
     return t_s[first:].reshape(-1, step)[:, -1], values[first:].reshape(-1, step).max(axis=1)
@@ -332,7 +332,7 @@ class CostCard(ReadingCard):
         self.sum.setText(f"{grouped(round(tick_ns))} ns of {period_ms:g} ms" if view.cost else "not measured yet")
 
     def _wait(self) -> None:
-        """Take the numbers away and leave the lines, so that nothing below jumps while a slider is dragged."""
+        """Clear the numbers and keep the lines, so that nothing jumps while a slider is dragged."""
         for line in self.lines:
             line.show_waiting()
         self.sum.setText(UNKNOWN)

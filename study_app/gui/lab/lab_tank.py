@@ -67,7 +67,7 @@ class TailPlaces:
 
 
 def tail_places(tail: Tail, camera: Camera, box: Box) -> TailPlaces:
-    """Return where a tail goes on the screen of ``camera``."""
+    """Return the screen positions of a tail."""
     count = len(tail.positions_m)
     inside = (-box.x, box.x), (box.floor, box.water), (-box.z, box.z)
     x, y, z = (np.clip(tail.positions_m[:, k], *span) for k, span in enumerate(inside))
@@ -101,7 +101,7 @@ def paint_floor(painter: QPainter, places: TailPlaces) -> None:
 
 
 def paint_tail(painter: QPainter, places: TailPlaces) -> None:
-    """Paint the segments from the oldest to the newest, a head on each that is long enough, then the breaks."""
+    """Paint the segments from oldest to newest, heads on those long enough, then the breaks."""
     painter.setBrush(Qt.BrushStyle.NoBrush)
     for shade, points in places.runs:
         ink, width = shade_style(shade)
@@ -123,7 +123,7 @@ def draw_ring(painter: QPainter, place: QPointF) -> None:
 
 @lru_cache(maxsize=SHADES)
 def shade_style(shade: int) -> tuple[QColor, float]:
-    """Return colour and width of a step of age, 0 the newest."""
+    """Return colour and width of a shade of age, 0 the newest."""
     newness = 1.0 - shade / (SHADES - 1)
     old, new, mix = QColor(TANK.tail_old), QColor(TANK.tail), newness**1.6
     red, green, blue = (
@@ -135,7 +135,7 @@ def shade_style(shade: int) -> tuple[QColor, float]:
 
 
 def _runs(points: list[QPointF], shades: NDArray[np.int_]) -> list[tuple[int, QPolygonF]]:
-    """Return the stretches of one shade, each beginning where the one before ends."""
+    """Return the stretches of one shade, each beginning at the end of the previous one."""
     cuts = [0, *(int(cut) for cut in np.flatnonzero(np.diff(shades)) + 1), len(points) - 1]
     return [
         (int(shades[start]), QPolygonF(points[start : end + 1]))
@@ -145,7 +145,7 @@ def _runs(points: list[QPointF], shades: NDArray[np.int_]) -> list[tuple[int, QP
 
 
 def _head(pixels: Floats) -> tuple[QPointF, float, int] | None:
-    """Return the middle of a segment's length, its direction there, and the row; None where it is too short."""
+    """Return midpoint, direction and row of a segment; None if it is too short."""
     steps = np.hypot(*np.diff(pixels, axis=0).T)
     length = float(steps.sum())
     if length < LEAST_FOR_HEAD_PX:
@@ -156,14 +156,14 @@ def _head(pixels: Floats) -> tuple[QPointF, float, int] | None:
 
 
 def _kept(pixels: Floats) -> NDArray[np.int_]:
-    """Return the rows that are drawn: both ends, and one in every few px between."""
+    """Return the rows that are drawn: both ends, and one every few px between."""
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pixels, axis=0).T))])
     kept = np.flatnonzero(np.diff(np.floor(arc / STEP_PX), prepend=-1.0))
     return np.unique(np.append(kept, len(pixels) - 1))
 
 
 def _pixels(camera: Camera, x: Floats, y: Floats, z: Floats) -> Floats:
-    """Return where points, a column each, fall on the screen: (n, 2) px."""
+    """Return the screen positions of points (n, 2) [px]."""
     place: Any = camera.point((x, y, z))  # type: ignore[arg-type]  # arithmetic alone: whole columns at once
     return np.column_stack(place)
 
@@ -304,7 +304,7 @@ class LabTank(Themed, QWidget):
         self._paint_corners(painter)
 
     def _still_of(self, camera: Camera) -> Backdrop | None:
-        """Return what stands still, painted for this size; None while it is being painted in the background."""
+        """Return the image of the still parts at this size; None while it is painted in the background."""
         wanted = ((self.width(), self.height()), self.devicePixelRatioF(), self.box, camera)
         if wanted != self._wanted:
             self._wanted, self.still = wanted, None
@@ -399,7 +399,7 @@ class LabTank(Themed, QWidget):
             painter.drawImage(QPointF(left, top), plate(note, self.devicePixelRatioF()))
 
     def _paint_corners(self, painter: QPainter) -> None:
-        """Round the corners with the window's colour, and paint the focus ring."""
+        """Round the corners in the window's colour, and paint the focus ring."""
         whole = QRectF(self.rect())
         outside = QPainterPath()
         outside.addRect(whole)
@@ -413,7 +413,7 @@ class LabTank(Themed, QWidget):
 
 @lru_cache(maxsize=64)
 def plate(note: Words, ratio: float) -> QImage:
-    """Return words with their icon on a dark plate, for a screen of pixel ratio ``ratio``."""
+    """Return a text with its icon on a dark plate, for a screen with pixel ratio ``ratio``."""
     text, icon = note
     face = font("label", weight=600, tabular=True)
     wide = QFontMetricsF(face).horizontalAdvance(text) + (24 if icon else 0) + 24
@@ -490,7 +490,7 @@ class TankNote(Card):
             self._appear()
 
     def place(self) -> None:
-        """Stand in the middle of the tank's lower edge; what takes many words is wider, and never above the tank."""
+        """Put the note in the middle of the tank's lower edge, wide enough for its text and below the tank's top."""
         parent = self.parentWidget()
         if parent is not None and not self.isHidden():
             room = parent.width() - 2 * EDGE
@@ -502,7 +502,7 @@ class TankNote(Card):
             self.move((parent.width() - width) // 2, max(0, parent.height() - self.height() - below))
 
     def _put_away(self) -> None:
-        """Say this trouble no more; the force is on all the while."""
+        """Hide this problem; the force stays on."""
         if self._view is not None:
             self._dismissed = self._view.trouble
         self.hide()

@@ -28,7 +28,7 @@ KEY = "X"
 
 
 def side_colour(theme: Theme, side: Side) -> str:
-    """Return the colour of a side: in the switch, the plots and the tank's words."""
+    """Return the colour of a side in the switch, the plots and the tank's texts."""
     return theme.trace_x if side == "A" else theme.trace_y
 
 
@@ -93,7 +93,7 @@ class Segment(Themed, QPushButton):
         self.setIcon(QIcon(picture))
 
     def nextCheckState(self) -> None:
-        """Leave it to the view which side is felt."""
+        """Leave the choice of the felt side to the view."""
 
 
 class SideSwitch(QWidget):
@@ -150,7 +150,7 @@ class Picker(Choice):
         self.setCurrentIndex(self.findData(chosen))
 
     def show_whole(self, yes: bool) -> None:
-        """Be as wide as the longest words, or cut what is longer than most."""
+        """Make the list as wide as its longest label, or elide long ones."""
         policy = self.SizeAdjustPolicy
         self.setSizeAdjustPolicy(policy.AdjustToContents if yes else policy.AdjustToMinimumContentsLengthWithIcon)
 
@@ -200,7 +200,7 @@ class LabHeader(QWidget):
         self._grid.setColumnStretch(2, 1)
 
     def arrange(self, *, narrow: bool) -> None:
-        """Stand in one row or two; the force stop is at the right of the first in both."""
+        """Use one row or two; the force stop stays at the right of the first."""
         if narrow == self._narrow:
             return
         self._narrow = narrow
@@ -298,7 +298,7 @@ class ParameterRow(QWidget):
         self._below.setVisible(bool(why))
 
     def let_go(self) -> None:
-        """Release what is held, and hide the refusal, which belongs to another setting."""
+        """Release the slider, and hide the refusal, which belongs to another setting."""
         self.show_refused("")
 
     def parts(self) -> tuple[QWidget, ...]:
@@ -328,7 +328,7 @@ class NumberRow(ParameterRow):
         self.field.stepped.connect(self.slider.step)
 
     def show_row(self, row: FormRow) -> None:
-        """Show the number, unless it is being dragged or typed; changed ones are bold."""
+        """Show the number unless it is being dragged or typed; changed numbers are bold."""
         if self._row is not None and row.value != self._row.value:
             self.show_refused("")
         self._row = row
@@ -378,7 +378,7 @@ class NumberRow(ParameterRow):
         self.changed.emit(self.parameter.name, self._value(shown), False)
 
     def _value(self, shown: float) -> float:
-        """Return what a shown number is in SI: exactly the preset's or the present one's where it reads the same."""
+        """Return the shown number in SI units: the preset's or present value itself if it reads the same."""
         row = self._row
         for known in (row.preset, row.value) if row is not None else ():
             if isinstance(known, int | float) and read_number(self._text(known)) == shown:
@@ -430,7 +430,7 @@ class ChoiceRow(ParameterRow):
         return (self.choice,)
 
     def _choose(self, index: int) -> None:
-        """Ask for another one; the view says when it is."""
+        """Request another choice; the view shows it once it applies."""
         self.show_refused("")
         self.choice.setCurrentIndex(self.choice.findData(self._value))
         self.changed.emit(self.parameter.name, self.choice.itemData(index), False)
@@ -456,14 +456,14 @@ class SwitchRow(ParameterRow):
         return (self.toggle,)
 
     def _switch(self, on: bool) -> None:
-        """Ask for the other; the view says when it is."""
+        """Request the other state; the view shows it once it applies."""
         self.show_refused("")
         self.toggle.setChecked(not on)
         self.changed.emit(self.parameter.name, ON if on else OFF, False)
 
 
 def row_for(parameter: Parameter) -> ParameterRow:
-    """Return the row that suits a parameter."""
+    """Return the row that edits a parameter."""
     if not parameter.choices:
         return NumberRow(parameter)
     return (SwitchRow if {value for value, _ in parameter.choices} == SWITCHED else ChoiceRow)(parameter)
@@ -599,7 +599,7 @@ class FormPanel(Card):
             self.blocks[section.title].show_section(section, setting)
 
     def _make(self, form_sections: tuple[Section, ...]) -> None:
-        """Make the rows anew; the keyboard stays in the row that has it, and what is read in its place."""
+        """Make new rows; the keyboard focus and the scroll position stay."""
         rows = self.rows.items()
         focused = [(name, at) for name, row in rows for at, part in enumerate(row.parts()) if part.hasFocus()]
         scrolled_px = self.area.verticalScrollBar().value()

@@ -89,7 +89,7 @@ class LabPlace(Place):
         vbox(self.header, (self._body, 1), spacing=0, margins=0, parent=self)
 
     def _arrange(self, *, wide: bool) -> None:
-        """Place the right column next to the middle, or under it where there is no room."""
+        """Place the right column next to the middle, or below it if there is no room."""
         if wide == self._wide:
             return
         self._wide = wide
@@ -138,7 +138,7 @@ class LabPlace(Place):
         self._escape.held.connect(self._stop)
 
     def ask(self, what: str, *details: Any) -> None:
-        """Ask for something by its name."""
+        """Emit a request by name."""
         self.asked.emit(what, details)
 
     @property
@@ -153,7 +153,7 @@ class LabPlace(Place):
             part.show_view(view)
 
     def ask_where_to_save(self) -> None:
-        """Ask for the preset's file; nothing waits meanwhile, and the force can be stopped while the dialog is open."""
+        """Ask for the preset's file; the dialog is not modal, so that the force can be stopped."""
         if (setting := self._free_to_ask()) is not None:
             dialog = self._ask_for_file(f"Save preset: {setting.title}", "Presets", "save", setting, saves=True)
             dialog.setDefaultSuffix(SUFFIX[1:])
@@ -168,13 +168,13 @@ class LabPlace(Place):
             self.put_back_asked.emit(self._view.felt, setting)
 
     def _free_to_ask(self) -> Setting | None:
-        """Return the felt setting; None while another question is open, or the comparison is blind."""
+        """Return the felt setting; None while another question is open or the comparison is blind."""
         if self.dialog is not None or self._view is None or self._view.workbench.blind:
             return None
         return self._view.workbench.in_hand
 
     def _ask_for_file(self, title: str, files: str, what: str, *details: Any, saves: bool = False) -> QFileDialog:
-        """Ask for a file, at first in the workspace's protocols, then for what is to be done with it."""
+        """Ask for a file, starting in the workspace's protocols, then emit the request."""
         dialog = self.dialog = QFileDialog(self, title, str(workspace().protocols), f"{files} (*{SUFFIX})")
         if saves:
             dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
@@ -191,7 +191,7 @@ class LabPlace(Place):
         self.dialog = None
 
     def _stop(self) -> None:
-        """Ask for zero force when Esc was held, in whichever window of the program."""
+        """Request zero force after Esc was held in any window of the program."""
         if self.isVisible():
             self.ask("stop")
 
@@ -212,7 +212,7 @@ class LabPlace(Place):
             self.dialog.reject()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Give way in a small window: first the header, then the right column; the middle and the form scroll."""
+        """Shrink in a small window: first the header, then the right column; the middle and the form scroll."""
         super().resizeEvent(event)
         self.header.arrange(narrow=self.width() < ONE_ROW)
         self._arrange(wide=self.width() >= WIDE)
@@ -220,6 +220,6 @@ class LabPlace(Place):
 
 
 def preset_name(title: str) -> str:
-    """Return a setting's title as a file is called: "Water, edited" becomes "water-edited"."""
+    """Return a file name for a setting's title: "Water, edited" becomes "water-edited"."""
     parts = "".join(sign if sign.isalnum() else " " for sign in title.lower()).split()
     return "-".join(parts) or "preset"

@@ -44,7 +44,7 @@ class Actions(Card):
         add_parts(self.column, row, self.hint)
 
     def narrow(self, yes: bool) -> None:
-        """Do without the buttons' signs where there is no room for them."""
+        """Hide the buttons' icons if there is no room for them."""
         self._signs = not yes
         for button, sign in ((self.repeat, "repeat"), (self.end, "cross")):
             button.show_action("" if yes else sign, button.text())
@@ -68,7 +68,7 @@ class Actions(Card):
 
     @property
     def paused(self) -> str:
-        """What the first button asks for now."""
+        """The request of the first button."""
         return "resume" if self._resumes else "pause"
 
 
@@ -102,7 +102,7 @@ class NoteField(QPlainTextEdit):
         self.setMinimumHeight(52)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Keep the note on Enter; leave Esc to the window."""
+        """Store the note on Enter; leave Esc to the window."""
         plain = not event.modifiers() & Qt.KeyboardModifier.ShiftModifier
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and plain:
             self.entered.emit()
@@ -139,7 +139,7 @@ class NotesCard(Card):
         self.add.clicked.connect(self._add)
 
     def show_lines(self, most: int) -> None:
-        """Show so many notes at most; heading and hint go with the first that is left out."""
+        """Show at most so many notes; heading and hint are hidden with the first omitted note."""
         self._shown = most
         self._head.setVisible(most == NOTES_SHOWN)
         self._list.setVisible(most > 0)
@@ -286,7 +286,7 @@ class DeviceCard(Card):
         self.rows: list[tuple[QLabel, Elided]] = []
 
     def show_rows(self, most: int) -> None:
-        """Show so many rows at most; the rest is in the card's tip."""
+        """Show at most so many rows; the rest is in the card's tip."""
         self._most = most
         if self._view is not None:
             self.show_view(self._view)

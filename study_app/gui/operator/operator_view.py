@@ -145,21 +145,21 @@ class Session:
 
     @property
     def language(self) -> str:
-        """The language of the operator's window, English, where the study has it; else the study's first."""
+        """The language of the operator's window: English, if the study has it, else its first."""
         return operator_language(self.protocol)
 
     def trial(self, progress: Progress) -> Trial | None:
-        """Return the trial under way or being answered; None on a page of text and before the first step."""
+        """Return the trial being presented or answered; None on a text page and before the first step."""
         step = self.schedule.steps[progress.here] if progress.here >= 0 else None
         return step if isinstance(step, Trial) else None
 
     def main_trials(self, progress: Progress) -> tuple[int, int]:
-        """Return how many main trials were left behind, and how many there are."""
+        """Return how many main trials are done, and how many there are."""
         main = [at for at, step in enumerate(self.schedule.steps) if isinstance(step, Trial) and step.phase == "main"]
         return sum(at < progress.here or progress.reached_end for at in main), len(main)
 
     def broken(self, progress: Progress) -> dict[int, tuple[Broken, ...]]:
-        """Return what the trials done broke, as far as the operator may know: if double-blind, lateness and gaps."""
+        """Return the limits that finished trials broke and the operator may know: lateness and gaps if double-blind."""
         hidden = SEALED if self.protocol.study.blinding == "double" else frozenset()
         return {
             trial: tuple(limit for limit in them if limit[0] not in hidden) for trial, them in progress.broken.items()
@@ -183,7 +183,7 @@ def operator_view(
     dropped: int = 0,
     outlets_lost: Mapping[str, str] | None = None,
 ) -> OperatorView:
-    """Return what the operator sees at ``now_s`` on the session's clock.
+    """Return the operator's view at ``now_s`` on the session's clock.
 
     ``trouble`` is what the journal does not say; ``device_ready`` and ``faults`` (how many there were since the program
     was started) are the servo's own, whatever other trouble there is; ``forces`` are shown where a study is
@@ -368,7 +368,7 @@ def _counts(session: Session, progress: Progress) -> tuple[tuple[str, str], ...]
 
 
 def _slower(vitals: Vitals) -> tuple[str, ...]:
-    """Return a sentence while the device's delay is longer than at the start."""
+    """Return a sentence if the device's delay is longer than at the start."""
     if vitals.delay_ticks <= vitals.first_delay_ticks:
         return ()
     return (
@@ -378,7 +378,7 @@ def _slower(vitals: Vitals) -> tuple[str, ...]:
 
 
 def _lost(session: Session, progress: Progress, lost: Mapping[int, str]) -> tuple[str, ...]:
-    """Return a sentence for every trial whose recording could not be kept, the newest first."""
+    """Return a sentence for every trial whose recording was lost, newest first."""
     trials = {trial.number: trial for trial in session.schedule.trials}
     return tuple(
         f"Recording of {trials[number].label(session.protocol, session.language)} lost: {reason}"
@@ -387,7 +387,7 @@ def _lost(session: Session, progress: Progress, lost: Mapping[int, str]) -> tupl
 
 
 def _lacking(session: Session, progress: Progress, now: Mapping[int, int]) -> tuple[str, ...]:
-    """Return a sentence for every trial whose recording lacks samples, the newest first."""
+    """Return a sentence for every trial whose recording lacks samples, newest first."""
     labels = {trial.number: trial.label(session.protocol, session.language) for trial in session.schedule.trials}
     return tuple(
         f"Recording of {labels[number]} lacks {grouped(count)} samples: the disk does not keep up"
@@ -396,7 +396,7 @@ def _lacking(session: Session, progress: Progress, now: Mapping[int, int]) -> tu
 
 
 def _beyond(session: Session, progress: Progress) -> tuple[str, ...]:
-    """Return a sentence for every finished trial that broke a limit, the newest first."""
+    """Return a sentence for every finished trial that broke a limit, newest first."""
     labels = {trial.number: trial.label(session.protocol, session.language) for trial in session.schedule.trials}
     return tuple(
         f"{labels[number]} out of limits: " + "; ".join(broken_words(*limit) for limit in beyond)
@@ -406,7 +406,7 @@ def _beyond(session: Session, progress: Progress) -> tuple[str, ...]:
 
 
 def stages(protocol: Protocol, schedule: Schedule) -> tuple[Stage, ...]:
-    """Return the rows of the rail: pages and settings one by one, longer blocks as one row."""
+    """Return the rows of the rail: a row for each page and setting, and one for a long block."""
     language = operator_language(protocol)
     rows: list[Stage] = []
     index = 0
@@ -443,7 +443,7 @@ FAST_S: Final = 0.3
 
 
 def track_words(progress: Progress, schedule: Schedule, trial: Trial, choices: Mapping[str, str]) -> tuple[str, ...]:
-    """Return lines on the track of ``trial``; ``choices`` are its answers in words.
+    """Return lines about the track of ``trial``; ``choices`` maps its answers to labels.
 
     A line that ends in "check" deserves attention.
     """

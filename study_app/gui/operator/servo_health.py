@@ -74,7 +74,7 @@ class ServoHealth:
         self._path_rows = 0
 
     def take(self, samples: Any) -> None:
-        """Take new telemetry samples, in order (a recarray of ``layout.SAMPLE``)."""
+        """Add new telemetry samples, in order (a recarray of ``layout.SAMPLE``)."""
         count = len(samples)
         if count == 0:
             return
@@ -87,14 +87,14 @@ class ServoHealth:
         self._ticks += count
 
     def hand(self, at_s: float, position_m: Any) -> None:
-        """Take where the hand is [m, hand frame]; more often than a trace can show is ignored."""
+        """Add the hand's position [m, hand frame]; positions more frequent than the trace's resolution are ignored."""
         if self._path_rows and at_s < self._path[(self._path_rows - 1) % len(self._path), 0] + TRACE_STEP_S:
             return
         self._path[self._path_rows % len(self._path)] = (at_s, *position_m)
         self._path_rows += 1
 
     def frame(self, painted_ns: int) -> None:
-        """Take the time at which a frame of the tank was painted; the screen missed every refresh in between.
+        """Add the time at which a frame of the tank was painted; refreshes since the last one were missed.
 
         Whether what a frame shows is late is another matter: the trial's row has that (``frames_late``).
         """
@@ -108,7 +108,7 @@ class ServoHealth:
         self._last_frame_ns = painted_ns
 
     def frames_rest(self) -> None:
-        """Say that the tank is not shown now, so that the gap until it is shown again misses no refresh."""
+        """Pause the count of missed refreshes while the tank is hidden."""
         self._last_frame_ns = 0
 
     def vitals(self) -> Vitals:
@@ -127,7 +127,7 @@ class ServoHealth:
 
     @property
     def latenesses_us(self) -> Floats:
-        """How late the ticks of the last minute began [µs] (n,)."""
+        """The latenesses of the last minute's ticks [µs] (n,)."""
         return self._kept().astype(np.float64) * 1e-3
 
     def trace(self, now_s: float) -> tuple[Floats, Floats]:
@@ -223,7 +223,7 @@ class ForceFigures:
 
 
 def force_rows(protocol: Protocol, forces: ForceFigures | None) -> tuple[tuple[str, str], ...]:
-    """Return share of the limit, limiters and force withheld, or that they are hidden; as many rows in either case."""
+    """Return share of the limit, limiters and withheld force, or that they are hidden; equally many rows."""
     share, limiters = f"Force, share of {protocol.device.force_limit_n:g} N", "Limiters acted"
     withheld = f"Force withheld, limit {protocol.limits.withheld_percent:g}{THIN_SPACE}%"
     if protocol.study.blinding == "double":
@@ -252,7 +252,7 @@ class Forces:
         self._sums_n = np.zeros(2)  # permitted, withheld
 
     def take(self, samples: Any) -> None:
-        """Take new samples, in order (a recarray of ``layout.SAMPLE``)."""
+        """Add new samples, in order (a recarray of ``layout.SAMPLE``)."""
         if len(samples) == 0:
             return
         rows = np.empty((len(samples), 4))
@@ -292,7 +292,7 @@ class Forces:
                 self._rows[newest] = strongest
 
     def _count(self, samples: Any, sizes_n: Floats) -> None:
-        """Count limiters, forces and the strongest one of the newest scene that is none of rest."""
+        """Count limiters, forces and the strongest force of the newest scene except rest."""
         scenes = samples["scene"]
         self._now_n = float(sizes_n[-1])
         felt = scenes[scenes != 0]

@@ -251,7 +251,7 @@ class Tally(QWidget):
         self._place()
 
     def show_view(self, view: OperatorView) -> None:
-        """Show the counts, the newest limit that was broken (the tip has all of them), and how the track is doing."""
+        """Show the counts, the newest broken limit (the tip lists all), and the track's state."""
         if len(self.counts) < len(view.counts):
             for _ in range(len(view.counts) - len(self.counts)):
                 value = figures("", "label", weight=600)
@@ -303,7 +303,7 @@ class StepLine(Themed, QWidget):
         return QSize(super().sizeHint().width(), ROW_HEIGHT)
 
     def slim(self, yes: bool) -> None:
-        """Show the dot alone; the rest is in its tip."""
+        """Show the dot alone; its text is in the tip."""
         self._layout.setContentsMargins(0 if yes else 37, 0, 0, 0)
         for part in (self.name, self.note):
             part.setVisible(not yes)
@@ -368,7 +368,7 @@ class Rail(Card):
         self.take_back()
 
     def take_back(self) -> None:
-        """Hold now and counts, above and below the steps."""
+        """Show the present step and the counts above and below the steps."""
         for part in (self.now, self.tally):
             part.lie_flat(False)
         self.column.insertWidget(0, self.now)
@@ -376,7 +376,7 @@ class Rail(Card):
         self._be(slim=False)
 
     def give_away(self) -> None:
-        """Show the steps' dots alone: now and counts stand elsewhere."""
+        """Show only the steps' dots: the present step and the counts are elsewhere."""
         for part in (self.now, self.tally):
             part.lie_flat(True)
         self._be(slim=True)
@@ -395,7 +395,7 @@ class Rail(Card):
             line.slim(slim)
 
     def show_view(self, view: OperatorView) -> None:
-        """Show the steps; ``now`` and ``tally`` are shown for themselves, since each may fail alone."""
+        """Show the steps; ``now`` and ``tally`` are shown separately, since each may fail alone."""
         rows = view.steps
         while len(self.lines) < len(rows):
             line = StepLine()

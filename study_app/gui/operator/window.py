@@ -209,21 +209,21 @@ class OperatorWindow(Themed, QMainWindow):
         self.header.theme_button.clicked.connect(self._change_theme)
 
     def ask(self, what: str, *details: Any) -> None:
-        """Ask for what a button does, by its name."""
+        """Emit the request of a button by name."""
         self.asked.emit(what, details)
 
     def _press(self, what: str, _checked: bool = False) -> None:
         self.ask(what)
 
     def draw(self, show: Callable[..., object], *shown: object) -> None:
-        """Show what the session does not depend on; where that fails, the session goes on."""
+        """Show a part that the session does not depend on; if it fails, the session continues."""
         try:
             show(*shown)
         except Exception as error:  # noqa: BLE001 - told, and passed on to the log and the journal
             self.tell_of_failure(error)
 
     def tell_of_failure(self, error: BaseException) -> None:
-        """Say once that a part of the window failed."""
+        """Report once that a part of the window failed."""
         clear_frames(error.__traceback__)  # they may hold a painter, and Qt would paint no window any more
         if (what := f"{type(error).__name__}: {PASSED_ON.sub('', str(error))}") not in self._failures:
             self._failures.add(what)
@@ -231,7 +231,7 @@ class OperatorWindow(Themed, QMainWindow):
             self.ask("failed", what, error)
 
     def show_view(self, view: OperatorView) -> None:
-        """Show everything but the plots; trouble first, for it may be that one of the parts cannot be shown."""
+        """Show everything but the plots; the problem first, since a part may fail to show."""
         if view == self._view:
             return
         self.banner.show_view(view)
@@ -248,7 +248,7 @@ class OperatorWindow(Themed, QMainWindow):
         self.draw(self.position.show_health, health, now_s)
 
     def show_forces(self, forces: Forces, now_ns: int) -> None:
-        """Draw the force (30 times a second), where they are not hidden."""
+        """Draw the force (30 times a second) unless it is hidden."""
         if isinstance(self.force, ForceCard):
             self.draw(self.force.show_forces, forces, now_ns)
 
@@ -256,7 +256,7 @@ class OperatorWindow(Themed, QMainWindow):
         self.draw(self.lateness.show_health, health)
 
     def ask_to_repeat(self) -> None:
-        """Ask for the reason of a repetition; nothing happens without one."""
+        """Ask for the reason of a repetition, which is required."""
         if self._view is not None and self._view.may_repeat:
             setting = _setting(self._view)
             self._ask(
@@ -287,7 +287,7 @@ class OperatorWindow(Themed, QMainWindow):
             self.question.back.setDefault(True)
 
     def _ask(self, what: str, title: str, explanation: str, go_on: ActionButton, **more: Any) -> None:
-        """Open a question, unless one is open; what it asks for is asked for with its values."""
+        """Open a question unless one is open; its answer emits the request with the values."""
         if self.question is not None:
             self.question.raise_()
             self.question.activateWindow()
@@ -314,7 +314,7 @@ class OperatorWindow(Themed, QMainWindow):
         self._take_keyboard()
 
     def _take_keyboard(self) -> None:
-        """Take the keyboard after a dialog: Esc must work without a window manager, too."""
+        """Take the keyboard focus after a dialog: Esc must work without a window manager, too."""
         if QGuiApplication.focusWindow() is None:
             self.activateWindow()
 
@@ -322,7 +322,7 @@ class OperatorWindow(Themed, QMainWindow):
         apply_theme(self, LIGHT if self.theme.dark else DARK)
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Close at once when the session is over; else leave it to who listens, with the window open."""
+        """Close at once after the session; else leave it to the listener and keep the window open."""
         if self.may_close:
             event.accept()
         else:
@@ -331,5 +331,5 @@ class OperatorWindow(Themed, QMainWindow):
 
 
 def _setting(view: OperatorView) -> str:
-    """Return the neutral name of the trial under way, with its place so that it names one trial alone."""
+    """Return the neutral name of the present trial, with its number so that it is unique."""
     return f"{view.setting_line.split('  ·  ')[0]} ({view.heading.lower()})"

@@ -56,7 +56,7 @@ ALWAYS = QRegion(0, 0, 1, 1)  # a frame in which nothing moved is a frame too
 
 
 def look(page: TaskPage, captions: Captions, width: int, height: int) -> tuple[Box, Camera]:
-    """Return the tank of a page and the camera that shows it in a window of ``width`` × ``height`` [px]."""
+    """Return the tank of a page and the camera for a window of ``width`` × ``height`` [px]."""
     box = Box.around(page.workspace_m, page.body_radius_m)
     left, top, wide, high = AREA
     top = max(top, captions.above(width, height) / height)
@@ -65,7 +65,7 @@ def look(page: TaskPage, captions: Captions, width: int, height: int) -> tuple[B
 
 
 def paint_ahead(page: TaskPage, wording: Words, text_scale: float, size: QSize, ratio: float) -> Thread:
-    """Paint the still images of a page that is to come, in a thread of their own, so that it comes at once."""
+    """Paint the still images of a coming page in a thread of their own, so that it appears at once."""
     width, height = size.width(), size.height()
     box, camera = look(page, Captions(page, wording, text_scale), width, height)
     painting = Thread(target=backdrop, args=((width, height), ratio, box, camera), name="backdrop")
@@ -134,7 +134,7 @@ class TankWidget(QWidget):
 
     @property
     def may_leave(self) -> bool:
-        """Whether the exploration shown has had its least time, so that the participant may go on."""
+        """Whether the minimum exploration time is over, so that the participant may continue."""
         least_s = self._page.task.least_s
         return (
             not self.resting and least_s is not None and self.view is not None and self.view.task.elapsed_s >= least_s
@@ -148,7 +148,7 @@ class TankWidget(QWidget):
         return QSize(1920, 1080)
 
     def turn_to(self, page: TaskPage) -> None:
-        """Draw another interval of the same trial, or the rest before it; a view of before is no frame of it."""
+        """Show another interval of the same trial, or the rest before it; earlier views are discarded."""
         self._page = page
         self._captions.turn_to(page)
         if self.controls is not None:
@@ -171,11 +171,11 @@ class TankWidget(QWidget):
             say(self, self.accessibleName() if self._page.adjusts else interval.announced)
 
     def prepare(self) -> None:
-        """Paint the still images now, so that the first frame does not wait for them."""
+        """Paint the still images now, so that the first frame does not wait."""
         self._ready()
 
     def show_view(self, view: TankView) -> None:
-        """Draw the proxy where ``view`` says, with the task as it was then."""
+        """Draw the proxy's position in ``view``, and the task at that time."""
         self.view = view
         self._unpainted = True
         x, y, z = (float(value) for value in view.position_m)
@@ -250,7 +250,7 @@ class TankWidget(QWidget):
         return None if self.view is None else self.view.task
 
     def _hint(self) -> str:
-        """Return how the ball gets into the target that waits for it: only its depth is wrong, where a wheel moves it.
+        """Return how the ball reaches the target; nearer or further if a wheel moves it and only the depth is wrong.
 
         In a rest that waits for the ball, that it is to come back; otherwise "".
         """
@@ -322,7 +322,7 @@ class TankWidget(QWidget):
         return things
 
     def _paint_things(self, painter: QPainter, region: QRegion) -> None:
-        """Paint floor marks, shadow, then ball and targets from the far ones to the near ones."""
+        """Paint floor marks and shadow, then ball and targets from far to near."""
         lit = self._task.lit if self._task else None
         for index, target in enumerate(self.targets):
             if region.intersects(target.marks.toAlignedRect()):

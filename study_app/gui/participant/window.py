@@ -101,7 +101,7 @@ class PointerCapture(QObject):
         self._move(0.0, 0.0, 0.0)
 
     def release(self) -> None:
-        """Let the pointer go; buttons count as let go."""
+        """Release the pointer; its buttons count as released."""
         if self._widget is None:
             return
         widget, self._widget = self._widget, None
@@ -136,7 +136,7 @@ class PointerCapture(QObject):
         return self._widget.mapToGlobal(self._widget.rect().center())
 
     def _follow(self, place: QPoint, modifiers: Qt.KeyboardModifier) -> None:
-        """Move the hand by the pointer's step; bring the pointer back when it strays."""
+        """Move the hand by the pointer's step; recentre a pointer that strays."""
         assert self._widget is not None  # noqa: S101  # events come only while held
         middle = self._middle()
         if self._returning and _apart(place, middle) < _apart(place, self._last):
@@ -152,7 +152,7 @@ class PointerCapture(QObject):
             self._bring_back(middle)
 
     def _bring_back(self, middle: QPoint) -> None:
-        """Put the pointer into the middle, and follow it from there.
+        """Put the pointer into the middle and follow it from there.
 
         On X11 the answer to the question where it is comes after the jump, and Qt then delivers only the last of all
         motions, so that the next one is counted from the middle. Elsewhere motions from before may still come: until
@@ -279,7 +279,7 @@ class ParticipantWindow(QWidget):
 
     @property
     def page(self) -> Page | None:
-        """The page that is shown; None before the first, and while "Time is up" is shown."""
+        """The shown page; None before the first and while "Time is up" is shown."""
         return None if self.time_up.isActive() else self._page
 
     @property
@@ -288,11 +288,11 @@ class ParticipantWindow(QWidget):
 
     @property
     def tank(self) -> TankWidget | None:
-        """The tank, while it is shown."""
+        """The tank if it is shown."""
         return self._widget if isinstance(self._widget, TankWidget) else None
 
     def open_on(self, screen: QScreen | None = None) -> None:
-        """Open the window on ``screen`` (or where the system puts it), full-screen unless windowed."""
+        """Open the window on ``screen`` (None: the system's choice), full-screen unless windowed."""
         give_role(self, QAccessible.Role.Window)  # again: what was connected to its methods since has taken it away
         if screen is not None:
             self.setScreen(screen)
@@ -311,7 +311,7 @@ class ParticipantWindow(QWidget):
         self.activateWindow()
 
     def show_page(self, page: Page) -> None:
-        """Put a page in place of the present one, whole and at once; the tank stays throughout a trial of intervals."""
+        """Replace the present page at once; the tank stays throughout a trial's intervals."""
         tank = self.tank
         if isinstance(page, TaskPage) and page.interval and tank is not None and tank.page.trial == page.trial:
             self._page = page
@@ -406,7 +406,7 @@ class ParticipantWindow(QWidget):
         self._ahead.start()
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Do not let the participant close a session by accident: that is a pause."""
+        """Pause instead of closing: the participant must not end a session by accident."""
         if not self.may_close and not isinstance(self._page, EndPage | None):
             event.ignore()
             self._pause()
@@ -417,14 +417,14 @@ class ParticipantWindow(QWidget):
             self.left.emit()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        """Fill what no page covers: nothing, or the frame of a pilot."""
+        """Fill the area around the page, or paint a pilot's frame."""
         painter = QPainter(self)
         painter.setClipRegion(QRegion(self.rect()) - QRegion(self._widget.geometry()))
         painter.fillRect(self.rect(), QColor(PARTICIPANT.warn if self.frame_px else PARTICIPANT.window))
         painter.end()
 
     def _paint_ahead(self) -> None:
-        """While a text or a pause is read, paint the tank that comes after it."""
+        """Paint the tank that follows a text or a pause while that is shown."""
         if isinstance(self._page, TextPage | PausePage) and self._page.coming is not None:
             size, ratio = self._room().size(), self.devicePixelRatioF()
             self.painting = paint_ahead(self._page.coming, self._words, self.text_scale, size, ratio)
@@ -434,13 +434,13 @@ class ParticipantWindow(QWidget):
         return ReadingPage(column, self._context)
 
     def _show_if_painted(self) -> None:
-        """Put the tank in place of the page that asks to wait, once it is painted."""
+        """Replace the waiting page by the tank once it is painted."""
         if isinstance(self._page, TaskPage) and self.painting is not None and not self.painting.is_alive():
             self.waiting.stop()
             self._put(self._make(self._page, self._widget))
 
     def _ask(self) -> None:
-        """Put the questions in place of the page that tells that the time is up."""
+        """Replace the page "Time is up" by the questions."""
         if isinstance(self._page, QuestionnairePage):
             self._put(self._make(self._page, self._widget))
 
@@ -493,7 +493,7 @@ class ParticipantWindow(QWidget):
         return self.tank is not None and self.tank.may_leave
 
     def _press(self, bits: int) -> None:
-        """Take a click of the mouse that is the device: it goes on where Space would, and is a button anywhere else."""
+        """Handle a click of the mouse that is the device: as Space to continue, else as a device button."""
         if bits and ignores_clicks(self._widget):
             return
         if bits & BUTTONS[Qt.MouseButton.LeftButton] and self._may_leave_tank():
@@ -502,7 +502,7 @@ class ParticipantWindow(QWidget):
             self.buttons.emit(bits)
 
     def _pause_if_left(self) -> None:
-        """Pause where the pointer is the device and went to another program; the operator's window is none."""
+        """Pause if the pointer is the device and left for another program; the operator's window does not count."""
         if self.tank is None or self._capture.held:
             self.settling.stop()
         elif QGuiApplication.focusWindow() is None:
@@ -510,7 +510,7 @@ class ParticipantWindow(QWidget):
             self._pause()
 
     def _pause(self) -> None:
-        """Pause the session; close the last page."""
+        """Pause the session, or close the last page."""
         if isinstance(self._page, TextPage | TaskPage | QuestionnairePage | DesignPage | FeedbackPage):
             self.event.emit(PauseRequested(self._clock(), "participant"))
         elif isinstance(self._page, EndPage):

@@ -73,7 +73,7 @@ class PreflightView:
 
     @property
     def start_words(self) -> str:
-        """What the button says: that warnings are accepted by pressing it, or that it cannot be pressed."""
+        """The text of the button: pressing it accepts warnings, or it is disabled."""
         if self.failures:
             return "Cannot start"
         if self.warnings:
@@ -82,7 +82,7 @@ class PreflightView:
 
 
 def resumed_rows(protocol: Protocol, schedule: Schedule, lines: Iterable[Event]) -> tuple[tuple[str, str], ...]:
-    """Return where the session with these journal lines goes on, and how much of it is kept.
+    """Return where the session with these journal lines resumes, and how much of it is kept.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def resumed_rows(protocol: Protocol, schedule: Schedule, lines: Iterable[Event])
 def planned_rows(
     protocol: Protocol, now: datetime, error_n: float | None, *, asked_error: bool = True
 ) -> tuple[tuple[str, str], ...]:
-    """Return the rows of what will run.
+    """Return the rows about the coming session.
 
     ``error_n`` is the largest difference of a scene's force from the exact definition [N], None while it is not
     known; where no one was asked (``asked_error``) its line is left out.
@@ -133,7 +133,7 @@ RECOMPILES: Final = "Every start compiles again, for up to a minute: set NUMBA_C
 def computer_checks(
     facts: Measurements, protocol: Protocol, devices: Sequence[Backend], *, cache: Path | None, compiled: int
 ) -> tuple[Check, ...]:
-    """Return what is to be said of a computer.
+    """Return the checks of a computer.
 
     ``facts`` were measured with the simulated hand, for which ``compiled`` functions had to be compiled; the protocol's
     limits apply; ``cache`` is the folder of compiled code, None where nothing can be stored.
@@ -144,7 +144,7 @@ def computer_checks(
 
 
 def _devices(devices: Sequence[Backend]) -> Check:
-    """Say which haptic devices are connected; without one sessions run with the mouse."""
+    """Return the check of the connected haptic devices; without one, sessions use the mouse."""
     haptic = [device for device in devices if device.state.startswith("connected")]
     missing = [device.name for device in devices if device.state == NOT_AVAILABLE]
     about = f"cannot be used now: {', '.join(missing)}" if missing else "every device can be used"
@@ -223,7 +223,7 @@ class CheckRow(Themed, QWidget):
 
 
 def check_rows(checks: Sequence[Check], before: list[CheckRow], column: QBoxLayout) -> list[CheckRow]:
-    """Return the rows of checks, put into a column in place of those before."""
+    """Return the rows of checks, placed in a column in place of ``before``."""
     for row in before:
         remove_widget(row)
     made = [CheckRow(check, last=check is checks[-1]) for check in checks]
@@ -295,7 +295,7 @@ class PreflightWindow(QWidget):
         vbox(head, (middle, 1), Rule(), foot, spacing=16, margins=(32, 22, 32, 20), parent=self)
 
     def _beside(self) -> QWidget:
-        """Return the column next to the checks: how late the servo is, and what will run; it scrolls if it must."""
+        """Return the scrolling column beside the checks: the servo's lateness and the coming session."""
         lateness = Card("Servo lateness", label("measured at rest, µs", "small", "text2"), padding=18, gap=6)
         self.plot.setMinimumHeight(150)
         lateness.column.addWidget(self.plot, 1)
@@ -355,7 +355,7 @@ class PreflightWindow(QWidget):
             self.start_asked.emit()
 
     def finish(self) -> None:
-        """Close because the session's windows open, or it was called off elsewhere."""
+        """Close without a signal: the session begins, or was cancelled elsewhere."""
         self._done = True
         self.close()
 

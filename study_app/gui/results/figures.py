@@ -38,7 +38,7 @@ Kind: TypeAlias = Literal["", "simulated", "pilot"]
 
 
 def kind_of(study: StudyAt) -> Kind:
-    """Return what a study is where it holds no participants' data."""
+    """Return the kind of a study without participants' data."""
     return "pilot" if study.pilot else "simulated" if study.simulated else ""
 
 
@@ -50,13 +50,13 @@ def unblinded_words(reveal: Mapping[str, str]) -> str:
 
 
 def excluded_words(exclusion: Exclusion) -> str:
-    """Return what is excluded: "P003, session 2, trial 4"."""
+    """Return the subject of an exclusion: "P003, session 2, trial 4"."""
     name = exclusion.participant if exclusion.session == 1 else f"{exclusion.participant}, session {exclusion.session}"
     return name if exclusion.trial is None else f"{name}, trial {exclusion.trial}"
 
 
 def time_of(text: object) -> datetime | None:
-    """Return the time in a file, None where there is none: people may have changed it."""
+    """Return a time read from a file, None if it is none: people may have edited it."""
     try:
         return datetime.fromisoformat(str(text))
     except ValueError:
@@ -117,7 +117,7 @@ class ResultsView:
 
 
 def in_figures(sessions: Sequence[SessionFacts]) -> tuple[str, str]:
-    """Return how many sessions are in the figures, and why the others are not; empty without sessions."""
+    """Return how many sessions the figures include, and why others are left out; empty without sessions."""
     inside = [session for session in sessions if session.counts]
     head = f"{len(inside)} of {counted(len(sessions), 'session')} in the figures"
     if not sessions:
@@ -163,7 +163,7 @@ def themed_svg(svg: bytes, colours: Mapping[str, str], theme: Theme) -> bytes:
 
 
 def _ink(theme: Theme, role: str) -> str:
-    """Return the colour of a role; "band" is the accent thinned until lines are seen on it."""
+    """Return the colour of a role; "band" is a lighter accent, on which lines are visible."""
     if role != "band":
         return str(getattr(theme, role))
     paper, accent = QColor(theme.surface), QColor(theme.accent)
@@ -173,14 +173,14 @@ def _ink(theme: Theme, role: str) -> str:
 
 
 def _dyed(part: bytes, by: Mapping[bytes, bytes], accent: bytes) -> bytes:
-    """Replace colours; the accent as a shade, laid on with an opacity under letters, stays as deep as it is."""
+    """Replace colours; the accent as a translucent shade under letters keeps its depth."""
     shade = b"fill: " + re.escape(accent) + rb"; (?:fill-)?opacity"
     pattern = re.compile(b"|".join([shade, *map(re.escape, sorted(by, key=len, reverse=True))]))
     return pattern.sub(lambda match: by.get(match[0], match[0]), part)
 
 
 def drawn(svg: bytes, size: QSize, ratio: float) -> QImage:
-    """Return an SVG as an image of ``size`` logical px for a screen of that device pixel ratio."""
+    """Return an SVG as an image of ``size`` logical px for a screen with that device pixel ratio."""
     renderer = QSvgRenderer(svg)
     image = QImage(round(size.width() * ratio), round(size.height() * ratio), QImage.Format.Format_ARGB32_Premultiplied)
     image.fill(Qt.GlobalColor.transparent)
@@ -211,7 +211,7 @@ class FigureView(Coloured, QWidget):
         return not self._drawing.busy and not self._image.isNull()
 
     def show_figure(self, figure: FigureDrawn, colours: Mapping[str, str]) -> None:
-        """Draw another figure from now on; the one before stays until that one is drawn."""
+        """Draw another figure; the previous one stays visible until then."""
         self._figure, self._colours = figure, colours
         size = SIZE.search(figure.svg)
         self._proportion = float(size[2]) / float(size[1]) if size else 0.5
@@ -237,7 +237,7 @@ class FigureView(Coloured, QWidget):
         self._ask()
 
     def _ask(self) -> None:
-        """Have it drawn as it is to be now, unless it is."""
+        """Request a drawing at the present size and theme, unless it exists."""
         if self.width() < 2 or self.height() < 2 or not self.testAttribute(Qt.WidgetAttribute.WA_Resized):
             return
         size, ratio = self.size(), self.devicePixelRatioF()
@@ -343,7 +343,7 @@ class WorkLine(Card):
         add_layout(self.column, row)
 
     def show_going(self, going: Progress | None, *, untested: bool) -> None:
-        """Say how far it is; ``untested``: that it was stopped, and what is missing."""
+        """Show the progress; ``untested``: the work was stopped, and what is missing."""
         self.setVisible(going is not None or untested)
         self.bar.setVisible(going is not None)
         self.stop.setVisible(going is not None)
@@ -418,7 +418,7 @@ class FiguresPanel(QScrollArea):
         self._whole = False
 
     def show_view(self, view: ResultsView) -> None:
-        """Show the figures there are; a card whose figure is drawn anew stays where it is."""
+        """Show the figures; a card stays while its figure is drawn again."""
         names = [figure.name for figure in view.figures]
         if [card.figure.name for card in self.cards] != names:
             self._order(view)
@@ -434,7 +434,7 @@ class FiguresPanel(QScrollArea):
         self.fit()
 
     def _order(self, view: ResultsView) -> None:
-        """Keep the cards whose figures are still there, make the others, all in the figures' order."""
+        """Keep the cards of present figures and make the others, in the figures' order."""
         kept = {card.figure.name: card for card in self.cards}
         self.cards = []
         for place, figure in enumerate(view.figures):
@@ -445,14 +445,14 @@ class FiguresPanel(QScrollArea):
             remove_widget(gone)
 
     def show_whole(self, yes: bool) -> None:
-        """Be as high as the figures are, for a page that scrolls as a whole."""
+        """Be as high as the figures, for a page that scrolls as a whole."""
         self._whole = yes
         off = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
         self.setVerticalScrollBarPolicy(off if yes else Qt.ScrollBarPolicy.ScrollBarAsNeeded)
         self.fit()
 
     def fit(self) -> None:
-        """Give the figures the width there is; less where two of them can be seen at once by that."""
+        """Set the figures' width; smaller if two of them fit side by side then."""
         bar = 0 if self._whole else self.verticalScrollBar().sizeHint().width()  # there or not: or they would flutter
         width = min(self.width() - bar - AROUND, MOST_WIDTH)
         first = [card.drawing for card in self.cards if card.drawing is not None][:AT_ONCE]

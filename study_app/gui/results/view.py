@@ -107,7 +107,7 @@ class WriteDialog(Work):
 
     @property
     def asked(self) -> tuple[Path, tuple[str, ...]]:
-        """The folder, and the names of the extras."""
+        """The folder, and the names of the chosen extras."""
         return Path(self.value("to")).expanduser(), tuple(name for name in self._extras if self.value(name))
 
     def show_written(self, files: Sequence[Path], warnings: Sequence[str]) -> None:
@@ -122,7 +122,7 @@ NEEDS: Final = {"by": "Please enter a name; it is recorded.", "reason": REASON}
 
 
 def by_and_reason(by: str, who: str, example: str) -> tuple[Field, Field]:
-    """Return the fields that say who decides, and why."""
+    """Return the fields for name and reason of a decision."""
     return Field("by", by, placeholder=who), Field("reason", "Reason", placeholder=f"For example: {example}")
 
 
@@ -221,7 +221,7 @@ class SessionsCard(Card):
         self.version.setEnabled(chosen is not None and bool(chosen.version))
 
     def show_sessions(self, sessions: Sequence[SessionFacts], none: str = "No sessions.") -> None:
-        """Show these sessions in place of those before, or the words ``none`` in their place; the filters stay."""
+        """Show these sessions, or the text ``none``; the filters stay."""
         self._none = none
         self.rows.show_rows(sessions, datetime.now().astimezone())
         chosen = self.state.currentData()
@@ -269,7 +269,7 @@ class ExclusionsCard(Card):
         self.show_left_out(())
 
     def show_left_out(self, listed: Sequence[Exclusion]) -> None:
-        """Show what is left out, the last decision first; the keyboard does not leave with a line."""
+        """Show the exclusions, the latest first; the keyboard focus survives a removed line."""
         at = self.window().focusWidget()
         if at is not None and any(line.isAncestorOf(at) for line in self.lines):
             self.leave_out.setFocus()
@@ -285,7 +285,7 @@ class ExclusionsCard(Card):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, grows)
 
     def _line(self, exclusion: Exclusion) -> QWidget:
-        """Return one decision: what, why, who and when."""
+        """Return the row of one exclusion: what, why, who and when."""
         back = ActionButton("undo", "Include again …", role="plain", height=30)
         back.setAccessibleName(f"Include again: {excluded_words(exclusion)}")
         back.clicked.connect(lambda: self.take_back_asked.emit(exclusion))
@@ -301,7 +301,7 @@ class ExclusionsCard(Card):
 
 
 def exclusions_at(study: Path) -> Path:
-    """Return the list of exclusions; of a merged study the folder of its sites, each of which has one."""
+    """Return the file of exclusions; for a merged study the folder of its sites, each with its own file."""
     folders = folders_of(study)
     return StudyFolder(study).exclusions if "" in folders else study / FOLDER
 
@@ -436,7 +436,7 @@ class ResultsPlace(Place):
         self._show(drawing=None, testing=None)
 
     def show_view(self, view: ResultsView) -> None:
-        """Show what there is; only what has changed is made anew."""
+        """Show a view; only changed parts are made anew."""
         before, self.view = self.view, view
         if view.studies != before.studies or view.chosen != before.chosen:
             self._show_studies()
@@ -596,7 +596,7 @@ class ResultsPlace(Place):
 
     @property
     def busy(self) -> bool:
-        """Whether something was asked for and has not come to its end."""
+        """Whether a request has not ended."""
         return bool(self._orders) or self._writer is not None
 
     def show_results(self, results: Path) -> None:
@@ -606,11 +606,11 @@ class ResultsPlace(Place):
             self.look()
 
     def look(self) -> None:
-        """Look which studies there are, and read the chosen one again."""
+        """Read the list of studies, and the chosen study again."""
         self._ask(FindStudies(self.results), "looking for studies")
 
     def choose(self, folder: Path) -> None:
-        """Show this study when the place is entered next."""
+        """Show this study the next time the place is entered."""
         self.show_view(ResultsView(studies=self.view.studies, chosen=folder))
 
     def _ask(self, order: Order, what: str) -> None:
@@ -625,7 +625,7 @@ class ResultsPlace(Place):
         self._listening.start()
 
     def _listen(self) -> None:
-        """Take the answers to the last request; say what goes on where that takes long."""
+        """Read the answers to the last request; show the activity if it takes long."""
         if self.reader is not None and self._orders:
             for number, answer in self.reader.answers():
                 self._take(number, answer)
@@ -700,7 +700,7 @@ class ResultsPlace(Place):
             self._read(folder)
 
     def _read(self, folder: Path) -> None:
-        """Read a study; what is shown of it stays until it is known anew."""
+        """Read a study; its present view stays until then."""
         if folder != self.view.chosen:
             self.show_view(ResultsView(studies=self.view.studies, chosen=folder))
             self._blocks = 0
@@ -790,7 +790,7 @@ class ResultsPlace(Place):
             self._writer.stop()
 
     def _listen_to_writer(self) -> None:
-        """Pass on how far it is; where it has come to its end, end the process."""
+        """Show the writer's progress; end its process after the last answer."""
         dialog = self.writing
         if self._writer is None:
             return
@@ -816,7 +816,7 @@ class ResultsPlace(Place):
             dialog.show_refused(f"{last.sentence}.")
 
     def _arrange(self) -> None:
-        """Put the figures below the sessions in a narrow window, and the chips below the heading where they must be."""
+        """Put the figures below the sessions in a narrow window, and the chips below the heading if necessary."""
         stacked = self.width() < STACKED_BELOW
         down, right = QBoxLayout.Direction.TopToBottom, QBoxLayout.Direction.LeftToRight
         self._row.setDirection(down if stacked else right)

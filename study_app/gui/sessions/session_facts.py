@@ -64,13 +64,13 @@ class SessionFacts:
 
     @property
     def version(self) -> str:
-        """The study's version that it was run with, by its receipt, which is read then; "" where that does not say."""
+        """The study's version in the session's receipt, which is read on first use; "" if there is none."""
         run = run_of(SessionFolder(self.folder, self.participant, self.session).receipt)
         return "" if run is None else run.version
 
     @property
     def kind(self) -> Kind:
-        """The kind "sample", "simulated" or "pilot"; "" for a session of a participant.
+        """The kind "sample", "simulated" or "pilot"; "" for a participant's session.
 
         Samples are the simulated sessions that ship with the program, in a folder whose name begins with "sample-". A
         pilot stays one where its first steps or its device were simulated.
@@ -91,7 +91,7 @@ class SessionFacts:
 
     @property
     def name(self) -> str:
-        """The participant, and which session it is where it is not the first."""
+        """The participant, with the session's number unless it is the first."""
         return self.participant if self.session == 1 else f"{self.participant}, session {self.session}"
 
 
@@ -111,7 +111,7 @@ def sessions(results: Path, answers_of: Mapping[str, int]) -> tuple[SessionFacts
 def session_facts(
     study: Path, rows: Iterable[Mapping[str, Any]], listed: Iterable[Exclusion], answers_of: Mapping[str, int]
 ) -> list[SessionFacts]:
-    """Return the rows of a study's participants as facts; ``listed`` is what is excluded from the analysis."""
+    """Return the facts about a study's sessions; ``listed`` are the exclusions from the analysis."""
     reasons = {
         (exclusion.participant, exclusion.session): exclusion.reason for exclusion in listed if exclusion.trial is None
     }
@@ -144,14 +144,14 @@ def session_facts(
 
 
 def _missing(session: SessionFolder) -> MissingTrials | None:
-    """Return the trials of a session that were not delivered; None if its journal cannot be read."""
+    """Return the undelivered trials of a session; None if its journal cannot be read."""
     with contextlib.suppress(StoreError):
         return progress_of(journal.read(session.journal)).missing_trials
     return None
 
 
 def _began(row: Mapping[str, Any], session: SessionFolder) -> object:
-    """Return when a session began; of a pilot that was played from a later step when it was played."""
+    """Return the time at which a session began; for a pilot played from a later step, the time of playing."""
     if row["pilot"] and row["simulated"] and row.get("resumed"):
         with contextlib.suppress(StoreError):
             return receipt.began_at(receipt.read(session.receipt))
@@ -159,7 +159,7 @@ def _began(row: Mapping[str, Any], session: SessionFolder) -> object:
 
 
 def _started(time: object, folder: Path) -> datetime:
-    """Return when a session began; where its journal is too damaged to tell, when its folder last changed."""
+    """Return the time at which a session began; for a damaged journal, the time of the folder's last change."""
     with contextlib.suppress(ValueError):
         return datetime.fromisoformat(str(time))
     with contextlib.suppress(OSError):
@@ -168,14 +168,14 @@ def _started(time: object, folder: Path) -> datetime:
 
 
 def _exclusions(study: Path) -> tuple[Exclusion, ...]:
-    """Return what is left out; nothing where the list cannot be read, which the commands complain of."""
+    """Return the exclusions; empty if the list cannot be read, which the commands report."""
     with contextlib.suppress(StoreError):
         return exclusions(study)
     return ()
 
 
 def started_words(started: datetime, now: datetime) -> str:
-    """Return when a session began as people say it: "Today 09:31", "Yesterday 16:11", "18 Nov 15:20"."""
+    """Return the start of a session in words: "Today 09:31", "Yesterday 16:11", "18 Nov 15:20"."""
     days = (now.date() - started.date()).days
     day = {0: "Today", 1: "Yesterday"}.get(days, f"{started.day} {started:%b}")
     year = "" if started.year == now.year else f" {started.year}"
@@ -218,7 +218,7 @@ LIMIT_WORDS: Mapping[str, tuple[str, str]] = {
 
 
 def broken_words(measure: str, value: float, limit: float) -> str:
-    """Return a sentence on a limit that was broken."""
+    """Return a sentence about a broken limit."""
     what, unit = LIMIT_WORDS[measure]
     return f"{what}: {value:.3g} {unit}, limit {limit:g} {unit}"
 
@@ -233,12 +233,12 @@ class Column(NamedTuple):
 
 
 def status_chip(facts: SessionFacts) -> Chipped:
-    """Return what the chip says of how a session ended."""
+    """Return the chip about a session's end."""
     return STATUS.get(facts.status, ("neutral", "ring", facts.status.capitalize()))
 
 
 def validity_chip(facts: SessionFacts) -> Chipped:
-    """Return what the chip says of a session's limits and recordings, or that it does not count at all."""
+    """Return the chip about a session's limits and recordings, or that the session is excluded."""
     if facts.excluded is not None:
         return "neutral", "cross", "Excluded"
     if facts.validity != "invalid" and (facts.missing or facts.lost):
@@ -247,7 +247,7 @@ def validity_chip(facts: SessionFacts) -> Chipped:
 
 
 def incidents(facts: SessionFacts) -> str:
-    """Return what happened to device, recordings and outlets: "2 recordings lost, device reconnected", or nothing."""
+    """Return the incidents of device, recordings and outlets: "2 recordings lost, device reconnected"; "" if none."""
     lost = f"{counted(facts.lost, 'recording')} lost" if facts.lost else ""
     times = "" if facts.reconnected == 1 else f" {facts.reconnected} times"
     outlets = f"{counted(facts.outlets_lost, 'outlet')} failed" if facts.outlets_lost else ""
@@ -255,12 +255,12 @@ def incidents(facts: SessionFacts) -> str:
 
 
 def answers_words(facts: SessionFacts) -> str:
-    """Return "12 of 62", or "12" where the whole is not known."""
+    """Return "12 of 62", or "12" if the total is unknown."""
     return f"{facts.answers} of {facts.answers_of}" if facts.answers_of is not None else str(facts.answers)
 
 
 def matching(text: str, status: str) -> Callable[[SessionFacts], bool]:
-    """Return whether a session's participant holds ``text`` and its state is ``status`` ("" for any).
+    """Return a predicate: the participant contains ``text`` and the state is ``status`` ("" for any).
 
     ``status`` is one of `STATUS`, "excluded", "invalid" or "lost".
     """
@@ -279,7 +279,7 @@ def matching(text: str, status: str) -> Callable[[SessionFacts], bool]:
 
 
 def states_of(sessions: Iterable[SessionFacts]) -> list[tuple[str, str]]:
-    """Return the states that occur among sessions, with their words, in the order of `STATUS`."""
+    """Return the states that occur among sessions with their labels, in the order of `STATUS`."""
     listed = list(sessions)
     states = [
         (status, word) for status, (_, _, word) in STATUS.items() if any(session.status == status for session in listed)
@@ -294,7 +294,7 @@ def states_of(sessions: Iterable[SessionFacts]) -> list[tuple[str, str]]:
 
 
 def operator_language(protocol: Protocol) -> str:
-    """Return the language in which the operator reads a study's own texts: English, or the study's first."""
+    """Return the operator's language for a study's texts: English, or the study's first."""
     return "en" if "en" in protocol.study.languages else protocol.study.languages[0]
 
 
@@ -331,7 +331,7 @@ class Extent:
 
 
 def extent_of(protocol: Protocol) -> Extent:
-    """Return how much the sessions of a study ask; of one session where its own protocol is given."""
+    """Return the extent of a study's sessions: parts, settings, answers and duration."""
     sessions = [variant.protocol for variant in variants(protocol)]
     orders = [orders_of(session) for session in sessions]
     return Extent(
@@ -344,5 +344,5 @@ def extent_of(protocol: Protocol) -> Extent:
 
 
 def counted_each(numbers: Sequence[int], word: str) -> str:
-    """Return "1 part", "2 parts", or "1 to 2 parts" where sessions differ."""
+    """Return "1 part", "2 parts", or "1 to 2 parts" if sessions differ."""
     return f"{spread(numbers)} {word}" if set(numbers) == {1} else f"{spread(numbers)} {word}s"

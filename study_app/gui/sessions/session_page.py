@@ -78,7 +78,7 @@ class SessionRecord:
 
 
 def read_record(folder: Path) -> SessionRecord:
-    """Return what a session's folder holds.
+    """Read the record in a session's folder.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def read_record(folder: Path) -> SessionRecord:
 def limits_sentence(
     trials: Sequence[TrialRecord], missing: MissingTrials, *, excluded: bool = False, sealed: bool
 ) -> str:
-    """Return how many trials were not delivered, how many kept the study's limits, and what that means."""
+    """Return sentences on undelivered trials and on trials within the study's limits."""
     lost = f"{missing_sentence(missing, excluded=excluded)} " if missing.count else ""
     repeated = sum(trial.outcome == UNDELIVERED for trial in trials)
     again = f"{counted(repeated, 'presentation')} broke a limit and had no question. " if repeated else ""
@@ -129,7 +129,7 @@ def limits_sentence(
 
 
 def missing_sentence(missing: MissingTrials, *, excluded: bool) -> str:
-    """Return how many trials were not delivered and why, and whether the session is included, as sentences."""
+    """Return sentences on undelivered trials, with reasons, and whether the session is included."""
     permitted = missing.limits.get(MISSING_PERCENT)
     states = f" The study permits {permitted:g} % of the trials to be missing." if permitted is not None else ""
     if missing.exceed:
@@ -182,7 +182,7 @@ def _trials(
 
 
 def _choices(given: Mapping[str, Answer]) -> tuple[str, ...]:
-    """Return choices as "item: value", in the order in which the items were first answered."""
+    """Return answers as "item: value", in the order of the first answers."""
     chosen = sorted(given.items(), key=lambda entry: entry[1].first_s or 0.0)
     return tuple(f"{item}: {'cannot judge' if answer.value is None else answer.value}" for item, answer in chosen)
 
@@ -193,7 +193,7 @@ def _row_notes(row: Mapping[str, Any]) -> list[str]:
 
 
 def _words(row: Mapping[str, Any]) -> str:
-    """Return what was presented without a condition: "Part 1, L2", "practice, 2nd attempt"."""
+    """Return a trial's setting without a condition: "Part 1, L2", "practice, 2nd attempt"."""
     phase = f"Part {row['part']}" if row["part"] is not None else str(row["phase"]).capitalize()
     again = "" if row["attempt"] == 1 else f", attempt {row['attempt']}"
     return f"{phase}, {row['code']}{again}"
@@ -253,14 +253,14 @@ def trial_cell(trial: TrialRecord, heading: str) -> dict[int, Any]:
 
 
 def trial_chip(trial: TrialRecord) -> Any:
-    """Return what the chip says of a trial's limits, or that it is left out."""
+    """Return the chip about a trial's limits, or that it is excluded."""
     if trial.excluded is not None:
         return "neutral", "cross", "Excluded"
     return VALIDITY[None if trial.valid is None else "valid" if trial.valid else "invalid"]
 
 
 def trial_words(trial: TrialRecord) -> str:
-    """Return a line on a trial's limits."""
+    """Return a line about a trial's limits."""
     said = f"Trial {trial.number}: "
     if trial.excluded is not None:
         said += f"excluded from the analysis ({trial.excluded}); "

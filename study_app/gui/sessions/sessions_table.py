@@ -103,12 +103,12 @@ class SessionsTable(QWidget):
         return None if row is None else self.shown[row]
 
     def show_rows(self, sessions: Sequence[SessionFacts], now: datetime) -> None:
-        """Show these sessions in place of those before, as far as they match; the one that was chosen stays so."""
+        """Show these sessions as far as they match the filter; the chosen one stays chosen."""
         self._every, self._now = tuple(sessions), now
         self.show_matching(self._matches)
 
     def show_matching(self, matches: Callable[[SessionFacts], bool]) -> None:
-        """Show the sessions alone that match, now and later."""
+        """Show only matching sessions from now on."""
         before, self._matches = self.chosen, matches
         self.model.show(filter(matches, self._every))
         places = [session.folder for session in self.shown]

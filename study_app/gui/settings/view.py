@@ -79,13 +79,13 @@ class FrameTimes:
         self._times: deque[int] = deque()
 
     def add(self, time_ns: int) -> None:
-        """Take a frame's time [ns]; older than ten seconds are forgotten."""
+        """Add a frame's time [ns]; times older than ten seconds are dropped."""
         self._times.append(time_ns)
         while time_ns - self._times[0] > 1e9 * KEPT_S:
             self._times.popleft()
 
     def words(self) -> tuple[str, ...]:
-        """Return rate, median gap, 99th percentile of the gaps and refreshes missed; dashes until there are enough."""
+        """Return rate, median gap, 99th percentile of the gaps and missed refreshes; dashes until there are enough."""
         times = list(self._times)
         if len(times) < 3 or times[-1] - times[0] < self._least_ns:
             return ("–",) * len(NAMES)
@@ -133,7 +133,7 @@ class OffsetForm(QWidget):
         self.forget.clicked.connect(self.forgotten)
 
     def show_offset(self, offset: DisplayOffset | None, screen: str) -> None:
-        """Show what was measured; of another screen than ``screen`` it is said so."""
+        """Show the measured offset, and whether it was measured on another screen than ``screen``."""
         self.forget.setEnabled(offset is not None)
         self.said.setText(offset_words(offset, screen))
         if offset is not None:
@@ -154,7 +154,7 @@ class OffsetForm(QWidget):
 
 
 def offset_words(offset: DisplayOffset | None, screen: str) -> str:
-    """Return what is known of a screen's offset, in a sentence."""
+    """Return a sentence on the offset of a screen."""
     if offset is None:
         return (
             "Not measured. The screen shows each frame slightly later; the delay is recorded as “not measured” in "
@@ -236,7 +236,7 @@ class DisplayTest(QWidget):
         self.report_timer.start()
 
     def frame(self) -> None:
-        """Ask for a frame, as a session does; the patch toggles when its time has come."""
+        """Request a frame, as a session does; toggle the patch when it is due."""
         now_ns = self._now_ns()
         if now_ns - self._toggled_ns >= 1e6 * self.interval_ms:
             self._toggled_ns = now_ns
@@ -357,7 +357,7 @@ class ScreensCard(Card):
         add_parts(self.column, self._host, self.note, hbox(self.test, STRETCH))
 
     def show_screens(self, screens: tuple[ScreenShown, ...], chosen: int, missing: str) -> None:
-        """Show screens; ``chosen`` is the participant's number, ``missing`` the name of one that is not there."""
+        """Show screens; ``chosen`` is the participant's number, ``missing`` the name of an unplugged screen."""
         if screens != self._shown:
             self._shown, old, self._rows = screens, self._rows, QWidget()
             group, rows = QButtonGroup(self._rows), vbox(spacing=8, margins=0, parent=self._rows)
@@ -472,7 +472,7 @@ class MachinePlace(Place):
         vbox(scrolled(inside), margins=0, parent=self)
 
     def enter(self) -> None:
-        """Look at the screens again: one may have been plugged in."""
+        """Read the screens again: one may have been plugged in."""
         self._show()
 
     def leave(self) -> None:
@@ -484,7 +484,7 @@ class MachinePlace(Place):
         return self._screens[self.settings.screen_among([screen.name for screen in self._screens]) - 1]
 
     def show_settings(self, settings: MachineSettings, *, folder: str, undo: str, kept_in: str) -> None:
-        """Show what is set; ``undo`` names what can be taken back ("" where nothing), ``folder`` is the workspace."""
+        """Show settings; ``undo`` names the change to undo ("" if none), ``folder`` is the workspace."""
         self.settings = settings
         self.undo.setEnabled(bool(undo))
         self.undo.show_action("undo", f"Undo {undo}" if undo else "Undo")
@@ -533,13 +533,13 @@ class MachinePlace(Place):
 
 
 def width_words(settings: MachineSettings, screen: ScreenShown) -> str:
-    """Return what the system reports of a screen's width."""
+    """Return a sentence on the screen width that the system reports."""
     known = f"The system reports {screen.width_mm:.0f} mm." if screen.width_mm > 0 else "The system does not report it."
     return known if settings.screen_width_mm is None else f"{known} The measured value is used."
 
 
 def size_words(settings: MachineSettings, screen: ScreenShown, scale: float) -> str:
-    """Return what the viewing distance means for the size of text, in a sentence."""
+    """Return a sentence on the text size for the viewing distance."""
     seen, least = settings.x_height_deg(screen.width_px, screen.width_mm), f"{LEAST_X_HEIGHT_DEG:g}°"
     if seen is None:
         enlarged = f"Measure the distance: text is then enlarged until an x subtends {least}."

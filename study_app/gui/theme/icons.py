@@ -126,7 +126,7 @@ def _parsed(name: str) -> tuple[QPainterPath, QPainterPath]:
 
 
 def draw_icon(painter: QPainter, name: str, rect: QRectF, colour: str | QColor, stroke: float = STROKE) -> None:
-    """Paint an icon into the square in the middle of ``rect``; ``stroke`` is its line width on the grid of 24."""
+    """Paint an icon in the central square of ``rect``; ``stroke`` is its line width on the grid of 24."""
     stroked, filled = _parsed(name)
     side = min(rect.width(), rect.height())
     ink = QColor(colour)
@@ -164,7 +164,7 @@ def icon(name: str, colour: str, size: int = 20) -> QIcon:
 
 
 def logo(size: int, background: str, ink: str) -> QIcon:
-    """Return the program's mark, a drop on a rounded square, as the window icon."""
+    """Return the window icon: a drop on a rounded square."""
     made = QIcon()
     for side in (size, 2 * size, 4 * size):
         pixmap = QPixmap(QSize(side, side))
@@ -177,7 +177,7 @@ def logo(size: int, background: str, ink: str) -> QIcon:
 
 
 def draw_logo(painter: QPainter, rect: QRectF, background: str, ink: str) -> None:
-    """Paint the program's mark into ``rect``."""
+    """Paint the program's logo in ``rect``."""
     painter.save()
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.setPen(Qt.PenStyle.NoPen)

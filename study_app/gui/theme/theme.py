@@ -51,7 +51,7 @@ TYPE: dict[TypeRole, Type] = {
 
 @cache
 def load_fonts() -> tuple[str, ...]:
-    """Register the package's fonts with Qt, once; return the families they bring (a QApplication must exist)."""
+    """Register the package's fonts with Qt, once; return their families (a QApplication must exist)."""
     families: list[str] = []
     for name in FILES:
         content = resources.files("study_app.gui").joinpath("assets", "fonts", name).read_bytes()

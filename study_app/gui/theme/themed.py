@@ -31,7 +31,7 @@ class Coloured(Themed):
 
 
 def _given(part: object) -> Theme | None:
-    """Return the theme of the window that a part is in; between them may be what PySide had better not wrap."""
+    """Return the theme of a part's window; parents in between may be objects that PySide must not wrap."""
     while isinstance(part, QWidget):
         window = part.window()
         if (theme := getattr(window, "given_theme", None)) is not None:
@@ -49,7 +49,7 @@ def apply_theme(window: QWidget, theme: Theme) -> None:
 
 
 def _palette(theme: Theme) -> QPalette:
-    """Return the palette for what no style sheet reaches: marks of check boxes, arrows, selections."""
+    """Return the palette for parts that style sheets do not reach: check marks, arrows, selections."""
     made = QPalette()
     group = QPalette.ColorRole
     for role, colour in (
@@ -72,19 +72,19 @@ def _palette(theme: Theme) -> QPalette:
 
 
 def give_ground(part: QWidget, role: str) -> None:
-    """Let the style sheet paint the ground of a part, by its ``role``."""
+    """Let the style sheet paint a part's background, by its ``role``."""
     part.setProperty("role", role)
     part.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
 
 
 def name_bars(whole: QWidget) -> None:
-    """Name the scroll bars of a part, which Qt leaves without a name."""
+    """Give a part's scroll bars an accessible name, which Qt does not."""
     for bar in whole.findChildren(QScrollBar):
         bar.setAccessibleName("Scroll bar")
 
 
 def remove_widget(part: QWidget) -> None:
-    """Take a part out of its window for good.
+    """Remove a part from its window for good.
 
     It is hidden first: the layout that it came into may still be about to show it, and would show it as a window.
     """
@@ -94,7 +94,7 @@ def remove_widget(part: QWidget) -> None:
 
 
 def replace_inside(area: QScrollArea, inside: QWidget) -> None:
-    """Show other content in ``area``; that before is deleted later, since one of its buttons may just be pressed."""
+    """Replace the content of ``area``; the old content is deleted later, since one of its buttons may be pressed."""
     old = area.takeWidget()
     area.setWidget(inside)
     if old is not None:

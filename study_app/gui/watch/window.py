@@ -112,7 +112,7 @@ class ForcePlot(Plot):
 
 
 def thinned(times_s: Floats, values: Floats) -> tuple[Floats, tuple[Floats, Floats]]:
-    """Return times (k,) and the least and greatest values (k,) from each to the next; some `MOST_POINTS` at most."""
+    """Return times (k,) and the least and greatest values (k,) between them, at most `MOST_POINTS`."""
     starts = np.arange(0, len(values), max(1, len(values) // MOST_POINTS))
     return times_s[starts], (np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts))
 
@@ -168,7 +168,7 @@ class Stage(QWidget):
         }
 
     def show_moment(self, at_s: float) -> None:
-        """Show a time [s]; what lies outside the recording is the nearest moment of it."""
+        """Show a time [s], or the nearest one within the recording."""
         shown = self.shown
         self.at_s = at_s = min(max(at_s, shown.begins_s), shown.ends_s)
         view = shown.view(shown.drawn_s(at_s) if self.as_seen else at_s)
@@ -185,7 +185,7 @@ class Stage(QWidget):
         self.happened.show_text(f"{before[-1].at_s:.2f} s: {before[-1].text}" if before else "")
 
     def describe(self) -> None:
-        """Tell screen readers the moment that is shown."""
+        """Describe the shown moment to screen readers."""
         self.line.setAccessibleDescription(f"{self.numbers.text()}. {self.happened.whole}")
 
     def _arrows(self, view: TankView, sample: Any) -> tuple[Arrow, ...]:
@@ -336,14 +336,14 @@ class WatchWindow(Themed, QDialog):
             self.room.setCurrentWidget(self.sentence)
 
     def go(self, at_s: float) -> None:
-        """Show a time of the trial [s], and stay there."""
+        """Show a time of the trial [s] and stay there."""
         self.pause()
         if self.stage is not None:
             self.stage.show_moment(at_s)
             self.stage.describe()
 
     def step(self, kind: Literal["sample", "frame"], way: int) -> None:
-        """Go to the next sample or frame, or to the one before."""
+        """Go to the next or previous sample or frame."""
         if self.stage is not None:
             times_s = self.stage.shown.steps_s(kind)
             side: Literal["left", "right"] = "right" if way > 0 else "left"
@@ -356,7 +356,7 @@ class WatchWindow(Themed, QDialog):
         return self._timer.isActive()
 
     def toggle(self) -> None:
-        """Play from here, from the beginning where it is over, or pause."""
+        """Play from here, at the end from the start, or pause."""
         if self.playing or self.stage is None:
             self.pause()
             return
@@ -373,7 +373,7 @@ class WatchWindow(Themed, QDialog):
             self.stage.describe()
 
     def _set_off(self) -> None:
-        """Count time from here on, at the speed that is chosen."""
+        """Start the clock at the chosen speed."""
         self._since = (time.perf_counter(), 0.0 if self.stage is None else self.stage.at_s)
 
     def _play_on(self) -> None:
@@ -423,7 +423,7 @@ class WatchWindow(Themed, QDialog):
         self._writing.start()
 
     def _write_on(self, pictures: Iterator[float | Path]) -> None:
-        """Write one picture more; say how far that is, or what came of it."""
+        """Write one more picture; show the progress or the result."""
         dialog = self.export_dialog
         assert dialog is not None  # noqa: S101 - it has begun
         try:
@@ -464,7 +464,7 @@ class WatchWindow(Themed, QDialog):
 
 
 def _pixels(stage: Stage, size: QSize) -> np.ndarray:
-    """Return what is seen now (height, width, 4): blue, green, red, unused."""
+    """Return the shown picture (height, width, 4): blue, green, red, unused."""
     image = stage.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
     if image.size() != size:  # the window was resized meanwhile
         image = image.scaled(size)

@@ -12,7 +12,7 @@ _PRUNED_AT = 256  # and at its multiples
 
 
 def give_role(widget: QWidget, role: QAccessible.Role) -> None:
-    """Give ``widget`` a role that Qt does not give to its class; its accessible name and description stay its own.
+    """Give ``widget`` a role that its class lacks in Qt; its accessible name and description stay.
 
     Qt owns the interface and deletes it with the widget; Python's reference must outlive it, or it is deleted twice.
     Call it last: Qt forgets the role once a signal is connected to a method that the widget's class has in Python.

@@ -22,13 +22,13 @@ _telling, _program_ends = threading.Lock(), threading.Event()
 
 @atexit.register
 def _end() -> None:
-    """Let no job that is still at work speak to Qt, which Python takes down next: that ended in a fault of memory."""
+    """Abandon running jobs before Python takes Qt down: a late signal would crash."""
     with _telling:
         _program_ends.set()
 
 
 def wait_for_jobs(seconds: float) -> None:
-    """Wait a limited time for the jobs of every `Background`: Python aborts if it ends while one loads a module."""
+    """Wait a limited time for the jobs of every `Background`: Python aborts if it ends during an import."""
     until_s = time.monotonic() + seconds
     for thread in tuple(_threads):
         thread.join(max(until_s - time.monotonic(), 0.0))
@@ -55,7 +55,7 @@ def _ends() -> _Ends:
 
 
 def delayed(owner: QObject, milliseconds: int, run: Callable[[], Any]) -> QTimer:
-    """Return a timer that runs something once, so long after it was last started."""
+    """Return a timer that calls a function once, this time after it was last started."""
     made = QTimer(owner)
     made.setSingleShot(True)
     made.setInterval(milliseconds)
@@ -86,13 +86,13 @@ class Background(QObject):
         return self._wanted is not None
 
     def run(self, job: Callable[[], Any]) -> None:
-        """Run ``job`` in a thread; what was asked for before it does not come any more."""
+        """Run ``job`` in a thread; the result of an earlier job is dropped."""
         self._wanted = job
         if self._thread is None:
             self._begin(job)
 
     def wait(self, seconds: float | None = None) -> bool:
-        """Wait until the job that runs has ended; return whether it has."""
+        """Wait until the running job has ended; return whether it has."""
         if self._thread is None:
             return True
         self._thread.join(seconds)
@@ -118,7 +118,7 @@ class Background(QObject):
         self._thread.start()
 
     def take(self, job: Callable[[], Any], whole: bool, outcome: Any) -> None:
-        """Pass on what a job returned, or raised where it is not ``whole``; begin the one that took its place."""
+        """Emit a job's result, or its exception if it is not ``whole``; begin the job that replaced it."""
         self._thread = None
         if self._wanted is not job and self._wanted is not None:
             self._begin(self._wanted)

@@ -18,21 +18,21 @@ B = TypeVar("B", bound=QBoxLayout)
 def hbox(
     *parts: Part, spacing: int | None = None, margins: Margins = None, parent: QWidget | None = None
 ) -> QHBoxLayout:
-    """Return a row of parts, as the layout of ``parent`` where there is one."""
+    """Return a row of parts, as the layout of ``parent`` if given."""
     return _box(QHBoxLayout(), parts, spacing, margins, parent)
 
 
 def vbox(
     *parts: Part, spacing: int | None = None, margins: Margins = None, parent: QWidget | None = None
 ) -> QVBoxLayout:
-    """Return a column of parts, as the layout of ``parent`` where there is one."""
+    """Return a column of parts, as the layout of ``parent`` if given."""
     return _box(QVBoxLayout(), parts, spacing, margins, parent)
 
 
 def grid(
     across: int | None = None, down: int | None = None, *, margins: Margins = None, parent: QWidget | None = None
 ) -> QGridLayout:
-    """Return a grid with its gaps across and down [px], as the layout of ``parent`` where there is one."""
+    """Return a grid with its gaps across and down [px], as the layout of ``parent`` if given."""
     made = QGridLayout(parent) if parent is not None else QGridLayout()
     if margins is not None:
         made.setContentsMargins(*((margins,) * 4 if isinstance(margins, int) else margins))
@@ -81,7 +81,7 @@ def insert_layout(outer: QBoxLayout, at: int, inner: QLayout) -> None:
 
 
 def _release_items(layout: QLayout) -> None:
-    """Release the wrappers that PySide makes of the items of a layout when it adds that to another one.
+    """Release PySide's wrappers of a layout's items when the layout is added to another one.
 
     PySide does not notice when Qt deletes an item; an event at its address would get the wrapper, and its class.
     """

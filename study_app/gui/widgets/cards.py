@@ -49,7 +49,7 @@ class Card(Themed, QWidget):
 
 
 def scrolled(content: QWidget | QLayout) -> QScrollArea:
-    """Return ``content`` in a frame that scrolls up and down, where there is too little room, and never sideways."""
+    """Return ``content`` in a frame that scrolls vertically if necessary, and never sideways."""
     if isinstance(content, QLayout):
         inside = QWidget()
         inside.setLayout(content)
@@ -63,7 +63,7 @@ def scrolled(content: QWidget | QLayout) -> QScrollArea:
 
 
 def smooth_painter(part: QWidget) -> QPainter:
-    """Return a painter of a part whose edges are smoothed."""
+    """Return an antialiasing painter of a part."""
     painter = QPainter(part)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     return painter
@@ -170,7 +170,7 @@ class Bar(Themed, QWidget):
         self.setFixedHeight(height + 6)
 
     def show_share(self, share: float, tick: float | None = None) -> None:
-        """Fill ``share`` of the bar (0 to 1); ``tick`` is a place on it (0 to 1) or None."""
+        """Fill ``share`` of the bar (0 to 1); ``tick`` is a position on it (0 to 1) or None."""
         self.share, self.tick = min(1.0, max(0.0, share)), tick
         self.update()
 

@@ -65,12 +65,12 @@ class Cap(Themed, QWidget):
 
 
 def cap_size(text: str) -> QSize:
-    """Return the room for keys as on a keyboard; none where there are no keys."""
+    """Return the size of a key cap; none without keys."""
     return QSize(max(20, round(QFontMetricsF(font("key")).horizontalAdvance(text)) + 10) if text else 0, 20)
 
 
 def paint_cap(painter: QPainter, at: QPointF, text: str, ink: str, edge: str) -> None:
-    """Paint keys as on a keyboard, with their upper left corner at ``at``."""
+    """Paint a key cap with its upper left corner at ``at``."""
     body = QRectF(at, cap_size(text).toSizeF())
     painter.setPen(QPen(QColor(edge), 1))
     painter.setBrush(Qt.BrushStyle.NoBrush)
@@ -376,7 +376,7 @@ def _marked_size(button: QAbstractButton) -> QSize:
 
 
 def _begin_mark(button: QAbstractButton, theme: Theme) -> tuple[QPainter, QRectF]:
-    """Paint the button's words; return the painter with the mark's pen, and the mark's place."""
+    """Paint the button's text; return the painter with the mark's pen, and the mark's place."""
     painter = QPainter(button)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.setPen(QColor(theme.text if button.isEnabled() else theme.text3))

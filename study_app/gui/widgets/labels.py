@@ -138,12 +138,12 @@ def clamped(text: str, most: int, font: QFont, width: int) -> list[str]:
 
 
 def set_ink(widget: QLabel, ink: Ink) -> None:
-    """Give a label the colour of another role."""
+    """Set the colour role of a label."""
     set_property(widget, "role", ink)
 
 
 def set_property(widget: QWidget, name: str, value: str) -> None:
-    """Set a property that the style sheet goes by, and apply that again."""
+    """Set a property that the style sheet uses, and apply the sheet again."""
     if (widget.property(name) or "") != value:
         widget.setProperty(name, value)
         widget.style().unpolish(widget)

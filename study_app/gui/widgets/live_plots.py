@@ -99,7 +99,7 @@ class Plot(Coloured, pg.GraphicsView):
         self.axes["bottom"].setHeight(28)
 
     def stroke(self, colour: str, width: float = STROKE, dash: tuple[float, float] | None = None) -> QPen:
-        """Return a pen of so many logical px, as wide on a screen of any density."""
+        """Return a pen of so many logical px on a screen of any density."""
         return pen(colour, width * self.devicePixelRatioF(), dash)
 
     def event(self, event: QEvent) -> bool:
@@ -108,7 +108,7 @@ class Plot(Coloured, pg.GraphicsView):
         return bool(super().event(event))
 
     def paint_now(self) -> None:
-        """Paint what was changed at once, and not when Qt finds the time."""
+        """Paint changes at once instead of waiting for Qt."""
         QCoreApplication.sendPostedEvents(self.scene(), QEvent.Type.MetaCall.value)
 
     def sizeHint(self) -> QSize:
@@ -166,13 +166,13 @@ class TracePlot(Plot):
         self.apply_theme(LIGHT)
 
     def show_reach(self, reach: float) -> None:
-        """Show values from −reach to reach, and as much more as makes even ticks."""
+        """Show values from −reach to reach, extended to even ticks."""
         if reach != self._asked:
             self._asked = reach
             self._make_room()
 
     def _make_room(self) -> None:
-        """Keep room in px for the names at the right and for half a line above and below the outermost ticks."""
+        """Keep room in px for the names at the right and half a line above and below the outer ticks."""
         height, width = max(60.0, self.box.height()), max(120.0, self.box.width())
         most = 3 if height > 130 else 2 if height > 84 else 1  # grid lines on either side of zero
         step = step_for(self._asked, most)
@@ -202,7 +202,7 @@ class TracePlot(Plot):
         self._place_names()
 
     def _place_names(self) -> None:
-        """Put every name at its curve's newest end, or as near to it as the others and the plot's edges let it."""
+        """Put every name at its curve's newest end, or as near as the others and the plot's edges permit."""
         if not self._newest:
             return
         for end, height in zip(self.ends, apart(self._newest, self._name_height, self.reach), strict=True):
@@ -245,7 +245,7 @@ class LatenessPlot(Plot):
         self.show_ticks("left", [(k, number(10.0**k)) for k in range(up + 1)])
 
     def _make_room(self) -> None:
-        """Keep two lines of text free above the bars: the limit's name stands above that of the 99th percentile."""
+        """Keep two lines of text above the bars: the limit's name is above that of the 99th percentile."""
         across, up = self._decades
         share = min(0.2, HALF_TICK_PX / max(1.0, self.box.width()))  # half of the last tick's text
         last = across * (1 + share / (1 - share))
@@ -287,7 +287,7 @@ class LatenessPlot(Plot):
 
 
 def lateness_histogram(lateness_us: Floats) -> tuple[Floats, NDArray[np.int64]]:
-    """Return bin edges [µs] (bins + 1,), even in their logarithm, and counts (bins,); below 1 µs counts as 1 µs."""
+    """Return bin edges [µs] (bins + 1,), evenly spaced logarithms, and counts (bins,); below 1 µs counts as 1 µs."""
     micros = np.maximum(lateness_us, LOWEST_US)
     decades = int(np.ceil(np.log10(max(LEAST_HIGHEST_US, float(micros.max(initial=0.0)))) - 1e-9))
     edges = np.logspace(0, decades, decades * BINS_PER_DECADE + 1)
@@ -296,7 +296,7 @@ def lateness_histogram(lateness_us: Floats) -> tuple[Floats, NDArray[np.int64]]:
 
 
 def draw_quickly(curve: pg.PlotCurveItem, *, solid: bool) -> None:
-    """Let a solid curve be drawn a piece at a time, which takes half as long; dashes run on from piece to piece."""
+    """Draw a solid curve in pieces, which takes half as long; dashes must run on between pieces."""
     curve.setSegmentedLineMode("on" if solid else "off")
 
 
@@ -313,7 +313,7 @@ def time_ticks(span_s: float) -> list[tuple[float, str]]:
 
 
 def apart(places: Sequence[float], least: float, reach: float) -> list[float]:
-    """Return ``places`` moved as little as their order allows so that names there do not touch, within ±reach."""
+    """Return ``places`` moved as little as possible, in order, so that names there do not touch, within ±reach."""
     order = np.argsort(places, kind="stable")
     moved = np.asarray(places, float)[order]
     for _ in range(8):

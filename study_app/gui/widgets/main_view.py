@@ -50,7 +50,7 @@ class EscapeKey(QObject):
         return False
 
     def _follow(self, window: QObject | None, event: QKeyEvent) -> None:
-        """Follow Esc by presses and releases; their time stamps count if the program was too busy to time a hold."""
+        """Follow Esc by presses and releases, and by their time stamps if the program was busy."""
         if event.key() != Qt.Key.Key_Escape:
             return
         if event.type() == QEvent.Type.KeyPress and not self._timer.isActive():
@@ -85,13 +85,13 @@ class Place(Themed, QWidget):
     go_asked = Signal(str)
 
     def enter(self) -> None:
-        """Take note that the place is shown from now on: look again at what may have changed."""
+        """Handle that the place is shown: reload what may have changed."""
 
     def leave(self) -> None:
-        """React to the place being hidden: release at once every device that acts on the hand."""
+        """Handle that the place is hidden: release at once every device that acts on the hand."""
 
 
 def last_focused(part: QWidget) -> QWidget | None:
-    """Return what in a part had the keyboard last, if it is shown and enabled."""
+    """Return the part that last had keyboard focus, if it is visible and enabled."""
     last = part.focusWidget()
     return last if last not in {None, part} and last.isVisible() and last.isEnabled() else None

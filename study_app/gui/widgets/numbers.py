@@ -17,13 +17,13 @@ NUMERALS = set("0123456789.,+-eE' \u00a0\u2009\u202f" + MINUS)
 
 
 def read_number(text: str, decimal_sign: str = ".") -> float | None:
-    """Return the number that a text says (`number_of`) as a float; None if it says none or can say two."""
+    """Return the number in a text (`number_of`) as a float; None if there is none or two readings."""
     number = number_of(text, decimal_sign)
     return None if number is None else float(number)
 
 
 def write_number(value: float, decimals: int, decimal_sign: str = ".") -> str:
-    """Return a number with at most so many decimals, without empty ones, with a real minus."""
+    """Return a number with at most so many decimals, without trailing zeros, with a real minus."""
     text = f"{value:.{decimals}f}"
     text = text.rstrip("0").rstrip(".") if "." in text else text
     if text.strip("-0.") == "":
@@ -54,7 +54,7 @@ class NumberField(QLineEdit):
 
     @property
     def state(self) -> str:
-        """What the field's edge says: "", "changed" or "refused"."""
+        """The mark of the field's edge: "", "changed" or "refused"."""
         return self._state
 
     def show_text(self, text: str) -> None:
@@ -64,7 +64,7 @@ class NumberField(QLineEdit):
             self.setCursorPosition(0)
 
     def show_state(self, state: str) -> None:
-        """Give the field the edge of ``state``; changed and refused numbers are bold."""
+        """Set the mark of the field's edge; changed and refused numbers are bold."""
         if state == self._state:
             return
         self._state = state
@@ -76,7 +76,7 @@ class NumberField(QLineEdit):
         self.setModified(False)
 
     def event(self, event: QEvent) -> bool:
-        """Leave to the window the keys that mean nothing in a number, so that its shortcuts work from here."""
+        """Leave keys without a meaning in a number to the window, so that its shortcuts work."""
         if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent):
             undoes = event.matches(QKeySequence.StandardKey.Undo) or event.matches(QKeySequence.StandardKey.Redo)
             plain = event.modifiers() in {Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ShiftModifier}
@@ -114,13 +114,13 @@ class NumberField(QLineEdit):
         return bool(text) and set(text) <= NUMERALS
 
     def _try(self) -> None:
-        """Take what was typed, a refused number once more: what was in its way may be gone."""
+        """Take the typed text; retry a refused number, since the obstacle may be gone."""
         if self._state == "refused":
             self.setModified(True)
         self.flush()
 
     def flush(self) -> None:
-        """Say what was typed, once; it stays where it is not one number."""
+        """Emit the typed text, once; it stays if it is not one number."""
         if not self.isModified():
             return
         value = read_number(self.text())
@@ -155,7 +155,7 @@ class Range:
         return STEPS
 
     def share(self, value: float) -> float:
-        """Return where a number is, 0 at the left end and 1 at the right; beyond the ends, at the end."""
+        """Return the position of a number on the track, 0 to 1; numbers beyond the ends are at the end."""
         if self.most <= self.least:
             return 0.0
         value = min(max(value, self.least), self.most)
@@ -164,7 +164,7 @@ class Range:
         return (value - self.least) / (self.most - self.least)
 
     def value(self, share: float) -> float:
-        """Return the number at a place, with as many figures as a slider can tell apart."""
+        """Return the number at a position, with as many digits as a slider can resolve."""
         if share <= 0.0 or self.most <= self.least:
             return self.least
         if share >= 1.0:
@@ -225,7 +225,7 @@ class Slider(Themed, QSlider):
         self.update()
 
     def let_go(self) -> None:
-        """Let the knob go without a word, whatever the mouse holds on to."""
+        """Release the knob without a signal, even while the mouse holds it."""
         self._dragged = False
         self.update()
 
@@ -305,7 +305,7 @@ class Slider(Themed, QSlider):
         return self._span.value((x - MARGIN) / max(1.0, self.width() - 2 * MARGIN))
 
     def _stepped(self, steps: int) -> float:
-        """Return the number some steps on: always another one, unless the end is reached."""
+        """Return the number some steps on, always another one unless the end is reached."""
         share = self._span.share(self._value)
         value = self._span.value(share + steps / self._span.steps)
         if self._span.whole and value == self._value:
@@ -321,7 +321,7 @@ class Slider(Themed, QSlider):
         self.slid.emit(value, held)
 
     def _set(self, step: int) -> None:
-        """Follow a change that came neither from mouse nor from keys, such as a screen reader's."""
+        """Follow a change that came neither from mouse nor keys, as from a screen reader."""
         self._move(self._span.value(step / self._span.steps), held=False)
 
     def _tell(self) -> None:

@@ -52,7 +52,7 @@ class Rows(QAbstractTableModel):
         self._cells: dict[tuple[int, int], Mapping[int, Any]] = {}
 
     def show(self, rows: Iterable[Any]) -> None:
-        """Show these rows in place of those before."""
+        """Replace the rows."""
         self.beginResetModel()
         self.rows, self._cells = tuple(rows), {}
         self.endResetModel()

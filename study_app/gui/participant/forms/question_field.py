@@ -62,17 +62,17 @@ class QuestionWords(QWidget):
         self.setSizePolicy(policy)
 
     def fill_row(self) -> None:
-        """Take the room that a row of a given height leaves, and ask for none."""
+        """Take the room that a row of a given height leaves, without a minimum."""
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
 
     def show_note(self, note: str, *, missing: bool) -> None:
-        """Show the small line, or none; with the sign and the colour of what is missing."""
+        """Show the small note, or none; a missing answer gets its sign and colour."""
         if (note, missing) != (self.note, self.missing):
             self.note, self.missing = note, missing
             self._changed()
 
     def set_fonts(self, text: QFont, note: QFont, number: QFont, sign_gap: float) -> None:
-        """Write in these fonts, with a gap [px] after the sign."""
+        """Set the fonts, and the gap after the sign [px]."""
         if (text, note, number) == self._faces:
             return
         self._faces, self._sign_gap = (text, note, number), sign_gap
@@ -80,13 +80,13 @@ class QuestionWords(QWidget):
         self._changed()
 
     def set_number_width(self, width: int) -> None:
-        """Give the number its column [px]."""
+        """Set the width of the number's column [px]."""
         if width != self._number_width:
             self._number_width = width
             self._changed()
 
     def sizeHint(self) -> QSize:
-        """Return the least size: the width is a share of the row, the height follows from it."""
+        """Return the minimum size: the width is a share of the row, the height follows from it."""
         return self.minimumSizeHint()
 
     def minimumSizeHint(self) -> QSize:
@@ -131,7 +131,7 @@ class QuestionWords(QWidget):
 
     @property
     def _note_left(self) -> int:
-        """Where the note begins after the number's column [px]."""
+        """The left edge of the note, after the number's column [px]."""
         return round(self._sign + self._sign_gap) if self.missing else 0
 
     def _placed(self, place: QRect) -> QRectF:
@@ -165,7 +165,7 @@ LEAST_TARGET = 44.0  # of what is hit with mouse or finger [logical px]
 
 
 def target_px(scale: float) -> float:
-    """Return how high and wide at least what is hit is, however small words become [logical px]."""
+    """Return the minimum height and width of anything that is clicked, however small the text [logical px]."""
     return LEAST_TARGET * max(1.0, scale)
 
 
@@ -223,7 +223,7 @@ class QuestionField(QWidget):
         return self.view.keys
 
     def put(self, answer: QWidget) -> None:
-        """Put the part with which the question is answered after its words."""
+        """Put the part that answers the question after its text."""
         self._answer = answer
         self.grid.addWidget(answer, 0, self.ANSWER, Qt.AlignmentFlag.AlignVCenter)
 
@@ -234,7 +234,7 @@ class QuestionField(QWidget):
         return str(self.value)
 
     def finish(self) -> bool:
-        """Take what is being typed; return False where that is not an answer."""
+        """Take the typed text; return False if it is not an answer."""
         return True
 
     def set_scale(self, scale: float) -> None:
@@ -246,21 +246,21 @@ class QuestionField(QWidget):
 
     @property
     def horizontal_margin(self) -> int:
-        """From the row's edges to what is in it [px]."""
+        """The margin at the row's left and right edges [px]."""
         return round(MARGIN * self.scale)
 
     def set_fonts(self, statement: QFont, note: QFont, scale: float) -> None:
-        """Write statement and note in these fonts, and the number as large as in all rows of a page."""
+        """Set the fonts of statement and note; the number is as large as in all rows of a page."""
         number = font("cell", scale=scale * 0.9, weight=700 if self.missing else 400)
         self.statement.set_fonts(statement, note, number, NOTE_GAP * scale)
 
     def set_words_columns(self, number: float, after: float) -> None:
-        """Give the number its width, and keep so much room after the words [px]."""
+        """Set the width of the number's column and the room after the text [px]."""
         self.statement.set_number_width(round(number))
         self.grid.setColumnMinimumWidth(1, round(after))
 
     def height_in(self, width: int, room: int) -> int:
-        """Return the height [px] that words, note and answer need in a width; there is ``room`` for so much."""
+        """Return the height that text, note and answer need at a width; ``room`` is available [px]."""
         self.statement.show_note(self.note or self._words.please_answer, missing=True)  # once Continue is pressed
         if self._answer is not None:
             self._answer.updateGeometry()  # the layout keeps what it asked for before
@@ -270,14 +270,14 @@ class QuestionField(QWidget):
         return height
 
     def point(self, place: int) -> None:
-        """Point at an answer, at none with -1; what is typed cannot be pointed at."""
+        """Point at an answer, at none with -1; typed answers have nothing to point at."""
 
     def ask(self, *, missing: bool) -> None:
         self.missing = missing and not self.is_answered
         self._tell()
 
     def give(self, value: Value) -> None:
-        """Take an answer, and say it where it is another one."""
+        """Take an answer, and emit it if it is new."""
         changed = not self.is_answered or value != self.value
         self.value, self.is_answered, self.missing = value, True, False
         self._tell()
@@ -292,16 +292,16 @@ class QuestionField(QWidget):
             self.retracted.emit()
 
     def forget(self) -> None:
-        """Have no answer again, without saying so: another answer hid the question."""
+        """Discard the answer without a signal: another answer hid the question."""
         self.value, self.is_answered, self.missing = None, False, False
         self.clear()
         self._tell()
 
     def clear(self) -> None:
-        """Show no answer; what is painted follows from `value`."""
+        """Show no answer; painting follows `value`."""
 
     def kept(self, value: Value) -> None:
-        """Have an answer without saying so."""
+        """Set the answer without a signal."""
         self.value, self.is_answered, self.missing = value, True, False
         self._tell()
 
@@ -359,7 +359,7 @@ class QuestionField(QWidget):
 
 
 def question_of(part: QWidget) -> QuestionField | None:
-    """Return the question that a widget is part of."""
+    """Return the question that contains a widget."""
     above: QWidget | None = part
     while above is not None and not isinstance(above, QuestionField):
         above = above.parentWidget()
@@ -378,21 +378,21 @@ Look: TypeAlias = Literal["words", "point", "off scale"]
 
 @lru_cache(maxsize=1024)
 def widest_word(text: str, scale: float) -> float:
-    """Return the width of the widest word of an answer [px]; the points of all rows of a page are alike."""
+    """Return the width of an answer's widest word [px]; the points of all rows of a page are alike."""
     metrics = QFontMetricsF(font("chosen", scale=scale))
     return max((metrics.horizontalAdvance(word) for word in text.split()), default=0.0)
 
 
 @lru_cache(maxsize=1024)
 def size_of(text: str, scale: float) -> QSize:
-    """Return a size that can be hit, as wide as the longest word [px]."""
+    """Return a clickable size, as wide as the longest word [px]."""
     least = target_px(scale)
     return QSize(round(max(least, widest_word(text, scale) + TAKEN * scale)), round(least))
 
 
 @lru_cache(maxsize=1024)
 def height_of(text: str, scale: float, width_px: float) -> float:
-    """Return the height of an answer that is wrapped at a width [px]."""
+    """Return the height of an answer wrapped at a width [px]."""
     room = QRectF(0, 0, width_px, 1e4)
     return QFontMetricsF(font("chosen", scale=scale)).boundingRect(room, CENTRE, text).height()
 
@@ -426,7 +426,7 @@ class OpenLook(NamedTuple):
 
 @lru_cache(maxsize=256)
 def picture_of(look: OpenLook, ground: str) -> QImage:
-    """Return the picture of an answer on a ground of one colour."""
+    """Return the picture of an answer on a plain ground."""
     made = QImage(look.width, look.height, QImage.Format.Format_RGB32)
     made.fill(QColor(ground))
     painter = QPainter(made)
@@ -464,7 +464,7 @@ class OptionLook(Button):
         self.update()
 
     def point(self, pointed: bool) -> None:
-        """Show that the pointer, or the keyboard's own pointer, is here."""
+        """Show the mouse pointer, or the keyboard's own pointer, on this answer."""
         if pointed != self.pointed:
             self.pointed = pointed
             self.update()
@@ -479,7 +479,7 @@ class OptionLook(Button):
         return self.sizeHint()
 
     def hasHeightForWidth(self) -> bool:
-        """Return that words wrap; points are short."""
+        """Return True if the text wraps; points are short."""
         return self._look != "point"
 
     def heightForWidth(self, width: int) -> int:
@@ -504,7 +504,7 @@ class OptionLook(Button):
             question.point(place)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        """Draw the answer; a point looks like those of other questions and is drawn once for all of them."""
+        """Draw the answer; points look the same in all questions and are drawn once for all."""
         painter = page_painter(self)
         in_focus = self._in_focus()
         strong = self._look == "words" or self.pointed or in_focus
@@ -585,7 +585,7 @@ class OptionsField(QuestionField):
 
     @property
     def forward(self) -> int:
-        """Which way the key → goes: 1 to the next option, -1 to the one before."""
+        """The direction of the key →: 1 for the next option, -1 for the previous one."""
         return 1
 
     @property
@@ -619,7 +619,7 @@ class OptionsField(QuestionField):
         self.pointed_at.emit(place)
 
     def choose(self, place: int, *, by_key: bool) -> None:
-        """Answer with an option; a key that answers leads to the next question."""
+        """Answer with an option; an answer by key leads to the next question."""
         self.give(self.value_at(place))
         self._check()
         point_at(self.options[place])
@@ -627,7 +627,7 @@ class OptionsField(QuestionField):
             self.left.emit()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Choose with digits and Space, point with left and right; the rest is the page's."""
+        """Choose with digits and Space, point with left and right; other keys are the page's."""
         number = digit_of(event)
         plain = not event.modifiers() & Qt.KeyboardModifier.ControlModifier
         if number is not None and 1 <= number <= self.digits and plain:
@@ -659,7 +659,7 @@ class OptionsField(QuestionField):
             self.choose(place, by_key=False)
 
     def _toggle(self, place: int, on: bool) -> None:
-        """Hear what is checked, by a click or by a screen reader, which does it without one."""
+        """Choose an option that a click or a screen reader checked."""
         if on != (place in self.chosen) and (on or self.several):
             self.choose(place, by_key=False)
 
@@ -677,7 +677,7 @@ class ScaleField(OptionsField):
     labels: tuple[str, ...] = ()
 
     def build(self, labels: tuple[str, ...], judge_name: str | None, judge_text: str | None) -> None:
-        """Make the options: the points of the scale, and where there is one the answer off it."""
+        """Make the options: the points of the scale, and the off-scale answer if there is one."""
         self.labels = labels
         names = [f"{point} {label}" for point, label in enumerate(labels, start=1)]
         text = self.view.text
@@ -689,7 +689,7 @@ class ScaleField(OptionsField):
 
     @property
     def digits(self) -> int:
-        """How many points digits choose: the answer off the scale has none."""
+        """The number of points that digits choose; the off-scale answer has no digit."""
         return min(MOST_DIGITS, len(self.labels))
 
     @property
@@ -719,7 +719,7 @@ class EntryKeys(Widget):
     """A widget to type into that leaves Esc to the window and other keys to the page, and shows its question's ring."""
 
     def leaves_to_page(self, event: QKeyEvent) -> bool:
-        """Return whether a key is the page's: it means nothing while one types."""
+        """Return whether a key belongs to the page: it has no meaning in the field."""
         return event.key() in (*ENTER, *VERTICAL)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -747,7 +747,7 @@ class TypedField(QuestionField):
     """What is typed is taken when typing pauses, and at the latest when the question is left."""
 
     def type_into(self, entry: QWidget, wait_ms: int, take: Callable[[], object]) -> None:
-        """Give the keyboard to ``entry``; call ``take`` this time after the last key."""
+        """Give ``entry`` the keyboard focus; call ``take`` this time after the last key press."""
         self.setFocusProxy(entry)
         self._timer = QTimer(self, singleShot=True, interval=wait_ms)
         self._timer.timeout.connect(take)

@@ -74,12 +74,12 @@ class Grid:
         return min(self.cell_height, self.cell_width) >= LEAST_CELL * self.scale - 0.01
 
     def with_rows(self, room: float, per_page: int) -> Grid:
-        """Return the sizes where ``room`` [px] is divided among so many rows."""
+        """Return the sizes if ``room`` [px] is divided among so many rows."""
         return replace(self, pitch=math.floor(min(room / per_page, 68 * self.text)))
 
 
 def parts(items: int, width: float) -> Iterator[int]:
-    """Yield how many statements a page could show, most first: all of them, else as even parts as there can be."""
+    """Yield the possible numbers of statements per page, the largest first: all, then even parts."""
     if width >= NARROW:
         yield items
     for most in range(min(FEW, items), 0, -1):
@@ -87,7 +87,7 @@ def parts(items: int, width: float) -> Iterator[int]:
 
 
 def grid(width: float, height: float, asked: Asked, margin: float, *, text_scale: float = 1.0) -> Grid:
-    """Return the widths of a row in a window, ``margin`` from its edges to the words [logical px].
+    """Return the widths of a row in a window; ``margin`` is between its edges and the text [logical px].
 
     Words are drawn ``text_scale`` times as large as designed at least. Rows may turn out too low for their words or
     their cells: see `Grid.holds`.
@@ -124,7 +124,7 @@ Fitted: TypeAlias = tuple[QFont, QFont, float, float]
 
 @lru_cache(maxsize=256)
 def statement_height(text: str, scale: float, weight: int, width_px: int) -> float:
-    """Return the height of a statement that is wrapped at a width [px]; a page of statements often comes again."""
+    """Return the height of a statement wrapped at a width [px]; cached, since pages of statements recur."""
     room = QRectF(0, 0, width_px, 1e4)
     return QFontMetricsF(font("statement", scale=scale, weight=weight)).boundingRect(room, WRAP_LEFT, text).height()
 
@@ -153,19 +153,19 @@ class StatementField(ScaleField):
 
     @property
     def note(self) -> str:
-        """The small line under the statement says which keys answer, where the keyboard is."""
+        """The small line under the focused statement: which keys answer."""
         if self.missing and self.hasFocus():
             return f"{self._words.please_answer} · {self._words.press_keys}"
         return super().note
 
     @property
     def columns(self) -> list[tuple[float, float]]:
-        """Left end and width of every cell in the row [px]."""
+        """The left edge and width of each cell in the row [px]."""
         return [(cell.x(), cell.width()) for cell in self.options]
 
     @property
     def rule(self) -> float | None:
-        """Where the rule between the scale and "cannot judge" is [px]; None without that."""
+        """The position of the rule between the scale and "cannot judge" [px]; None without that answer."""
         if self.judge is None:
             return None
         (first, _), (last, width), (left, wide) = (self.columns[place] for place in (0, -2, -1))
@@ -189,11 +189,11 @@ class StatementField(ScaleField):
         self._tell()
 
     def fits(self, sizes: Grid, note: str) -> bool:
-        """Return whether statement and ``note`` can be read in a row of these sizes, no smaller than they must."""
+        """Return whether statement and ``note`` are legible in a row of these sizes."""
         return self.fitted(sizes, note) is not None
 
     def fitted(self, sizes: Grid, note: str) -> Fitted | None:
-        """Return the largest fonts with which statement and note fit the row, and their heights [px]; None if none do.
+        """Return the largest fonts with which statement and note fit the row, and their heights [px]; None if none.
 
         Words that must be so large (``sizes.text`` beyond ``sizes.scale``) are not made smaller; a note may be.
         """
@@ -214,7 +214,7 @@ class StatementField(ScaleField):
         self._tell()
 
     def _smallest(self, sizes: Grid, note: str) -> Fitted:
-        """Return fonts for a row that is alone on its page and still too low."""
+        """Return the fonts of a row that is alone on its page and still too low."""
         for percent in range(95, 30, -5):
             fitted = self._measured(sizes, note, percent / 100, percent / 100)
             if fitted[2] + fitted[3] <= sizes.pitch - 3 * sizes.scale:
@@ -248,7 +248,7 @@ SHARES = (1.0, 1.2, 1.4, 1.6, 1.8)
 
 
 def label_height(labels: tuple[str, ...], widest: float) -> float:
-    """Return the height [px] of labels at scale 1 that may be ``widest`` px wide, where they wrap as they are drawn."""
+    """Return the height of labels at scale 1 wrapped at ``widest`` px [px]."""
     metrics = QFontMetricsF(font("label", weight=600))
     room = QRectF(0, 0, min(LABEL_WIDTH, 0.95 * widest), 1e3)  # letters of other sizes are not quite in proportion
     return max((metrics.boundingRect(room, WRAP_LEFT, text).height() for text in labels), default=0.0)
@@ -278,7 +278,7 @@ class Heading(QWidget):
 
     @property
     def shown(self) -> tuple[str, ...]:
-        """The labels that can be read now, from left to right."""
+        """The labels that are visible now, from left to right."""
         return tuple(self._labels[column] for column in sorted(self.columns()))
 
     def set_sizes(self, sizes: Grid) -> None:
@@ -307,7 +307,7 @@ class Heading(QWidget):
         painter.end()
 
     def columns(self) -> set[int]:
-        """Return the columns whose label is drawn: one that leaves the pointed one too little room gives way to it."""
+        """Return the columns with a visible label; one that takes the pointed label's room is hidden."""
         if self._pointed < 0:
             return self._fixed
         neighbours = {
@@ -322,21 +322,21 @@ class Heading(QWidget):
         return self._fixed | {self._pointed}
 
     def _fits(self, column: int, width: float) -> bool:
-        """Return whether a label can be read in ``width`` [px] and the height of the heading."""
+        """Return whether a label fits ``width`` [px] and the height of the heading."""
         assert self._sizes is not None  # noqa: S101  # asked only when laid out
         metrics = QFontMetricsF(font("label", scale=self._sizes.text, weight=600))
         bounds = metrics.boundingRect(QRectF(0, 0, width, 1e4), WRAP_LEFT, self._labels[column])
         return bounds.width() <= width and bounds.height() <= self.height() + 1
 
     def _bounds(self, column: int) -> tuple[float, float]:
-        """Return between which places [px] a label stands: those of the scale do not cross the rule at its end."""
+        """Return the left and right limits of a label [px]: the scale's labels do not cross the rule at its end."""
         row = self._row()
         if row.rule is None or column == POINTS:
             return 0.0, self.width()
         return (row.rule, self.width()) if row.columns[POINTS] < row.columns[0] else (0.0, row.rule)
 
     def column_area(self, column: int) -> QRectF:
-        """Return the room of a label: its column, and on either side as much as it needs, within the row."""
+        """Return the area of a label: its column, and as much as it needs on either side, within the row."""
         assert self._sizes is not None  # noqa: S101  # painted only when laid out
         left, width = self._row().columns[column]
         pitch = min(self._sizes.cell_pitch, LABEL_WIDTH * self._sizes.text) if column < POINTS else width
@@ -369,7 +369,7 @@ class QuestionnaireWidget(QuestionsPage):
         return self._heading.shown
 
     def arranged(self, asked: Sequence[QuestionField]) -> list[list[QuestionField]]:
-        """Give the rows their sizes, with as many statements on a part as can be read and hit."""
+        """Set the rows' sizes, with as many legible and clickable statements per part as possible."""
         sizes, per_page = self._sizes()
         self._heading.set_sizes(sizes)
         for field in self.fields:
@@ -377,7 +377,7 @@ class QuestionnaireWidget(QuestionsPage):
         return [list(asked[first : first + per_page]) for first in range(0, len(asked), per_page)]
 
     def lead(self) -> int:
-        """Return the height [px] above the statements: few of them begin a third down the page."""
+        """Return the height above the statements [px]: few statements begin a third down the page."""
         room, needed = self.room(tabs=False), self._heading.height() + sum(it.minimumHeight() for it in self.fields)
         few = len(self.parts) == 1 and 2 * needed <= room
         return max(0, self.foot.height() + room - 2 * self.height() // 3) if few else 0
@@ -387,7 +387,7 @@ class QuestionnaireWidget(QuestionsPage):
         return next((field for field in self.fields if field in part), self.fields[0])
 
     def _sizes(self) -> tuple[Grid, int]:
-        """Return the sizes of the rows, and how many of them stand on a part."""
+        """Return the sizes of the rows, and the number of rows per part."""
         page, many = self._page, len(self.fields)
         bare, label = QFontMetricsF(font("statement")), QFontMetricsF(font("label", weight=600))
         off = () if page.cannot_judge is None else (page.cannot_judge,)

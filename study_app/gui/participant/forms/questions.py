@@ -86,7 +86,7 @@ class ChoiceField(OptionsField):
         return self._words.joined([self._texts[self._ids[place]] for place in self.chosen])
 
     def height_in(self, width: int, room: int) -> int:
-        """Return the height [px] in a width, with more options side by side where there is too little room."""
+        """Return the height at a width [px], with more options side by side if there is too little room."""
         for across in range(self._across, min(MOST_ACROSS, len(self.options)) + 1):
             self._arrange(across)
             if (height := super().height_in(width, room)) <= room:
@@ -104,7 +104,7 @@ class ChoiceField(OptionsField):
         self._cells.setSpacing(round(8 * scale))
 
     def choose(self, place: int, *, by_key: bool) -> None:
-        """Answer with an option; of several, add it or remove it."""
+        """Answer with an option; with several possible, add or remove it."""
         if not self.several:
             super().choose(place, by_key=by_key)
             return
@@ -158,7 +158,7 @@ class NumberField(TypedField):
 
     @property
     def problem(self) -> str:
-        """What is wrong with the entry; "" where nothing is."""
+        """The problem of the entry; "" if there is none."""
         return self._wrong.text()
 
     def show_answer(self, value: Value) -> None:
@@ -182,7 +182,7 @@ class NumberField(TypedField):
         self._pad.set_size(side, side, round(6 * scale), font("cell", scale=scale))
 
     def height_in(self, width: int, room: int) -> int:
-        """Return the height [px] that the question needs where its entry is reported as wrong, too."""
+        """Return the height that the question needs with a reported problem [px]."""
         problem = self._wrong.text()
         unclear = self._words.unclear_number("888,888") or self._words.unclear_number("888.888")
         self._wrong.setText(problem or max(unclear, self._expected(), key=len))
@@ -196,7 +196,7 @@ class NumberField(TypedField):
         return self.entry.text()
 
     def finish(self) -> bool:
-        """Take the entry; say what is wrong with it."""
+        """Take the entry, or show its problem."""
         self._timer.stop()
         text = self.entry.text().strip()
         if not text:
@@ -225,7 +225,7 @@ class NumberField(TypedField):
         self._timer.start()
 
     def _take(self) -> None:
-        """Take what was typed so far if it is a number; while one types, nothing is reported."""
+        """Take the text typed so far if it is a number; nothing is reported while typing."""
         number = read_number(self.entry.text(), self._words.decimal_sign)
         if number is not None and self._number.permits(number):
             self.give(plain_number(number))
@@ -297,7 +297,7 @@ class RatingField(ScaleField):
             label.setFont(font("label", scale=scale, weight=600))
 
     def _columns(self) -> list[tuple[int, int]]:
-        """Return over which columns each name stands, the first and the last of them."""
+        """Return the first and last column below each name."""
         points = len(self.labels)
         if points <= ALL_NAMED:
             return [(place, place) for place in range(points)]
@@ -311,7 +311,7 @@ class RatingField(ScaleField):
         return [Qt.AlignmentFlag.AlignLeft, centre, Qt.AlignmentFlag.AlignRight]
 
     def _name_points(self, _place: int = -1) -> None:
-        """Show the names: all of a short scale; of a long one the ends, and in the middle the one pointed at."""
+        """Show the names: all of a short scale; of a long one the ends, and the pointed one in the middle."""
         texts = list(self.labels)
         if len(texts) > ALL_NAMED:
             middle = self.labels[len(texts) // 2] if len(texts) % 2 else ""
@@ -356,14 +356,14 @@ class Line(QSlider):
         return QSize(round(240 * self._scale), round(target_px(self._scale)))
 
     def show_step(self, step: int) -> None:
-        """Put the handle at a step without a signal."""
+        """Set the handle to a step without a signal."""
         self.touched = True
         with QSignalBlocker(self):
             self.setValue(step)
         self.update()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Move by steps, or to the ends; the first key puts the handle into the middle, or to an end."""
+        """Move by steps or to the ends; the first key puts the handle in the middle or at an end."""
         if event.key() in (Qt.Key.Key_Home, Qt.Key.Key_End):
             self._move(self.minimum() if event.key() == Qt.Key.Key_Home else self.maximum())
         elif (by := STEP_KEYS.get(Qt.Key(event.key()))) is not None:
@@ -381,14 +381,14 @@ class Line(QSlider):
             self._drag(event.position().x())
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        """Let the handle go: that is the answer."""
+        """Release the handle: its place is the answer."""
         if self.isSliderDown():
             self._drag(event.position().x())
             self.setSliderDown(False)
             self.set_to.emit(self.value())
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Leave the wheel alone: it changes no answer by accident."""
+        """Ignore the wheel, which would change answers by accident."""
         event.ignore()
 
     def focusInEvent(self, event: QFocusEvent) -> None:
@@ -513,7 +513,7 @@ class TextEntry(EntryKeys, QPlainTextEdit):
             self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
 
     def leaves_to_page(self, event: QKeyEvent) -> bool:
-        """Return whether a key is the page's: of several lines only Ctrl+Enter."""
+        """Return whether a key belongs to the page: with several lines only Ctrl+Enter."""
         if self._lines == 1:
             return super().leaves_to_page(event)
         return event.key() in ENTER and bool(event.modifiers() & Qt.KeyboardModifier.ControlModifier)
@@ -565,7 +565,7 @@ class TextField(TypedField):
         return self.entry.toPlainText()
 
     def _edit(self) -> None:
-        """Keep the text within its length, and free of what cannot be printed."""
+        """Keep the text within its length and free of unprintable characters."""
         text, cursor = self.entry.toPlainText(), self.entry.textCursor()
         kept = "".join(characters(self._printable(text))[: self._shown.longest])
         if kept != text:
@@ -579,7 +579,7 @@ class TextField(TypedField):
         self._timer.start()
 
     def _printable(self, text: str) -> str:
-        """Return a text without what cannot be printed; a field of one line has no line breaks."""
+        """Return a text without unprintable characters; a field of one line has no line breaks."""
         kept = "".join(
             character for character in text if character == "\n" or unicodedata.category(character) not in UNPRINTABLE
         )
@@ -587,7 +587,7 @@ class TextField(TypedField):
 
 
 def _utf16(text: str) -> bytes:
-    """Return a text as Qt counts its places, of two bytes each."""
+    """Return a text in UTF-16, in which Qt counts positions: two bytes each."""
     return text.encode("utf-16-le", "surrogatepass")
 
 

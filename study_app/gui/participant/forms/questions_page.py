@@ -73,7 +73,7 @@ class Foot(QWidget):
         self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        """Draw a line, and under it from the end: how many are answered, the keys, and what is missing."""
+        """Draw a line, and below it from the end: the count of answers, the keys, and what is missing."""
         painter = page_painter(self)
         painter.setLayoutDirection(Qt.LayoutDirection.LayoutDirectionAuto)  # words are in their own language's
         painter.fillRect(0, 0, self.width(), LINE, QColor(PARTICIPANT.border))
@@ -94,7 +94,7 @@ class Foot(QWidget):
         painter.end()
 
     def _paint_count(self, painter: QPainter, end: int) -> int:
-        """Draw up to ``end`` how many are answered; return where that begins [px]."""
+        """Draw the count of answers up to ``end``; return its start [px]."""
         before, after = round(14 * self._scale), round(4 * self._scale)
         width = before + self._width(self._tabular, self._count) + after
         place = self._placed(end - width, width).adjusted(before, 0, -after, 0)
@@ -102,7 +102,7 @@ class Foot(QWidget):
         return end - width
 
     def _paint_keys(self, painter: QPainter, end: int, room: float) -> int:
-        """Draw the keys up to ``end`` where there is ``room`` for them; return where they begin [px]."""
+        """Draw the keys up to ``end`` if they fit ``room``; return their start [px]."""
         gap, wording = round(GAP * self._scale), self._words
         hints = ((MOVE_KEYS, wording.key_move), (self._answer_keys, wording.key_answer))
         caps = [round(key_size(key, self._scale)[0]) + 2 for key, _ in hints]
@@ -120,7 +120,7 @@ class Foot(QWidget):
         return end + gap
 
     def _paint_message(self, painter: QPainter, end: int, *, kept: bool) -> None:
-        """Draw what is missing up to ``end``, with a second line that nothing is lost where ``kept``."""
+        """Draw the message up to ``end``; ``kept`` adds a line that no answer is lost."""
         side = round(MARK * self._scale)
         left = self._row.contentsRect().left() + side + round(GAP * self._scale)
         sign = self._placed(self._row.contentsRect().left(), side)
@@ -146,12 +146,12 @@ class Foot(QWidget):
         painter.drawText(QRectF(place), flags, text)
 
     def _placed(self, left: int, width: int) -> QRect:
-        """Return a place, as high as the foot, so far from where lines begin [px]."""
+        """Return a rectangle as high as the foot, at a distance from the start of lines [px]."""
         line = self._row.contentsRect()
         return QStyle.visualRect(self.layoutDirection(), line, QRect(left, line.top(), width, line.height()))
 
     def _width(self, face: QFont, text: str) -> int:
-        """Return the width of words on one line [px]."""
+        """Return the width of a text on one line [px]."""
         return self._bounds(face, text, HIGHEST).width()
 
     def _bounds(self, face: QFont, text: str, width: int) -> QRect:
@@ -211,7 +211,7 @@ class QuestionsPage(PageWidget):
         raise NotImplementedError
 
     def arranged(self, asked: Sequence[QuestionField]) -> list[list[QuestionField]]:
-        """Give the questions that are asked their sizes, and return the parts that they stand on."""
+        """Set the sizes of the asked questions and return the parts that contain them."""
         raise NotImplementedError
 
     def missing_words(self, numbers: Sequence[int]) -> str:
@@ -239,7 +239,7 @@ class QuestionsPage(PageWidget):
 
     @property
     def message(self) -> str:
-        """What the foot says: which questions still need an answer, once Continue was pressed too early."""
+        """The message of the foot: which questions need an answer, once Continue was pressed too early."""
         numbers = [field.view.number for field in self.asked if field.missing]
         return self.missing_words(numbers) if numbers else ""
 
@@ -253,16 +253,16 @@ class QuestionsPage(PageWidget):
 
     @property
     def tight(self) -> bool:
-        """Whether margins give way, in a window that is low for its words."""
+        """Whether margins shrink in a window that is low for its text size."""
         return self.height() < 740 * self.words_scale
 
     @property
     def margin(self) -> float:
-        """From the window's edges to the words [px]."""
+        """The margin between the window's edges and the text [px]."""
         return (40 if self.width() >= 1100 else 24) * self.space_scale
 
     def room(self, *, tabs: bool) -> int:
-        """Return the height [px] that there is for questions, with the parts' tabs or without."""
+        """Return the height available for questions, with or without the parts' tabs [px]."""
         self._head.invalidate()
         title = self._title.sizeHint().height()
         head = self._head.heightForWidth(self.width())  # -1 without an introduction, which wraps
@@ -279,7 +279,7 @@ class QuestionsPage(PageWidget):
         return next((field for field in asked if not field.is_answered), asked[0])
 
     def submit(self) -> None:
-        """Confirm the answers, go to the next part, or name what is missing and go there."""
+        """Confirm the answers, go to the next part, or show the first missing answer."""
         for field in self.part:
             if not field.finish():
                 field.setFocus(Qt.FocusReason.OtherFocusReason)
@@ -311,7 +311,7 @@ class QuestionsPage(PageWidget):
             super().keyPressEvent(event)
 
     def lay_out(self, scale: float) -> None:
-        """Give every part its size; decide how many questions a part holds."""
+        """Set the size of everything and divide the questions into parts."""
         self.space_scale = scale
         text, margin = self.words_scale, round(self.margin)
         side = round(self.margin - MARGIN * scale)
@@ -330,7 +330,7 @@ class QuestionsPage(PageWidget):
         return 0
 
     def _arrange(self) -> None:
-        """Divide the questions into parts that fit, and show the one that has the keyboard."""
+        """Divide the questions into parts that fit, and show the focused one."""
         here = self.focusWidget()
         kept = question_of(here) if here is not None else None
         self.parts = self.arranged(self.asked)
@@ -389,7 +389,7 @@ class QuestionsPage(PageWidget):
         self._tell()
 
     def _move(self, by: int) -> None:
-        """Put the keyboard on the next or the previous question; after the last comes the button."""
+        """Focus the next or previous question; after the last comes the button."""
         here = self.focusWidget()
         question = question_of(here) if here is not None else None
         asked = self.asked
@@ -400,7 +400,7 @@ class QuestionsPage(PageWidget):
             self.go_to(asked[target])
 
     def _leave(self, field: QuestionField) -> None:
-        """Go on from a question that a key answered, within its part; after its last comes the button."""
+        """Go on after an answer by key, within the part; after its last question comes the button."""
         part = self.part
         following = part.index(field) + 1 if field in part else len(part)
         if following < len(part):
@@ -420,7 +420,7 @@ class QuestionsPage(PageWidget):
         self._follow_up()
 
     def _follow_up(self) -> None:
-        """Show the questions that an answer shows, and empty those that it hides."""
+        """Show the questions that depend on an answer, and clear those that it hides."""
         asked = self.asked
         for field in self.fields:
             if field not in asked and field.is_answered:
@@ -430,7 +430,7 @@ class QuestionsPage(PageWidget):
         self._tell()
 
     def _saw(self, field: QuestionField) -> None:
-        """Keep the moment; the event is emitted after the painting."""
+        """Note the time of showing; the event is emitted after painting."""
         self._unsent.append(ItemShown(self._clock(), field.view.id))
         self._sender.start()
 
@@ -456,7 +456,7 @@ class FormWidget(QuestionsPage):
         return self._words.questions_missing(numbers)
 
     def arranged(self, asked: Sequence[QuestionField]) -> Parts:
-        """Return the questions in parts that fit; with smaller words on one part where two are nearly one."""
+        """Return the questions in parts that fit; smaller text avoids a second part if that is enough."""
         must = self.words_scale > 1.0 and self._text_scale > 1.0
         parts = self._packed(asked, self.words_scale)
         if len(parts) == 2 and not must:
@@ -464,7 +464,7 @@ class FormWidget(QuestionsPage):
         return parts
 
     def _on_one_part(self, asked: Sequence[QuestionField]) -> Parts | None:
-        """Return the questions in one part with smaller words, where a little smaller is enough."""
+        """Return all questions in one part with slightly smaller text, None if they do not fit."""
         for shrink in SHRINKING:
             parts = self._packed(asked, self.words_scale * shrink)
             if len(parts) == 1:
@@ -474,7 +474,7 @@ class FormWidget(QuestionsPage):
         return None
 
     def _packed(self, asked: Sequence[QuestionField], scale: float) -> Parts:
-        """Return the questions in parts as high as there is room, with words of a size."""
+        """Return the questions at a text size in parts as high as the room."""
         margins = self.questions.contentsMargins()
         width = self.width() - margins.left() - margins.right()
         whole, divided = self.room(tabs=False), self.room(tabs=True)
@@ -484,7 +484,7 @@ class FormWidget(QuestionsPage):
 
 
 def _fitted(field: QuestionField, scale: float, width: int, room: int) -> int:
-    """Give a question words of a size, smaller where it is too high for a part of its own; return its height [px]."""
+    """Set a question's text size, smaller if it is too high for a part of its own; return its height [px]."""
     for percent in range(100, 45, -5):
         field.set_scale(scale * percent / 100)
         if (height := max(field.height_in(width, room), round(target_px(scale * percent / 100)))) <= room:
@@ -494,7 +494,7 @@ def _fitted(field: QuestionField, scale: float, width: int, room: int) -> int:
 
 
 def _parts(asked: Sequence[QuestionField], heights: Sequence[int], room: int) -> Parts:
-    """Return the questions in parts that are at most as high as there is room [px], as many in each as fit."""
+    """Return the questions in parts no higher than the room [px], as many in each as fit."""
     parts: Parts = []
     taken = 0
     for field, height in zip(asked, heights, strict=True):

@@ -56,7 +56,7 @@ class AnswerPage(PageWidget):
         self.event_made.emit(ItemShown(self._clock(), self.page.item.id))
 
     def answer(self, value: Value) -> None:
-        """Answer and continue; whatever is pressed later is no answer."""
+        """Answer and continue; later presses are ignored."""
         if self._answered:
             return
         self._answered = True
@@ -65,7 +65,7 @@ class AnswerPage(PageWidget):
 
 
 def sized(pixels: float) -> QFont:
-    """Return the font of words of that height [logical px]."""
+    """Return the font of a text height [logical px]."""
     made = font("body")
     made.setPixelSize(round(pixels))
     return made
@@ -118,7 +118,7 @@ class ChoiceWidget(AnswerPage):
             super().keyPressEvent(event)
 
     def _take(self, event: QKeyEvent) -> bool:
-        """Take a key of the page; an arrow that repeats moves nothing here."""
+        """Handle a key of the page; a repeated arrow does nothing."""
         number = digit_of(event)
         away = ARROWS.get(Qt.Key(event.key()))
         if event.isAutoRepeat():
@@ -136,7 +136,7 @@ class ChoiceWidget(AnswerPage):
         return True
 
     def _go(self, step: int) -> None:
-        """Choose the first or the last of two answers; of more go to the next button."""
+        """Choose the first or last of two answers; with more, focus the next button."""
         if len(self.buttons) == 2:
             self.answer(self._values[0 if step < 0 else 1])
             return
@@ -176,7 +176,7 @@ GAP = 10.0
 
 
 def interval_width(interval: Interval, wording: Words, scale: float) -> float:
-    """Return the width that words and squares take [px]."""
+    """Return the width of text and squares [px]."""
     return _words_width(interval, wording, scale) + GAP * scale + interval.of * (SQUARE + GAP) * scale
 
 
@@ -188,7 +188,7 @@ def _words_width(interval: Interval, wording: Words, scale: float) -> float:
 def draw_interval(
     painter: QPainter, width: float, middle: float, interval: Interval, wording: Words, scale: float
 ) -> None:
-    """Draw words and squares, centred in a page of ``width`` around the height ``middle`` [px].
+    """Draw text and squares, centred in a page of ``width`` around the height ``middle`` [px].
 
     In a rest no square is filled; in a language that is read from right to left the first is on the right.
     """
@@ -261,7 +261,7 @@ class NumberWidget(AnswerPage):
             super().keyPressEvent(event)
 
     def _confirm(self) -> None:
-        """Answer with the number in the field, or report what is wrong with it."""
+        """Answer with the number in the field, or show its problem."""
         text = self.field.text()
         number = read_number(text, self._words.decimal_sign)
         if number is not None and self._permits(number):
@@ -322,13 +322,13 @@ class SettingControls(QWidget):
         self.setVisible(self._adjusts and buttons)
 
     def turn_to(self, page: TaskPage) -> None:
-        """Appear where the level of an interval is set, and go with it."""
+        """Show the controls in intervals whose level is set."""
         self._adjusts = page.adjusts
         self.let_go()
         self.setVisible(self._adjusts and self._buttons)
 
     def place(self, scale: float, middle: float) -> None:
-        """Lie at the foot of the tank among its words, above the way to pause where both have no room side by side."""
+        """Place the controls at the tank's foot, above the pause hint if both do not fit side by side."""
         width, height = (round(side * scale) for side in BUTTON_PX)
         for button in (self.less, self.more):
             button.setFont(sized(TEXT_PX * scale))
@@ -342,7 +342,7 @@ class SettingControls(QWidget):
         self.raise_()
 
     def press(self, event: QKeyEvent) -> bool:
-        """Take a key that went down; say whether it was one of these."""
+        """Handle a key press; return whether the key is one of these controls."""
         way = KEYS.get(Qt.Key(event.key()), 0)
         if not self._adjusts or (not way and event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter)):
             return False
@@ -360,14 +360,14 @@ class SettingControls(QWidget):
             self.let_go()
 
     def turn_wheel(self, event: QWheelEvent) -> None:
-        """Step with each notch of the wheel: forwards is more."""
+        """Step with each notch of the wheel; forwards increases."""
         self._turned += event.angleDelta().y()
         steps = int(self._turned / NOTCH)
         self._turned -= steps * NOTCH
         self._step(steps)
 
     def let_go(self) -> None:
-        """Stop stepping; a window that is left never hears the release of its key."""
+        """Stop stepping: a deactivated window never receives the key's release."""
         self._held = self._turned = 0
         self._timer.stop()
 

@@ -43,12 +43,12 @@ MOST_TEXT = 2.0
 
 
 def page_scale(width: float, height: float) -> float:
-    """Return how much larger than designed a page is drawn in a window of this size [logical px]; never smaller."""
+    """Return the scale of a page in a window of this size [logical px], at least 1."""
     return min(max(min(width / DESIGNED_FOR[0], height / DESIGNED_FOR[1]), 1.0), MOST_SCALE)
 
 
 def words_scale(width: float, height: float, text_scale: float) -> float:
-    """Return how much larger than designed words are in a window [logical px]: as large as they must be read.
+    """Return the scale of text in a window [logical px], at least that for legibility.
 
     A window that is smaller than designed holds words of 200 % no more: there they grow as far as it can hold them.
     """
@@ -57,23 +57,23 @@ def words_scale(width: float, height: float, text_scale: float) -> float:
 
 
 def direction(wording: Words) -> Qt.LayoutDirection:
-    """Return in which direction pages in a language are laid out."""
+    """Return the layout direction of a language."""
     return Qt.LayoutDirection.RightToLeft if wording.right_to_left else Qt.LayoutDirection.LeftToRight
 
 
 def beginning(widget: QWidget) -> Qt.AlignmentFlag:
-    """Return where lines begin in a widget, in whatever language their words are."""
+    """Return the alignment of the start of lines in a widget's language."""
     right = widget.layoutDirection() == Qt.LayoutDirection.RightToLeft
     return Qt.AlignmentFlag.AlignAbsolute | (Qt.AlignmentFlag.AlignRight if right else Qt.AlignmentFlag.AlignLeft)
 
 
 def mirrored(place: QRectF, width: float) -> QRectF:
-    """Return a place as a mirror in the middle of ``width`` shows it."""
+    """Return a rectangle mirrored about the middle of ``width``."""
     return QRectF(width - place.right(), place.top(), place.width(), place.height())
 
 
 def page_painter(widget: QWidget) -> QPainter:
-    """Return a painter of a widget that smooths edges and writes in the widget's direction."""
+    """Return an antialiasing painter with the widget's layout direction."""
     painter = QPainter(widget)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.setLayoutDirection(widget.layoutDirection())
@@ -123,7 +123,7 @@ class PageWidget(QWidget):
         return words_scale(self.width(), self.height(), self._text_scale)
 
     def lay_out(self, scale: float) -> None:
-        """Place everything for the present size."""
+        """Lay out everything at the present size."""
 
     def focus_first(self) -> None:
         self.setFocus()
@@ -143,7 +143,7 @@ BAR = (40.0, 6.0, 8.0)  # width, height, gap [logical px at scale 1]
 
 
 def progress_words(progress: Progress, wording: Words) -> tuple[str, str]:
-    """Return "Part 2 of 2" and "Delay setting 3 of 7"; what is the only one of its kind is not counted."""
+    """Return "Part 2 of 2" and "Delay setting 3 of 7"; an only part or setting is not counted."""
     counted = progress.part is not None and progress.parts > 1
     part = wording.part.format(part=progress.part, parts=progress.parts) if counted else ""
     named = progress.label and progress.of > 1
@@ -155,7 +155,7 @@ def progress_words(progress: Progress, wording: Words) -> tuple[str, str]:
 def draw_progress(
     painter: QPainter, room: QRectF, progress: Progress, wording: Words, *, scale: float = 1.0, share: float = 0.5
 ) -> float:
-    """Draw words and bars from the beginning of a line in ``room``; return the width [px].
+    """Draw text and bars from the start of a line in ``room``; return the width [px].
 
     ``share`` is how much of the present bar is full: the task is its first half, the questionnaire its second. Bars
     that find no room are left out; the words say the same.
@@ -183,7 +183,7 @@ def draw_progress(
 def _draw_bars(
     painter: QPainter, room: QRectF, x: float, progress: Progress, *, scale: float, share: float, flip: bool
 ) -> float:
-    """Draw one bar a setting from ``x`` on; return where they end [px from the beginning]."""
+    """Draw a bar for each setting from ``x`` on; return their end [px from the start]."""
     width, height, gap = (size * scale for size in BAR)
     painter.setPen(Qt.PenStyle.NoPen)
     for index in range(1, progress.of + 1):
@@ -204,7 +204,7 @@ def _bars_width(count: int, scale: float) -> float:
 
 
 def _from(room: QRectF, x: float, width: float, height: float, *, flip: bool) -> QRectF:
-    """Return a place ``x`` from where the line begins, in the middle of its height."""
+    """Return a rectangle at ``x`` from the start of the line, centred vertically."""
     left = room.right() - x - width if flip else room.left() + x
     return QRectF(left, room.center().y() - height / 2, width, height)
 
@@ -304,7 +304,7 @@ class LitButton(Button):
     ringed = False
 
     def focusInEvent(self, event: QFocusEvent) -> None:
-        """Show the ring where the keyboard led here; a page that begins here has its key cap to say so."""
+        """Show the focus ring after keyboard navigation; on a page that begins here, the key cap suffices."""
         self.ringed = event.reason() in KEYBOARD
         super().focusInEvent(event)
 
@@ -367,7 +367,7 @@ class GoButton(LitButton, QPushButton):
         painter.end()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Leave arrows to the page: they scroll or move there, and must not lead the keyboard away."""
+        """Leave arrow keys to the page, where they scroll or move; here they would move the focus."""
         if event.key() in ARROWS:
             event.ignore()
         else:
@@ -461,7 +461,7 @@ class LanguageSwitch(QGroupBox):
         self.resize(x - round(4 * scale), self.buttons[0].height())
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        """Draw nothing: the buttons are all."""
+        """Draw nothing: the buttons paint themselves."""
 
     def _choose(self, code: str, present: str) -> None:
         if code != present:
@@ -493,7 +493,7 @@ class DigitPad(QWidget):
             self._grid.addWidget(key, place // across, place % across)
 
     def set_size(self, width: int, height: int, gap: int, face: QFont) -> None:
-        """Give every key its size [px]."""
+        """Set the size of the keys [px]."""
         self._grid.setSpacing(gap)
         for key in self.keys:
             key.setFont(face)
@@ -517,6 +517,6 @@ class DigitPad(QWidget):
 
 
 def point_at(widget: QWidget) -> None:
-    """Lead a screen reader to ``widget``, which does not have the keyboard: it says its name and whether checked."""
+    """Let screen readers announce ``widget``, which lacks keyboard focus: its name and whether it is checked."""
     if QAccessible.isActive():
         QAccessible.updateAccessibility(QAccessibleEvent(widget, QAccessible.Event.Focus))

@@ -36,7 +36,7 @@ PAGE_KEYS = {Qt.Key.Key_PageUp: -1, Qt.Key.Key_PageDown: 1}
 
 
 def paragraphs_html(paragraphs: tuple[str, ...], gap: float, *, right_to_left: bool = False) -> str:
-    """Return paragraphs with room between their lines, for a QLabel."""
+    """Return paragraphs with spacing between their lines as HTML for a QLabel."""
     style = f"line-height: {LINE_PERCENT}%; margin: 0 0 {round(gap)}px 0"
     way = "rtl" if right_to_left else "ltr"
     return "".join(f'<p dir="{way}" style="{style}">{html.escape(text)}</p>' for text in paragraphs)
@@ -96,7 +96,7 @@ class Column(QWidget):
         self._layout.setSpacing(round(14 * scale))
 
     def needed(self, width: int) -> int:
-        """Return the height [px] that the texts need in a column of ``width``."""
+        """Return the height of the texts in a column of ``width`` [px]."""
         return self._layout.heightForWidth(width)
 
 
@@ -134,7 +134,7 @@ class ReadingPage(PageWidget):
             self.button.clicked.connect(self.go_on)
 
     def go_on(self) -> None:
-        """Do what the page's button says."""
+        """Do the action of the page's button."""
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         bar = self._scroll.verticalScrollBar()
@@ -146,7 +146,7 @@ class ReadingPage(PageWidget):
             super().keyPressEvent(event)
 
     def lay_out(self, scale: float) -> None:
-        """Put the column into the middle, a little above it, the button under the edge where its lines begin."""
+        """Centre the column, slightly above the middle; the button is at the start of its lines."""
         least = self.words_scale > scale
         scale = self.words_scale
         margin = round((40 if self.width() >= 1100 else 24) * scale)
@@ -184,11 +184,11 @@ class ReadingPage(PageWidget):
             self.button.move(left, y + height + foot - below - self.button.height())
 
     def _below_button(self, _width: int) -> int:
-        """Return the height [px] of what stands under the button in a column of a width."""
+        """Return the height below the button in a column of this width [px]."""
         return 0
 
     def _lay_out_head(self, _scale: float, _margin: int, top: int) -> int:
-        """Place what stands above the column from ``top`` on; return where the column's room begins [px]."""
+        """Lay out the head from ``top`` on; return the top of the column's room [px]."""
         return top
 
 
@@ -210,7 +210,7 @@ class DeclineButton(QPushButton):
         self.setFixedSize(round(metrics.horizontalAdvance(self.text()) + 44 * scale), round(48 * scale))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Decline with Enter, too, where the keyboard is here: it must not agree."""
+        """Decline with Enter, too, if the button has focus: Enter must not agree."""
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self.click()
         else:
@@ -254,7 +254,7 @@ class TextWidget(ReadingPage):
 
     @property
     def seconds_left(self) -> int:
-        """Whole seconds until the page may be left, 0 when it may."""
+        """Whole seconds until the page may be left, 0 afterwards."""
         if self._stays_until_s is None:
             return 0
         return max(0, math.ceil(self._stays_until_s - self._clock()))
@@ -264,7 +264,7 @@ class TextWidget(ReadingPage):
         return self.count_label.text()
 
     def tick(self) -> None:
-        """Count down; when the time is over, put the button where the count was."""
+        """Count down; at the end, show the button in place of the count."""
         assert self.button is not None  # noqa: S101  # these pages have one
         left = self.seconds_left
         self.count_label.setText(self._words.continue_in.format(seconds=left) if left else "")
@@ -282,7 +282,7 @@ class TextWidget(ReadingPage):
                 say(self.button, self.button.text())
 
     def focus_first(self) -> None:
-        """Leave the consent's button alone: Space must not agree by itself."""
+        """Do not focus the consent's button: Space must not agree by itself."""
         if self._consent or self.button is None or self.button.isHidden():
             self.setFocus()
         else:
@@ -297,7 +297,7 @@ class TextWidget(ReadingPage):
         self._place_decline()
 
     def _below_button(self, width: int) -> int:
-        """Leave room for the button that declines, where the column is too narrow for both in one line."""
+        """Leave room for the decline button if both do not fit in one line."""
         if self.decline is None or self.button is None:
             return 0
         self.decline.set_scale(self.words_scale)
@@ -309,7 +309,7 @@ class TextWidget(ReadingPage):
         return round(16 * self.words_scale)
 
     def _place_decline(self) -> None:
-        """Put the button that declines next to the other one, or below it."""
+        """Place the decline button next to the other one, or below it."""
         if self.decline is None or self.button is None:
             return
         place, size = self.button.geometry(), self.decline.size()
@@ -338,7 +338,7 @@ class TextWidget(ReadingPage):
         return top + height - 8
 
     def _room_for_languages(self, margin: int) -> float:
-        """Return the largest scale at which the languages fit in one line of the window."""
+        """Return the largest scale at which the languages fit in one line."""
         assert self.languages is not None  # noqa: S101  # asked only where there are some
         self.languages.set_scale(1.0)
         return max(1.0, (self.width() - 2 * margin) / self.languages.width())
@@ -355,7 +355,7 @@ class TextWidget(ReadingPage):
             super().keyPressEvent(event)
 
     def go_on(self) -> None:
-        """Tell that the participant goes on, once the page may be left."""
+        """Emit that the participant continues, once the page may be left."""
         if not self.seconds_left:
             self.event_made.emit(Continue(self._clock()))
 
@@ -384,14 +384,14 @@ class PauseWidget(ReadingPage):
         super().__init__(column, context, button)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Go on with Enter; Space alone could still be the key of the page before."""
+        """Continue with Enter; Space alone could still be meant for the previous page."""
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self.go_on()
         else:
             super().keyPressEvent(event)
 
     def go_on(self) -> None:
-        """Ask to go on with the session, where that is the participant's to do."""
+        """Ask to resume the session if the participant may do so."""
         if self.button is not None:
             self.event_made.emit(ResumeRequested(self._clock(), "participant"))
 

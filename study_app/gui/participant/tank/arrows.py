@@ -32,7 +32,7 @@ class Arrow(NamedTuple):
 
 
 def arrows_place(camera: Camera, arrows: Sequence[Arrow]) -> QRectF:
-    """Return a place that holds arrows with their names [px]."""
+    """Return a rectangle that contains the arrows with their names [px]."""
     whole = QRectF()
     for start, tip in (arrow.ends(camera) for arrow in arrows):
         whole |= QRectF(start, tip).normalized()
@@ -40,7 +40,7 @@ def arrows_place(camera: Camera, arrows: Sequence[Arrow]) -> QRectF:
 
 
 def paint_arrows(painter: QPainter, camera: Camera, arrows: Sequence[Arrow]) -> None:
-    """Paint arrows, their names above all of them; those that are too short to have a direction are left out."""
+    """Paint arrows with their names on top; arrows too short to have a direction are omitted."""
     taken, shown = QRectF(), []
     for arrow in arrows:
         start, tip = arrow.ends(camera)
@@ -79,7 +79,7 @@ def draw_head(painter: QPainter, tip: QPointF, turn: float, ink: QColor, size: f
 
 @lru_cache(maxsize=16)
 def _name(word: str, colour: str, ratio: float) -> QImage:
-    """Return a word with a dark edge, for a screen of pixel ratio ``ratio``."""
+    """Return a word with a dark outline, for a screen with pixel ratio ``ratio``."""
     face = font("label", weight=600)
     wide = QFontMetricsF(face).horizontalAdvance(word) + 4
     image = QImage(math.ceil(wide * ratio), math.ceil(NAME_PX * ratio), QImage.Format.Format_ARGB32_Premultiplied)

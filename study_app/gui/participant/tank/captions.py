@@ -33,7 +33,7 @@ RIGHT = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
 
 
 def caption_scale(width: float, height: float) -> float:
-    """Return how much larger than at 1920 × 1080 words are written in a window of ``width`` × ``height`` [px]."""
+    """Return the scale of text relative to 1920 × 1080 in a window of ``width`` × ``height`` [px]."""
     return min(max(min(width / DESIGNED_FOR[0], height / DESIGNED_FOR[1]), LEAST_SCALE), 2.0)
 
 
@@ -57,7 +57,7 @@ class Captions:
         self._page = page
 
     def below(self, width: float, height: float) -> float:
-        """Return the height [px] that instruction and foot need under the tank; the same for most instructions."""
+        """Return the height of instruction and foot below the tank [px]; the same for most instructions."""
         self._size_words(width, height)
         lines = max(2, self._instruction_lines())
         stacked = self._stacked()
@@ -65,12 +65,12 @@ class Captions:
         return max(168 * self._scale, foot + (lines + 0.3) * self._line) + self._controls_above
 
     def above(self, width: float, height: float) -> float:
-        """Return the height [px] that progress and count need above the tank."""
+        """Return the height of progress and count above the tank [px]."""
         self._size_words(width, height)
         return 102 * self._scale if self._text_scale > 1 else 0.0
 
     def lay_out(self, width: float, height: float, below: float) -> None:
-        """Find the places in a window of ``width`` × ``height``; the tank ends at ``below`` [px]."""
+        """Lay out the texts in a window of ``width`` × ``height``; the tank ends at ``below`` [px]."""
         self._size_words(width, height)
         scale, margin = self._scale, 64 * caption_scale(width, height)
         head, small = 58 * scale, QFontMetricsF(self._small).height()
@@ -113,7 +113,7 @@ class Captions:
         return max(1, *(round(metrics.boundingRect(room, CENTRED, text).height() / self._line) for text in texts))
 
     def _room_of_foot(self) -> tuple[float, float]:
-        """Return where the foot begins, read from left to right, and how wide it may be [px]."""
+        """Return start and width of the foot's room, read from left to right [px]."""
         margin = 64 * caption_scale(self._width, self._height)
         start = max(margin, PATCH_ROOM + 12) if self._words.right_to_left else margin
         return start, self._width - start - (margin if self._words.right_to_left else PATCH_ROOM + 12)
@@ -122,7 +122,7 @@ class Captions:
         return max(QFontMetricsF(self._small).horizontalAdvance(text) for text in self._longest_hints()) + 8
 
     def _stacked(self) -> bool:
-        """Return whether the hint has no room next to the foot, so that it is above it."""
+        """Return whether the hint is above the foot because there is no room next to it."""
         start, room = self._room_of_foot()
         return start + min(self._foot_width(), room) + 24 > (self._width - self._longest_hint()) / 2
 
@@ -145,7 +145,7 @@ class Captions:
         }
 
     def draw(self, painter: QPainter, region: QRegion, task: TaskShown | None, hint: str = "") -> None:
-        """Draw the words in ``region``; ``hint`` is how the ball gets into its target, "" where it needs none."""
+        """Draw the texts in ``region``; ``hint`` says how the ball reaches its target, "" if none is needed."""
         page, wording = self._page, self._words
         painter.setLayoutDirection(self._way)
         if page.progress is not None and region.intersects(self._head.toAlignedRect()):
@@ -171,18 +171,18 @@ class Captions:
         return max(1.25 * self._scale, self._fine)
 
     def _placed(self, place: QRectF) -> QRectF:
-        """Return a place of a page read from left to right, in this one."""
+        """Return a rectangle of a left-to-right page on this page."""
         return mirrored(place, self._width) if self._words.right_to_left else place
 
     @property
     def controls_middle(self) -> float:
-        """At which height the controls of an adjustment are [px]: that of the foot, or above it."""
+        """The height of the adjustment controls' middle [px]: the foot's, or above it."""
         above = self._controls_above
         return self._foot.top() - above / 2 if above else self._foot_middle()
 
     @property
     def _controls_above(self) -> float:
-        """The height that controls need above the foot [px]; 0 where there is room beside it, or are none."""
+        """The height of controls above the foot [px]; 0 if they fit beside it or there are none."""
         wide, high = (side * self._fine for side in CONTROLS_PX)
         start = 64 * caption_scale(self._width, self._height)
         beside = start + self._foot_width() + 24 <= (self._width - wide) / 2
@@ -216,7 +216,7 @@ class Captions:
         _text(painter, self._placed(words_at), BEGINNING, wording.pause_hint, self._pause_font, PARTICIPANT.text2)
 
     def _hint_words(self, task: TaskShown | None, hint: str) -> str:
-        """Return how the ball gets into its target, and how long it takes until the participant may or must go on."""
+        """Return the hint how the ball reaches its target, or the time until the participant may or must continue."""
         todo, wording = self._page.task, self._words
         if self._page.adjusts:
             return hint

@@ -39,7 +39,7 @@ class Box:
 
     @classmethod
     def around(cls, workspace_m: Point, ball_m: float) -> Box:
-        """Return the tank in which a ball of radius ``ball_m`` can be at every place of the workspace (full sizes)."""
+        """Return the tank in which a ball of radius ``ball_m`` can reach the whole workspace (full sizes)."""
         spare = 2 * (ball_m + MARGIN_M)
         width, height, depth = (size + spare for size in workspace_m)
         return cls(
@@ -67,7 +67,7 @@ class Camera:
 
     @classmethod
     def fitted(cls, box: Box, left: float, top: float, width: float, height: float, *, pitch: float = PITCH) -> Camera:
-        """Return the camera that shows the whole box as large as the rectangle allows, in its middle [px]."""
+        """Return the camera that shows the whole box centred and as large as the rectangle allows [px]."""
         middle = (box.top + box.floor) / 2
         distance = DISTANCE * (box.water - box.floor) + box.z
         eye_y = middle + math.sin(pitch) * distance
@@ -86,7 +86,7 @@ class Camera:
         )
 
     def distance(self, point: Point) -> float:
-        """Return how far a point is from the eye along the line of sight [m]."""
+        """Return the distance of a point from the eye along the line of sight [m]."""
         _, y, z = point
         return (self.eye_y - y) * math.sin(self.pitch) + (self.eye_z - z) * math.cos(self.pitch)
 
@@ -94,7 +94,7 @@ class Camera:
         return self.focal / self.distance(point)
 
     def point(self, point: Point) -> Pixel:
-        """Return where a point falls on the screen [px]."""
+        """Return the screen position of a point [px]."""
         x, y, z = point
         up = (y - self.eye_y) * math.cos(self.pitch) - (z - self.eye_z) * math.sin(self.pitch)
         scale = self.scale(point)
@@ -160,19 +160,19 @@ class TargetPlace:
 
     @property
     def place(self) -> QRectF:
-        """Return the square that holds ring, ticks and light."""
+        """Return the square around ring, ticks and light."""
         reach = self.radius * sprites.GLOW + 4
         return QRectF(self.middle.x() - reach, self.middle.y() - reach, 2 * reach, 2 * reach)
 
     @property
     def marks(self) -> QRectF:
-        """Return the place of the marks on the floor and of the line above them."""
+        """Return the rectangle around the marks on the floor and the line above them."""
         above = QRectF(self.middle, self.circle.boundingRect().center()).normalized().adjusted(-4, 0, 4, 0)
         return self.circle.boundingRect().united(self.diamond.boundingRect()).united(above).adjusted(-3, -3, 3, 3)
 
 
 def target_place(camera: Camera, box: Box, centre: Point, radius_m: float) -> TargetPlace:
-    """Return where a target of ``radius_m`` around ``centre`` [m, hand] is drawn."""
+    """Return the drawn place of a target of ``radius_m`` around ``centre`` [m, hand]."""
     x, _, z = centre
     reach = MARK * radius_m
     circle = [
@@ -207,7 +207,7 @@ class BallPlacer:
         self._nearest, self._step = nearest, (farthest - nearest) / (DEPTH_STEPS - 1)
 
     def size(self, step: int) -> tuple[float, float]:
-        """Return radius [px] and haze of a step of depth, 0 the nearest."""
+        """Return radius [px] and haze of a depth step, 0 the nearest."""
         distance = self._nearest + step * self._step
         return self._radius_m * self._camera.focal / distance, step / (DEPTH_STEPS - 1)
 
@@ -216,7 +216,7 @@ class BallPlacer:
         return min(max(round(nearness), 0), DEPTH_STEPS - 1)
 
     def place(self, position_m: Point) -> BallPlace:
-        """Return where a ball at ``position_m`` [m, hand] is drawn; beyond the glass it stays at the glass."""
+        """Return the drawn place of a ball at ``position_m`` [m, hand]; it stays inside the glass."""
         box, spare = self._box, self._radius_m
         x, y, z = position_m
         x = min(max(x, -box.x + spare), box.x - spare)
@@ -245,7 +245,7 @@ class BallPlacer:
 
 
 def _feet(floor: QPointF, end: QPointF, pitch: float) -> tuple[QPointF, ...]:
-    """Return dots from the floor up to ``end``, ``pitch`` px apart: they stand still while the ball rises."""
+    """Return dots from the floor up to ``end``, ``pitch`` px apart: they stay in place while the ball rises."""
     along = end - floor
     length = math.hypot(along.x(), along.y())
     return (
@@ -256,7 +256,7 @@ def _feet(floor: QPointF, end: QPointF, pitch: float) -> tuple[QPointF, ...]:
 
 
 def ball_things(ball: BallPlace) -> dict[str, Placed]:
-    """Return ball, shadow and plumb line as things of a frame."""
+    """Return ball, shadow and plumb line as parts of a frame."""
     state = (ball.middle.x(), ball.middle.y(), ball.radius, ball.floor.x(), ball.floor.y())
     around = ball.radius + 3
     wide = ball.spread * ball.floor_radius * sprites.SOFT + 3
@@ -270,7 +270,7 @@ def ball_things(ball: BallPlace) -> dict[str, Placed]:
 
 
 def changes(before: dict[str, Placed], after: dict[str, Placed]) -> QRegion:
-    """Return the places [whole logical px] that look different in two frames."""
+    """Return the region that differs between two frames [whole logical px]."""
     region = QRegion()
     for name in before.keys() | after.keys():
         old, new = before.get(name), after.get(name)
@@ -283,7 +283,7 @@ def changes(before: dict[str, Placed], after: dict[str, Placed]) -> QRegion:
 
 
 def paint_marks(painter: QPainter, target: TargetPlace, stroke: float, *, is_lit: bool) -> None:
-    """Paint them with lines that follow the width of a ``stroke`` [px]."""
+    """Paint the marks with lines as wide as a share of ``stroke`` [px]."""
     painter.setBrush(Qt.BrushStyle.NoBrush)
     ink = QColor(TANK.lit if is_lit else TANK.dim)
     ink.setAlphaF(0.62 if is_lit else 0.55)

@@ -53,14 +53,14 @@ def brightness() -> NDArray[np.float32]:
 
 
 def _starts(cells: int) -> NDArray[np.float32]:
-    """Return where rays start along one axis [widths of the floor], a shift beyond either end of it."""
+    """Return the start positions of rays along one axis [widths of the floor], beyond both ends."""
     beyond = math.ceil(BEND * COLUMNS) * RAYS
     starts: NDArray[np.float32] = np.arange(-beyond, cells * RAYS + beyond, dtype=np.float32)
     return (starts + np.float32(0.5)) / np.float32(COLUMNS * RAYS)
 
 
 def _gathered(x: NDArray[np.float32], z: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Count rays per cell of the floor, 1 where it is as bright as without ripples."""
+    """Count rays per cell of the floor; 1 is the brightness without ripples."""
     column = np.floor(x * COLUMNS).astype(np.int32).ravel()
     row = np.floor(z * COLUMNS).astype(np.int32).ravel()
     inside = (column >= 0) & (column < COLUMNS) & (row >= 0) & (row < ROWS)
@@ -85,17 +85,17 @@ FLOOR_LINES = 10
 
 
 def at(camera: Camera, point: Point) -> QPointF:
-    """Return where a point falls on the screen."""
+    """Return the screen position of a point."""
     return QPointF(*camera.point(point))
 
 
 def polygon(camera: Camera, points: list[Point]) -> QPolygonF:
-    """Return points of the tank as a polygon on the screen."""
+    """Return the screen polygon of points in the tank."""
     return QPolygonF([at(camera, point) for point in points])
 
 
 def ink(colour: str, alpha: int = 255) -> QColor:
-    """Return a colour of the given opacity, 0 … 255."""
+    """Return a colour with an opacity from 0 to 255."""
     made = QColor(colour)
     made.setAlpha(alpha)
     return made
@@ -148,7 +148,7 @@ def walls(painter: QPainter, box: Box, camera: Camera) -> None:
 
 
 def floor(painter: QPainter, box: Box, camera: Camera) -> None:
-    """Paint the floor: sand-free glass with caustics and a grid that gives the eye a scale."""
+    """Paint the floor: glass with caustics and a grid for the sense of scale."""
     x, y, z = box.x, box.floor, box.z
     quad = polygon(camera, [(-x, y, -z), (x, y, -z), (x, y, z), (-x, y, z)])
     far, near = quad.at(0).y(), quad.at(2).y()
@@ -240,7 +240,7 @@ def far_edges(painter: QPainter, box: Box, camera: Camera) -> None:
 
 
 def near_sides(painter: QPainter, box: Box, camera: Camera) -> None:
-    """Paint the near edges at the sides and below, which nothing that moves can hide."""
+    """Paint the near edges at the sides and below, which moving parts cannot hide."""
     x, z = box.x, box.z
     painter.setPen(pen(TANK.glass, 150, 1.25))
     corners = [(-x, box.top, z), (-x, box.floor, z), (x, box.floor, z), (x, box.top, z)]
@@ -248,14 +248,14 @@ def near_sides(painter: QPainter, box: Box, camera: Camera) -> None:
 
 
 def near_lines(painter: QPainter, box: Box, camera: Camera) -> None:
-    """Paint the near edge of the glass above the water, and the water line: they lie before all that moves."""
+    """Paint the near edge of the glass above the water, and the water line, in front of moving parts."""
     for height, colour, alpha, width in ((box.top, TANK.glass, 150, 1.25), (box.water, "#E9F6FD", 215, 1.5)):
         painter.setPen(pen(colour, alpha, width))
         painter.drawLine(at(camera, (-box.x, height, box.z)), at(camera, (box.x, height, box.z)))
 
 
 def front_area(box: Box, camera: Camera) -> QRectF:
-    """Return the place of water surface and near lines, on whole pixels."""
+    """Return the area of water surface and near lines, in whole pixels."""
     level = [(side * box.x, box.water, end * box.z) for side in (-1, 1) for end in (-1, 1)]
     glass = [(side * box.x, box.top, box.z) for side in (-1, 1)]
     return QRectF(polygon(camera, level + glass).boundingRect().adjusted(-2, -2, 2, 2).toAlignedRect())

@@ -33,7 +33,7 @@ class Backdrop:
 
 
 def backdrop(size: tuple[int, int], ratio: float, box: Box, camera: Camera) -> Backdrop:
-    """Return both images of a tank for a widget of ``size`` [logical px] on a screen of pixel ratio ``ratio``.
+    """Return both images of a tank for a widget of ``size`` [logical px] on a screen with pixel ratio ``ratio``.
 
     The last two are kept. It may be called in another thread to have them at hand: who asks meanwhile waits for it.
     """
@@ -77,7 +77,7 @@ def _painter(image: QImage) -> QPainter:
 
 
 def _room(painter: QPainter, area: QRectF, box: Box, camera: Camera) -> None:
-    """Paint the dark room, a breath of light around the tank and the tank's mirror image on the table."""
+    """Paint the dark room, faint light around the tank, and its reflection on the table."""
     top, middle, bottom = ROOM
     painter.fillRect(
         area, glass.shade(QLinearGradient(0, 0, 0, area.height()), (0, top, 255), (0.6, middle, 255), (1, bottom, 255))
@@ -135,7 +135,7 @@ class OnsetPatch:
         self._rested = True
 
     def follow(self, position_m: tuple[float, float, float], time_ns: int) -> bool:
-        """Take the shown proxy (3,) [m] and the time of its sample [ns]; return whether the patch is lit."""
+        """Take the shown proxy (3,) [m] and its sample's time [ns]; return whether the patch is lit."""
         if self._position is None:
             self._position, self._time_ns = position_m, time_ns
         step_ns = time_ns - self._time_ns
@@ -159,7 +159,7 @@ PATCH = (88.0, 72.0)  # black square, white square in its corner [logical px]
 
 
 def patch_place(width: float, height: float) -> QRectF:
-    """Return where the patch is in a window of this size [logical px]."""
+    """Return the patch's place in a window of this size [logical px]."""
     black, _ = PATCH
     return QRectF(width - black, height - black, black, black)
 
@@ -190,14 +190,14 @@ class Pane(QOpenGLWidget):
         self.frameSwapped.connect(self.swapped)
 
     def paintGL(self) -> None:
-        """Paint the whole surface: what was on it before is not kept."""
+        """Paint the whole surface: its previous content is lost."""
         painter = page_painter(self)
         self._paint(painter, QRegion(QRect(0, 0, self.width(), self.height())))
         painter.end()
 
 
 def video_place(camera: Camera, box: Box) -> QRectF:
-    """Return the place of a video: where the tank would be [px]."""
+    """Return the place of a video, that of the tank [px]."""
     xs, ys = zip(*map(camera.point, box.corners()), strict=True)
     return QRectF(QPointF(min(xs), min(ys)), QPointF(max(xs), max(ys))).toAlignedRect().toRectF()
 
@@ -230,7 +230,7 @@ class VideoLayer:
             painter.drawImage(self.middle(self._frame), self._image)
 
     def middle(self, frame: VideoFrame) -> QRectF:
-        """Return where a frame is drawn: as large as the place allows, with its own ratio."""
+        """Return the rectangle of a frame: as large as the place allows, with its aspect ratio."""
         share = min(self.place.width() / frame.width, self.place.height() / frame.height)
         drawn = QRectF(self.place.topLeft(), QSizeF(share * frame.width, share * frame.height))
         drawn.moveCenter(self.place.center())

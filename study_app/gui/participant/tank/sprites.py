@@ -23,13 +23,13 @@ class Sprite:
     half_height: float
 
     def place(self, middle: QPointF, grown: float = 1.0) -> QRectF:
-        """Return where the sprite goes when its middle is at ``middle``."""
+        """Return the sprite's rectangle around ``middle``."""
         wide, high = grown * self.half_width, grown * self.half_height
         return QRectF(middle.x() - wide, middle.y() - high, 2 * wide, 2 * high)
 
 
 def _sprite(half_width: float, half_height: float, ratio: float) -> tuple[Sprite, QPainter]:
-    """Return an empty sprite with room for its edge, and a painter whose origin is its middle."""
+    """Return an empty sprite with room for its edge, and a painter with the origin in its middle."""
     wide, high = math.ceil(half_width * ratio) + 1, math.ceil(half_height * ratio) + 1
     image = QImage(2 * wide, 2 * high, QImage.Format.Format_ARGB32_Premultiplied)
     image.fill(Qt.GlobalColor.transparent)
@@ -152,7 +152,7 @@ def diamond(radius: float, ratio: float, stroke: float) -> Sprite:
 
 
 def dashes(ink: QColor, stroke: float, side: float, count: int) -> QPen:
-    """Return a pen that makes ``count`` dashes on a side [px] and has half a dash at both of its ends."""
+    """Return a pen that makes ``count`` dashes on a side [px], with half a dash at both ends."""
     pen = QPen(ink, stroke, Qt.PenStyle.CustomDashLine, Qt.PenCapStyle.FlatCap, Qt.PenJoinStyle.MiterJoin)
     period = side / (count * stroke)
     pen.setDashPattern([period * 0.64, period * 0.36])
@@ -161,7 +161,7 @@ def dashes(ink: QColor, stroke: float, side: float, count: int) -> QPen:
 
 
 def draw(painter: QPainter, sprite: Sprite, middle: QPointF, *, opacity: float = 1.0, grown: float = 1.0) -> None:
-    """Draw a sprite with its middle at a sub-pixel place, ``grown`` times its size."""
+    """Draw a sprite around a sub-pixel position, ``grown`` times its size."""
     painter.setOpacity(opacity)
     painter.drawImage(sprite.place(middle, grown), sprite.image)
     painter.setOpacity(1.0)
