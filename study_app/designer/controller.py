@@ -97,7 +97,7 @@ class DesignerController(QObject):
         self.measures.warned.connect(self._show_warnings)
 
     def take(self, asked: Request | Do) -> None:
-        """Make a step of the study as the place asks for it, or do another task."""
+        """Carry out a request or task of the designer's page."""
         if isinstance(asked, Do):
             self._does[asked.what](*asked.arguments)
         else:
@@ -106,14 +106,14 @@ class DesignerController(QObject):
     # opening
 
     def enter(self) -> None:
-        """Look again at what there is; a file that another program changed is taken in where nothing was edited."""
+        """Reload the list of studies; load a file that another program changed if nothing was edited."""
         self._choices = studies(self.editing.opened)
         self.saving.look_again()
         self.runs.look()
         self.show()
 
     def open(self, source: str) -> None:
-        """Open a study of the workspace, one that ships, or a file; one that is open stays, with its steps."""
+        """Open a study of the workspace, a shipped one or a file; an open study keeps its undo steps."""
         self.place.message_over.emit()
         self.saving.leave()
         try:
@@ -135,7 +135,7 @@ class DesignerController(QObject):
         self._take(opened)
 
     def begin(self, source: str, name: str, answers: Answers = NO_ANSWERS) -> None:
-        """Begin a study under a name, as a copy of a template ("template:NAME") or of another study."""
+        """Create a study under a name, as a copy of a template ("template:NAME") or of another study."""
         try:
             if source.startswith("template:"):
                 study, copy_of = template(source.removeprefix("template:")), ""
@@ -189,7 +189,7 @@ class DesignerController(QObject):
     # steps that ask first
 
     def ask_to_delete(self, path: Place) -> None:
-        """Delete an element, or show what refers to it and ask what to do with that."""
+        """Delete an element; if others refer to it, ask how."""
         opened = self.editing.writable
         if opened is None or len(path) < 2:
             return
@@ -251,7 +251,7 @@ class DesignerController(QObject):
     # what is shown
 
     def show(self) -> None:
-        """Show the open study: header, form, file and problems now, the outline when the keyboard rests."""
+        """Show the open study: header, form, file and problems now, the outline after a pause in typing."""
         opened = self.editing.opened
         if opened is None:
             self.place.show_view(DesignerView(self._header()))

@@ -74,7 +74,7 @@ class Editing(QObject):
             opened.selected = there(opened.study.document, opened.selected)
 
     def ask(self, asked: Request) -> None:
-        """Make a step as a view asks for it; ``refused`` says why where it cannot be made."""
+        """Carry out a step that a view requests; emit ``refused`` with the reason if it cannot be made."""
         opened = self.writable
         if opened is None:
             return
@@ -95,7 +95,7 @@ class Editing(QObject):
         self.made.emit(step)
 
     def suggest_id(self) -> None:
-        """Give the element that was added last the id of its text, once: when its text is left."""
+        """Give the last added element an id made from its text, once, when the text is left."""
         path, name, initial = self._added
         if (opened := self.writable) is None or not path or id_at(opened.study.document, path) != name:
             return
@@ -111,7 +111,7 @@ class Editing(QObject):
         self._note()
 
     def make(self, name: str, *edits: Edit, text: str | None = None, select: Place | None = None) -> None:
-        """Make a step of edits, or of another text; one that is refused changes nothing."""
+        """Make a step of edits or of another text; a refused step changes nothing."""
         if (opened := self.writable) is not None:
             opened.edit(name, *edits, text=text, select=select)
             self._note()

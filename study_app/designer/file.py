@@ -168,7 +168,7 @@ class FileEditor(Coloured, QPlainTextEdit):
         return self.document().toRawText().replace("\u2029", "\n")
 
     def show_file(self, file: FileText, *, scroll: bool) -> None:
-        """Show a file, as soon as the editor is seen; only what differs is replaced: cursor and scroll bar stay."""
+        """Show a file once the editor is visible; only differences are replaced, cursor and scroll bar stay."""
         self.shown = file
         if not self.pending:
             self._late = scroll or bool(self._late)
@@ -307,5 +307,5 @@ class FileCard(Card):
 
 
 def _units(text: str) -> int:
-    """Return how many places of a text editor a text takes: letters beyond the basic plane take two."""
+    """Return the number of UTF-16 units of a text."""
     return len(text.encode("utf-16-le")) // 2

@@ -101,7 +101,7 @@ class NoticeCard(Card):
             next(iter(self.buttons.values())).setFocus()  # of the window, once it is active again
 
     def close_by_key(self) -> bool:
-        """Close a line that can be closed; return whether there was one."""
+        """Close the notice if it can be closed; return whether there was one."""
         closes = self.isVisible() and self.notice is not None and (self.notice.closes or "close" in self.buttons)
         if closes:
             self.asked.emit("close")
@@ -135,14 +135,14 @@ class PlayDevices:
 
 
 def asks_for_device(title: str, step: str, *, has_force: bool) -> Notice:
-    """Return the question before a device other than the scripted hand is used."""
+    """Return the question before a device other than the simulated hand is used."""
     force = "The force fades in when a trial begins; hold" if has_force else "It has no force. Hold"
     question = f"Play from {step}, with the device {title}? {force} Esc to stop."
     return Notice(question, (("play", "Play"), ("close", "Cancel")), "warn", "device")
 
 
 def refuses(problems: tuple[str, ...]) -> Notice:
-    """Return why the study cannot be played from here."""
+    """Return the notice with the problems that prevent playing from here."""
     more = (f"and {len(problems) - MOST_PROBLEMS} more",) if len(problems) > MOST_PROBLEMS else ()
     sentence = "The study cannot be played from here: correct these problems first"
     actions = (("problems", "Show problems"), ("close", "Close"))
@@ -150,18 +150,18 @@ def refuses(problems: tuple[str, ...]) -> Notice:
 
 
 def under_way(step: str, title: str) -> Notice:
-    """Return what is said while a pilot is played."""
+    """Return the notice that is shown while a pilot is played."""
     sentence = f"Playing from {step}, with the device {title}. Hold Esc to stop."
     return Notice(sentence, (("stop", "Stop"),), "ok", "play")
 
 
 def ended(step: str, how: str) -> Notice:
-    """Return the question after a pilot was played: whether its data are kept."""
+    """Return the question whether the data of a played pilot are kept."""
     return Notice(f"Played from {step}: {how}. Its data are deleted unless you keep them.", KEEP, "neutral", "flag")
 
 
 def kept(folder: str) -> Notice:
-    """Return where a pilot was kept."""
+    """Return the notice with the folder of a kept pilot."""
     return Notice(f"Kept as a pilot in {folder}.", (("close", "Close"),), "ok", "check")
 
 
@@ -254,7 +254,7 @@ class DesignerView:
 
 
 def problems_chip(count: int, warnings: int) -> tuple[Tone, str, str]:
-    """Return tone, icon and words of the chip of problems."""
+    """Return tone, icon and text of the problems chip."""
     if count:
         return "bad", "warning", counted(count, "problem")
     if warnings:
@@ -408,7 +408,7 @@ class DesignerHeader(QWidget):
         self._make_room()
 
     def _enable(self, button: QWidget, *, on: bool) -> None:
-        """Enable a button or not; Qt would give its keyboard to whatever is next."""
+        """Enable or disable a button without moving the keyboard focus, as Qt would."""
         if not on and self.window().focusWidget() is button:
             self.keyboard_left.emit()
         button.setEnabled(on)
@@ -429,7 +429,7 @@ class DesignerHeader(QWidget):
             part.setVisible(part.isVisibleTo(self) and self._row.minimumSize().width() + more <= self.width())
 
     def _announce(self, before: HeaderState, state: HeaderState) -> None:
-        """Have said once what changes by itself: the problems, and that a draft is kept."""
+        """Announce changes that happen by themselves, once: problems, and that a draft is kept."""
         if not state.chosen or state.chosen != before.chosen:
             return
         if state.problems != before.problems:

@@ -86,7 +86,7 @@ class MeasuresController(QObject):
             part.open_asked.connect(editing.select)
 
     def show(self) -> None:
-        """Show the numbers of the study as it is now, and order those that are not known."""
+        """Show the study's present numbers, and order the missing ones."""
         opened = self._editing.opened
         if opened is None or not self._place.isVisible():
             self._want(None)
@@ -115,7 +115,7 @@ class MeasuresController(QObject):
         self._place.pane.facts.show_measures(view)
 
     def leave(self) -> None:
-        """End the process: a session that begins now must not share the processor with it."""
+        """End the process: it must not share the processor with a session."""
         self._idle.stop()
         self._want(None)
         self._close()
@@ -153,7 +153,7 @@ class MeasuresController(QObject):
         return self.rest.isActive() or self._look.isActive()
 
     def _want(self, wanted: Simulation | None) -> None:
-        """Want this from now on; what is under way for another element or study is given up."""
+        """Request a simulation; cancel one for another element or version."""
         if wanted == self._wanted:
             return
         self._wanted, self._failed = wanted, ""
@@ -208,7 +208,7 @@ class MeasuresController(QObject):
             self.warned.emit()
 
     def _simulated(self) -> Simulated:
-        """Return the answer of the current simulation; until it is done, the last answer of the same block."""
+        """Return the current simulation's answer; until it is complete, the last answer of the same block."""
         wanted = self._wanted
         if wanted is None:
             return Simulated()

@@ -106,7 +106,7 @@ class KnownAnswer:
 
 @cache
 def known_answers() -> dict[str, KnownAnswer]:
-    """Return the known answers of the templates that have one, as they were computed when the templates were made."""
+    """Return the known answers of the templates that have one, computed when the templates were made."""
     answers: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
     return {name: KnownAnswer(**values) for name, values in answers.items()}
 
@@ -174,12 +174,12 @@ class TemplateChoice:
 
 
 def languages_offered() -> tuple[tuple[str, str], ...]:
-    """Return code and name of each language that participants can be addressed in."""
+    """Return code and name of each language of the participant's pages."""
     return tuple((code, language.english_name) for code, language in LANGUAGES.items())
 
 
 def template_choice(name: str, study: Study) -> TemplateChoice:
-    """Return what is shown of a template."""
+    """Return the description of a template for the page of new studies."""
     title, description = _described(study.document)
     shown, question = TEMPLATES.get(name, (name, description))
     protocol = study.protocol
@@ -206,7 +206,7 @@ def template_choice(name: str, study: Study) -> TemplateChoice:
 
 
 def copy_choice(source: str, document: Mapping[str, Any], note: str, name: str) -> TemplateChoice:
-    """Return what is shown of a study that can be copied."""
+    """Return the description of a study that can be copied."""
     title, description = _described(document)
     return TemplateChoice(
         source=source, title=title or source, description=description, copy=True, note=note, name=name,
@@ -244,7 +244,7 @@ def _questions(name: str, study: Study) -> Iterator[OwnQuestion]:
 
 
 def _unit_of(study: Study, path: Place) -> str:
-    """Return the unit of a stimulus's numbers, which is that of the key that it varies."""
+    """Return the unit of a stimulus' numbers, that of the varied key."""
     varied = study.document.get(path[0], {}).get(path[1], {}).get("vary") if path[0] == "stimuli" else None
     if isinstance(varied, str):
         return unit_of(varied)
@@ -252,7 +252,7 @@ def _unit_of(study: Study, path: Place) -> str:
 
 
 def studies(opened: Document | None) -> tuple[StudyChoice, ...]:
-    """Return what can be opened: the open file, drafts that were never saved, recent files, names at hand.
+    """Return the studies that can be opened: the open one, unsaved drafts, recent files, known names.
 
     They are in the order of their titles; studies that ship with the program come last.
     """
@@ -276,7 +276,7 @@ def studies(opened: Document | None) -> tuple[StudyChoice, ...]:
 
 
 def _title(file: Path | None, *, drafted: bool) -> str:
-    """Return the title of a study, of its draft where one is kept; "" where it has none or cannot be read."""
+    """Return the title of a study, or of its draft; "" if it has none or cannot be read."""
     if file is not None and drafted and (draft := draft_of(file)) is not None:
         return study_title(read(draft.text.encode(), file.parent).document)
     try:
@@ -298,7 +298,7 @@ def _title_of_file(file: Path, _changed_ns: int, _size: int) -> str:
 def header_state(
     opened: Document | None, choices: tuple[StudyChoice, ...], warnings: int, version: VersionChip
 ) -> HeaderState:
-    """Return the header's state of the open study; ``warnings`` is how many it has."""
+    """Return the header's state for the open study, which has so many ``warnings``."""
     if opened is None:
         return HeaderState(studies=choices)
     draft = "Saved" if not opened.edited and opened.base else "Not saved yet"
@@ -318,13 +318,13 @@ def header_state(
 
 
 def source_of(file: Path) -> str:
-    """Return what a study's file is opened by: its name at hand, else its path."""
+    """Return the name that opens a study's file, else its path."""
     found_file = _file(file.stem)
     return file.stem if found_file is not None and found_file.resolve() == file.resolve() else str(file)
 
 
 def new_choices(source: str = "") -> tuple[TemplateChoice, ...]:
-    """Return what a new study can begin as: templates, the empty one last, then studies to copy.
+    """Return the choices for a new study: templates, the empty one last, then studies to copy.
 
     Raises StudyError if the study ``source`` cannot be read.
     """
@@ -564,7 +564,7 @@ class Questions(Themed, QWidget):
         self.name.clear()
 
     def show_choice(self, choice: TemplateChoice) -> None:
-        """Ask the questions of a template or copy; what was typed as a name stays."""
+        """Show the questions of a template or copy; a typed name stays."""
         before, self._choice = self._choice, choice
         if before is not None and before.source == choice.source:
             return
@@ -592,7 +592,7 @@ class Questions(Themed, QWidget):
         self.name.setPlaceholderText(self._proposed or NAME_HINT)
 
     def _show_first_texts(self) -> None:
-        """Say in which language the texts begin where none of the template's is chosen."""
+        """Show the language of the template's texts if none of the template's languages is chosen."""
         languages = () if self._choice is None else self._choice.languages
         chosen = [code for code, check in self.languages.items() if check.isChecked()]
         without = bool(languages and chosen) and set(languages).isdisjoint(chosen)
@@ -605,11 +605,11 @@ class Questions(Themed, QWidget):
         return short_name_of(self.title.text()) or ("" if self._choice is None else self._choice.name)
 
     def short_name(self) -> str:
-        """Return the short name that was typed, else the one that the title gives, else that of a copy."""
+        """Return the typed short name, else one made from the title, else that of the copied study."""
         return self.name.text().strip() or self._proposed
 
     def answers(self) -> Answers | str:
-        """Return the answers, or a sentence about one that cannot be taken."""
+        """Return the answers, or a sentence about an invalid one."""
         chosen = tuple(code for code, check in self.languages.items() if check.isChecked())
         if not chosen:
             return "choose at least one language"
@@ -781,7 +781,7 @@ class NewStudyPage(Themed, QWidget):
         QTimer.singleShot(0, first, lambda: self.area.ensureWidgetVisible(first))  # once it has its place
 
     def _come(self, button: TemplateButton, by_mouse: bool) -> None:
-        """Show the card that the keyboard came to; after a click the keyboard stays in the questions."""
+        """Show the card that has keyboard focus. A mouse click leaves the focus in the form."""
         if by_mouse:
             (last_focused(self.card) or self.card.questions.title).setFocus()
         else:

@@ -101,7 +101,7 @@ class OutlineRow:
 
 
 def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> tuple[OutlineRow, ...]:
-    """Return the outline of a study; with words to find only the elements that hold them.
+    """Return the outline of a study; with a search text only the matching elements.
 
     ``times_s``: how long each step takes [s], by its id; empty while the study has faults; ``find``: what an element's
     title, id or one of its texts must hold, or the label or a choice of one of its fields.
@@ -128,7 +128,7 @@ def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> 
 
 
 def _titles(elements: Sequence[Element]) -> dict[Path, str]:
-    """Return the name of each element: its title, with its id if an earlier element of the section has this title."""
+    """Return the label of each element: its title, with its id if an earlier element has the same title."""
     first: dict[tuple[Path, str], Path] = {}
     for element in elements:
         first.setdefault((element.path[:-1], element.title), element.path)
@@ -139,7 +139,7 @@ def _titles(elements: Sequence[Element]) -> dict[Path, str]:
 
 
 def _found(study: Study, row: OutlineRow, text: str, field: FoundField | None) -> OutlineRow | None:
-    """Return a row where its element was found, with the label of the field that was; else None."""
+    """Return a matching row with the label of its matching field; None if the element does not match."""
     named = found(study.document, row.path, text, named=True)
     if field is not None and (field.rank == LABEL or not named):
         title, name = f"{row.title} · {field.label}", f"{row.name}, field {field.label}"
@@ -212,7 +212,7 @@ class Addable:
 
 
 def addable(study: Study, selected: Path) -> tuple[Addable, ...]:
-    """Return what can be added: to lists of the selected element, to its section, then to the other sections."""
+    """Return the addable elements: for lists of the selected element, its section, then the other sections."""
     document = study.document
     around = selected[:2] if len(selected) > 1 else ()
     lists = [row.path for row in rows(document, around) if row.kind == "list"] if around else []
@@ -237,7 +237,7 @@ def addable(study: Study, selected: Path) -> tuple[Addable, ...]:
 
 
 def _questions(study: Study, around: Path) -> Iterator[Addable]:
-    """Yield a question for each questionnaire to which one can be added: for the one that the element names alone.
+    """Yield a question for each questionnaire that can get one, or only for the one that the element names.
 
     Where there are several, each says of which it is.
     """
@@ -252,7 +252,7 @@ def _questions(study: Study, around: Path) -> Iterator[Addable]:
 
 @cache
 def _instruments() -> tuple[Addable, ...]:
-    """Return the standard questionnaires, with who published each and under which licence its texts are."""
+    """Return the standard questionnaires, with publisher and licence of their texts."""
     entries = []
     for name in instruments():
         source = instrument(name)
@@ -264,7 +264,7 @@ def _instruments() -> tuple[Addable, ...]:
 
 
 def _of_list(study: Study, path: Path) -> Addable:
-    """Return what adds an entry to a list, found by each kind that it can be."""
+    """Return the entry that adds to a list, found by each of its kinds."""
     known = tags(node_at(study.document, (*path, 0)))[1] if is_second(study.document) else ()
     kinds = ", ".join(label_of(kind).lower() for kind in known if kind)
     to = f"To {title_of(study.document, path[:2])}{kinds and f'; kinds: {kinds}'}"
@@ -307,7 +307,7 @@ class AddList(Themed, QFrame):
         self.list.itemActivated.connect(lambda _item: self._choose())
 
     def open(self, every: tuple[Addable, ...], above: QPoint) -> None:
-        """Show what can be added, with its lower left corner at a place of the screen."""
+        """Show the addable elements with the lower left corner at a screen position."""
         self._every = every
         self.words.clear()
         self._type("")
@@ -438,12 +438,12 @@ class RowPainter(QStyledItemDelegate):
 
 
 def sign_right(row: OutlineRow) -> float:
-    """Return where the sign ends that shows whether what is below a row is shown [px]."""
+    """Return the right edge of the sign that shows whether a row is expanded [px]."""
     return 12.0 + INDENT * row.depth
 
 
 def paint_grip(painter: QPainter, place: QRectF, ink: str) -> None:
-    """Paint the six dots that something is dragged by."""
+    """Paint the six dots of a drag handle."""
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(QColor(ink))
     middle = place.center()
@@ -538,7 +538,7 @@ class Tree(Themed, QTreeView):
         self.viewport().update()
 
     def _target(self, at: QPoint) -> tuple[ElementPath, float] | None:
-        """Return the place of the entry that comes next where the line is, and how far down the line is."""
+        """Return the place of the entry after the drop line, and the line's height."""
         place = self.dragged[:-1]
         places: list[tuple[ElementPath, float]] = []
         end: tuple[ElementPath, float] | None = None
@@ -622,7 +622,7 @@ class OutlineCard(Coloured, Card):
         self._sign.setIcon(icon("search", theme.text2, 16))
 
     def begin(self) -> None:
-        """Begin with the next rows as if there had been none: at the top, everything closed, nothing to find."""
+        """Reset the outline for the next rows: at the top, everything closed, no search text."""
         self.rows, self._opened = (), set()
         self._filling = True
         self.items.clear()
@@ -630,7 +630,7 @@ class OutlineCard(Coloured, Card):
         self.words.clear()
 
     def show_outline(self, rows: tuple[OutlineRow, ...], selected: object) -> None:
-        """Show rows; what was open stays open. Where nothing was found, a line says so."""
+        """Show rows; open branches stay open. If nothing matches, a line says so."""
         self._say_whether_found(rows)
         if rows != self.rows:
             current = self.tree.currentIndex()
@@ -671,7 +671,7 @@ class OutlineCard(Coloured, Card):
         self.nothing.setVisible(bool(sentence))
 
     def mark(self, path: object, *, reveals: bool = True) -> None:
-        """Mark the row of an element; ``reveals`` opens what it is in, and scrolls to it."""
+        """Mark the row of an element; ``reveals`` opens its branch and scrolls to it."""
         current = self.tree.currentIndex()
         if current.isValid() and current.data(ROW_ROLE).path == path:
             return
@@ -695,7 +695,7 @@ class OutlineCard(Coloured, Card):
         self._filling = False
 
     def indexes(self) -> list[QModelIndex]:
-        """Return the rows in their order, those of branches that are closed included."""
+        """Return the rows in order, including those of closed branches."""
         indexes: list[QModelIndex] = []
         waiting = [self.items.index(row, 0) for row in range(self.items.rowCount())]
         while waiting:
@@ -713,7 +713,7 @@ class OutlineCard(Coloured, Card):
             self.chosen.emit(index.data(ROW_ROLE).path)
 
     def _click(self, index: QModelIndex) -> None:
-        """Open or close the heading of several, or what its arrow is clicked of; else go to what was found."""
+        """Open or close the clicked branch, else go to the matching field."""
         heading = self.items.hasChildren(index) and len(index.data(ROW_ROLE).path) == 1
         if heading or self.tree.arrow_pressed:
             self.tree.setExpanded(index, not self.tree.isExpanded(index))
@@ -723,7 +723,7 @@ class OutlineCard(Coloured, Card):
                 self.element_clicked.emit()
 
     def _open_field(self) -> bool:
-        """Go to the field of the current row that was found; return whether there is one."""
+        """Go to the matching field of the current row; return whether there is one."""
         current = self.tree.currentIndex()
         field: ElementPath = current.data(ROW_ROLE).field if current.isValid() else ()
         if field:
@@ -731,7 +731,7 @@ class OutlineCard(Coloured, Card):
         return bool(field)
 
     def _go_to_first(self) -> bool:
-        """Select the first element that is called so, else the first with a field that is; return whether one is."""
+        """Select the first element with a matching title, else with a matching field; return whether there is one."""
         rows = [(index, index.data(ROW_ROLE)) for index in self.indexes() if index.data(ROW_ROLE).path]
         called = [index for index, row in rows if row.named]
         with_field = [index for index, row in rows if row.field]
@@ -741,7 +741,7 @@ class OutlineCard(Coloured, Card):
         return first is not None
 
     def _open_first(self) -> None:
-        """Select the first element that was found, and go to its field."""
+        """Select the first matching element and go to its field."""
         if self.words.text().strip() and self._go_to_first() and not self._open_field():
             self.tree.setFocus(Qt.FocusReason.OtherFocusReason)
 

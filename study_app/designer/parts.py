@@ -92,7 +92,7 @@ W = TypeVar("W", bound=QWidget)
 
 
 def dense(part: W, name: str, height: int = FIELD_PX) -> W:
-    """Return a field or list in the low form that it has in the designer, with its name."""
+    """Give a field or list the designer's low form and an accessible name."""
     part.setAccessibleName(name)
     part.setProperty("dense", "true")
     part.setFont(font("label", weight=400))
@@ -101,7 +101,7 @@ def dense(part: W, name: str, height: int = FIELD_PX) -> W:
 
 
 def small_button(icon: str, label: str, *, cap: str = "", role: str = "", height: int = 34) -> ActionButton:
-    """Return a button with little room around its words."""
+    """Return a button with little room around its text."""
     made = ActionButton(icon, label, cap=cap, role=role, height=height)
     made.setProperty("dense", "true")
     made.setFont(font("label"))
@@ -109,7 +109,7 @@ def small_button(icon: str, label: str, *, cap: str = "", role: str = "", height
 
 
 def cut_text(text: str, role: TypeRole = "small", ink: Ink = "text2", *, right: bool = False) -> Elided:
-    """Return a line of text that ends in "…" where there is too little room, at the left or at the right."""
+    """Return a line of text that ends in "…" if it is too long, aligned left or right."""
     made = Elided(role, ink)
     made.show_text(text)
     if right:

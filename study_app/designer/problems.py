@@ -48,7 +48,7 @@ class ProblemRow:
 
     @property
     def identity(self) -> tuple[Path, str, bool]:
-        """What stays the same where lines are inserted above it."""
+        """The part that stays the same when lines are inserted above."""
         return self.fault.path, self.message, self.warning
 
     @property
@@ -90,7 +90,7 @@ def warning_rows(study: Study, sentences: Iterable[str]) -> tuple[ProblemRow, ..
 
 
 def _placed(study: Study, sentence: str) -> tuple[Path, str]:
-    """Return the place of a warning, and what it says of it."""
+    """Return the place of a warning and its sentence."""
     if (stated := _PLACE.match(sentence)) is not None:
         return tuple(int(step) - 1 if step.isdecimal() else step for step in stated[1].split(".")), stated[2]
     for word in re.findall(r"\w+", sentence):
@@ -146,7 +146,7 @@ class RepairSearch(QObject):
             self._timer.stop()
 
     def repair(self, row: ProblemRow, sentence: str) -> Repair | None:
-        """Return a repair by its words; one that was offered before the last edit is looked for at once."""
+        """Return a repair by its sentence; after an edit it is searched for at once."""
         self._look(row)
         return next((repair for repair in self._known.get(row, ()) if repair.words == sentence), None)
 
@@ -259,7 +259,7 @@ class ProblemLine(Coloured, QWidget):
 
 
 def _column(*parts: QWidget) -> QVBoxLayout:
-    """Return lines of text, in the middle of their row."""
+    """Return lines of text, vertically centred."""
     return vbox(STRETCH, *parts, STRETCH, spacing=0)
 
 
@@ -299,7 +299,7 @@ class ProblemsCard(Card):
         self.close_button.clicked.connect(self.close_asked)
 
     def begin(self) -> None:
-        """Begin with another study: its problems and then warnings are shown next, and without any the list closes."""
+        """Reset the list for another study; it closes if there are no problems or warnings."""
         self._had = bool(self.rows)
         self.problems = self._warnings = ()
         self.lines, self._listed = [], None
@@ -307,7 +307,7 @@ class ProblemsCard(Card):
         self.area.verticalScrollBar().setValue(0)
 
     def show_problems(self, rows: tuple[ProblemRow, ...], element: object) -> None:
-        """Show problems; ``element`` is the selected one. The list closes when the last problem is solved."""
+        """Show problems; ``element`` is selected. The list closes when the last problem is solved."""
         had, self.problems, self._element = bool(self.problems), rows, element
         self.repairs = {row: sentences for row, sentences in self.repairs.items() if row in rows}
         self._show(closes=had)
@@ -366,7 +366,7 @@ class ProblemsCard(Card):
 
     @property
     def under_pointer(self) -> bool:
-        """Whether the pointer is over the list: it keeps its height then, else a click would hit what is below."""
+        """Whether the pointer is over the list, which then keeps its height so that a click hits nothing below."""
         return self.isVisible() and self.underMouse()
 
     def leaveEvent(self, event: QEvent) -> None:
@@ -383,7 +383,7 @@ class ProblemsCard(Card):
 
     @property
     def coming(self) -> tuple[ProblemRow, ...]:
-        """Every row from the next one on: where the last one is solved, from the one that took its place."""
+        """The rows after the current one; if the last is solved, from the row that took its place."""
         at = self.rows.index(self.at) + 1 if self.at in self.rows else self._number
         at %= max(1, len(self.rows))
         return (*self.rows[at:], *self.rows[:at])
@@ -392,7 +392,7 @@ class ProblemsCard(Card):
         return [button for line in self.lines for button in line.repairs if line.row == problem]
 
     def set_current(self, row: ProblemRow) -> None:
-        """Take a problem as the one that one is at; ``coming`` begins after it."""
+        """Make a problem the current one; ``coming`` begins after it."""
         if row in self.rows:
             self.at, self._number = row, self.rows.index(row)
 

@@ -47,7 +47,7 @@ class Prompt(Card):
 
 
 def naming(study: Study, path: Path) -> tuple[str, ...]:
-    """Return the places outside an element that name it, in words."""
+    """Return the places outside an element that refer to it, in words."""
     document = study.document
     places = (*references_to(document, path), *left_without(document, [path]))
     outside = [place for place in places if place[: len(path)] != path]
@@ -147,7 +147,7 @@ class SeriesCard(Prompt):
         return MakeSeries(self.path, self.numbers[self.number.currentIndex()].path, values)
 
     def _show(self) -> None:
-        """Show what the step would say: the titles of the copies, or why there can be none."""
+        """Show the titles of the copies, or why none can be made."""
         said, why = "", ""
         try:
             if self.values.text().strip():

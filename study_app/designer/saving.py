@@ -75,7 +75,7 @@ class Saving(QObject):
         self.banner = _banner(opened) or self._notice
 
     def offer_to_discard(self) -> None:
-        """Say of when the draft is that was found, of a study that was never saved each time it is opened."""
+        """Show the time of the restored draft; for a study that was never saved each time it is opened."""
         opened = self.editing.opened
         draft = None if opened is None else opened.draft if opened.base else draft_of(opened.file)
         if opened is not None and draft is not None and opened.edited:
@@ -83,11 +83,11 @@ class Saving(QObject):
             self._note(sentence, ("discard", "Discard the draft"), lasts=True)
 
     def _note(self, sentence: str | None, *actions: tuple[str, str], lasts: bool | None = None) -> None:
-        """Show a line that needs no answer where no other one is needed, None for none; ``lasts`` says for how long."""
+        """Show a notice unless another one needs an answer; None removes it, ``lasts`` sets its duration."""
         self._notice, self._lasts = None if sentence is None else Notice(sentence, actions, closes=True), lasts
 
     def _end_notice(self) -> None:
-        """Take back what is true no longer: that the draft differs from the file, or that the file has problems."""
+        """Remove a notice that no longer applies: the draft differs from the file, or the file has problems."""
         opened = self.editing.opened
         if opened is not None and self._notice is not None and self._lasts is (not opened.edited):
             self._close_notice(opened)
@@ -99,7 +99,7 @@ class Saving(QObject):
         self.place.banner.show_notice(self.banner)
 
     def look_again(self) -> None:
-        """Look whether the study may be changed, and whether another program changed its file.
+        """Check whether the study may be edited, and whether another program changed its file.
 
         Where it was not edited here, the file's content is taken in as a step; else it is asked which is to be kept.
         """
@@ -115,7 +115,7 @@ class Saving(QObject):
             self.editing.announce()
 
     def _come_back(self, state: Qt.ApplicationState) -> None:
-        """Look at the file when the program is in front again: another one may have written it meanwhile."""
+        """Check the file when the program becomes active: another one may have written it."""
         if state == Qt.ApplicationState.ApplicationActive and self.place.isVisible():
             self.place.flush()
             self.look_again()
@@ -193,7 +193,7 @@ class Saving(QObject):
         self.place.show_prompt(card, card.first)
 
     def save_as_version(self, version: str) -> None:
-        """Give the study another version and save it; the card says why where that cannot be."""
+        """Set the study's version and save it; the card says why if that fails."""
         opened = self.editing.writable
         if opened is None:
             return
@@ -246,7 +246,7 @@ class Saving(QObject):
         self.write_draft(at_once=True)
 
     def write_draft(self, *, at_once: bool = False) -> None:
-        """Write the draft if it is due; what fails is tried again, and said once."""
+        """Write the draft if it is due; a failed write is retried and reported once."""
         opened = self.editing.opened
         if opened is None:
             return
@@ -282,7 +282,7 @@ class Saving(QObject):
 
 
 def _banner(opened: Document) -> Notice | None:
-    """Return why a study is read-only, or what another program did to its file; None where there is neither."""
+    """Return why a study is read-only, or that another program changed its file; None if neither applies."""
     if opened.read_only:
         return Notice(opened.read_only, (("copy", "Make a copy …"),))
     try:
@@ -301,7 +301,7 @@ def _banner(opened: Document) -> Notice | None:
 
 
 def _changed_outside(opened: Document) -> bool:
-    """Return whether the file can be read and has another content than the one that is edited."""
+    """Return whether the file can be read and differs from the content that is being edited."""
     try:
         return opened.changed_outside()
     except StudyError:

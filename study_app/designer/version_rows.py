@@ -45,7 +45,7 @@ class Comparison:
 
 
 def version_chip(standing: Standing, known: Iterable[Run]) -> VersionChip:
-    """Return the chip of a study that stands so to what was run."""
+    """Return the chip of a study with this standing."""
     known = tuple(known)
     tip = "\n".join(f"Version {run.version}: {counts(run)}" for run in known)
     save = f"Save {standing.version} …" if standing.asks else "Save"
@@ -61,7 +61,7 @@ def version_chip(standing: Standing, known: Iterable[Run]) -> VersionChip:
 
 
 def counts(run: Run) -> str:
-    """Return "12 sessions, 2 pilots, 1 rehearsal", without what there is none of."""
+    """Return "12 sessions, 2 pilots, 1 rehearsal", without zero counts."""
     numbers = ((run.sessions, "session"), (run.pilots, "pilot"), (run.rehearsals, "rehearsal"))
     return ", ".join(counted(number, word) for number, word in numbers if number)
 
@@ -69,7 +69,7 @@ def counts(run: Run) -> str:
 def version_choices(
     known: Sequence[Run], kept: Iterable[Kept], file: str, now: datetime
 ) -> tuple[tuple[str, str], ...]:
-    """Return key and words of what a study can be compared with: its file, what was run, what was saved, newest first.
+    """Return key and label of each version to compare with: the file, run and saved versions, newest first.
 
     ``file`` is what is said of the file, "" where it does not differ from the study; ``now`` is for "Today 14:02".
     """
@@ -103,12 +103,12 @@ NAMED_AT_MOST: Final = 3
 
 
 def draft_title(draft: str, folder: Path) -> str:
-    """Return the title of a study, "" where it has none."""
+    """Return the title of a study, "" if it has none."""
     return study_title(Study(draft, folder).document)
 
 
 def edited_words(saved: str, draft: str, folder: Path) -> str:
-    """Return the elements in which a draft differs from its file, in words: ": Water, Welcome and 2 more"."""
+    """Return the elements in which a draft differs from its file: ": Water, Welcome and 2 more"."""
     study = Study(draft, folder)
     try:
         differences = document_differences(tomllib.loads(saved), tomllib.loads(draft))

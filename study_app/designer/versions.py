@@ -65,7 +65,7 @@ class KnownRuns(QObject):
         editing.edited.connect(self._resting.start)
 
     def look(self) -> None:
-        """Read again which sessions there are, without waiting for it."""
+        """Read in the background which sessions there are."""
         if (opened := self.editing.opened) is not None:
             self._reader.run(partial(_read, self.editing.results, opened.name, opened.file))
 
@@ -238,7 +238,7 @@ class Version(NamedTuple):
 
 
 def version_of(opened: Document, run: Run) -> Version:
-    """Return a version that was run: its copy is kept, or it is what the file holds."""
+    """Return a version that was run, from its kept copy or the present file."""
     source = source_of(run)
     if source is None:
         file = with_liquid_files(opened.saved.encode(), opened.study.folder)
@@ -247,13 +247,13 @@ def version_of(opened: Document, run: Run) -> Version:
 
 
 def kept_version(hash_: str) -> Version:
-    """Return a version that was saved."""
+    """Return a saved version."""
     content = kept_content(hash_)
     return Version(None if content is None else content.decode("utf-8", "replace"))
 
 
 def file_version(file: Path) -> Version:
-    """Return what a study's file holds at this moment."""
+    """Return the present content of a study's file."""
     try:
         return Version(file.read_bytes().decode("utf-8", "replace"))
     except OSError:
@@ -261,7 +261,7 @@ def file_version(file: Path) -> Version:
 
 
 def compare(version: Version, study: Study) -> Comparison:
-    """Return how a study differs from a version: line by line, or in sentences where only a receipt is known."""
+    """Return the differences between a study and a version: lines, or sentences if only a receipt is known."""
     if version.source is None:
         held = None if version.run is None else version.run.protocol
         if held is None or study.protocol is None:
@@ -276,7 +276,7 @@ def compare(version: Version, study: Study) -> Comparison:
 
 
 def newest(known: Iterable[Run]) -> Run | None:
-    """Return what participants were run with last; where there are none, what was run last as a pilot or rehearsal."""
+    """Return the version that participants were run with last, else the last pilot or rehearsal."""
     ran = tuple(known)
     return next((run for run in reversed(ran) if run.sessions), ran[-1] if ran else None)
 
@@ -323,7 +323,7 @@ class Changes(Card):
         self.compare_now()
 
     def compare_with_session(self, study: str, folder: Path) -> None:
-        """Show the tab with the version that a session was run with, if its study is the one that is open."""
+        """Show the tab with the version of a session, if its study is open."""
         opened = self.editing.opened
         run = run_of(SessionFolder(folder, "", 0).receipt)
         if opened is None or run is None or opened.name != study:
@@ -336,7 +336,7 @@ class Changes(Card):
         self._resting.start()
 
     def compare_now(self) -> None:
-        """Compare anew, where the tab is shown."""
+        """Compare again if the tab is shown."""
         opened = self.editing.opened
         if opened is None or self.place.pane.tab != TAB:
             return
@@ -373,7 +373,7 @@ class Changes(Card):
         return version_choices(self._known(), kept_versions(opened.file), file, now)
 
     def _known(self) -> tuple[Run, ...]:
-        """Return what was run, with the session's version that was asked for, wherever its results are."""
+        """Return the run versions, with the requested session's version wherever its results are."""
         known = self.runs.known
         asked = self._asked
         return known if asked is None or any(run.hash == asked.hash for run in known) else (asked, *known)
@@ -426,7 +426,7 @@ class Renaming(QObject):
         return f"Answers of {counted(sessions, 'session')} are recorded under this id." if sessions else ""
 
     def _recorded(self, element: Place) -> frozenset[str]:
-        """Return the ids of a question's questionnaire under which answers are recorded."""
+        """Return the ids of a question's questionnaire that have recorded answers."""
         known = self.runs.items if element[2:3] == ("items",) else ()
         return frozenset(name for form, name in known if form == element[1])
 

@@ -104,7 +104,7 @@ class RightPane(QWidget):
             self.tab_shown.emit(name)
 
     def _place_aside(self) -> None:
-        """Put the controls of the page at the right of the tabs, or below them where there is no room."""
+        """Put the page's controls to the right of the tabs, or below them if there is no room."""
         page = next((page for page in self.pages if page.name == self.tab), None)
         if page is not None and page.aside is not None:
             room = self.width() - 2 * SHADOW - self.tabs.sizeHint().width() - ASIDE_GAP
@@ -117,7 +117,7 @@ class RightPane(QWidget):
         self.make_room()
 
     def make_room(self) -> None:
-        """Place the controls; hide the facts where the window is too low for them, or the page takes their place."""
+        """Place the controls; hide the facts if the window is too low or the page needs their room."""
         self._place_aside()
         page = next((page for page in self.pages if page.name == self.tab), None)
         height = self.window().height()
@@ -205,7 +205,7 @@ SHORTCUT = Qt.FocusReason.ShortcutFocusReason
 
 
 def stops(part: QWidget) -> Iterator[QWidget]:
-    """Yield what Tab goes to in a part: from top to bottom, parts beside each other from left to right."""
+    """Yield the focus stops of a part from top to bottom, parts beside each other from left to right."""
     if part.focusPolicy() & Qt.FocusPolicy.TabFocus and part.focusProxy() is None and part.isEnabled():
         yield part
     inner = (
@@ -301,7 +301,7 @@ class Arrangement(QWidget):
             self.focus_outline()
 
     def close_drawer(self) -> None:
-        """Close the drawer, where there is one; the button that opens it takes the keyboard that it had."""
+        """Close the drawer, if there is one; its button takes the keyboard focus."""
         if self.drawer and self.outline.isVisible():
             had = self.outline.isAncestorOf(self.window().focusWidget() or self)
             self._hide_drawer()
@@ -309,7 +309,7 @@ class Arrangement(QWidget):
                 self.path.outline.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _follow_focus(self, _left: QWidget | None, now: QWidget | None) -> None:
-        """Note which part has the keyboard; close the drawer when another part of the place takes it."""
+        """Note which part has keyboard focus; close the drawer when another part takes it."""
         parts = (self.outline, self.form, self.pane)
         self.used = next((part for part in parts if now is not None and part.isAncestorOf(now)), self.used)
         if self.drawer and now is not None and self.isAncestorOf(now) and not self.outline.isAncestorOf(now):
@@ -343,7 +343,7 @@ class Arrangement(QWidget):
         self.form.focus_first()
 
     def focus_field(self, path: ElementPath) -> None:
-        """Go to a field of the form, with its value selected; where it has no row, to the first row."""
+        """Focus a field of the form and select its value; without its row, the first row."""
         if not self.focus_row(path):
             self.form.focus_first()
         elif isinstance(field := self.form.focusWidget(), TypedLine | TypedText):
@@ -354,14 +354,14 @@ class Arrangement(QWidget):
         return self.form.focus(path)
 
     def focus_element(self) -> None:
-        """Go to the selected element: to its row, or to its form where the outline is a drawer."""
+        """Focus the selected element's row, or its form if the outline is a drawer."""
         if self.drawer:
             self.focus_form()
         else:
             self.focus_outline()
 
     def return_keyboard(self) -> None:
-        """Go back to where the keyboard was last in outline, form or pane; from *Find* to the selected element."""
+        """Restore the last focus in outline, form or pane; from *Find* focus the selected element."""
         last = last_focused(self.used)
         if last is None or last is self.outline.words:
             self.focus_element()
@@ -369,7 +369,7 @@ class Arrangement(QWidget):
             last.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def focus_pane(self) -> None:
-        """Go to the page of the right pane, and from within the pane to its tabs."""
+        """Focus the page of the right pane, and from within the pane its tabs."""
         pane = self.pane
         if pane.isAncestorOf(pane.window().focusWidget() or self.header):
             pane.tabs.setFocus(SHORTCUT)
@@ -377,7 +377,7 @@ class Arrangement(QWidget):
             self._focus_page()
 
     def _focus_tabs(self) -> None:
-        """Go to the tabs of the right pane; from there Tab goes to what is beside them, then to the page."""
+        """Focus the tabs of the right pane; Tab then goes to the controls beside them and to the page."""
         self.show_side("pane")
         self.pane.tabs.setFocus(SHORTCUT)
 
@@ -396,7 +396,7 @@ class Arrangement(QWidget):
         self.problems.next.setFocus(SHORTCUT)
 
     def switch_to_file(self) -> None:
-        """Go to the file, and from there back to where the keyboard was in the form."""
+        """Focus the file, and from there return to the last focus in the form."""
         if not self.file.editor.hasFocus():
             self.show_tab("file")
             return
@@ -565,7 +565,7 @@ class DesignerPlace(Place):
         self.form.show_repairs(self.problems.repairs)
 
     def begin_study(self) -> None:
-        """Show the next view at the top: it is of another study."""
+        """Show the next view from the top: it is of another study."""
         self.view, self.form.form = DesignerView(), None
         self.outline.begin()
         self.problems.begin()
@@ -592,7 +592,7 @@ class DesignerPlace(Place):
         first.setFocus()
 
     def close_prompt(self, *, elsewhere: bool = False) -> None:
-        """Close a question that is open; ``elsewhere`` says that another element is selected from now on."""
+        """Close an open question; ``elsewhere``: another element is selected from now on."""
         if self.prompt is not None:
             closing = self.prompt
             self.prompt = None
@@ -606,15 +606,15 @@ class DesignerPlace(Place):
         self.file.editor.flush()
 
     def ask(self, what: Task, *arguments: Any) -> None:
-        """Ask for what is no step of the study."""
+        """Request a task that is not a step of the study."""
         self.asked.emit(Do(what, arguments))
 
     def finish(self, what: Task, *arguments: Any) -> None:
-        """Ask for it after what is being typed, with the id that the element of the form has then."""
+        """Hand on the typed text, then request a task with the element's resulting id."""
         self.asked.emit(self._after_typing(Do(what, arguments)))
 
     def _after_typing(self, asked: Any) -> Any:
-        """Hand on what is being typed; return a path or request with the id that the form's element has then."""
+        """Hand on the typed text; return a path or request with the element's resulting id."""
         before = () if self.form.form is None else self.form.form.path
         self.flush()
         after = () if self.form.form is None else self.form.form.path
@@ -633,7 +633,7 @@ class DesignerPlace(Place):
         self.adding.open(every, button.mapToGlobal(button.rect().topLeft()))
 
     def _take_asked(self, asked: object) -> None:
-        """Hand on a request, after what is being typed; those of the place itself are done here."""
+        """Hand on a request after the typed text; the page carries out its own tasks."""
         if not (isinstance(asked, SetText | LeaveText) or (isinstance(asked, SetValue) and asked.typing)):
             asked = self._after_typing(asked)
         match asked:
@@ -647,7 +647,7 @@ class DesignerPlace(Place):
                 self.asked.emit(asked)
 
     def show_step(self, step: Step) -> None:
-        """Say what a step did, and lead to the first text of a new element."""
+        """Announce a step and focus the first text of a new element."""
         if step.said:
             say(self, step.said)
         beside = not self.parts.drawer and self.outline.isAncestorOf(self.focusWidget())
@@ -656,7 +656,7 @@ class DesignerPlace(Place):
             self.form.focus_first_text(filled=step.fresh == "copy")  # a copy has its texts
 
     def open_next_problem(self) -> None:
-        """Open the next problem; its repair takes the keyboard, where it has one."""
+        """Open the next problem and focus its repair, if it has one."""
         if self.view.form is not None:
             self.flush()
         if not (coming := self.problems.coming):
@@ -702,7 +702,7 @@ class DesignerPlace(Place):
         self.left.emit()
 
     def focusNextPrevChild(self, forward: bool) -> bool:
-        """Let Tab go through what is seen, as it is read, then to the beginning of the window, or Shift+Tab back."""
+        """Let Tab follow the reading order of visible parts, then go to the start of the window; Shift+Tab back."""
         self.flush()
         QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)  # parts made just now have their places
         in_order, here = list(stops(self)), self.window().focusWidget()

@@ -35,7 +35,7 @@ from study_app.protocol.wording.languages import LANGUAGES, language_name, langu
 
 
 def switched(study: Study, path: Path, kind: str | None) -> tuple[Edit, ...]:
-    """Return the edits that change the kind of a table, None for the kind without the key.
+    """Return the edits that change the kind of a table; None stands for the kind without the key.
 
     Keys of both kinds keep their values, the others are removed; keys that the new kind needs get an initial one.
     """
@@ -135,7 +135,7 @@ def short_of(text: str) -> str:
 
 
 def followed(study: Study, path: Path, language: str, text: str) -> tuple[Edit, ...]:
-    """Return the edit of the short text of a question whose text is typed; none if it was edited separately."""
+    """Return the edit of a question's short text when its text is typed; none if it was edited separately."""
     place = (*path[:-1], "short")
     before, short = value_at(study.document, path), value_at(study.document, place)
     if path[-1] != "text" or isinstance(before, Mapping) != isinstance(short, Mapping):
@@ -169,7 +169,7 @@ def repairs(study: Study, fault: Fault) -> tuple[Repair, ...]:
 
 
 def removes(study: Study, fault: Fault, repair: Repair) -> bool:
-    """Return whether a fault is gone after a repair, and there are not more than before."""
+    """Return whether a repair removes a fault and adds none."""
     try:
         after, _ = study.edited(*repair.edits)
     except Refused:
@@ -180,7 +180,7 @@ def removes(study: Study, fault: Fault, repair: Repair) -> bool:
 
 
 def _stated(study: Study, fault: Fault) -> Iterator[Repair]:
-    """Yield the value that the fault states, or the key that was meant; of a wrong sign the number without it."""
+    """Yield the value or key that the fault proposes; for a number with a wrong sign, the number without it."""
     if fault.use is None:
         return
     path, value = fault.use
@@ -197,7 +197,7 @@ def _stated(study: Study, fault: Fault) -> Iterator[Repair]:
 
 
 def _by_kind(study: Study, fault: Fault) -> Iterator[Repair]:
-    """Yield what follows from the kind of a fault."""
+    """Yield the repairs that follow from the kind of a fault."""
     path, value = fault.path, value_at(study.document, fault.path)
     languages = value_at(study.document, ("study", "languages"))
     sequence = value_at(study.document, ("sequence",))
@@ -221,7 +221,7 @@ def _by_kind(study: Study, fault: Fault) -> Iterator[Repair]:
 
 
 def _levels(study: Study, fault: Fault) -> Iterator[Repair]:
-    """Yield the highest level that is not beyond a limit."""
+    """Yield the highest level within the limit."""
     levels = value_at(study.document, fault.path)
     if fault.path[:1] != ("stimuli",) or fault.path[-1:] != ("levels",) or not isinstance(levels, tuple):
         return
@@ -234,7 +234,7 @@ def _levels(study: Study, fault: Fault) -> Iterator[Repair]:
 
 
 def _lowered(study: Study, stimulus: str, highest: float) -> dict[str, tuple[float, ...]]:
-    """Return the levels that methods of a stimulus list, none above the highest, of those that have one above it.
+    """Return the listed levels of a stimulus' methods, capped at the highest one, if any exceeds it.
 
     A method of another stimulus, too, keeps its levels.
     """
@@ -249,7 +249,7 @@ def _lowered(study: Study, stimulus: str, highest: float) -> dict[str, tuple[flo
 
 
 def highest_level(study: Study, fault: Fault, low: float, high: float) -> float | None:
-    """Return the highest level, in three digits, without this kind of fault; None where not even ``low`` is."""
+    """Return the highest level, in three digits, without this kind of fault; None if even ``low`` has it."""
     formed = study.formed
     if formed is None:
         return None
@@ -282,7 +282,7 @@ _ROUNDS: Final = 12
 def added(
     study: Study, section: Path, *, name: str = "", behind: str | int | None = None
 ) -> tuple[tuple[Edit, ...], Path]:
-    """Return the edits that add an element to a section or list, as one step, and the path of the element.
+    """Return the edits that add an element to a section or list as one step, and its path.
 
     ``name`` is the preferred name of a table; it is written after the table or entry ``behind``, else at the end.
     """
@@ -343,7 +343,7 @@ def additions_for(study: Study, fault: Fault) -> tuple[Repair, ...]:
 
 
 def duplicated(study: Study, path: Path, wanted: str = "") -> tuple[tuple[Edit, ...], Path]:
-    """Return the edits that copy an element right after itself, as one step, and the path of the copy.
+    """Return the edits that copy an element right after itself as one step, and the path of the copy.
 
     The copy has the name ``wanted``, or the next free one, the next free code letter, and a place in the session if it
     needs one. Its texts are those of the original.
@@ -367,7 +367,7 @@ def duplicated(study: Study, path: Path, wanted: str = "") -> tuple[tuple[Edit, 
 
 
 def fitted(before: Study, after: Study, path: Path) -> tuple[Edit, ...]:
-    """Return the additional edits for a copied element: a free code letter, and a place in the session."""
+    """Return the additional edits that a copy needs: a free code letter and a place in the session."""
     edits: list[Edit] = []
     for row in rows(after.document, path):
         if row.value is not None and rule_of(LETTER) in row.bounds:
@@ -400,7 +400,7 @@ _DEEPEST: Final = 2
 
 
 def number_rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
-    """Return the numbers of an element of which there can be a series, in the order of its form.
+    """Return the numbers of an element that a series can vary, in the order of its form.
 
     Pages differ only in their texts, so there is no series of them.
     """
@@ -424,7 +424,7 @@ def _numbers(document: Mapping[str, Any], path: Path, deepest: int) -> Iterator[
 
 
 def number_row(document: Mapping[str, Any], path: Path, field: Path) -> Row:
-    """Return the number of an element that differs in a series."""
+    """Return the number of an element that a series varies."""
     number = next((row for row in number_rows(document, path) if row.path == field), None)
     if number is None:
         raise Refused("choose a number of this element")
@@ -455,7 +455,7 @@ def copy_with(study: Study, path: Path, row: Row, value: float) -> tuple[tuple[E
 
 
 def titles_with(document: Mapping[str, Any], path: Path, row: Row, value: float) -> Iterator[tuple[Path, str]]:
-    """Yield the titles of a copy below it: the element's number at their end is replaced, else the new one added."""
+    """Yield the titles of a copy: the number at their end is replaced, or the new number is added."""
     number = re.compile(rf"(?:(?<!\w)[-{MINUS}])?\d+(?:[.,]\d+)?(?=\s*(?:{re.escape(row.unit)})?\s*$)")
     title = value_at(document, (*path, "title"))
     for language, text in title.items() if isinstance(title, Mapping) else (("", title),):

@@ -83,7 +83,7 @@ def copy_of(study: Study, name: str) -> Study:
 
 
 def answered(study: Study, answers: Answers) -> Study:
-    """Return a study with the answers to the questions that it begins with.
+    """Return a study with the answers given on the page of new studies.
 
     Raises Refused if an answer is not permitted.
     """
@@ -212,7 +212,7 @@ class Document:
         self.done = [*self.done, DoneStep(name, splices, before, selected)][-MOST_STEPS:]
 
     def rest(self) -> None:
-        """Let the next edit be a step of its own."""
+        """Close the current undo step: the next edit begins a new one."""
         self.last = (None, 0.0)
 
     def undo(self) -> None:
@@ -243,7 +243,7 @@ class Document:
 
     @property
     def version(self) -> str:
-        """The version that the study states, or the one that counts where it states none."""
+        """The version that the study states, or the default version."""
         stated = value_at(self.study.document, ("study", "version"))
         return str(stated) if stated is not None else DEFAULT_VERSION
 
@@ -254,14 +254,14 @@ class Document:
         return self.study.text != self.saved
 
     def note_edit(self, now_s: float) -> None:
-        """Let the draft follow an edit; a text that is the file's again needs none."""
+        """Schedule the draft after an edit; none is needed if the text equals the file again."""
         if self.edited or not self.base:
             self.keeper.note_edit(self.study.text, self.selected, now_s)
         else:
             self._settle()
 
     def _settle(self) -> None:
-        """Forget the draft: the text is the file's."""
+        """Discard the draft: the text equals the file's."""
         self.keeper.note_saved(self.base)
         self.kept = None
 
@@ -272,7 +272,7 @@ class Document:
         return written
 
     def discard_draft(self) -> None:
-        """Go back to the file as one step, and forget the draft."""
+        """Restore the file's text as one step and discard the draft."""
         self.edit("Discard the draft", text=self.saved)
         self.draft = None
         self._settle()
@@ -298,11 +298,11 @@ class Document:
         self.note_edit(now_s)
 
     def _rebase(self, base: str) -> None:
-        """Take edits as made from the content of another hash."""
+        """Treat the edits as based on the content with this hash."""
         self.base = self.keeper.base = base
 
     def continue_draft(self) -> None:
-        """Restore the draft of the file that was not saved, as one step."""
+        """Restore the unsaved draft of the file as one step."""
         if (draft := draft_of(self.file)) is None:
             return
         self.keeper.resume_from(draft)
@@ -314,7 +314,7 @@ class Document:
             self._rebase(draft.base)
 
     def why_read_only(self, results: Path) -> str:
-        """Return why the study cannot be changed at this moment, "" where it can."""
+        """Return why the study cannot be changed now, "" if it can."""
         if any(self.file.resolve() == shipped_file(name).resolve() for name in shipped()):
             return "This study ships with the program. Make a copy to change it."
         if self.file.exists() and not os.access(self.file, os.W_OK):
@@ -326,7 +326,7 @@ class Document:
     # versions
 
     def source(self) -> bytes:
-        """Return what a session would be run with: the text, and the liquid files that it names."""
+        """Return the content that a session would run: the text and the liquid files that it names."""
         return with_liquid_files(self.study.text.encode(), self.study.folder)
 
     def standing(self, known: tuple[Run, ...]) -> Standing:
@@ -336,7 +336,7 @@ class Document:
         return standing(content_hash(self.source()), base, self.version, known)
 
     def save(self, known: tuple[Run, ...]) -> None:
-        """Write the file, and keep what sessions will be run with.
+        """Write the file, and keep the content that sessions will run.
 
         It is refused where sessions were run with this version and another content, or the file was changed outside.
         """
@@ -353,7 +353,7 @@ class Document:
         self._settle()
 
     def _bring_files(self, source: bytes) -> None:
-        """Write the files that the study names into its own folder, where it was copied from another one."""
+        """Copy the files that the study names into its folder if it comes from another one."""
         folder = self.file.resolve().parent
         if self.study.folder.resolve() == folder:
             return
@@ -374,7 +374,7 @@ class Document:
         self.study = replace(self.study, folder=folder)
 
     def saved_as(self, name: str) -> Document:
-        """Return the study with its edits under another name, as one step; this one goes back to its file."""
+        """Return the edited study under another name, as one step; this one returns to its file."""
         made = Document(self.study, self.selected, check_free(name))
         made.done = [*self.done]
         made.edit(f"Save as {name}", text=copy_of(self.study, name).text)
@@ -385,7 +385,7 @@ class Document:
 
 
 def open_file(file: Path, results: Path) -> Document:
-    """Open a study's file, with the draft of it that was not saved."""
+    """Open a study's file with its unsaved draft."""
     content = _content(file)
     study = read(content, file.parent)
     opened = Document(study, first_element(study.document), file, content_hash(content))
@@ -427,7 +427,7 @@ class Standing:
 
 
 def standing(hash_: str, base: str, version: str, known: Iterable[Run]) -> Standing:
-    """Return how a study's content stands to what was run; pilots and rehearsals protect nothing.
+    """Return how a study's content relates to the versions that were run; pilots and rehearsals protect nothing.
 
     ``hash_`` and ``base`` are the ``protocol_hash`` of the study as it is edited, and of the file that it is edited
     from, "" for a new study; ``version`` is what the study states.
@@ -445,7 +445,7 @@ def standing(hash_: str, base: str, version: str, known: Iterable[Run]) -> Stand
 
 
 def check_version(version: str, known: Iterable[Run]) -> None:
-    """Refuse what cannot be the version of a content that was not run."""
+    """Refuse a text that cannot be the version of content that was not run."""
     if not _VERSION.fullmatch(version):
         raise Refused(f'"{version}" cannot be a version: write letters, digits, dots, plus and minus, such as 1.2')
     if any(run.sessions and run.version == version for run in known):
@@ -453,7 +453,7 @@ def check_version(version: str, known: Iterable[Run]) -> None:
 
 
 def next_version(version: str) -> str:
-    """Return a version with its last number raised: 1.2 of 1.1; of one without a number, with ".1" added."""
+    """Return a version with its last number raised: 1.2 for 1.1; without a number, with ".1" added."""
     last = re.search(r"(\d+)(\D*)$", version)
     if last is None:
         return f"{version}.1"

@@ -57,7 +57,7 @@ class Outline:
 
 
 def outline(study: Study) -> Outline:
-    """Return the outline of a study, sound or not."""
+    """Return the outline of a study, valid or not."""
     of_root = rows(study.document, ())
     named = [row.path for row in of_root if row.kind == "tables"]
     tables = [row.path for row in of_root if row.kind == "table"]
@@ -80,7 +80,7 @@ def element(study: Study, path: Path, depth: int = 0) -> Element:
 
 
 def title_of(document: Mapping[str, Any], path: Path) -> str:
-    """Return what an element is called: its title in the first language, else its id with blanks and a capital.
+    """Return an element's title in the first language, else its id with spaces and a capital.
 
     An entry of a list without either is called by its first texts.
     """
@@ -109,7 +109,7 @@ def _called(document: Mapping[str, Any], value: Mapping[str, Any]) -> str:
 
 
 def found(document: Mapping[str, Any], path: Path, sought: str, *, named: bool = False) -> bool:
-    """Return whether title, id or any text of an element holds what is looked for, in any language.
+    """Return whether title, id or any text of an element, in any language, contains the text.
 
     ``named`` leaves the texts out, but the title.
     """
@@ -118,7 +118,7 @@ def found(document: Mapping[str, Any], path: Path, sought: str, *, named: bool =
 
 
 def _session(study: Study) -> Iterator[Element]:
-    """Yield every step of every sequence, blocks with what they name, questionnaires with their items."""
+    """Yield the steps of every sequence, blocks with what they refer to, questionnaires with their items."""
     document = study.document
     steps: list[Path] = [(*place, index) for place, listed in sequences_in(document) for index in range(len(listed))]
     things = [(named_at(document, step), step) for step in steps]
@@ -138,7 +138,7 @@ def _session(study: Study) -> Iterator[Element]:
 
 
 def rows_of_blocks(document: Mapping[str, Any]) -> tuple[Row, ...]:
-    """Return what is decided about the main blocks together: their order, where there are several, and hypotheses."""
+    """Return the rows about all main blocks: their order, if there are several, and the hypotheses."""
     blocks = [block for _, block in entries(document, "blocks.*") if isinstance(block, Mapping)]
     several = sum(block.get("phase", "main") == "main" for block in blocks) > 1
     places = [("study", "block_order")] * several + [("analysis", "contrasts")]
@@ -157,7 +157,7 @@ def _texts(value: Any) -> Iterator[str]:
 
 
 def element_of(study: Study, path: Path) -> Path:
-    """Return the element of the outline that a place of the file belongs to."""
+    """Return the path of the outline's element that contains a place of the file."""
     if not path or not has(study.document, path[0]):
         return path[:1] or FIRST
     section = row_at(study.document, path[:1])
@@ -168,7 +168,7 @@ def element_of(study: Study, path: Path) -> Path:
 
 
 def step_of(document: Mapping[str, Any], path: Path) -> Path | None:
-    """Return the place of an element in the list that orders it: its own entry, or the step that names it."""
+    """Return the path that orders an element: its own list entry, or the session step that names it."""
     if path and isinstance(path[-1], int):
         return path
     for place, steps in sequences_in(document):
@@ -179,7 +179,7 @@ def step_of(document: Mapping[str, Any], path: Path) -> Path | None:
 
 
 def position_of(document: Mapping[str, Any], path: Path) -> tuple[int, int] | None:
-    """Return the place of an element among its neighbours, from 1, and how many there are; None without an order."""
+    """Return the position of an element among its neighbours, from 1, and their number; None if they have no order."""
     step = step_of(document, path) if len(path) > 1 else None
     if step is None or not isinstance(step[-1], int):
         return None
@@ -187,7 +187,7 @@ def position_of(document: Mapping[str, Any], path: Path) -> tuple[int, int] | No
 
 
 def first_element(document: Mapping[str, Any]) -> Path:
-    """Return what is selected first: the first step of the session, else the study's own table."""
+    """Return the path of the element that is selected first: the first session step, else the study's table."""
     steps = ((*place, 0) for place, listed in sequences_in(document) if listed)
     return next((named for step in steps if (named := named_at(document, step)) is not None), FIRST)
 
@@ -197,26 +197,26 @@ USED: Final = frozenset({"liquids", "conditions", "tasks", "questionnaires", "sc
 
 
 def kind_of(path: Path) -> str:
-    """Return what an element is: "Block"; "" of a table that is the only one of its kind."""
+    """Return the kind of an element, such as "Block"; "" for a table that is the only one of its kind."""
     if isinstance(path[-1], int):
         return label_of(singular(path[-2]))
     return label_of(singular(path[0])) if len(path) > 1 else ""
 
 
 def kind_and_title(document: Mapping[str, Any], path: Path) -> str:
-    """Return "Condition Water"; the title alone where it says what the element is."""
+    """Return "Condition Water", or the title alone if it names the kind."""
     kind, title = kind_of(path), title_of(document, path)
     return title if title.casefold().startswith(kind.casefold()) else f"{kind} {title}"
 
 
 def place_words(path: Path, line: int | None) -> str:
-    """Return a place in the file with its line, if that is known: "blocks.liquids.order · line 385"."""
+    """Return a place in the file with its line, if known: "blocks.liquids.order · line 385"."""
     place = ".".join(str(step + 1) if isinstance(step, int) else step for step in path)
     return " · ".join(filter(None, (place, "" if line is None else f"line {line}")))
 
 
 def brief(document: Mapping[str, Any], path: Path) -> str:
-    """Return how long a task takes, or how many questions a questionnaire has; "" of other elements."""
+    """Return the duration of a task or the number of questions of a questionnaire; "" for other elements."""
     value = value_at(document, path)
     if not isinstance(value, Mapping) or len(path) != 2:
         return ""
@@ -232,7 +232,7 @@ def brief(document: Mapping[str, Any], path: Path) -> str:
 
 
 def used_by(document: Mapping[str, Any], path: Path) -> str:
-    """Return how many elements use an element, by its name or as the only one: "used by 3 conditions", "not used".
+    """Return how many elements use an element: "used by 3 conditions", "not used".
 
     It is "" of steps and settings.
     """
@@ -267,12 +267,12 @@ class FoundField:
 
 
 def words_sought(text: str) -> list[str]:
-    """Return the words that are looked for, each without the "s" of a plural."""
+    """Return the search words, each without the "s" of a plural."""
     return [part.removesuffix("s") if len(part) > SHORTEST else part for part in text.casefold().split()]
 
 
 def found_fields(study: Study, text: str) -> tuple[FoundField, ...]:
-    """Return the fields whose labels or choices have words that begin so, labels first.
+    """Return the fields whose labels or choices have words beginning with the search words, labels first.
 
     Choices that are not chosen count where no label and nothing that is chosen has the words; sentences count last.
     """
@@ -285,7 +285,7 @@ def found_fields(study: Study, text: str) -> tuple[FoundField, ...]:
 
 
 def found_in_elements(study: Study, text: str) -> Mapping[Path, FoundField]:
-    """Return for each element the first field that was found in it."""
+    """Return the first matching field of each element."""
     first: dict[Path, FoundField] = {}
     for field in found_fields(study, text):
         first.setdefault(field.element, field)
@@ -320,7 +320,7 @@ def _of_table(study: Study, path: Path, above: str, depth: int = 0) -> Iterator[
 
 
 def _found_in(field: tuple[Path, Row, str], parts: list[str]) -> Iterator[FoundField]:
-    """Yield the field where its label has the words; else once for each of its choices that has them."""
+    """Yield the field if its label has the words, else once for each choice that has them."""
     element, row, label = field
     if _has(label, parts):
         yield FoundField(element, row.path, label)
@@ -336,13 +336,13 @@ def _found_in(field: tuple[Path, Row, str], parts: list[str]) -> Iterator[FoundF
 
 
 def _has(text: str, parts: list[str]) -> bool:
-    """Return whether a word of a text begins with each of some parts."""
+    """Return whether each part begins a word of a text."""
     spaced = " " + " ".join(text.casefold().replace("-", " ").replace(",", " ").replace("(", " ").split())
     return all(f" {part}" in spaced for part in parts)
 
 
 def there(document: Mapping[str, Any], path: Path) -> Path:
-    """Return a path, or as much of it as is in the document; a section may be left out; else the study's own table."""
+    """Return the longest existing part of a path; the study's own table if there is none."""
     value: Any = document
     known = path[:1] if path and row_at(document, path[:1]) is not None else FIRST
     for length, step in enumerate(path):

@@ -29,7 +29,7 @@ _MAY_LEAVE_OUT = (("blocks", "task"), ("stimuli", "condition"))
 
 
 def named_at(document: Document, place: Path) -> Path | None:
-    """Return the path of what the text at ``place`` names; None where it names nothing that is there."""
+    """Return the path of what the text at ``place`` refers to; None if it refers to nothing."""
     name = value_at(document, place)
     if not isinstance(name, str):
         return None
@@ -44,12 +44,12 @@ def named_at(document: Document, place: Path) -> Path | None:
 
 
 def references_to(document: Document, thing: Path) -> tuple[Path, ...]:
-    """Return the places of the texts that name a table, as ``("liquids", "water")``, or an item."""
+    """Return the places of the texts that refer to a table, such as ``("liquids", "water")``, or an item."""
     return tuple(place for place, named in named_places(document) if named == thing)
 
 
 def choices_at(document: Document, place: Path) -> tuple[str, ...] | None:
-    """Return the names that a text at ``place`` may have; None where it is not a reference."""
+    """Return the permitted names of a text at ``place``; None if it is not a reference."""
     for pattern in CHOICES:
         if _matches(place, pattern):
             return tuple(name for section in _sections(document, pattern) for name in names(document, section))
@@ -60,12 +60,12 @@ def choices_at(document: Document, place: Path) -> tuple[str, ...] | None:
 
 
 def sections_at(place: Path) -> tuple[str, ...]:
-    """Return the sections whose tables a text at ``place`` may name; none where it names no table."""
+    """Return the sections whose tables a text at ``place`` may refer to; empty if it refers to none."""
     return next((sections for pattern, sections in CHOICES.items() if _matches(place, pattern)), ())
 
 
 def renamed(document: Document, thing: Path, name: str, recorded: frozenset[str] = frozenset()) -> tuple[Edit, ...]:
-    """Return the edits that rename a table or item, and every text that names it.
+    """Return the edits that rename a table or item and all references to it.
 
     Where the name is refused, a free one is proposed that is not one of those with ``recorded`` answers.
     """
@@ -86,12 +86,12 @@ def renamed(document: Document, thing: Path, name: str, recorded: frozenset[str]
 
 
 def id_at(document: Document, thing: Path) -> str:
-    """Return the id of a table or item; "" where there is none."""
+    """Return the id of a table or item; "" if it has none."""
     return str(_item_id(document, thing) or thing[-1]) if value_at(document, thing) is not None else ""
 
 
 def suggested_id(document: Document, thing: Path, recorded: frozenset[str] = frozenset()) -> str:
-    """Return the free id that the text of a table or item gives in the first language; "" for its own, or no text."""
+    """Return a free id made from the text of a table or item; "" if it equals the id or there is no text."""
     text = value_at(document, (*thing, "text" if _item_id(document, thing) is not None else "title"))
     if isinstance(text, Mapping):
         text = text.get(languages_of(document)[0])
@@ -102,7 +102,7 @@ def suggested_id(document: Document, thing: Path, recorded: frozenset[str] = fro
 
 
 def taken_beside(document: Document, thing: Path) -> set[str]:
-    """Return the names that a table or item cannot have, since others have them."""
+    """Return the names that other tables or items already have."""
     if _item_id(document, thing) is None:
         node = value_at(document, thing[:-1])
         return {*(tuple(node) if isinstance(node, Mapping) else ())} - {str(thing[-1])}
@@ -110,12 +110,12 @@ def taken_beside(document: Document, thing: Path) -> set[str]:
 
 
 def replaced(document: Document, thing: Path, other: str) -> tuple[Edit, ...]:
-    """Return the edits that delete a thing and let everything that named it name another one."""
+    """Return the edits that delete an element and redirect its references to another one."""
     return (*(Set(place, other) for place in references_to(document, thing)), Unset(thing))
 
 
 def with_references(document: Document, thing: Path, needs: Callable[[Path], bool]) -> tuple[Path, ...]:
-    """Return the paths of all that must go with a thing, itself last: list entries, keys and whole tables.
+    """Return the paths that must be deleted with an element, itself last: list entries, keys and whole tables.
 
     A table whose key ``needs`` says that it cannot be without goes too, and so does one whose list would be empty.
     """
@@ -141,7 +141,7 @@ def with_references(document: Document, thing: Path, needs: Callable[[Path], boo
 
 
 def deletions(paths: Iterable[Path]) -> tuple[Edit, ...]:
-    """Return the edits that remove all of these paths: later entries of an array first, nothing twice."""
+    """Return the edits that remove these paths: later entries of an array first, nothing twice."""
     every = set(paths)
     outer = [path for path in every if not any(path[:length] in every for length in range(1, len(path)))]
     return tuple(
@@ -155,7 +155,7 @@ def deletions(paths: Iterable[Path]) -> tuple[Edit, ...]:
 
 
 def check_id(name: str, free: str = "") -> None:
-    """Refuse what is not an id, and propose one that is."""
+    """Refuse an invalid id and propose a valid one."""
     plain = name.isascii() and name.replace("_", "a").isalnum() and name == name.lower()
     if not plain or not name[:1].isalpha() or len(name) > MAX_ID:
         rule = f"at most {MAX_ID} small letters, digits and underscores, a letter first"
@@ -172,7 +172,7 @@ def _covered(path: Path, outer: Iterable[Path]) -> bool:
 
 
 def named_places(document: Document) -> Iterator[tuple[Path, Path]]:
-    """Yield every place of a text that names something, with what it names."""
+    """Yield every place of a reference with its target."""
     for pattern in CHOICES:
         for place, name in entries(document, pattern):
             for section in _sections(document, pattern):
@@ -187,7 +187,7 @@ def named_places(document: Document) -> Iterator[tuple[Path, Path]]:
 
 
 def uses(document: Document) -> Iterator[tuple[Path, Path]]:
-    """Yield what `named_places` does, and each key that is left out with the only table that it may name."""
+    """Yield every reference, and each omitted key with the only table that it can mean."""
     yield from named_places(document)
     for section, key in _MAY_LEAVE_OUT:
         (of,) = _sections(document, f"{section}.*.{key}")
@@ -195,7 +195,7 @@ def uses(document: Document) -> Iterator[tuple[Path, Path]]:
 
 
 def left_without(document: Document, things: Iterable[Path]) -> tuple[Path, ...]:
-    """Return the keys that are left out and mean nothing any more once all of these tables are gone."""
+    """Return the omitted keys that mean nothing once all of these tables are deleted."""
     gone = set(things)
     meant: dict[Path, set[Path]] = {}
     for place, named in _uses_in_turn(document):
@@ -205,7 +205,7 @@ def left_without(document: Document, things: Iterable[Path]) -> tuple[Path, ...]
 
 
 def _uses_in_turn(document: Document) -> Iterator[tuple[Path, Path]]:
-    """Yield what `uses` does, and what a key that is left out means once a study has no conditions any more."""
+    """Yield what `uses` yields, and the meaning of omitted keys once the study has no conditions."""
     yield from uses(document)
     if "conditions" in document:
         yield from _left_out(document, "stimuli", "condition", "liquids")
@@ -234,7 +234,7 @@ def _item_id(document: Document, thing: Path) -> str | None:
 
 
 def _in_reach(place: Path, item: Path) -> bool:
-    """Return whether a text can name an item: within a questionnaire only those of the same one."""
+    """Return whether a text may refer to an item: within a questionnaire only to its own items."""
     return place[0] != item[0] or place[1] == item[1]
 
 
@@ -249,7 +249,7 @@ OWN = "own description"
 
 
 def node_at(document: Any, path: Path) -> tuple[Node, ...]:
-    """Return the schema's alternatives for the value at ``path``, there or not; none where no value is permitted."""
+    """Return the schema's alternatives for the value at ``path``, present or not; none if no value is permitted."""
     nodes: list[Node] = [schema()]
     for step in path:
         nodes = [child for node in (table_of(tuple(nodes), document),) if node for child in _children(node, step)]
@@ -259,7 +259,7 @@ def node_at(document: Any, path: Path) -> tuple[Node, ...]:
 
 
 def table_of(nodes: tuple[Node, ...], value: Any) -> Node | None:
-    """Return the alternative that a table or array is of: the one whose fixed key, such as ``kind``, is the value's."""
+    """Return the alternative of a table or array whose fixed key, such as ``kind``, matches the value."""
     if isinstance(value, Mapping):
         tables = [node for node in nodes if node.get("type") == "object"]
         return next((node for node in tables if _is_of(node, tables, value)), tables[0] if tables else None)
@@ -269,7 +269,7 @@ def table_of(nodes: tuple[Node, ...], value: Any) -> Node | None:
 
 
 def tags(nodes: tuple[Node, ...]) -> tuple[str, dict[str | None, Node]]:
-    """Return the key that distinguishes the tables, and the table for each of its values; None: the key is left out."""
+    """Return the key that distinguishes the tables, and the table of each of its values; None: the key is omitted."""
     tables = [node for node in nodes if node.get("type") == "object" and "properties" in node]
     if len(tables) < 2:
         return "", {}
@@ -292,7 +292,7 @@ def alternatives(node: Node) -> Iterator[Node]:
 
 
 def _joined(around: Node, node: Node) -> Node:
-    """Return a node with the words around the union that it is of; its own description is `OWN` then."""
+    """Return a node with the keys of the union around it; `OWN` keeps the node's own description."""
     own = {OWN: node["description"]} if "description" in node and OWN not in node else {}
     return {**node, **own, **around}
 
@@ -309,7 +309,7 @@ def _is_of(node: Node, tables: list[Node], value: Mapping[str, Any]) -> bool:
 
 
 def _tells_apart(key: str, tables: list[Node]) -> bool:
-    """Return whether the key has different fixed values in each table; one table may lack the key."""
+    """Return whether the key has another fixed value in each table; one table may lack it."""
     values = [_values(node, key) for node in tables]
     every = [value for some in values for value in some]
     return sum(map(bool, values)) >= len(tables) - 1 and len(every) == len(set(every))
@@ -441,13 +441,13 @@ def rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
 
 
 def sections_of(document: Mapping[str, Any], path: Path) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    """Return the sections that the model of a table declares: each heading with its keys; keys in none come last."""
+    """Return the form sections of a table's model, each heading with its keys; other keys come last."""
     node = table_of(node_at(document, path), value_at(document, path)) or {}
     return tuple((heading, tuple(keys)) for heading, keys in node.get(SECTIONS, ()))
 
 
 def refused_at(document: Mapping[str, Any], path: Path) -> frozenset[str]:
-    """Return the keys that do not belong to a table with its present values."""
+    """Return the keys that a table with its present values does not permit."""
     table = value_at(document, path)
     node = table_of(node_at(document, path), table) or {}
     if not isinstance(table, Mapping):
@@ -575,7 +575,7 @@ def why_not(document: Mapping[str, Any], row: Row, number: float) -> str:
 
 
 def label_of(step: str | int) -> str:
-    """Return a key in words, without its unit: "Force limit" of ``force_limit_n``; of an entry its number."""
+    """Return a key in words without its unit: "Force limit" for ``force_limit_n``; for an entry its number."""
     if isinstance(step, int):
         return str(step + 1)
     if step in LABELS:
@@ -595,7 +595,7 @@ def _suffix(key: str) -> str:
 
 
 def _sentences(description: str) -> dict[str, str]:
-    """Return the sentence of each value in a description such as "fixed: as written; shuffled: anew in every trial"."""
+    """Return the sentence about each value in a description such as "fixed: as written; shuffled: anew each trial"."""
     return {value: match[2].strip() for match in _SENTENCES.finditer(description) for value in match[1].split(", ")}
 
 
@@ -662,7 +662,7 @@ def _initial(document: Mapping[str, Any], row: Row, node: Node) -> Any:
 
 
 def _tables(document: Mapping[str, Any], path: Path, node: Node) -> list[Any]:
-    """Return the least number of tables of a list, each with its required keys; or of lists, as of sequences."""
+    """Return the minimum number of tables of a list, each with its required keys, or of lists for sequences."""
     tables: list[Any] = []
     for number in range(max(1, node.get("minItems", 1))):
         place = (*path, number)

@@ -448,7 +448,7 @@ class GoTo:
 
 
 def with_path(asked: Any, before: Path, after: Path) -> Any:
-    """Return a request, or a path, in which the path of an element is another one, as after a new id."""
+    """Return a request or path with one element's path replaced, as after a new id."""
     if isinstance(asked, tuple):
         if asked[: len(before)] == before:
             return (*after, *asked[len(before) :])
@@ -460,7 +460,7 @@ def with_path(asked: Any, before: Path, after: Path) -> Any:
 
 
 def _beside(study: Study, edits: tuple[Edit, ...], original: Path, copy: Path) -> tuple[Edit, ...]:
-    """Return edits that add an element, with its step in the session right after that of another one."""
+    """Return the edits that add an element, with its session step right after the original's."""
     after, _ = study.edited(*edits)
     first, step = step_of(after.document, original), step_of(after.document, copy)
     if first is None or step is None or step == copy or step[:-1] != first[:-1]:
@@ -485,7 +485,7 @@ def index_of(path: Path) -> int:
 
 
 def _first_value(study: Study, path: Path) -> Any:
-    """Return the default of a key, or an initial value; of a table with the keys that it needs."""
+    """Return the default of a key, or an initial value; for a table with its required keys."""
     value = _listed(initial(study.document, path))
     if value != {}:
         return value
@@ -495,7 +495,7 @@ def _first_value(study: Study, path: Path) -> Any:
 
 
 def _listed(value: Any) -> Any:
-    """Return a value as it is written: lists in place of tuples, and no keys of tables that are left out."""
+    """Return a value as TOML writes it: lists instead of tuples, and no omitted keys."""
     if isinstance(value, Mapping):
         return {key: _listed(part) for key, part in value.items() if part is not None}
     return [_listed(part) for part in value] if isinstance(value, list | tuple) else value

@@ -35,7 +35,7 @@ class Study:
 
     @cached_property
     def _read(self) -> tuple[dict[str, Any] | None, Places, tuple[Problem, ...]]:
-        """The document with the files that it names and its line numbers; None and the reason if it is not TOML."""
+        """The document with the files that it names and its line numbers; None and the problem if it is not TOML."""
         try:
             return *read_document(self._source, ""), ()
         except ProtocolError as error:
@@ -84,7 +84,7 @@ class Study:
 
     @property
     def unreadable(self) -> bool:
-        """Whether there is only a text: it cannot be read, and no text before it could be."""
+        """Whether the text cannot be read as TOML and no earlier text could."""
         return not self.is_toml and not self.before
 
     def needs(self, place: Path) -> bool:
@@ -121,7 +121,7 @@ class Study:
 
 
 def read(source: bytes, folder: File = File()) -> Study:
-    """Return the study from a file's bytes; a byte order mark is no part of its text."""
+    """Return the study in a file's bytes, without a byte order mark."""
     if is_utf16(source):
         raise Refused("this is UTF-16 text: save the file as UTF-8")
     try:

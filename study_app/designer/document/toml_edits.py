@@ -33,7 +33,7 @@ _BLANK_LINE: Final = re.compile(r"[ \t]*(?:\r?\n|\Z)")
 
 
 def replace_value(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
-    """Replace the value that is written at ``path``; a comment behind it stays in its column where possible."""
+    """Replace the value at ``path``; a comment behind it keeps its column if possible."""
     node = spans.node(path)
     if node is None or node.kind in {"table", "array table"}:
         raise Refused("a table with headers cannot become a value in place")
@@ -57,7 +57,7 @@ def replace_value(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
 
 
 def add_key(spans: Spans, edit: Editor, path: Path, value: Any, after: str | None = None) -> None:
-    """Add a key that is not there to a table that is; ``after`` names the key or table that it comes after."""
+    """Add a missing key to an existing table; ``after`` names the key or table before it."""
     parent, pieces = path[:-1], spans.pieces(path[:-1])
     owner = spans.node(parent)
     if parent and not pieces:
@@ -76,7 +76,7 @@ def add_key(spans: Spans, edit: Editor, path: Path, value: Any, after: str | Non
 
 
 def _with_header(spans: Spans, path: Path, value: Any) -> bool:
-    """Return whether a new table gets a header: as its neighbours have, at the root, or where it fills more lines."""
+    """Return whether a new table gets a header: its neighbours have one, it is at the root, or needs several lines."""
     if isinstance(value, list | tuple):
         if not value or not all(isinstance(entry, Mapping) and entry for entry in value):
             return False
@@ -153,7 +153,7 @@ def _add_pair(spans: Spans, edit: Editor, owner: Node, path: Path, value: Any) -
 
 
 def _add_dotted(spans: Spans, edit: Editor, piece: Piece, path: Path, value: Any) -> None:
-    """Add a key to a table that is written with dotted keys: after the last one, with the same beginning."""
+    """Add a key to a table written with dotted keys: after the last one, with the same beginning."""
     node, text = piece.node, spans.text
     parts = node.parts[: len(path) - 1 - (len(node.path) - len(node.parts))]
     key = f"{text[parts[0][0] : parts[-1][1]]}.{key_text(str(path[-1]))} = "
@@ -176,7 +176,7 @@ def remove_key(spans: Spans, edit: Editor, path: Path) -> None:
 
 
 def blank_before(text: str, piece: Piece) -> int:
-    """Return where to begin a deletion: before the blank lines above, if a blank line or the end follows."""
+    """Return the start of a deletion: before the blank lines above, if a blank line or the end follows."""
     start = piece.start
     if not _BLANK_LINE.match(text, piece.end):
         return start
@@ -222,7 +222,7 @@ def _renamed(spans: Spans, piece: Piece, depth: int, name: str) -> str:
 
 
 def _key_parts(spans: Spans, path: Path) -> Iterator[tuple[int, int]]:
-    """Yield where the last step of a path is written, in headers and keys."""
+    """Yield the positions of a path's last step in headers and keys."""
     depth = len(path) - 1
     for node in spans.nodes:
         if node.path[: depth + 1] != path or not node.parts:
@@ -290,7 +290,7 @@ def _indent(spans: Spans, slot: Slot) -> str:
 
 
 def _append(spans: Spans, edit: Editor, last: Slot, body: str, tail: str = "") -> None:
-    """Add lines after the line on which an entry ends, with a comment behind; a missing comma is added before them."""
+    """Add lines after the line on which an entry ends, keeping its comment; add a missing comma."""
     newline = spans.newline
     comma = _TO_COMMA.match(spans.text, last.end)
     if comma is None:
@@ -486,12 +486,12 @@ def apply(text: str, edit: Edit) -> tuple[str, tuple[Splices, ...]]:
 
 @lru_cache(maxsize=4)
 def _read(text: str) -> Document:
-    """Return the document of a text, which must not be changed."""
+    """Return the document of a text; it must not be changed."""
     return tomllib.loads(text)
 
 
 def meaning(document: Mapping[str, Any], edit: Edit) -> Document:
-    """Return the document that an edit means; what it does not change is shared with the document before."""
+    """Return the document after an edit; unchanged parts are shared with the document before."""
     meant: Document = dict(document)
     *parent, last = edit.path
     if isinstance(edit, Set):
@@ -525,7 +525,7 @@ def meaning(document: Mapping[str, Any], edit: Edit) -> Document:
 
 
 def _own(document: Document, path: Iterable[str | int], *, makes: bool = False) -> Any:
-    """Return what is at a path as the document's own: tables and arrays on the way are copied, the rest is shared."""
+    """Return the document's own value at a path: tables and arrays on the way are copied, the rest is shared."""
     node: Any = document
     for step in path:
         absent = isinstance(node, dict) and isinstance(step, str) and step not in node
@@ -582,7 +582,7 @@ def _check_value(value: Any) -> None:
 
 
 def check_encodable(text: str) -> None:
-    """Refuse a text that UTF-8 cannot write."""
+    """Refuse a text that cannot be encoded in UTF-8."""
     if any("\ud800" <= letter <= "\udfff" for letter in text):
         raise Refused("the text holds half a character, which UTF-8 cannot write: type it again")
 
@@ -608,7 +608,7 @@ def _words(path: Path) -> str:
 
 
 def _parts(document: Document, edit: Edit) -> Iterator[Edit]:
-    """Yield edits that are one step of writing each."""
+    """Yield edits that each change one place of the text."""
     if not isinstance(edit, Set):
         yield edit
         return
@@ -625,7 +625,7 @@ def _parts(document: Document, edit: Edit) -> Iterator[Edit]:
 
 
 def _changes(path: Path, old: Any, new: Any) -> Iterator[Edit]:
-    """Yield the fewest edits that turn one value into another; what stays keeps its place and comments."""
+    """Yield the fewest edits that turn one value into another; unchanged parts keep place and comments."""
     if same(old, new):
         return
     if isinstance(old, dict) and isinstance(new, Mapping) and new:
@@ -680,7 +680,7 @@ def _write(spans: Spans, editor: Editor, edit: Edit) -> None:
 
 
 def _written_apart(spans: Spans, path: Path) -> bool:
-    """Return whether a value is written with headers or dotted keys, so that another one cannot be put in its place."""
+    """Return whether a value is written with headers or dotted keys, so that it cannot be replaced in place."""
     node = spans.node(path)
     apart = node.kind in {"table", "array table"} if node is not None else bool(spans.pieces(path))
     if apart and isinstance(path[-1], int):
@@ -689,7 +689,7 @@ def _written_apart(spans: Spans, path: Path) -> bool:
 
 
 def _pruned(document: Document, path: Path) -> Document:
-    """Return a document without the tables and arrays around ``path`` that hold nothing: TOML may not write them."""
+    """Return a document without the empty tables and arrays around ``path``, which TOML may not write."""
     for length in range(len(path), 0, -1):
         node: Any = document
         for step in path[: length - 1]:

@@ -40,7 +40,7 @@ class Editor:
         self._found: list[Splice] = []
 
     def replace(self, start: int, end: int, after: str) -> None:
-        """Replace the text from ``start`` to ``end``; nothing is kept of a replacement that changes nothing."""
+        """Replace the text from ``start`` to ``end``; a replacement without a change is dropped."""
         if (before := self.text[start:end]) != after:
             self._found.append(Splice(start, before, after))
 
@@ -48,12 +48,12 @@ class Editor:
         self.replace(at, at, after)
 
     def delete(self, start: int, end: int) -> None:
-        """Delete a piece; of pieces that overlap, what they cover together."""
+        """Delete a piece; overlapping deletions are joined."""
         self.replace(start, end, "")
 
     @property
     def splices(self) -> Splices:
-        """What was collected, overlapping deletions joined."""
+        """The collected splices, overlapping deletions joined."""
         joined: list[Splice] = []
         for splice in sorted(self._found, key=lambda splice: splice.at):
             if joined and splice.at < (end := joined[-1].at + len(joined[-1].before)):
@@ -67,7 +67,7 @@ class Editor:
 def common_ends(
     old: Sequence[Any], new: Sequence[Any], same: Callable[[Any, Any], bool] = operator.eq
 ) -> tuple[int, int]:
-    """Return how many letters or entries two texts or arrays have in common at the beginning, and then at the end."""
+    """Return the number of equal letters or entries at the beginning and at the end of two texts or arrays."""
     shortest, first, last = min(len(old), len(new)), 0, 0
     while first < shortest and same(old[first], new[first]):
         first += 1
@@ -89,7 +89,7 @@ def applied(text: str, splices: Iterable[Splice]) -> str:
 
 
 def reverted(splices: Splices) -> Splices:
-    """Return the splices that undo these in the text that they produced."""
+    """Return the splices that undo these in the resulting text."""
     shift, undoing = 0, list[Splice]()
     for at, before, after in splices:
         undoing.append(Splice(at + shift, after, before))
@@ -102,12 +102,12 @@ _ENDS: Final = re.compile("\r\n|\r|\u2029")
 
 
 def shown(text: str) -> str:
-    """Return a text with line feeds alone."""
+    """Return a text with line feeds only."""
     return _ENDS.sub("\n", text)
 
 
 def retyped(text: str, typed: str) -> str:
-    """Return a text with its own ends of lines after what was typed in the pane."""
+    """Return the typed text with the line ends of the original text."""
     old, newline = shown(text), "\r\n" if "\r\n" in text else "\n"
     first, last = common_ends(old, typed)
     begin, end = _original(text, first), _original(text, len(old) - last)
@@ -115,7 +115,7 @@ def retyped(text: str, typed: str) -> str:
 
 
 def _original(text: str, place: int) -> int:
-    """Return where a place of the shown text is in the file's text."""
+    """Return the position in the file's text of a position in the shown text."""
     for match in _ENDS.finditer(text):
         if match.start() >= place:
             break
@@ -155,7 +155,7 @@ class Slot(NamedTuple):
 
 @lru_cache(maxsize=4)
 def spans_of(text: str) -> Spans:
-    """Return where everything of a TOML text is written."""
+    """Return the source span of every key and value in a TOML document."""
     return Spans(text)
 
 
@@ -171,11 +171,11 @@ class Spans:
         self._starts = [node.start for node in self._lines]
 
     def node(self, path: Path) -> Node | None:
-        """Return the header, key or entry of a path; None where it is only a part of others' paths, or not there."""
+        """Return the header, key or entry at a path; None if it exists only as a part of other paths, or not at all."""
         return self._by_path.get(path)
 
     def pieces(self, path: Path) -> list[Piece]:
-        """Return everything that makes up the value at ``path``, in order.
+        """Return all pieces of the value at ``path``, in order.
 
         A table may be written as several headers and dotted keys, which need not be next to each other.
         """
@@ -194,7 +194,7 @@ class Spans:
         return Piece(node, self.owned_start(node), self.line_end(last))
 
     def last_of(self, header: Node | None) -> Node | None:
-        """Return the last key of a header's section, the header where it has none; None stands for the root."""
+        """Return the last key in a header's section, the header if it has none; None stands for the root."""
         place = -1 if header is None else self._place(header)
         last = header
         for node in self._lines[place + 1 :]:
@@ -214,14 +214,14 @@ class Spans:
         return (node for node in self._lines if node.kind != "key")
 
     def line_end(self, node: Node | None) -> int:
-        """Return where the line ends on which a header or key ends, after its comment and line break."""
+        """Return the end of the line that ends a header or key, after its comment and line break."""
         if node is None:
             return 0
         rest = _REST.match(self.text, node.end)
         return rest.end() if rest else node.end
 
     def owned_start(self, node: Node) -> int:
-        """Return where a header or key begins with its line and the comments right above it."""
+        """Return the start of a header or key with its line and the comments directly above."""
         place = self._place(node)
         return self._with_comments(node.start, self.line_end(self._lines[place - 1]) if place else 0)
 
@@ -232,7 +232,7 @@ class Spans:
         return self.text.rfind("\n", 0, position) + 1
 
     def _with_comments(self, position: int, floor: int) -> int:
-        """Return where the comments right above the line of ``position`` begin, not before ``floor``."""
+        """Return the start of the comments directly above the line of ``position``, not before ``floor``."""
         start = max(self._line_start(position), floor)
         while start > floor:
             above = self._line_start(start - 1)
@@ -337,6 +337,6 @@ def _string(value: str, like: str, newline: str) -> str:
 
 
 def _indent_in(array: str, indent: str) -> str:
-    """Return by how much the entries of an array are indented."""
+    """Return the indent of an array's entries."""
     match = re.search(r"\n([ \t]*)[^\s#\]]", array)
     return match.group(1).removeprefix(indent) if match else INDENT

@@ -94,7 +94,7 @@ class EitherField(Field):
         return replace(row, **values_of(row.either[row.number or 0]))
 
     def _switch(self, at: int) -> None:
-        """Ask for a value of another kind, made of the one there is as far as that goes."""
+        """Request a value of another kind, converted from the present one as far as possible."""
         if at == self.row.number:
             return
         to, value = self.row.either[at], self.row.value
@@ -222,7 +222,7 @@ class RowWidget(Themed, QWidget):
 
     @cached_property
     def wrong(self) -> FaultLine:
-        """What is wrong, below the editor; made when it is first needed."""
+        """The faults below the editor; made on first use."""
         made = FaultLine()
         column = self.layout()
         assert isinstance(column, QVBoxLayout)  # noqa: S101 - made so
@@ -232,7 +232,7 @@ class RowWidget(Themed, QWidget):
         return made
 
     def _remove(self) -> None:
-        """Ask to remove the key; what is being typed is handed on before, else it would come back with that."""
+        """Ask to remove the key; typed text is handed on first, otherwise it would restore the key."""
         for part in self.field.findChildren(QWidget):
             if isinstance(part, TypedLine | TypedText):
                 part.flush()
@@ -256,7 +256,7 @@ class RowWidget(Themed, QWidget):
         self.say()
 
     def begin(self, row: FormRow) -> None:
-        """Show a row of another element: nothing typed, refused or selected in this one stays."""
+        """Show a row of another element: nothing typed, refused or selected remains."""
         for field in (self.field, *self.field.findChildren(Field)):
             field.refusal = ""
         typed = [part for part in self.field.findChildren(QWidget) if isinstance(part, TypedLine | TypedText)]
@@ -292,7 +292,7 @@ class RowWidget(Themed, QWidget):
                 part.show_refused(bool(self.row.faults) and blamed)
 
     def show_repairs(self, known: Mapping[ProblemRow, tuple[str, ...]]) -> None:
-        """Offer the repairs of the problems of this row, of each the first; none that reads like another one."""
+        """Offer the first repair of each problem of this row, without repairs that read alike."""
         path = self.row.path
         offered = {
             problem: sentences
@@ -343,7 +343,7 @@ class RowWidget(Themed, QWidget):
 
 
 def special_editor_of(row: FormRow) -> SpecialEditor | None:
-    """Return the special editor of a row, None where its kind's editor is used."""
+    """Return the special editor of a row, None if the editor of its kind is used."""
     return EDITORS.get((row.model, str(row.path[-1])))
 
 
@@ -354,7 +354,7 @@ def is_wide(row: FormRow) -> bool:
 
 
 def structure_of(row: FormRow) -> object:
-    """Return what makes another editor of a row necessary."""
+    """Return the part of a row's state that, when it changes, requires a new editor."""
     special, own = special_editor_of(row), row
     inner = own.either[row.number or 0].kind if own.either else ""
     choices = tuple(choice.value for choice in own.choices) if own.kind in {"choice", "choices", "kind"} else ()
@@ -612,13 +612,13 @@ class FormCard(Card):
         self.foot.setVisible(self.height() >= FOOT_FROM)
 
     def _ask(self, asked: object) -> None:
-        """Ask for a step; a rename leaves the form at its element."""
+        """Request a step; after a rename the form stays at its element."""
         before, self._renames = self._renames, isinstance(asked, RenameElement | LeaveText)
         self.asked.emit(asked)
         self._renames = before
 
     def show_form(self, form: Form, *, read_only: bool) -> None:
-        """Show a form: parts that it has already stay as they are, others are made, the rest goes."""
+        """Show a form: existing parts stay, missing ones are made, the rest is removed."""
         before = self.form
         stays = before is not None and (
             form.path == before.path or (self._renames and form.path[:-1] == before.path[:-1])
@@ -644,7 +644,7 @@ class FormCard(Card):
         self.show_help()
 
     def _show_parts(self, form: Form, before: Form | None) -> None:
-        """Show what a form is made of; ``before`` is the form of the same element before, None for another element."""
+        """Show the parts of a form; ``before`` is the previous form of the same element, None for another element."""
         lines = form.questions.lines
         at = next((at for at, line in enumerate(lines) if line.path == form.path), 0)
         self.above.show_lines(lines[:at], form.questions.languages if lines else ())
@@ -678,7 +678,7 @@ class FormCard(Card):
             self._refocus(form, before, gone)
 
     def _refocus(self, form: Form, before: Form | None, gone: QWidget) -> None:
-        """Give the keyboard of a part that is gone to the row in its place, or that it added; else to the first row."""
+        """Move a removed part's keyboard focus to the row in its place or the row it added; else to the first row."""
         path: Path | None = None
         if before is not None and isinstance(gone, RowWidget):
             path = gone.row.path
@@ -694,7 +694,7 @@ class FormCard(Card):
             remove_widget(part)
 
     def _wanted(self, form: Form) -> Iterator[tuple[object, Callable[[], QWidget], FormRow | None]]:
-        """Yield the parts of a form from top to bottom: what tells each apart, what makes it, and its row."""
+        """Yield the parts of a form from top to bottom: identity, factory and row."""
         for number, section in enumerate(form.sections):
             at = form.path[:1], section.title, section.path[len(form.path) :]
             if number:
@@ -726,7 +726,7 @@ class FormCard(Card):
         self.asked.emit(AddKey(self._now(inner)))
 
     def _now(self, inner: Path) -> Path:
-        """Return the path of a part of the element that is shown."""
+        """Return the path of a part of the shown element."""
         return inner if self.form is None else (*self.form.path, *inner)
 
     def _heading(self, section: Section, *, removable: bool) -> QWidget:
@@ -759,7 +759,7 @@ class FormCard(Card):
                 part.flush()
 
     def _reveal(self, row: QWidget) -> None:
-        """Scroll to a row, and in a high row to the part with the keyboard; rows made just now are laid out before."""
+        """Scroll to a row, or to the focused part of a high row; new rows are laid out first."""
         QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)
         self.area.ensureWidgetVisible(row, 0, 40)
         keyboard = self.window().focusWidget()
@@ -771,7 +771,7 @@ class FormCard(Card):
         return max(around, key=lambda row: len(row.row.path), default=None)
 
     def focus(self, path: Path) -> bool:
-        """Give the keyboard to the row of a place and scroll; return whether there is one.
+        """Focus the row of a place and scroll to it; return whether there is one.
 
         A key that the file does not have has a button that adds it instead.
         """
@@ -791,7 +791,7 @@ class FormCard(Card):
             self.focus(self.rows[0].row.path)
 
     def focus_first_text(self, *, filled: bool) -> None:
-        """Give the keyboard to the first text, marked, before it to an empty one unless all are filled in.
+        """Focus the first text and select it; an empty one comes first unless all are filled in.
 
         A form without texts gives it to its first row.
         """
@@ -810,7 +810,7 @@ class FormCard(Card):
         self._reveal(row)
 
     def refuse(self, path: Path, sentence: str) -> None:
-        """Say at the field of a place why it was not changed."""
+        """Show at the field of a place why it was not changed."""
         if (row := self._row_of(path)) is not None:
             row.refusal = sentence
             row.say()

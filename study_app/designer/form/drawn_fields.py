@@ -77,7 +77,7 @@ class LevelAxis:
 
 
 def level_axis(study: Study, row: Row) -> LevelAxis | None:
-    """Return the axis of a stimulus' levels; None where they make no sense."""
+    """Return the axis of a stimulus' levels; None if they are invalid."""
     try:
         stimulus = Stimulus.model_validate(value_at(study.document, row.path[:-1]))
     except ValidationError:
@@ -290,7 +290,7 @@ def trial_strip(study: Study, row: Row) -> TrialStrip | None:
 
 
 def _length(task: AnyTask) -> str:
-    """Return the key that says how long a task takes."""
+    """Return the key that holds the duration of a task."""
     return next((key for key in ("count", "duration_s", "cycles", "max_s") if getattr(task, key, None)), "kind")
 
 
@@ -419,7 +419,7 @@ class StripView(Extra, Themed, QWidget):
 
 
 def _widths(phases: tuple[Phase, ...], whole: float) -> list[float]:
-    """Return how wide each phase is: wide enough for its words, and the longer it is, the wider."""
+    """Return the widths of the phases: wide enough for their texts, and longer phases are wider."""
     metrics = QFontMetrics(font("small"))
     least_widths = [max(map(metrics.horizontalAdvance, (phase.name, phase.duration))) + GAP for phase in phases]
     rest, total = max(0.0, whole - sum(least_widths)), sum(phase.duration_s for phase in phases) or 1.0

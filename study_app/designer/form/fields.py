@@ -42,7 +42,7 @@ KEYS_OF_PLACE = (QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo, Q
 
 
 def removes_key(event: QKeyEvent) -> bool:
-    """Return whether a key removes the field's key from the file."""
+    """Return whether a key press removes the field's key from the file."""
     return QKeySequence(event.keyCombination()) == QKeySequence(keys_of("remove")[0])
 
 
@@ -82,7 +82,7 @@ class _Typed(_Base):
             self.typed.emit(self.words())
 
     def _flush_after_click(self) -> None:
-        """Hand on what was typed, once no button is pressed and no list is open: another form would take it away."""
+        """Hand on the typed text once no button is pressed and no list is open, since another form would discard it."""
         if QApplication.mouseButtons() == Qt.MouseButton.NoButton and QApplication.activePopupWidget() is None:
             self.flush()
             if not self.hasFocus():
@@ -91,7 +91,7 @@ class _Typed(_Base):
             self._rest.start(CLICK_MS)
 
     def accept(self) -> None:
-        """Hand on what was typed; Esc restores it from now on, unless it is refused."""
+        """Hand on the typed text; from now on Esc restores it, unless it is refused."""
         self.flush()
         if self.property("state") != "refused":
             self._before = self.words()
@@ -100,23 +100,23 @@ class _Typed(_Base):
         raise NotImplementedError
 
     def nothing_to_delete(self) -> bool:
-        """Return whether all of the text is marked, or nothing is and the caret is at its end; other languages: empty.
+        """Return whether all text is selected, or none with the caret at the end, and other languages are empty.
 
         No key removes a text that is not.
         """
         return self.at_end() and not any(field.words() for field in self.beside if field is not self)
 
     def at_end(self) -> bool:
-        """Return whether the caret is at the end of a text of which nothing or all is marked."""
+        """Return whether the caret is at the end of a text of which nothing or all is selected."""
         raise NotImplementedError
 
     def begin_value(self) -> None:
-        """Take what is shown as the value of another element: nothing is refused, and Esc restores it."""
+        """Take the shown text as the value of another element: nothing is refused, and Esc restores it."""
         self.show_refused(False)
         self._before = self.words()
 
     def restore(self) -> None:
-        """Hand on what was there when the keyboard came."""
+        """Restore the text that was there when the field got the keyboard focus."""
         self._rest.stop()
         self.pending = False
         if self.words() != self._before:
@@ -128,11 +128,11 @@ class _Typed(_Base):
         raise NotImplementedError
 
     def show_refused(self, yes: bool) -> None:
-        """Give the field the edge of one whose text is refused, or take it away."""
+        """Mark the field as refused, or remove the mark."""
         set_property(self, "state", "refused" if yes else "")
 
     def leaves_to_place(self, event: QEvent) -> bool:
-        """Return whether a key is the place's, whose undo is for the whole study."""
+        """Return whether a key belongs to the page, such as undo, which is for the whole study."""
         if event.type() != QEvent.Type.ShortcutOverride or not isinstance(event, QKeyEvent):
             return False
         if not any(event.matches(key) for key in KEYS_OF_PLACE):
@@ -223,7 +223,7 @@ class TypedText(_Typed, QPlainTextEdit):
         self.textChanged.connect(self._note_change)
 
     def _note_change(self) -> None:
-        """Note what was typed; Qt says so of another font or margin, too."""
+        """Note typed text; Qt also emits the signal for another font or margin."""
         if self.words() != self._known:
             self._known = self.words()
             if not self._showing:
@@ -328,7 +328,7 @@ class Field(Themed, QWidget):
         self.show_extra()
 
     def add_extra(self, extra: QWidget) -> None:
-        """Add what shows the facts of the row, below the editor; an `Extra` at its right where there is room."""
+        """Add a widget with the row's facts below the editor; an `Extra` goes to its right if there is room."""
         self.extra = extra
         self.outer.addWidget(extra, 0, Qt.AlignmentFlag.AlignVCenter)
         self.show_extra()
@@ -362,7 +362,7 @@ class Field(Themed, QWidget):
         self.asked.emit(SetValue(self.row.path, value, typing))
 
     def placeholder(self) -> str:
-        """Return what counts where nothing is written."""
+        """Return the value that applies if the key is omitted."""
         default = self.row.default
         if default in (None, "", [], {}):
             return ""
@@ -392,7 +392,7 @@ class LineField(Field):
         self.show_value()
 
     def _step(self, by: int) -> None:
-        """Count up or down, in the last digit that is shown."""
+        """Count up or down in the last shown digit."""
         shown = self.line.text().strip() or str(self.row.default or 0)
         number = number_of(shown)
         if number is None or self.line.isReadOnly():
@@ -507,7 +507,7 @@ class ChoiceField(Field):
         self.arrow.setEnabled(row.target is not None)
 
     def words(self, choice: Any, default: object) -> str:
-        """Return what a choice is called; a statement has no kind in the file."""
+        """Return the label of a choice; a statement has no kind in the file."""
         if choice.value is None and self.row.kind == "kind" and "items" in self.row.path:
             return STATEMENT.capitalize()
         return choice_words(choice, default)
@@ -532,7 +532,7 @@ class ChoiceField(Field):
         self._make_room()
 
     def _pick(self, at: int) -> None:
-        """Choose a value; one of the last entries adds an element and names it."""
+        """Choose a value; the last entries add an element and refer to it."""
         sections = self.row.sections
         new = at - (len(self._values) - len(sections))
         if new < 0:
@@ -597,21 +597,21 @@ class UnknownField(Field):
 
 
 def add_button(name: str, accessible_name: str = "") -> ActionButton:
-    """Return a quiet button with a plus."""
+    """Return a plain button with a plus sign."""
     made = small_button("plus", accessible_name or name, role="plain", height=32)
     made.setAccessibleName(name)
     return made
 
 
 def kept(value: Any) -> str:
-    """Return which value a study keeps while what was typed is refused."""
+    """Return the sentence about the value that a study keeps while the typed one is refused."""
     if value is None:
         return "The study does not use it; Esc clears the field."
     return f"The study keeps {written(value)}; Esc restores it."
 
 
 def written(value: Any) -> str:
-    """Return a value as it is typed: numbers of a list with spaces between."""
+    """Return a value as it is typed: numbers of a list separated by spaces."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, tuple | list):
@@ -651,7 +651,7 @@ class LanguagesField(Field):
 
     @cached_property
     def copied(self) -> QLabel:
-        """Which texts are still in another language; made when it is first needed."""
+        """The label of texts that are still in another language; made on first use."""
         made = label("", "small", "warn")
         made.hide()
         self.outer.addWidget(made)
@@ -663,7 +663,7 @@ class LanguagesField(Field):
         return any(written) and not all(written)
 
     def show_value(self) -> None:
-        """Show each text; a plain one stands for the first language. A text that is not translated yet is marked."""
+        """Show each text; a plain text is in the first language. Untranslated texts are marked."""
         value, untranslated = self.row.value, self.row.untranslated
         if untranslated or "copied" in self.__dict__:
             source = language_name(untranslated[0].source) if untranslated else ""
@@ -680,7 +680,7 @@ class LanguagesField(Field):
 
 
 def stacked(row: FormRow) -> bool:
-    """Return whether texts in several languages are below each other, each with its language."""
+    """Return whether the texts of several languages are stacked, each with its language."""
     return len(row.languages) > 2 or row.kind == "paragraphs"
 
 

@@ -103,7 +103,7 @@ def form(study: Study, path: Path) -> Form:
 
 
 def asking(document: Mapping[str, Any], path: Path) -> Iterator[tuple[str, Request]]:
-    """Yield when a questionnaire can be asked, in words, with the request that does it."""
+    """Yield the ways to add a questionnaire to the session, each with its request."""
     if len(path) != 2 or path[0] != "questionnaires":
         return
     steps = [((*place, at), str(step)) for place, listed in sequences_in(document) for at, step in enumerate(listed)]
@@ -265,7 +265,7 @@ def _entries(study: Study, row: Row) -> Iterator[Entry]:
 
 
 def _fits(row: Row, value: Any) -> bool:
-    """Return whether a value is of the kind that a row edits."""
+    """Return whether a value has the kind that a row edits."""
     if row.kind in {"number", "whole number"}:
         return isinstance(value, int | float) and not isinstance(value, bool)
     if isinstance(value, tuple):

@@ -170,7 +170,7 @@ class EntryList(Field):
         self.box.addWidget(self.list)
 
     def filled_with(self) -> object:
-        """Return what makes other rows necessary."""
+        """Return the state of the entries that, when it changes, requires new rows."""
         return self.row.entries
 
     def fill(self) -> None:
@@ -203,7 +203,7 @@ class EntryList(Field):
         return made
 
     def freeze(self) -> None:
-        """Change nothing from now on; entries can still be opened."""
+        """Make the list read-only; entries can still be opened."""
         self.list.setDragEnabled(False)
         self.list.setAccessibleDescription("")
         self.list.keys = {keys: do for keys, do in self.list.keys.items() if keys in {"Return", "Enter"}}
@@ -227,13 +227,13 @@ class EntryList(Field):
         self.open(self.list.currentRow())
 
     def _change(self, asked: Request, after: int) -> None:
-        """Ask for a step, after which the entry at ``after`` is selected."""
+        """Request a step, after which the entry at ``after`` is selected."""
         self._after = after
         self.asked.emit(asked)
         self._after = None
 
     def move_entry(self, at: int, to: int) -> None:
-        """Ask to move an entry before the one at ``to``."""
+        """Request to move an entry before the one at ``to``."""
         after = to - (at < to)
         if at >= 0 and 0 <= to <= len(self.rows) and after != at:
             self._change(MoveTo(self.place(at), to, stays=True), after)

@@ -134,7 +134,7 @@ class FormRow(Row):
 
 
 def values_of(row: Row) -> dict[str, Any]:
-    """Return the values of a row by their names."""
+    """Return the field values of a row by name."""
     return {field.name: getattr(row, field.name) for field in fields(Row)}
 
 
@@ -182,7 +182,7 @@ class Form:
 
 
 def added_row(form: Form, before: Form) -> Path | None:
-    """Return the path of the first row that the form did not have before; None where it had each."""
+    """Return the path of the first new row of a form; None if there is none."""
     known = {row.path for row in before.rows}
     return next((row.path for row in form.rows if row.path not in known), None)
 
@@ -193,12 +193,12 @@ def is_right_to_left(code: str) -> bool:
 
 
 def new_words(section: str) -> str:
-    """Return what the choice is called that adds an element to a section and names it."""
+    """Return the label of the choice that adds an element to a section and refers to it."""
     return f"New {label_of(singular(section)).lower()} …"
 
 
 def choice_words(choice: Choice, default: object) -> str:
-    """Return what a choice is called: its value in words, marked where it counts without being written."""
+    """Return the label of a choice; the default is marked."""
     if choice.value is None:
         return "Not set"
     package, _, name = str(choice.value).rpartition(":")

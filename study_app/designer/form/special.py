@@ -52,7 +52,7 @@ SQUARES: Final[Mapping[Any, Literal["williams", "latin"]]] = {"williams": "willi
 
 
 def order_balance(study: Study, row: Row) -> tuple[Verdict, str] | None:
-    """Return how balanced the order of a block is, and what that means.
+    """Return how balanced the order of a block is, and the explanation.
 
     None where it has one condition, or another method orders it.
     """
@@ -85,7 +85,7 @@ class ScalePoints:
 
 
 def scale_points(study: Study, row: Row) -> ScalePoints:
-    """Return the points of a scale, for the languages of the study and others that it has."""
+    """Return the points of a scale in the study's languages and any others that it has."""
     labels = row.value if isinstance(row.value, Mapping) else {}
     codes = list(dict.fromkeys([*languages_of(study.document), *labels]))
     columns = [labels[code] if isinstance(labels.get(code), tuple) else () for code in codes]
@@ -146,7 +146,7 @@ class QuestionRow(Themed, QWidget):
 
 
 def _column_text(text: str, role: TypeRole, ink: Ink = "text") -> QLabel:
-    """Return a text as wide as its column, whatever its length."""
+    """Return a text label as wide as its column."""
     made = label(text, role, ink, wraps=True)
     policy = made.sizePolicy()
     policy.setHorizontalPolicy(QSizePolicy.Policy.Ignored)
@@ -334,7 +334,7 @@ QUESTION_LIST: Final = SpecialEditor(
 
 
 def order_of_blocks(study: Study, _row: Row) -> str:
-    """Return what the order of the blocks means for the planned participants; "" while that is not known."""
+    """Return a sentence on the blocks' order for the planned participants; "" while it is unknown."""
     protocol = valid_part(study).protocol
     if protocol is None or len(protocol.main_blocks) < 2:
         return ""
@@ -345,7 +345,7 @@ def order_of_blocks(study: Study, _row: Row) -> str:
 
 
 def choice_sentences(_study: Study, row: Row) -> str:
-    """Return the sentence of each choice, one per line."""
+    """Return the sentence about each choice, one per line."""
     described = [choice for choice in row.choices if choice.value is not None and choice.sentence]
     return "\n".join(f"{label_of(choice.value or '')}: {choice.sentence}." for choice in described)
 
@@ -386,17 +386,17 @@ class Compared:
     measures: tuple[tuple[str, str], ...]
 
     def others(self, every: tuple["Compared", ...]) -> tuple["Compared", ...]:
-        """Return what it can be compared with: other blocks with a measure of its own, or what is in the same block."""
+        """Return the items it can be compared with: other blocks with a common measure, or items of the same block."""
         alike = (item for item in every if item.key == self.key and item.name != self.name)
         return tuple(item for item in alike if self.shared(item) and (self.key == "blocks" or item.block == self.block))
 
     def shared(self, other: "Compared") -> tuple[tuple[str, str], ...]:
-        """Return the measures that both have."""
+        """Return the measures that both items have."""
         return tuple(measure for measure in self.measures if measure in other.measures)
 
 
 def compared(study: Study, _row: Row) -> tuple[Compared, ...]:
-    """Return what hypotheses can compare, in the order of the file; blocks of one title are told apart by their ids."""
+    """Return the items that hypotheses can compare, in file order; equal titles get the block's id."""
     every = tuple(_compared(study.document))
     times = Counter(item.words for item in every)
     every = tuple(
@@ -483,7 +483,7 @@ class Hypothesis(QWidget):
         box.setCurrentIndex(next((at for at, (value, _) in enumerate(values) if value == chosen), -1))
 
     def _take(self) -> None:
-        """Say the hypothesis as it is chosen; what does not fit the first of the two any more is chosen anew."""
+        """Emit the chosen hypothesis; replace choices that no longer fit the first item."""
         relation = RELATIONS[max(0, self.relation.currentIndex())][0]
         if not self.known or self.first.currentIndex() < 0:  # what it compares is not among the choices
             keys = ("measure", "blocks", "conditions", "groups")
@@ -498,7 +498,7 @@ class Hypothesis(QWidget):
         self.changed.emit(_table(first, second, measure) | _related(relation, self._bound(relation, measure)))
 
     def _bound(self, relation: Any, measure: str) -> Any:
-        """Return the bound that stays, the usual one of a new equality, or None."""
+        """Return the present bound, the default bound of a new equality, or None."""
         before = self.value.get("bound")
         if relation == "equal" and before is None:
             return RATIO if measure in {"threshold", "pse"} else BOUND
@@ -512,13 +512,13 @@ class Hypothesis(QWidget):
 
 
 def _related(relation: Any, bound: Any) -> dict[str, Any]:
-    """Return the keys of a hypothesis that say its relation."""
+    """Return the keys that state the relation of a hypothesis."""
     table = {} if relation in {None, "equal"} else {"expected": relation}
     return table if bound is None else {**table, "bound": bound}
 
 
 def _table(first: Compared, second: Compared, measure: str) -> dict[str, Any]:
-    """Return the keys of a hypothesis that say what it compares."""
+    """Return the keys that state the items that a hypothesis compares."""
     pair = [first.name, second.name]
     table: dict[str, Any] = {"measure": measure, "blocks": pair if first.key == "blocks" else [first.block]}
     return table if first.key == "blocks" else {**table, first.key: pair}
@@ -583,7 +583,7 @@ class HypothesesField(Field):
 
 
 def count_of(row: FormRow) -> int:
-    """Return how many hypotheses a row has; 0 where the file has something else there."""
+    """Return the number of a row's hypotheses; 0 if the file has another value there."""
     return len(row.value) if isinstance(row.value, tuple) else 0
 
 

@@ -274,7 +274,7 @@ class CardWidget(Card):
 
 
 def verdict_line(verdict: Verdict) -> QWidget:
-    """Return a state as icon and words that wrap."""
+    """Return a line with a verdict's icon and its wrapped text."""
     tone, icon, text = verdict
     made = QWidget()
     sign = (Icon(icon or "info", INKS[tone], 16), 0, Qt.AlignmentFlag.AlignTop)

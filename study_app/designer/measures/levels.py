@@ -46,7 +46,7 @@ class LevelWords:
 
     @property
     def name(self) -> str:
-        """What is estimated: the just noticeable difference, or a threshold of a value, or of what is there at all."""
+        """The name of the estimate: just noticeable difference, threshold of a value, or detection threshold."""
         detected = self.design.has_noise or self.stimulus.standards == (0.0,)
         return "threshold" if detected or self.stimulus.level_kind == "value" else "JND"
 
@@ -65,12 +65,12 @@ class LevelWords:
         return f"{self.number(level, digits)} {self.unit}".rstrip()
 
     def at(self, level: float) -> float:
-        """Return the place of a level: its coordinate, the least one for levels without a logarithm."""
+        """Return the axis position of a level: its coordinate, the smallest one for levels without a logarithm."""
         low, _ = self.stimulus.domain
         return max(self.stimulus.coordinate(level), low - 1.0)
 
     def ticks(self, most: int = MOST_TICKS) -> Ticks:
-        """Return round levels between the ends, at their places."""
+        """Return round levels between the ends with their axis positions."""
         low, high = (self.factor * level for level in self.stimulus.levels)
         values = log_ticks(low, high, most) if self.stimulus.spacing == "log" else even_ticks(low, high, most)
         return tuple((self.stimulus.coordinate(value / self.factor), rounded(value)) for value in values)
@@ -90,36 +90,36 @@ class LevelBlock:
 
     @property
     def standard(self) -> float | None:
-        """The standard that is shown: the highest, whose forces are the strongest."""
+        """The shown standard: the highest, whose forces are the strongest."""
         return max((level.standard for level in self.levels if level.standard is not None), default=None)
 
     @property
     def shown(self) -> tuple[Level, ...]:
-        """The levels of that standard."""
+        """The levels of the shown standard."""
         return tuple(level for level in self.levels if level.standard == self.standard)
 
     @property
     def clipped_from(self) -> tuple[float, Limit] | None:
-        """The place from which on a limit takes part of the force away, and which; None where no level is beyond it."""
+        """The axis position from which a limit clips the force, with the limit; None if no level is beyond it."""
         level = math.inf if self.clipping is None else self.clipping.highest(self.words.stimulus)
         if self.limits is None or not math.isfinite(level):
             return None
         return self.words.at(level), "norm" if self.limits.force == self.limits.lowest else "slope"
 
     def measures(self, threshold: float) -> bool:
-        """Return whether a threshold is below the highest level that observers answer to in full."""
+        """Return whether a threshold is below the highest unclipped level."""
         paced = self.clipping is not None and self.clipping.paced
         return not paced or self.clipping is None or threshold < self.clipping.highest(self.words.stimulus)
 
     @property
     def as_asked(self) -> str:
-        """That clipped levels are simulated as they are asked; "" where none is clipped, or as they are presented."""
+        """A sentence that clipped levels are simulated as requested; "" if none is clipped or as presented."""
         simulated = self.clipping is not None and self.clipping.paced
         return "" if simulated or all(level.clipped_by is None for level in self.shown) else AS_ASKED
 
     @property
     def clipped_words(self) -> str:
-        """Which levels a limit clips, and what is simulated of them; "" where none is clipped."""
+        """A sentence on the clipped levels and their simulation; "" if none is clipped."""
         if self.clipping is None:
             return self.as_asked
         highest = self.clipping.highest(self.words.stimulus)
@@ -133,7 +133,7 @@ class LevelBlock:
 
 
 def level_block(protocol: Protocol, block: Block, *, forces: bool = True) -> LevelBlock | None:
-    """Return a block's levels; None where it varies nothing. Without ``forces`` its limits are not known."""
+    """Return a block's levels; None if it varies nothing. Without ``forces`` its limits are unknown."""
     if block.stimulus is None or block.design is None:
         return None
     presented = levels(protocol, block.id)
@@ -150,7 +150,7 @@ def limit_colour(theme: Theme, limit: Limit) -> str:
 
 
 def rounded(value: float, digits: int = 3) -> str:
-    """Return a number with so many digits at most, without an exponent."""
+    """Return a number with at most so many digits, without an exponent."""
     if value == 0 or not math.isfinite(value):
         return "0" if value == 0 else "–"
     places = max(0, digits - 1 - math.floor(math.log10(abs(value))))

@@ -69,7 +69,7 @@ class Control(QWidget):
         self.entered.emit(value)
 
     def _refuse(self, text: str) -> None:
-        """Leave the text in the field, and say above it why it is no number."""
+        """Leave the text in the field and show above it why it is not a number."""
         why = f"{unclear_number(text)}, or press Esc"
         self.field.show_state("refused")
         self.field.setAccessibleDescription(why)
@@ -92,7 +92,7 @@ class MeasureControls(QWidget):
         hbox(STRETCH, self.threshold, self.lapses, self.participants, spacing=10, margins=0, parent=self)
 
     def show_values(self, shown: Controls, wording: LevelWords | None) -> None:
-        """Show other values; threshold and lapses only where observers are simulated, with the ``wording`` of the levels."""
+        """Show other values; threshold and lapses only where observers are simulated (with their ``wording``)."""
         planned = "planned" if shown.planned == shown.participants else f"({shown.planned or 'none'} planned)"
         self.participants.show_words("participants", planned)
         self.participants.show_number(str(shown.participants))
@@ -116,7 +116,7 @@ class PlotCard(Card):
         self._legend, self.plot = legend, plot
 
     def show_simulated(self, heading: str, of: LevelBlock, shown: MeasuresView) -> None:
-        """Show what observers answered so far; where others are simulated or cannot be, the legend says so."""
+        """Show the answers simulated so far; the legend says if others are being simulated or cannot be."""
         observed, waiting = shown.simulated.observed, shown.simulated.waiting
         self.heading_unit.show_text(heading if observed else "")
         said = FAILED[2] if shown.simulated.failed else waiting
@@ -152,7 +152,7 @@ class ForcesCard(Card):
         add_parts(self.column, head, (plot, 1), self.bar)
 
     def show_levels(self, shown: MeasuresView) -> None:
-        """Show the forces, unless they are not known or a level has none."""
+        """Show the forces, unless they are unknown or a level has none."""
         of = shown.levels
         has_forces = of is not None and any(level.asked_n is not None for level in of.shown)
         if of is None or not has_forces or (of.forces and of.limits is None):
@@ -183,7 +183,7 @@ class ForcesCard(Card):
 
 
 def clipped_sentence(of: LevelBlock) -> str:
-    """Return what clips levels, "" where nothing does."""
+    """Return a sentence on the clipped levels, "" if there are none."""
     if of.limits is None:
         return NO_FORCES
     messages = [fault.message for fault in clipped(of.protocol, [of.block], ASSUMED_TICKS)]
@@ -300,7 +300,7 @@ class FactsRow(MeasureCards):
         self.make_room(0, 0)
 
     def make_room(self, window_px: int, left_px: int) -> None:
-        """Take the height of the cards, as far as the window has room for them, or the page above leaves it."""
+        """Take the height of the cards as far as the window has room or the page above leaves it."""
         self._window_px, self._left_px = window_px, left_px
         most = FACTS_MOST if window_px >= HIGH_FROM else max(FACTS_LEAST, round(FACTS_SHARE * window_px))
         most = left_px if left_px > 0 else most

@@ -75,7 +75,7 @@ class MeasuresView:
 
     @property
     def below(self) -> tuple[MeasureCard, ...]:
-        """The cards that stay below other tabs; the tab itself shows cards where it has no numbers."""
+        """The cards that stay below other tabs; the measures tab shows them if it has no numbers."""
         return self.cards[:BELOW]
 
 
@@ -89,7 +89,7 @@ def measures_view(
     *,
     earlier: bool = False,
 ) -> MeasuresView:
-    """Return what is shown of the selected element.
+    """Return the measures of the selected element.
 
     ``problems`` has the words of the repairs of each as far as they were found, ``earlier`` says that the study is the
     last one without faults.
@@ -117,7 +117,7 @@ def measures_view(
 def _cards(
     study: Study, facts: Facts, path: Path, focus: Focus, controls: Controls, simulated: Simulated
 ) -> list[MeasureCard]:
-    """Return the cards of an element without simulated tracks, those that concern it first."""
+    """Return the cards of an element without simulated tracks, the most relevant first."""
     valid, block = valid_part(study), focus.block
     protocol = valid.protocol
     cards: list[MeasureCard] = [session_card(study, facts, path)]
@@ -136,7 +136,7 @@ def _cards(
 
 
 def _liquids(protocol: Protocol, path: Path, block: Block | None) -> list[str]:
-    """Return the liquids of an element, of most elements all."""
+    """Return the liquids of an element, or all liquids if it has none."""
     if path[0] == "liquids" and len(path) > 1 and path[1] in protocol.liquids:
         return [str(path[1])]
     names = () if block is None else protocol.conditions_in(block.id)
@@ -147,14 +147,14 @@ def _liquids(protocol: Protocol, path: Path, block: Block | None) -> list[str]:
 
 
 def people(participants: int, planned: int | None) -> str:
-    """Return a number of participants that are simulated, and whether the file plans as many."""
+    """Return the number of simulated participants, and whether the file plans as many."""
     return f"{participants} {'planned' if participants == planned else 'simulated'}"
 
 
 def number_cards(
     of: LevelBlock, simulated: Simulated, controls: Controls, duration_s: float, order: BlockOrder
 ) -> tuple[NumberCard, ...]:
-    """Return the four numbers of a block whose tracks are simulated."""
+    """Return the four number cards of a block with simulated tracks."""
     breaks = f", {counted(order.breaks, 'break')}" if order.breaks else ""
     figure, unit = duration_figure(duration_s)
     return (
@@ -168,7 +168,7 @@ def number_cards(
 
 
 def _unknown(title: str, unit: str, simulated: Simulated) -> NumberCard:
-    """Return a number that is not known: not yet, because its simulation failed, or because nothing simulates it."""
+    """Return the card of an unknown number: not simulated yet, failed, or never simulated."""
     if simulated.failed:
         return NumberCard(title, UNKNOWN, unit=unit, note=FAILED, more=simulated.failed)
     return NumberCard(title, UNKNOWN, unit=unit, note=("neutral", "info", "not simulated"))
@@ -226,7 +226,7 @@ def _people(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberC
 
 
 def session_card(study: Study, facts: Facts, path: Path) -> MeasureCard:
-    """Return the session in numbers, with the step that is looked at."""
+    """Return the session in numbers, with the duration of the selected step."""
     verdicts = text_verdicts(study, facts)
     if facts.expected_s is None or facts.range_s is None:
         unknown = tuple((UNKNOWN, word) for word in ("min", "answers", "trials"))
@@ -252,12 +252,12 @@ def session_card(study: Study, facts: Facts, path: Path) -> MeasureCard:
 
 
 def _ruled(verdicts: Iterable[Verdict]) -> tuple[Part, ...]:
-    """Return states below a rule; nothing where there are none."""
+    """Return verdicts below a rule; empty if there are none."""
     return (None, *states) if (states := tuple(verdicts)) else ()
 
 
 def hypotheses_card(protocol: Protocol, path: Path, controls: Controls, simulated: Simulated) -> MeasureCard | None:
-    """Return the hypotheses about a block, or at the session's order all, with what the participants show of each."""
+    """Return the hypotheses about a block, at the session's order all of them, with the simulated results."""
     block = str(path[1]) if path[:1] == ("blocks",) and len(path) > 1 else ""
     contrasts = hypotheses_of(protocol, block) if block or path == SEQUENCE else ()
     known, waiting = dict(simulated.hypotheses), simulated.failed or simulated.waiting or "liquid-study power plans it"
@@ -291,7 +291,7 @@ def block_card(study: Study, facts: Facts, protocol: Protocol, block: Block) -> 
 
 
 def text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
-    """Return whether texts are missing, and whether a text reveals a condition."""
+    """Return verdicts on missing texts and on texts that reveal a condition."""
     if study.unreadable:
         return ()
     missing = ", ".join(f"{count} in {language_name(code)}" for code, count in facts.missing.items())
@@ -313,7 +313,7 @@ def text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
 
 
 def balance_card(study: Study, protocol: Protocol, block: Block, controls: Controls) -> list[MeasureCard]:
-    """Return how even the orders of a block are over so many participants; none where it has one code."""
+    """Return how balanced the orders of a block are for the participants; none if it has one code."""
     participants = controls.participants
     judged = balance_of(protocol, block, participants)
     if judged is None:
@@ -384,7 +384,7 @@ def force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[s
 
 
 def detectable_card(study: Study, block: Block, who: str, simulated: Simulated) -> MeasureCard:
-    """Return the smallest difference of each statement that studies of so many participants (``who``) show."""
+    """Return the smallest difference of each statement that studies of so many participants (``who``) detect."""
     title, detectable = "Smallest differences", simulated.detectable
     if not valid_part(study).forces:  # what is answered depends on them
         return lines_card(title, who, (), (("neutral", "minus", NO_FORCES),))

@@ -50,14 +50,14 @@ class MeasurePlot(Plot):
         return QSize(220, 110)
 
     def show_plot(self, sentence: str, *shown: Any, grey: bool = False) -> None:
-        """Draw other values, nothing where there are none; ``grey`` if they are of an earlier study."""
+        """Draw other values, nothing if there are none; in grey if they are of an earlier version."""
         if (shown, grey) != (self.shown, self.grey):
             self.shown, self.grey = shown, grey
             self.setAccessibleDescription(sentence)
             self._draw()
 
     def show_observed(self, of: LevelBlock, observed: Observed | None, *, grey: bool) -> None:
-        """Show what observers answered; None before the first answer."""
+        """Show the observers' answers; None before the first answer."""
         if observed is None or not observed.course:
             self.show_plot("Not known yet.")
         else:
@@ -81,7 +81,7 @@ class MeasurePlot(Plot):
         self._draw()
 
     def add(self, item: pg.GraphicsObject, z: float = 0.0) -> None:
-        """Draw an item at a height: those of more are in front."""
+        """Draw an item at a z value; higher ones are in front."""
         item.setZValue(z)
         self.box.addItem(item, ignoreBounds=True)
         self.drawn.append(item)
@@ -110,7 +110,7 @@ class MeasurePlot(Plot):
     def words(
         self, text: str, x: float, y: float, colour: str, anchor: tuple[float, float], *, over: bool = False
     ) -> None:
-        """Write words at a place; those ``over`` a line of the grid interrupt it."""
+        """Write a text at a position; with ``over`` it interrupts the grid line behind it."""
         made = pg.TextItem(text, color=QColor(colour), anchor=anchor, fill=QColor(self.theme.surface) if over else None)
         made.textItem.setFont(font("small", weight=600, tabular=True))
         made.setPos(QPointF(x, y))
@@ -126,7 +126,7 @@ class FunctionView(MeasurePlot):
         self.apply_theme(LIGHT)
 
     def draw(self, wording: LevelWords, observed: Observed, clipped_from: tuple[float, Limit] | None) -> None:
-        """Draw bands, function, mark and bars; places along x are in the coordinate of the levels, y in percent."""
+        """Draw bands, function, mark and bars; x is the coordinate of the levels, y is in percent."""
         theme, x = self.theme, np.array([wording.at(level) for level in observed.levels])
         left, right = float(x[0]), float(x[-1])
         planted, quantiles = 100 * np.array(observed.planted), [100 * np.array(quantile) for quantile in observed.found]
@@ -186,7 +186,7 @@ class TrackView(MeasurePlot):
         self.apply_theme(LIGHT)
 
     def draw(self, wording: LevelWords, observed: Observed, clipped_from: tuple[float, Limit] | None) -> None:
-        """Draw bands, median, planted threshold and trials; places along y are in the coordinate of the levels."""
+        """Draw bands, median, planted threshold and trials; y is the coordinate of the levels."""
         theme, bottom, top = self.theme, wording.at(observed.levels[0]), wording.at(observed.levels[-1])
         last, planted = _last_trial(observed), wording.at(observed.threshold)
         x = np.array([number for number, _ in observed.course], float)
@@ -223,7 +223,7 @@ class ForcesView(MeasurePlot):
         self.apply_theme(LIGHT)
 
     def show_levels(self, of: LevelBlock) -> None:
-        """Show the levels of the highest standard; nothing where no force is known."""
+        """Show the levels of the highest standard; nothing if no force is known."""
         shown = [level for level in of.shown if level.asked_n is not None]
         if not shown or of.limits is None:
             self.show_plot(forces_sentence(of))
@@ -238,7 +238,7 @@ class ForcesView(MeasurePlot):
     def draw(
         self, bars: tuple[Level, ...], values: tuple[float, ...], limits: dict[Limit, float], has_standard: bool
     ) -> None:
-        """Draw bars and limits; what is ``values`` of each bar is written below some."""
+        """Draw bars and limits; below some bars stands their value of ``values``."""
         theme, count = self.theme, len(bars)
         forces = [(bar.asked_n or 0.0, bar.sent_n or 0.0) for bar in bars]
         top = max(limits["norm"], *(asked for asked, _ in forces))
@@ -272,7 +272,7 @@ class ForcesView(MeasurePlot):
 
 
 def function_sentence(scale: LevelWords, seen: Observed) -> str:
-    """Return the psychometric function in a sentence."""
+    """Describe the psychometric function in a sentence."""
     most, _ = max(seen.asked, key=lambda pair: pair[1], default=(0.0, 0.0))
     low, high = _middle(seen)
     return (
@@ -285,7 +285,7 @@ def function_sentence(scale: LevelWords, seen: Observed) -> str:
 
 
 def track_sentence(scale: LevelWords, seen: Observed) -> str:
-    """Return the expected track in a sentence."""
+    """Describe the expected track in a sentence."""
     low, high = _middle(seen)
     return (
         f"Estimates of the {scale.name} over {_last_trial(seen)} trials: after the last one half of the observers are "
@@ -295,7 +295,7 @@ def track_sentence(scale: LevelWords, seen: Observed) -> str:
 
 
 def forces_sentence(of: LevelBlock) -> str:
-    """Return the force at each level of the highest standard in a sentence."""
+    """Describe the force at each level of the highest standard in a sentence."""
     shown = [level for level in of.shown if level.asked_n is not None]
     if not shown or of.limits is None:
         return NO_FORCES

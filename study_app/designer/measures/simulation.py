@@ -54,7 +54,7 @@ Values: TypeAlias = tuple[float, ...]
 
 
 def unchecked() -> None:
-    """Let simulations come to their end."""
+    """Let simulations run to their end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +180,7 @@ class Simulated:
 
 
 def observe(plan: ThresholdPlan, threshold: float, lapses: float, check: Check = unchecked) -> Observed:
-    """Return what observers with a threshold (a level) show."""
+    """Simulate observers with a threshold (a level) and return their answers and estimates."""
     stimulus, random = plan.stimulus, np.random.default_rng(SEED)
     u = stimulus.coordinate(threshold)
     medians, course, presented = [], None, []
@@ -214,14 +214,14 @@ def observe(plan: ThresholdPlan, threshold: float, lapses: float, check: Check =
 
 
 def _lapsing(plan: ThresholdPlan, lapses: float) -> Person:
-    """Return who lapses at a rate: of answers at random some are correct."""
+    """Return an observer with a lapse rate: some of the random answers are correct by chance."""
     return Person(lapse=lapses / Person(lapse=1.0).wrong(len(plan.design.answers)))
 
 
 def measurable(
     plan: ThresholdPlan, lapses: float, least: float, check: Check = unchecked, most: float = math.inf
 ) -> Measurable:
-    """Return which thresholds a block can measure.
+    """Return the range of thresholds that a block can measure.
 
     ``lapses`` is the lapse rate of the observers. No threshold counts below the level ``least``, twice the largest
     error of a valid trial, or above ``most``, the highest one that is presented in full. ``check``
@@ -245,7 +245,7 @@ def measurable(
 
 
 def _longest(planted: list[Planted]) -> tuple[float, float] | None:
-    """Return the ends of the longest row of thresholds that are measurable."""
+    """Return the ends of the longest run of measurable thresholds."""
     best: list[Planted] = []
     run: list[Planted] = []
     for threshold in planted:
@@ -255,14 +255,14 @@ def _longest(planted: list[Planted]) -> tuple[float, float] | None:
 
 
 def _function(answered: ObserverAnswers, u: float, at: Floats) -> list[float]:
-    """Return the function of an observer with threshold ``u`` at some levels [u], were they presented in full."""
+    """Return the unclipped success rates of an observer with threshold ``u`` at some levels [u]."""
     observer = replace(answered.observers, thresholds=np.array(u), moves=0.0, presented=None)
     probabilities: list[float] = observer.probability(at).tolist()
     return probabilities
 
 
 def _asked(plan: ThresholdPlan, presented: Floats) -> tuple[tuple[float, float], ...]:
-    """Return levels with their shares of the trials: those presented, or where they are many the nearest of a grid."""
+    """Return levels with their shares of the trials, on a grid if there are many."""
     places = np.unique(presented)
     if len(places) > MOST_BARS:
         places = np.array([plan.stimulus.coordinate(level) for level in plan.stimulus.spaced(plan.stimulus.steps)])
@@ -272,7 +272,7 @@ def _asked(plan: ThresholdPlan, presented: Floats) -> tuple[tuple[float, float],
 
 
 def _course(plan: ThresholdPlan, answered: ObserverAnswers, check: Check) -> tuple[tuple[int, Values], ...]:
-    """Return the quantiles of the estimates after some numbers of trials."""
+    """Return quantiles of the estimates after increasing numbers of trials."""
     trials, tracks = answered.tracks[0].levels.shape[1], len(answered.tracks)
     course: list[tuple[int, Values]] = []
     for number in sorted({round(trial) for trial in np.geomspace(1, trials, min(COURSE, trials))}):
@@ -297,7 +297,7 @@ def _one(plan: ThresholdPlan, answered: ObserverAnswers) -> list[Asked]:
 
 
 def balance_of(protocol: Protocol, block: Block, participants: int) -> tuple[str, Evenness, int | None] | None:
-    """Return order and evenness of a block, and how many participants a round of its square takes, if it has one.
+    """Return order and evenness of a block, and the participants per round of its square, if it has one.
 
     None where the block has one code.
     """
@@ -362,7 +362,7 @@ class Focus:
 
 
 def focus_of(protocol: Protocol | None, path: Path) -> Focus:
-    """Return what the measures of an element are of."""
+    """Return the block of an element's measures and what is simulated for it."""
     if protocol is None or (len(path) < 2 and path != SEQUENCE):
         return Focus()
     block = protocol.blocks.get(str(path[1])) if path[0] == "blocks" else None
@@ -396,7 +396,7 @@ class Simulation:
 
 
 def simulation_of(protocol: Protocol, focus: Focus, controls: Controls) -> Simulation | None:
-    """Return what is to be simulated for an element; None where nothing is."""
+    """Return the simulation that an element needs; None if it needs none."""
     simulated = focus.block is not None and (focus.plan is not None or focus.compares)
     if not simulated and not advises(protocol):
         return None
@@ -406,32 +406,32 @@ def simulation_of(protocol: Protocol, focus: Focus, controls: Controls) -> Simul
 
 
 def advises(protocol: Protocol) -> bool:
-    """Return whether ``check`` warns of the precision of this study's thresholds, for which it simulates observers."""
+    """Return whether ``check`` warns about the precision of the study's thresholds, which it simulates."""
     decided = protocol.analysis
     planned = decided is not None and decided.precision is not None and decided.participants is not None
     return planned and any(threshold_plan(protocol, block) is not None for block in protocol.main_blocks)
 
 
 def precision_of(protocol: Protocol | None) -> float:
-    """Return half the 95 % interval that is wanted, as a share of the mean."""
+    """Return half the desired 95 % interval as a share of the mean."""
     decided = None if protocol is None else protocol.analysis
     return PRECISION if decided is None or decided.precision is None else decided.precision
 
 
 def participants_of(study: Study) -> int:
-    """Return how many participants are simulated unless another number is asked for: the planned ones."""
+    """Return the default number of simulated participants: the planned ones."""
     return planned_of(study) or PARTICIPANTS
 
 
 def planned_of(study: Study) -> int | None:
-    """Return how many participants the file plans, whatever else is wrong with it; None where it does not say."""
+    """Return the number of participants that the file plans, even if other parts are faulty; None if it states none."""
     planned = value_at(study.document, PLANNED)
     faulty = any(fault.path == PLANNED for fault in study.faults)
     return planned if isinstance(planned, int) and not faulty else None
 
 
 def threshold_of(plan: ThresholdPlan) -> float:
-    """Return the threshold (a level) that is simulated first: that of viscosity, or one in the middle of the levels."""
+    """Return the first simulated threshold (a level): that of viscosity, or one in the middle of the levels."""
     stimulus = plan.stimulus
     low, high = stimulus.levels
     if stimulus.level_kind == "weber" and low < JND < high:
@@ -440,7 +440,7 @@ def threshold_of(plan: ThresholdPlan) -> float:
 
 
 def least_of(protocol: Protocol, plan: ThresholdPlan) -> float:
-    """Return the smallest level that an estimate can be of: twice the largest error of a valid trial."""
+    """Return the smallest level that can be estimated: twice the largest error of a valid trial."""
     limits = protocol.limits
     if plan.stimulus.vary.endswith("_ms"):
         return ERRORS * (limits.level_error_ms or USUAL_ERROR_MS)
@@ -464,7 +464,7 @@ def start_measure_worker() -> MeasureClient:
 
 
 def carry_out(order: Simulation, _send: Send, stop: Stop) -> Simulated:
-    """Return what is simulated; raises Stopped if another order came, or the client is gone."""
+    """Run a simulation; raise Stopped if another order came or the client has ended."""
 
     def check() -> None:
         if stop():
@@ -521,7 +521,7 @@ def _group(plan: ThresholdPlan, controls: Controls, check: Check) -> GroupPrecis
 
 
 def _studies(plan: ThresholdPlan, sizes: Sequence[int], check: Check) -> threshold_studies.PrecisionResult:
-    """Return what simulated studies of so many participants find, as ``power`` does."""
+    """Simulate studies of so many participants, as ``power`` does."""
     from study_app.analysis.planning import threshold_studies  # noqa: PLC0415 - loads scipy: only in this process
 
     total = threshold_studies.PrecisionResult()
@@ -537,7 +537,7 @@ EQUALITY: Final = "{} of studies of {} show equality, if there is no difference"
 
 
 def _ratios(protocol: Protocol, block: str, people: int, check: Check) -> Iterator[tuple[str, str]]:
-    """Yield for each hypothesis about thresholds what studies show, as ``power`` computes it."""
+    """Yield a sentence for each hypothesis about thresholds, computed as ``power`` does."""
     from study_app.analysis.data.blocks import decisions  # noqa: PLC0415 - loads scipy: only in this process
     from study_app.analysis.planning.power_curves import detectable, shown_equal  # noqa: PLC0415 - the same
     from study_app.analysis.planning.simulated_studies import group_shares  # noqa: PLC0415 - the same
@@ -623,7 +623,7 @@ _features_of: dict[str, ConditionFeatures] = {}
 
 
 def _features(order: Simulation, check: Check) -> ConditionFeatures:
-    """Return the features of each condition, kept for the last study: rehearsing them takes most of the time."""
+    """Return the features of each condition, cached for the last study: rehearsing them takes most of the time."""
     from study_app.session.simulated.rehearsal import condition_features  # noqa: PLC0415 - the compiler: only here
 
     if order.depends not in _features_of:

@@ -44,7 +44,7 @@ class Revealing:
 
 
 def texts_by_language(study: Study) -> dict[str, tuple[int, int]]:
-    """Return for each language how many texts it has, and how many it should have."""
+    """Return for each language the numbers of its present and its required texts."""
     languages = languages_of(study.document)
     counted = {code: [0, 0] for code in languages}
     for _, value in texts_of(study):
@@ -56,12 +56,12 @@ def texts_by_language(study: Study) -> dict[str, tuple[int, int]]:
 
 
 def missing_texts(study: Study) -> dict[str, int]:
-    """Return how many texts each language lacks; none where it lacks none."""
+    """Return the number of missing texts of each language that lacks some."""
     return {code: wanted - present for code, (present, wanted) in texts_by_language(study).items() if present < wanted}
 
 
 def copied_texts(study: Study) -> dict[str, int]:
-    """Return for each language how many of its texts are still in another language; none where it has none."""
+    """Return the number of untranslated texts of each language that has some."""
     return dict(Counter(text.language for text in untranslated_texts(study.document)))
 
 
@@ -71,7 +71,7 @@ def to_translate(study: Study) -> tuple[str, ...]:
 
 
 def revealing(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:
-    """Return the texts that name a liquid, a condition or a delay which participants must not know."""
+    """Return the texts that name a liquid, condition or delay which participants must not know."""
     telltales = Telltales(_words(protocol))
     debriefs = {name for name, page in protocol.pages.items() if page.kind == "debrief"}
     revealing = []
@@ -87,7 +87,7 @@ def revealing(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:
 
 
 def _words(protocol: Protocol) -> set[str]:
-    """Return the names of what main blocks compare, and their delays with the unit."""
+    """Return the names of everything that main blocks compare, and their delays with the unit."""
     telltales: set[str] = set()
     for block in protocol.main_blocks:
         names = protocol.conditions_in(block.id)
@@ -104,7 +104,7 @@ def _words(protocol: Protocol) -> set[str]:
 
 @cache
 def text_keys() -> frozenset[str]:
-    """Return the keys that have a text for each language, of every model of the grammar."""
+    """Return the keys with a text for each language, of every model of the file format."""
     models = [schema(), *schema()["$defs"].values()]
     properties = (pair for model in models for pair in model.get("properties", {}).items())
     return frozenset(key for key, node in properties if is_localised(tuple(alternatives(node))))
@@ -141,12 +141,12 @@ class ValidPart:
 
 @lru_cache(maxsize=2)
 def valid_part(study: Study) -> ValidPart:
-    """Return what can be measured of a study."""
+    """Return the part of a study without faults that can be measured."""
     return restored_part(study, {})
 
 
 def restored_part(study: Study, before: Mapping[str, Any]) -> ValidPart:
-    """Return what can be measured or shown of a study: a faulty value is the one of the document ``before``, if any."""
+    """Return the valid part of a study; faulty values come from the document ``before``, if any."""
     if study.formed is not None or not (study.is_toml or before):
         return ValidPart(study.formed, whole=study.formed is not None)
     document: Any = study.document
@@ -174,7 +174,7 @@ def restored_part(study: Study, before: Mapping[str, Any]) -> ValidPart:
 
 
 def _restored(document: Any, fault: Fault, before: Mapping[str, Any]) -> tuple[Path, Any] | None:
-    """Return the place to change because of a fault, and the value that it had before; None where it had none."""
+    """Return the place to change because of a fault, and its earlier value; None if it had none."""
     if not before or fault.missing_language:
         return None
     path, value = fault.path, value_at(document, fault.path)
@@ -192,7 +192,7 @@ def _restored(document: Any, fault: Fault, before: Mapping[str, Any]) -> tuple[P
 
 
 def _path_before(document: Any, path: Path, before: Any) -> Path:
-    """Return where an element of a document was before: a question is found by its id, not by its number."""
+    """Return the earlier place of an element: a question is found by its id, not by its number."""
     path_before: list[str | int] = []
     for step in path:
         document = document[step] if has(document, step) else None
@@ -209,12 +209,12 @@ def _path_before(document: Any, path: Path, before: Any) -> Path:
 
 
 def _place(fault: Fault) -> tuple[str, ...]:
-    """Return a key by which later entries of a list come after earlier ones."""
+    """Return a sort key that puts later entries of a list after earlier ones."""
     return tuple(f"{step:06}" if isinstance(step, int) else step for step in fault.path)
 
 
 def _mended(document: Any, fault: Fault, *, of_others: bool) -> tuple[Path, Any]:
-    """Return the place to change because of a fault, and its value (None leaves it out); () where nothing helps.
+    """Return the place to change because of a fault, and its value (None omits it); () if nothing helps.
 
     A key that is wrong only because another element was left out (``of_others``) is left out before its own element.
     """

@@ -74,7 +74,7 @@ class ParticipantView:
 
 
 def step_words(shown: Preview, step: Step, language: str) -> str:
-    """Return what a step is called: "Welcome", "Liquids, trial 3 of 6"."""
+    """Return the label of a step: "Welcome", "Liquids, trial 3 of 6"."""
     protocol = shown.protocol
     if isinstance(step, Trial):
         title = protocol.text(protocol.blocks[step.block].title, language)
@@ -86,7 +86,7 @@ def step_words(shown: Preview, step: Step, language: str) -> str:
 
 
 def moment_words(moments: tuple[Moment, ...]) -> tuple[tuple[Moment, str], ...]:
-    """Return the pages of a step with their words; none where there is no choice."""
+    """Return the pages of a step with their labels; none if there is only one."""
     tanks = sum(moment.kind == "tank" for moment in moments)
     named = {
         "tank": "Tank",
@@ -107,14 +107,14 @@ Graph: TypeAlias = Mapping[Path, frozenset[Path]]
 
 
 def first_step(shown: Preview, path: Path) -> int | None:
-    """Return the index of the first step that shows an element, or a place within it; None where no step does."""
+    """Return the index of the first step that shows an element, or a place within it; None if none does."""
     graph = graph_of(shown.protocol.model_dump())
     tables = (_shown_by(shown, step, graph) for step in shown.schedule.steps)
     return next((at for at, tables_of_step in enumerate(tables) if path[:2] in tables_of_step), None)
 
 
 def graph_of(document: Mapping[str, object]) -> Graph:
-    """Return what each table of a study names."""
+    """Return the tables that each table of a study refers to."""
     names: dict[Path, set[Path]] = {}
     for place, named in named_places(document):
         names.setdefault(place[:2], set()).add(named[:2])
@@ -122,7 +122,7 @@ def graph_of(document: Mapping[str, object]) -> Graph:
 
 
 def reached(graph: Graph, first: Iterable[Path]) -> frozenset[Path]:
-    """Return tables and all that they name, directly or not."""
+    """Return tables and everything that they refer to, directly or not."""
     tables = dict.fromkeys(first)
     todo = list(tables)
     for table in todo:  # grows while it is read
@@ -133,7 +133,7 @@ def reached(graph: Graph, first: Iterable[Path]) -> frozenset[Path]:
 
 
 def _shown_by(shown: Preview, step: Step, graph: Graph) -> frozenset[Path]:
-    """Return the tables that a step presents, and what these name; of a trial only its own condition."""
+    """Return the tables that a step presents and those they refer to; for a trial only its own condition."""
     if isinstance(step, PageStep):
         return reached(graph, [("pages", step.page_id)])
     if isinstance(step, FormStep):
@@ -182,7 +182,7 @@ def step_name(step: Step) -> str:
 
 
 def previews(study: Protocol) -> Iterator[tuple[str, Preview]]:
-    """Yield each kind of session with what it is called: that of the first participant first, without a name."""
+    """Yield each kind of session with its name, the first participant's first and without a name."""
     first = preview(study)
     yield "", first
     for variant in variants(study):
@@ -192,7 +192,7 @@ def previews(study: Protocol) -> Iterator[tuple[str, Preview]]:
 
 
 def showing(study: Protocol, path: Path) -> Found | None:
-    """Return the first step that shows an element, None where none does.
+    """Return the first step that shows an element, None if none does.
 
     A page or questionnaire that is in no session is shown on its own.
     """
@@ -213,7 +213,7 @@ def showing(study: Protocol, path: Path) -> Found | None:
 
 
 def same_step(study: Protocol, name: str, trial: int, session: str) -> Found | None:
-    """Return the step of a name, of a block the trial of that index or its last; None where it is no longer there."""
+    """Return the step with a name, for a block the trial with that index or its last; None if it is gone."""
     for called, shown in previews(study):
         if called == session and (at := step_of(shown, name, trial)) is not None:
             return Found(shown, at, session)
@@ -221,14 +221,14 @@ def same_step(study: Protocol, name: str, trial: int, session: str) -> Found | N
 
 
 def step_of(shown: Preview, name: str, trial: int) -> int | None:
-    """Return the index of the step of a name, of a block the trial of that index or its last; None without one."""
+    """Return the index of the step with a name, for a block the trial with that index or its last; None without one."""
     named = [(at, step) for at, step in enumerate(shown.schedule.steps) if step_name(step) == name]
     exact = (pair for pair in named if isinstance(pair[1], Trial) and pair[1].index == trial)
     return next((at for at, _ in (*exact, *(named[::-1] if trial > 1 else named))), None)
 
 
 def side_of(path: Path) -> Side | None:
-    """Return on which page of a trial an element is seen; None: on either."""
+    """Return the page of a trial that shows an element; None: either."""
     return _SIDES.get(str(path[0])) if path else None
 
 
@@ -237,7 +237,7 @@ MOST_EARLIER: Final = 5
 
 
 def last_valid(opened: Document) -> Study | None:
-    """Return the study as its file or the newest kept version of it has it, of those without faults."""
+    """Return the study of the file or of its newest kept version without faults."""
     earlier = (kept_content(version.hash) or b"" for version in reversed(kept_versions(opened.file)[-MOST_EARLIER:]))
     for text in (opened.saved.encode(), *(unbundled(content)[0] for content in earlier)):
         with suppress(Refused):
@@ -268,7 +268,7 @@ class NotPlayableError(StudyError):
 
 
 def playable(study: Study, path: Path, position: StepPosition | None = None) -> Playable:
-    """Return what is played from a position on, or from the first step that shows an element.
+    """Return the part to play from a position, or from the first step that shows an element.
 
     ``position``: where the preview is. Raises NotPlayableError if the study has faults, but for texts that are missing
     in languages that are not shown.
@@ -302,7 +302,7 @@ def playable(study: Study, path: Path, position: StepPosition | None = None) -> 
 
 
 def _filled_texts(study: Study, language: str) -> Iterator[Edit]:
-    """Yield the edits that fill in the texts that languages lack that are not shown."""
+    """Yield the edits that fill in missing texts of languages that are not shown."""
     for fault in study.faults:
         text = value_at(study.document, fault.path)
         lacking = fault.missing_language
@@ -342,7 +342,7 @@ class Feeling(QObject):
         place.form.head.feel_asked.connect(self.feel)
 
     def feel(self, path: Path) -> None:
-        """Open the liquids of an element in the lab, unsaved values included: as A, and a second one as B."""
+        """Open an element's liquids in the lab, with unsaved values: the first as A, the second as B."""
         self.place.flush()
         opened = self.editing.opened
         if opened is None:
@@ -366,7 +366,7 @@ class Feeling(QObject):
         self.asked.emit(LabLiquids(settings[0], settings[1], "" if opened.read_only else opened.file.stem))
 
     def put_back(self, side: LabSide, setting: Setting) -> None:
-        """Give the liquid of a side the values of a setting, as one step."""
+        """Set the liquid of a side to the values of a setting, as one step."""
         opened, before = self.editing.opened, self._sides.get(side)
         if opened is None or before is None or opened.file != self._file:
             self.place.message.emit("It was not put back", "Another study is open in the designer now.")
@@ -418,7 +418,7 @@ def _values(liquid: Liquid) -> dict[str, Any]:
 def _edits(
     document: Mapping[str, Any], path: Path, before: Mapping[str, Any], after: Mapping[str, Any]
 ) -> Iterator[Edit]:
-    """Yield the edits of what differs between two tables of a liquid."""
+    """Yield the edits for the differences between two liquid tables."""
     for key in before:
         if key not in after and has(value_at(document, path), key):
             yield Unset((*path, key))
@@ -433,7 +433,7 @@ def _edits(
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as it is written: lists, and whole numbers without a decimal point."""
+    """Return a value as TOML writes it: lists, and whole numbers without a decimal point."""
     if isinstance(value, Mapping):
         return {key: _plain(entry) for key, entry in value.items()}
     if isinstance(value, tuple):

@@ -130,7 +130,7 @@ class LivePage(Coloured, QGraphicsView):
     # what is shown
 
     def show_view(self, view: ParticipantView) -> None:
-        """Show a page; one that is the same but for its answers stays, with what was typed into it."""
+        """Show a page; if only its answers differ, it stays with the typed text."""
         before, self._view = self._view, view
         self.setAccessibleName(view.name)
         self.viewport().setAccessibleName(view.name)
@@ -169,7 +169,7 @@ class LivePage(Coloured, QGraphicsView):
         self._colour_ground()
 
     def _colour_ground(self) -> None:
-        """Be dark around a page, as in a session, and like a card without one."""
+        """Make the ground dark around a page, as in a session, and like a card without one."""
         colour = self.theme.surface if self._view.page is None else PARTICIPANT.window
         self.setBackgroundBrush(QBrush(QColor(colour)))
 
@@ -195,12 +195,12 @@ class LivePage(Coloured, QGraphicsView):
 
     @property
     def page_size(self) -> QSize:
-        """The size that the page is made for [logical px]."""
+        """The size for which the page is laid out [logical px]."""
         return QSize(self._screen.width, self._screen.height)
 
     @property
     def scale_now(self) -> float:
-        """How large the page is drawn: 1 is 100 %."""
+        """The scale at which the page is drawn: 1 is 100 %."""
         if not self._fits:
             return 1.0
         return min(self.width() / self._screen.width, self.height() / self._screen.height)
@@ -233,7 +233,7 @@ class LivePage(Coloured, QGraphicsView):
             proxy.deleteLater()
 
     def _question_now(self) -> str | None:
-        """Return the id of the question that has the page's focus."""
+        """Return the id of the focused question."""
         page = None if self.page_window is None else self.page_window.widget
         if not isinstance(page, QuestionsPage):
             return None
@@ -256,7 +256,7 @@ class LivePage(Coloured, QGraphicsView):
                     self.ensureVisible(QRectF(0, top, 1, field.height()))
 
     def make_room(self, width: int) -> None:
-        """Be as high as the page is in so much width, where it is shown whole."""
+        """Take the page's height at this width if it is shown whole."""
         high = math.ceil(width * self._screen.height / self._screen.width)
         self.setMaximumHeight(high if self._fits else QWIDGETSIZE_MAX)
         self._scale()
@@ -348,7 +348,7 @@ _OPEN: WeakSet[LivePage] = WeakSet()
 
 @atexit.register
 def _close_pages() -> None:
-    """Close what is still open when the program ends: Qt cannot free a visible window within a scene after Python."""
+    """Close open pages when the program ends: Qt cannot free a visible window in a scene after Python."""
     for page in tuple(_OPEN):
         if isValid(page):
             page.close_page()
@@ -434,7 +434,7 @@ class ParticipantPreview(Card):
 
     @property
     def position(self) -> StepPosition | None:
-        """Where the preview is; None where it shows nothing, or a page that is not in the first session."""
+        """The previewed position; None if there is none, or the page is not in the first session."""
         self._update()
         shown = self._found
         if shown is None or shown.session:
@@ -454,7 +454,7 @@ class ParticipantPreview(Card):
         self.place.pane.show_tab("participant")
 
     def show_next_language(self) -> None:
-        """Show the pages in the next language; the keyboard stays where it is, if that is not hidden now."""
+        """Show the pages in the next language; the keyboard focus stays, if its part is still visible."""
         form = self.place.form
         hides = form.isVisible()
         self._come_forward()
@@ -483,7 +483,7 @@ class ParticipantPreview(Card):
         self._show()
 
     def _hear(self, event: object) -> None:
-        """Keep an answer for this page; go on where the participant would."""
+        """Keep an answer for this page; go to the next page where the participant would."""
         if isinstance(event, LanguageChosen):
             self.show_language(event.language)
         elif isinstance(event, Chosen):
@@ -515,7 +515,7 @@ class ParticipantPreview(Card):
         self._after_form.start()
 
     def _look_at_screen(self) -> None:
-        """Offer this machine's participant screen; it may have been set elsewhere meanwhile."""
+        """Offer this machine's participant screen, which may have been set elsewhere."""
         settings, _ = settings_here()
         self._photodiode = settings.photodiode
         screen = choose_screens(screen_number(settings))[0]
@@ -530,7 +530,7 @@ class ParticipantPreview(Card):
             self._show()
 
     def _update(self) -> None:
-        """Find the shown step in the study as it is now; another step where another element was selected."""
+        """Find the shown step in the present study; another step if another element was selected."""
         opened = self.editing.opened
         if opened is None:
             return
@@ -621,7 +621,7 @@ class ParticipantPreview(Card):
 
     @property
     def _page_key(self) -> tuple[str, int]:
-        """What answers are kept by: a form, or a trial of a block."""
+        """The key of the page's answers: a form, or a trial of a block."""
         assert self._found is not None  # noqa: S101 - a page is shown
         step = self._found.shown.schedule.steps[self._found.index]
         return step_name(step), step.index if isinstance(step, Trial) else 0
@@ -634,7 +634,7 @@ class ParticipantPreview(Card):
         return name if isinstance(name, str) else None
 
     def _note(self, study: Study, step: Found) -> str:
-        """Return what is not shown as it is written, in the language of the page."""
+        """Return a note, in the page's language, on parts that are not shown as written."""
         first = step.shown.protocol.study.languages[0]
         faults = [fault for fault in study.faults if fault.concerns(self._language, first)]
         count = len(study.problems) - len(study.faults) + len(faults)
@@ -652,7 +652,7 @@ class ParticipantPreview(Card):
         return f"{title_of(study.document, self._selected)} has a problem ({own.message}): {shown} shown."
 
     def _place_ball(self, page: TaskPage, condition: str | None) -> None:
-        """Put the ball at the beginning of its path, where the tank is another one."""
+        """Put the ball at the start of its path if the tank has changed."""
         assert self._found is not None  # noqa: S101 - a page is shown
         hides = condition is not None and self._found.shown.protocol.conditions[condition].ball == "hidden"
         tank = (page.task, page.workspace_m, page.trial, self._moment, hides)
@@ -720,7 +720,7 @@ class ParticipantPreview(Card):
 
     @property
     def most_px(self) -> int:
-        """The height that it can use: where the page is shown whole, no more than that needs [px]."""
+        """The largest height it can use: of a page that is shown whole, the height of that page [px]."""
         other = self.column.minimumSize().height() - self.page.minimumHeight()
         return min(QWIDGETSIZE_MAX, self.page.maximumHeight() + other)
 
