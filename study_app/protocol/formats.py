@@ -123,7 +123,7 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
         completed.setdefault("conditions", {name: {"liquid": name} for name in liquids})
     if isinstance(blocks := completed.get("blocks", {}), dict) and blocks:
         completed["blocks"] = _with_numbers(blocks, names(completed, "tasks"), _languages(completed))
-        own = {"sequence", "sequences"}  # of groups, each of which has one, so that the study needs none
+        own = {"sequence", "sequences"}  # if each group has one, the study needs none
         groups = [isinstance(group, Mapping) and group.keys() & own for _, group in entries(completed, "groups.*")]
         if "sequences" not in completed and not (groups and all(groups)):
             completed.setdefault("sequence", tuple(blocks))

@@ -194,7 +194,7 @@ def _with_liquids_of_files(document: dict[str, Any]) -> tuple[dict[str, Any], li
         except _LiquidFileFault as fault:
             message, hint = fault.args
             faults.append(Fault(("liquids", name, "file"), message, hint))
-            resolved[name] = {"density_kg_m3": 1000.0}  # stands in, so that nothing but the file is reported
+            resolved[name] = {"density_kg_m3": 1000.0}  # a placeholder, so that only the file is reported
     return {key: value for key, value in document.items() if key != TABLE} | {"liquids": resolved}, faults
 
 
@@ -259,7 +259,7 @@ def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
         raise ProtocolError(name, (Problem("file", "is not UTF-8 text", line, hint="save it as UTF-8"),)) from error
     try:
         document: dict[str, Any] = frozen(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:  # which names the place in its message
+    except tomllib.TOMLDecodeError as error:  # which states the place in its message
         sentence = re.sub(r" \(at .*\)$", "", str(error))
         place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
         line, column = (int(place[1]), int(place[2])) if place else (text.count("\n") + 1, 1)

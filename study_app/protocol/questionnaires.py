@@ -177,7 +177,7 @@ def _filled(
         for name, (path, _) in own.items()
         if name not in known
     ]
-    unwritten = {language: list[tuple[str, str]]() for language in languages}  # which text lacks, and of what
+    unwritten = {language: list[tuple[str, str]]() for language in languages}  # the missing texts and their owners
 
     def ask(path: Path | None, thing: str, made: Mapping[str, Any], *keys: str) -> None:
         """Note the languages that texts of a table lack: at its place in the study, if it is written there."""

@@ -131,7 +131,7 @@ def faults_of(error: ValidationError, document: Mapping[str, Any], schema: Schem
     """Return pydantic's findings in ``document`` as faults; ``schema`` is its JSON Schema."""
     faults = [_fault(details, document, schema) for details in error.errors(include_url=False)]
     paths = [fault.path for fault in faults]
-    return [  # where an entry of an array is broken, pydantic counts the sound ones only
+    return [  # if an array has an invalid entry, pydantic counts only the valid ones
         fault
         for fault in faults
         if not (fault.counts_entries and any(path[:-1][: len(fault.path)] == fault.path for path in paths))

@@ -90,7 +90,7 @@ class Design(Table):
     has_correct_answer: ClassVar[bool] = True
     has_noise: ClassVar[bool] = False  # whether some slots present the standard alone
     asks_for_more: ClassVar[bool] = False  # the interval with more, or less, is correct: levels on both sides have none
-    success_name: ClassVar[str] = "correct"  # what `success` counts
+    success_name: ClassVar[str] = "correct"  # the name of a success
     adaptive: ClassVar[bool] = True  # whether answers can choose the next level; else the method must be "constant"
     paper_name: ClassVar[str]
     """What a paper calls it."""
