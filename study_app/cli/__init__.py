@@ -52,7 +52,7 @@ for module in (demo, study, data, power, model, evidence):
     for command in vars(module).values():
         if isinstance(command, click.Command):
             commands.add_command(command)
-for command in (devices, outlets, plugins):  # what else their module holds belongs to the group devices
+for command in (devices, outlets, plugins):  # the module's other commands belong to the group devices
     commands.add_command(command)
 
 
@@ -77,8 +77,8 @@ def main() -> None:
     """
     ended: list[int] = []
     atexit.register(_leave, ended)  # registered first, so it is called last
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # none is used; the search reads every package
-    if isinstance(sys.stdout, io.TextIOWrapper):  # a pipe or an old console may lack a letter of a study's title
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # none is used, and searching them reads every package
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a pipe or an old console may lack a letter
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
         with naming_the_extra():

@@ -87,7 +87,7 @@ def doctor(name: str, faults: tuple[str, ...], to: Path | None, device_options: 
     code 3 if something is wrong. The zip file contains this report, versions, settings, log and last error, but no
     participant IDs, answers or liquids.
     """
-    click.echo(_PREPARING)  # what is imported and compiled next takes long the first time
+    click.echo(_PREPARING)  # the next imports and compiled next takes long the first time
     from study_app.devices.doctor import report_lines
     from study_app.devices.registry import check_options, doctor_of
 
@@ -230,7 +230,7 @@ def _falcon(name: str, firmware: Path | None, grams: float | None) -> tuple[Falc
         return device, None
     if grams is None:
         raise DeviceError("an emulated Falcon cannot be pulled with a scale: use a weight with --grams")
-    # A serial number of its own: no rehearsal shall find this calibration.
+    # A separate serial number, so that no rehearsal finds this calibration.
     emulator = Emulator(running=firmware is None, serial="EMULATED-WEIGHED")
     return EmulatedFalcon(firmware=firmware, progress=click.echo, emulator=emulator), emulator
 
