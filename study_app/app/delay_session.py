@@ -228,7 +228,7 @@ class _Showing:
 
         bridge.runner.on_change(follow)
         with ended_from_outside(end):
-            QApplication.processEvents()  # the windows stand before the first trial, as after a page
+            QApplication.processEvents()  # show the windows before the first trial, as after a text page
             bridge.start()
             loop.exec()
         QApplication.processEvents()
@@ -248,7 +248,7 @@ class _Showing:
 
 
 FRAME_MS, TRACE_MS, TILES_MS = 16, 33, 500
-HEARTBEAT_MS = 100  # Python hears Ctrl+C only while it runs; Qt waits outside it
+HEARTBEAT_MS = 100  # Python handles Ctrl+C only while it runs; Qt waits outside Python
 LONGEST_FRAME_TICKS = 100
 
 T = TypeVar("T")

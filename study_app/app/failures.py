@@ -177,9 +177,9 @@ class CrashTrace:
                 self._path.unlink()
 
 
-HEARTBEAT_MS = 100  # how long a signal may wait to be heard
-BY_SIGNAL_S = 2.0  # how long a program that is ended from outside waits for threads; the force is zero before
-HANG_UP = 1  # the number of SIGHUP, which a log-off counts as everywhere
+HEARTBEAT_MS = 100  # the longest delay before Python handles a signal
+BY_SIGNAL_S = 2.0  # the longest wait for threads when a signal ends the program; the force is zero before
+HANG_UP = 1  # the number of SIGHUP, for a log-off on any system
 
 
 class Patience:
@@ -231,7 +231,7 @@ def ended_from_outside(end: Callable[[int], None]) -> Iterator[None]:
     refuse_suspension(heard)
     logging_off.connect(log_off, Qt.ConnectionType.DirectConnection)
     heart = QTimer()
-    heart.timeout.connect(lambda: None)  # Python hears signals only while it runs; Qt waits outside it
+    heart.timeout.connect(lambda: None)  # Python handles signals only while it runs; Qt waits outside Python
     heart.start(HEARTBEAT_MS)
     try:
         yield

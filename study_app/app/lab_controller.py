@@ -93,7 +93,7 @@ class Prices:
         if self._appraiser is None:
             try:
                 self._appraiser = self._make()
-            except OSError as error:  # no process to be had: the lab continues without costs
+            except OSError as error:  # no process could be started: the lab works without costs
                 log.info("the appraisal failed: %s", error)
                 return
         self._asked, self.waits = self._appraiser.order(Question(scene)), True
@@ -116,7 +116,7 @@ class Prices:
 
 
 PATIENCE_S = 20.0
-STARTS_AFTER_MS = 150  # the lab is laid out and painted first: opening a device takes Python's lock for long
+STARTS_AFTER_MS = 150  # opening a device holds Python's lock for long, so the lab is laid out and painted first
 
 
 class LabOpening(QObject):
@@ -189,7 +189,7 @@ class LabOpening(QObject):
                 self._open_live = partial(open_live, options=self._options)
             made: object = self._open_live(name, progress=self.said.emit, cancelled=cancelled.is_set)
             if loads:
-                gc.freeze()  # the windows' thread need not look through all that was loaded here
+                gc.freeze()  # keep the loaded objects out of the windows' thread's collections
         except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             made = error
         return made, cancelled
@@ -351,7 +351,7 @@ class LabController(QObject):
                 self._choose(side, chosen)
             case "copy", *_:
                 self._try(bench.copy_to_other, "")
-            case "switch", *_:  # a knob that is held is let go of at once, for it was the other one's
+            case "switch", *_:  # release a held knob at once: it belonged to the other side
                 self.feel(bench.switch())
                 self._show()
             case "blind", True:
@@ -368,7 +368,7 @@ class LabController(QObject):
                 live.stop_force()
             case "stop", *_ if self._opening.busy_with is not None:  # a device would bring its own force
                 self._cancel()
-            case "diagnose", *_:  # the main window opens the diagnosis then, which needs the device
+            case "diagnose", *_:  # the main window then opens the diagnosis, which needs the device
                 self.trouble = self.view().trouble
                 self._let_go()
             case "fade in", *_:
@@ -428,14 +428,14 @@ class LabController(QObject):
         known = isinstance(error, StudyError)
         said = f"{error}" if known else f"{type(error).__name__}: {error}; the force is off"
         before, self.trouble = self.trouble, said
-        if not known and self.trouble != before:  # once, though it may come with every frame
+        if not known and self.trouble != before:  # once, though every frame may raise it
             log.error("the lab failed: %s", error, exc_info=error)
 
     def view(self) -> LabView:
         bench, live, opening, costs = self.bench, self.live, self._opening.busy_with, self._prices.costs
         reading = None if live is None else live.reading()
         fault = "" if reading is None else reading.fault
-        if fault or (self.trouble and live is None):  # an edit or a file that was refused stops no device
+        if fault or (self.trouble and live is None):  # a refused edit or file does not stop the device
             state = "stopped"
         else:
             state = "opening" if opening is not None else "ready" if live is not None else "closed"
@@ -453,7 +453,7 @@ class LabController(QObject):
                 "now": Now(position_m=reading.position_m, force_n=reading.force_n, wake_mps=reading.wake_mps),
                 "limiters": live.limiters(),
             }
-        if not bench.blind:  # the ball's size would tell one from the other
+        if not bench.blind:  # the ball's size would reveal the side
             shown["body_radius_m"] = scene.body.diameter_m / 2 / scene.scale
         described = descriptor_of(self.device)
         return LabView(

@@ -136,10 +136,10 @@ def load_modules() -> None:
 
     brightness()
     schema()
-    gc.freeze()  # no collection need look through all that was loaded here
+    gc.freeze()  # keep the loaded objects out of later collections
 
 
-LOOK_AFTER_MS = 300  # the window stands by then
+LOOK_AFTER_MS = 300  # the window is painted by then
 JOBS_PATIENCE_S = 5.0
 
 
@@ -197,7 +197,7 @@ class MainController(QObject):
             {name: _with_guarded_painting(make) for name, make in makers.items()},
             theme=theme_named(self.machine.settings.theme),
         )
-        self.window.place("devices")  # before it is visited, home shows what it found
+        self.window.place("devices")  # the home page shows its results before its first visit
         self.loop = QEventLoop()
         self.code = 0
         self.live: LiveSession | None = None
@@ -268,7 +268,7 @@ class MainController(QObject):
         self._loading.run(load_modules)
 
     def _lab(self) -> LabPlace:
-        self._loading.wait()  # two threads that load modules of one cycle may see them half loaded
+        self._loading.wait()  # two threads that load modules of one import cycle may see them half loaded
         from study_app.app.lab_controller import LabController  # noqa: PLC0415 - pyqtgraph: only once it is needed
         from study_app.gui.lab.view import LabPlace  # noqa: PLC0415
 
@@ -281,7 +281,7 @@ class MainController(QObject):
 
     def _lab_asked(self, what: str, _details: object) -> None:
         if what in {"enter", "device", "fade in"}:
-            self.devices.end_diagnosis()  # it would hold the device
+            self.devices.end_diagnosis()  # the diagnosis would hold the device
         elif what == "diagnose" and self.lab is not None:
             self.devices.diagnose(self.lab.device)
 
@@ -412,7 +412,7 @@ class MainController(QObject):
         After a signal the program waits for 2 s at most; a device that is still being opened then gets no force.
         """
         patience = Patience(BY_SIGNAL_S if self.code else OPENING_PATIENCE_S)
-        self._opened.stop()  # what it begins would outlive Python
+        self._opened.stop()  # a thread that it starts would outlive Python
         self._home_place.end()
         for part in (self.playing, self.lab):
             if part is not None:
@@ -434,7 +434,7 @@ class MainController(QObject):
     def _start(self, chosen: NewSession) -> None:
         if self.live is not None:
             return
-        self.devices.end_diagnosis()  # it would hold the device
+        self.devices.end_diagnosis()  # the diagnosis would hold the device
         self.machine.remember_operator(chosen.operator)
         self.live = LiveSession(chosen, self.window.theme, asks=True)
         self.live.over.connect(self._return)
@@ -448,7 +448,7 @@ class MainController(QObject):
         self._called_off = [earlier for earlier in (*self._called_off, live) if earlier.opening]
         if self.code:
             return
-        if live.theme is not self.window.theme:  # it was changed in the cockpit
+        if live.theme is not self.window.theme:  # the theme may have been changed in the operator's window
             self.machine.change({"theme": live.theme.name})
         if live.began and self.results_place is not None:
             self.results_place.choose(live.chosen.results)

@@ -13,9 +13,9 @@ from typing import Final
 
 from PySide6.QtCore import QTimer
 
-MOST_PERIODS: Final = 4  # so long a work waits for room; then it is done without
-MOST_SHARE: Final = 0.15  # of the time that a work may take: what takes longer is done less often
-FORGETS: Final = 0.9  # what a work took at worst is forgotten by so much each time
+MOST_PERIODS: Final = 4  # the longest wait of a task for free time
+MOST_SHARE: Final = 0.15  # the largest share of the time that a task may use; slower tasks run less often
+FORGETS: Final = 0.9  # the decay of a task's worst duration per run
 
 
 @dataclass(slots=True, kw_only=True)
@@ -139,7 +139,7 @@ def collecting_here() -> Iterator[None]:
 
 
 NICE: Final = -10
-ABOVE_NORMAL, NORMAL = 1, 0  # of Windows' threads
+ABOVE_NORMAL, NORMAL = 1, 0  # thread priorities on Windows
 
 
 class ThreadPriority:
@@ -153,7 +153,7 @@ class ThreadPriority:
         if sys.platform == "win32":
             return _prefer(ABOVE_NORMAL)
         if sys.platform == "darwin":
-            return True  # the thread of windows is interactive there as it is
+            return True  # the windows' thread already has interactive priority there
         thread = threading.get_native_id()
         before = os.getpriority(os.PRIO_PROCESS, thread)
         try:

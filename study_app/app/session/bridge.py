@@ -80,7 +80,7 @@ if TYPE_CHECKING:
 TRACES_S = 0.030  # every second frame of 60 a second, every fifth of 144
 TILES_S = 0.5
 END_SHOWN_MS = 5000
-SCREEN_SETTLES_MS = 500  # a window manager may put a window on another screen for a moment
+SCREEN_SETTLES_MS = 500  # a window manager may briefly put a window on another screen
 SCREEN_REMOVED = (
     "Both windows are on one screen",
     "The session is paused: the participant's window would cover the force stop. Connect the second screen again, and "
@@ -196,7 +196,7 @@ class SessionBridge(QObject):
             parts.session.protocol, parts.session.schedule, parts.key, ports, parts.language, parts.start, parts.secret
         )
         self.reconnecting = Background(self, refusals=Exception)
-        self._reconnection = ""  # what is being done to connect the device again, or why it failed
+        self._reconnection = ""  # the progress of the reconnection, or why it failed
         self._hand: Hand | None = None
         self._gone = False
         self._stalled: str | None = None
@@ -296,7 +296,7 @@ class SessionBridge(QObject):
             return
         self.trouble, self.failure = what, error
         log.error("the session failed: %s", what, exc_info=_trace_of(raised))
-        traceback.clear_frames(raised.__traceback__)  # they may hold a painter, and Qt would paint no window any more
+        traceback.clear_frames(raised.__traceback__)  # frames may hold a painter, and Qt would then paint no window
         try:
             if not self.runner.finished:
                 self.runner.post(broken(self._now(), error))
@@ -396,7 +396,7 @@ class SessionBridge(QObject):
             QTimer.singleShot(0, self, self._leave)
         elif self.runner.finished and self.participant.isFullScreen():
             ended = self.parts.journal.progress.reached_end
-            said = ended and isinstance(self.parts.session.schedule.steps[-1], PageStep)  # goodbye, by the study
+            said = ended and isinstance(self.parts.session.schedule.steps[-1], PageStep)  # a study's last page
             QTimer.singleShot(0 if said else END_SHOWN_MS, self.operator, self.operator.come_forward)
 
     def _show(self) -> None:
@@ -563,7 +563,7 @@ class SessionBridge(QObject):
         self.operator.hide()
         self.done.emit()
         for part in (self.participant, self.operator, self):
-            part.deleteLater()  # here and now, in this thread: never by a garbage collection in another
+            part.deleteLater()  # delete the objects in this thread, never in a collection of another one
 
 
 def _trace_of(error: BaseException) -> BaseException | None:

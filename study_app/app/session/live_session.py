@@ -179,9 +179,9 @@ class LiveSession(QObject):
                 facts = measure_rig(rig, self.chosen, videos, sleep=self._ending.wait)
                 made = Ready(rig, facts, outlets=outlets, videos=videos)
             if not self._closed:
-                gc.freeze()  # the windows' thread need not look through all that was loaded here
+                gc.freeze()  # keep the loaded objects out of the windows' thread's collections
         except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
-            with suppress(Exception):  # what came first says why
+            with suppress(Exception):  # the first error is the cause
                 _close_all(rig, videos, outlets)
             return error
         return made
@@ -272,7 +272,7 @@ class LiveSession(QObject):
         parts = made.masking, made.outlets, made.videos
         store = self._store = open_store(chosen, protocol, source, rig, screens, *parts)
         if not chosen.played:
-            with suppress(StoreError):  # only the designer's comparisons would miss it
+            with suppress(StoreError):  # only the designer's comparisons need the copy
                 keep_content(source)
         self._crash_trace = CrashTrace(store.folder.crash)
         store.append(journal_events.Preflight(checks=[check.entry for check in results]))
@@ -284,7 +284,7 @@ class LiveSession(QObject):
         self.bridge.done.connect(self._finished)
         self.bridge.diagnose_asked.connect(self.diagnose)
         yield
-        self.bridge.start()  # before its windows are shown: nothing can be asked of a session that has not begun
+        self.bridge.start()  # before the windows are shown: a session that has not begun accepts no requests
         yield
         yield from bridge.show_windows(self.bridge, self.screens, played=chosen.played)
         self._close_note()
@@ -357,7 +357,7 @@ class LiveSession(QObject):
         self._closed = True
         self._ending.set()
         if self.bridge is None:
-            unfreeze_garbage()  # a bridge does it when it leaves
+            unfreeze_garbage()  # a bridge does this when it leaves
         try:
             with ExitStack() as closing:
                 closing.callback(self._let_go)  # even where a window cannot be closed
@@ -367,9 +367,9 @@ class LiveSession(QObject):
                     window.deleteLater()
                 self._steps = None
                 if self.bridge is not None:
-                    self.bridge.leave_now()  # where it failed before it could: no window stays without its session
+                    self.bridge.leave_now()  # if it failed before that: no window stays open without its session
         except StudyError as error:
-            self.error = self.error or error  # what came first says why
+            self.error = self.error or error  # the first error is the cause
         except Exception:  # noqa: BLE001 - printed; whoever waits for the end must be notified
             traceback.print_exc()
             self.code = BUG
@@ -391,8 +391,8 @@ class LiveSession(QObject):
     def _let_go(self) -> None:
         rig, self.rig = self.rig, None
         bridge = self.bridge
-        if bridge is not None and not bridge.reconnecting.wait(self.patience_s):  # it gives up now that this is closed
-            rig = None  # its thread has it, at zero force, until the program ends
+        if bridge is not None and not bridge.reconnecting.wait(self.patience_s):  # it ends now that this is closed
+            rig = None  # its thread keeps the rig, at zero force, until the program ends
         store, self._store = self._store, None
         outlets, self._outlets = self._outlets, None
         crash_trace, self._crash_trace = self._crash_trace, None
@@ -475,7 +475,7 @@ def run(
     )
     check_choices(chosen, study)
     if Path(protocol).is_file():
-        with suppress(StoreError):  # a session does not depend on it
+        with suppress(StoreError):  # a session works without it
             remember_protocol(Path(protocol))
     return run_session(chosen, progress)
 

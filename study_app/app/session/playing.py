@@ -173,7 +173,7 @@ class Playing(QObject):
     def under_way(self) -> bool:
         return self._preparing.busy or (self.pilot is not None and self.pilot.session is not None)
 
-    # what is asked for
+    # requests
 
     def choose_device(self, name: str) -> None:
         self.device = name
@@ -224,7 +224,7 @@ class Playing(QObject):
             self._delete()
             self._show(None)
 
-    # playing
+    # pilots
 
     def _prepare(self) -> None:
         """Simulate the steps before the first shown one, in the background."""
@@ -283,7 +283,7 @@ class Playing(QObject):
         except StudyError as error:
             self.place.message.emit("The pilot was not kept", f"{error}.")
             return
-        with suppress(StoreError):  # only the tab Changes would miss it
+        with suppress(StoreError):  # only the tab Changes needs the copy
             keep_content(pilot.what.source)
         self._delete()
         self._show(shown.kept(to.name))
@@ -314,7 +314,7 @@ class Playing(QObject):
         if pilot is not None:
             _remove(pilot.folder)
 
-    # what is shown
+    # display
 
     def _show(self, state: Notice | None) -> None:
         self.place.header.strip.show_notice(state)

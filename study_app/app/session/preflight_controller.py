@@ -223,7 +223,7 @@ class Preflight(QObject):
 
     def _take(self, facts: Measurements) -> None:
         self._ready = replace(self._ready, facts=facts)
-        if _dynamics(facts, self._protocol) != self.appraisal.dynamics:  # the delay, and with it what is withheld
+        if _dynamics(facts, self._protocol) != self.appraisal.dynamics:  # the delay decides how much force is withheld
             self.appraisal.close()
             self.appraisal, self._appraised = _appraisal(self._protocol, facts), False
         self._show()
