@@ -47,9 +47,9 @@ class KeyPresses(QObject):
     def __init__(self, application: QGuiApplication) -> None:
         super().__init__(application)
         self._window: QWindow | None = None
-        self._receivers: dict[int, QObject | None] = {}  # of the presses that were delivered, by key
+        self._receivers: dict[int, QObject | None] = {}  # the delivered presses by key
         self._release: _Release | None = None  # the last release, until it is known to be real
-        self._sent: QKeyEvent | None = None  # an event of this filter, on its way through it
+        self._sent: QKeyEvent | None = None  # the event that this filter is sending
         self._settling = QTimer(self, singleShot=True, interval=RELEASE_MS)
         # An overdue timer may come before a press that waits in the queue; a timer without a time comes after it.
         self._settling.timeout.connect(lambda: QTimer.singleShot(0, self, self._settle_if_due))
@@ -93,7 +93,7 @@ class KeyPresses(QObject):
     def _watch(self, window: QWindow | None) -> None:
         """Filter the events of the focused window, which alone receives keys."""
         if window is not None and window is not self._window:
-            window.removeEventFilter(self)  # one that comes back is filtered once
+            window.removeEventFilter(self)  # a window that becomes active again is filtered once
             window.installEventFilter(self)
         self._window = window
 

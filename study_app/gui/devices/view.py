@@ -113,7 +113,7 @@ class DevicesPlace(Place):
     def __init__(self, settings: MachineSettings = DEFAULTS, look: Callable[[], Sequence[Backend]] = backends) -> None:
         super().__init__()
         self._settings, self.backends = settings, look
-        self.looking = Background(self, refusals=Exception)  # a bug of a driver is what the machine shows
+        self.looking = Background(self, refusals=Exception)  # a driver's bug is a result of the search
         self.looking.done.connect(self._show_found)
         self.looking.failed.connect(self._show_unexamined)
         self._ended = False
@@ -198,7 +198,7 @@ class DevicesPlace(Place):
                 self.rows[device.name].show_device(device)
             else:
                 self._add(device)
-        self._group.setExclusive(False)  # or what is marked could not lose its mark
+        self._group.setExclusive(False)  # otherwise the marked button could not be unmarked
         for name, row in self.rows.items():
             if isinstance(row.title, Radio):
                 row.title.setChecked(name == self._settings.device.partition(":")[0])

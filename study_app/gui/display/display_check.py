@@ -33,7 +33,7 @@ def check_display(environment: Mapping[str, str] = os.environ, platform: str = s
         return
     wanted = environment.get("QT_QPA_PLATFORM", "").partition(":")[0]
     if wanted not in {"", "xcb"}:
-        return  # offscreen, wayland, vnc …: asked for by name, so Qt's own word counts
+        return  # offscreen, wayland, vnc …: requested by name, so Qt reports its own errors
     if wanted == "" and environment.get("WAYLAND_DISPLAY"):
         return
     display = environment.get("DISPLAY", "")
@@ -94,7 +94,7 @@ def _load_plugin() -> None:
         raise DisplayError("PySide6 is not installed: reinstall liquid-study with pip")
     plugin = Path(package.origin).parent / "Qt" / "plugins" / "platforms" / "libqxcb.so"
     if not plugin.exists():
-        return  # Qt from the system's own packages brings what it needs
+        return  # Qt from system packages has its libraries
     try:
         ctypes.CDLL(str(plugin))
     except OSError as error:

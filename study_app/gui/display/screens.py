@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QWidget
 
 from study_app.errors import DisplayError
 
-FRAME_LOOKS_MS = (300, 1000, 3000)  # when to look for the frame that a window manager puts around a new window
+FRAME_LOOKS_MS = (300, 1000, 3000)  # delay before measuring a window manager's frame around a new window
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,8 +155,8 @@ def has_card() -> bool:
     return name is not None and not any(word in name.lower() for word in IN_SOFTWARE)
 
 
-LEAD_NS: Final = 5_000_000  # so long before a swap a frame is drawn: twice what the tank takes at 1080p
-STALE_REFRESHES: Final = 8  # without a swap for so many refreshes the clock counts alone
+LEAD_NS: Final = 5_000_000  # time before a swap at which a frame is drawn: twice the tank's drawing time at 1080p
+STALE_REFRESHES: Final = 8  # refreshes without a swap after which the clock alone paces
 NS_PER_S: Final = 1_000_000_000
 LOCKED, BY_CLOCK = "locked to the screen's swaps", "by the clock"
 

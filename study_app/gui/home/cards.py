@@ -396,4 +396,4 @@ class CardGrid(QWidget):
             self._grid.addWidget(card, index // across, index % across)
         for column in range(min(across, max(2, len(self.cards)))):
             self._grid.setColumnStretch(column, 1)
-        self._grid.activate()  # at once, or what is above keeps the room of the arrangement before
+        self._grid.activate()  # at once, or the part above keeps the previous layout's room

@@ -387,7 +387,7 @@ class NewSessionDialog(QDialog):
         self._show_recorded_group(self._state_now().group_of(participant))
         numbers = used.numbers(participant)
         self._ways_row.setVisible(session in numbers)
-        if session in numbers:  # ways to go on that need no thought; resuming is for home
+        if session in numbers:  # choices that need no decision; resuming is on the home page
             self._free = min(max(numbers) + 1, MAX_SESSION), used.suggested()
             self.ways[0].show_action("", f"Session {self._free[0]} of {participant}")
             self.ways[1].show_action("", f"New participant {self._free[1]}")

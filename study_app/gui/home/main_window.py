@@ -188,9 +188,9 @@ class MainWindow(Themed, QMainWindow):
         self.setWindowTitle("Liquid Study")
         self.setMinimumSize(LEAST)
         self.notice: Question | None = None
-        self._notice_of = ""  # the place that has it said
-        self._resting = False  # whether a session has the screen
-        self.not_opened: BaseException | None = None  # why a place could not be opened: a notice has said so
+        self._notice_of = ""  # the place of the message
+        self._resting = False  # whether a session uses the screen
+        self.not_opened: BaseException | None = None  # the error of a place that could not be opened, already shown
         self._had_keyboard: QWidget | None = None
         self._makers = makers
         self._places: dict[str, Place] = {}
@@ -309,7 +309,7 @@ class MainWindow(Themed, QMainWindow):
     def _show_notice(self, notice: Question, of: str = "") -> None:
         notice.finished.connect(notice.deleteLater)
         self.notice, self._notice_of = notice, of
-        if not self._resting:  # else it would be in front of a session
+        if not self._resting:  # otherwise it would cover a session
             notice.show()
 
     def _close_notice(self, of: str) -> None:

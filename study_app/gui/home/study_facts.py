@@ -323,7 +323,7 @@ def interrupted(
             schedule = begun_schedule(protocol, begun, read_key(study.path))
             step = resume_at(protocol, schedule, lines).step
         except StudyError:
-            continue  # what is wrong with it is said when it is asked for by its folder
+            continue  # its errors are reported when its folder is requested
         where = place_words(protocol, schedule, step)
         stopped = started_words(datetime.fromisoformat(lines[-1].at).astimezone(now.tzinfo), now)
         whole = f" of {session.answers_of}" if session.answers_of is not None else ""

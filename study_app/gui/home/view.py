@@ -174,7 +174,7 @@ class HomePlace(Place):
         )
         self.area = scrolled(inside)
         vbox(self.area, margins=0, parent=self)
-        self.below.hide()  # until the cards are there, which would move it
+        self.below.hide()  # shown once the cards are there, which would move it
         self.area.verticalScrollBar().rangeChanged.connect(lambda _least, most: self._keep_margin(most > 0))
         bar = self.cards_area.verticalScrollBar()
         bar.rangeChanged.connect(lambda _least, most: self.grid.leave_room(0 if most > 0 else BAR_PX))
@@ -210,7 +210,7 @@ class HomePlace(Place):
 
     def _show_unread(self, error: Exception) -> None:
         self._show_studies(self._facts)
-        self._files, self._unread = None, True  # read again when one comes back here, not at each activation
+        self._files, self._unread = None, True  # read again at the next visit, not at each activation
         what = f"{type(error).__name__}: {error}"
         self.message.emit("The studies could not be read", f"{what}. The terminal shows the details.")
 

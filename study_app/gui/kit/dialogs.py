@@ -201,7 +201,7 @@ class Work(Question):
         self.bar.hide()
         self.said.setText(sentence)
         self.go_on.show()
-        self.back.setEnabled(True)  # it may have come to an end although one asked to stop
+        self.back.setEnabled(True)  # it may have ended in spite of the request to stop
         self._shrink()
 
     def _shrink(self) -> None:

@@ -17,7 +17,7 @@ from study_app.gui.widgets.numbers import read_number, write_number
 from study_app.number_text import readings_of, unclear_number
 from study_app.session.start import MAX_SEED
 
-LEAST_WORDS = 280  # narrower, wrapped words would ask for room that they do not need
+LEAST_WORDS = 280  # narrower, wrapped text would request too much room
 UNIT_WIDTH = 28
 
 

@@ -22,12 +22,12 @@ from study_app.gui.widgets.live_plots import MINUS, Plot, draw_quickly, number, 
 from study_app.lab.live import LimiterCount
 from study_app.number_text import grouped
 
-POINTS = 240  # of a curve: one for one to two pixels; painting takes as long as there are points
+POINTS = 240  # points of a curve, one for one to two pixels; painting time grows with them
 STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 MOST_TICKS, TICK_PX = 5, 22
 LEGEND_LINE, LEGEND_GAP, STROKE_WIDTH = 20, 16.0, 24.0
 LABEL_PX = 9.0  # half of a tick's number
-SHRINKS_BELOW = 0.45  # of the height: a plot that follows every peak is never at rest
+SHRINKS_BELOW = 0.45  # share of the height: a plot that follows every peak never rests
 DASH: dict[str, tuple[float, float] | None] = {"solid": None, "long": (6.0, 3.0), "short": (3.0, 2.0)}
 
 
@@ -245,7 +245,7 @@ def thinned(t_s: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 NAME_WIDTH = 84
 LINE = 26
-COST_HEIGHT, ERROR_HEIGHT = 252, 3 * LINE + 6  # of what is usual, kept free until it is measured
+COST_HEIGHT, ERROR_HEIGHT = 252, 3 * LINE + 6  # usual heights, kept free until the measurement
 UNKNOWN = "–"
 LEAST_NS = 1.0  # the smallest cost that a measurement next to a running servo resolves
 LimiterState = Literal["acting", "acted", "quiet"]

@@ -173,7 +173,7 @@ def _points(pixels: Floats) -> list[QPointF]:
 
 
 WORKSPACE_M: Point = (0.1, 0.06, 0.06)
-BALL_M = 0.0034  # radius that the glass is made for: it stays where it is while the ball's own is changed
+BALL_M = 0.0034  # radius for which the glass is made: it stays while the ball's radius changes
 RING = "break"
 Words: TypeAlias = tuple[str, str]
 """What a plate says, and the icon before it."""
@@ -403,7 +403,7 @@ class LabTank(Themed, QWidget):
         whole = QRectF(self.rect())
         outside = QPainterPath()
         outside.addRect(whole)
-        outside.addRoundedRect(whole, RADIUS_CARD, RADIUS_CARD)  # odd-even: what lies between both
+        outside.addRoundedRect(whole, RADIUS_CARD, RADIUS_CARD)  # odd-even fill: the area between both
         painter.fillPath(outside, QColor(self.theme.window))
         if self.hasFocus():
             painter.setBrush(Qt.BrushStyle.NoBrush)

@@ -233,7 +233,7 @@ class LabHeader(QWidget):
         self.save.setEnabled(not view.workbench.blind)
 
     def _ask_blind(self, on: bool) -> None:
-        self.blind.setChecked(not on)  # the view says when it is
+        self.blind.setChecked(not on)  # the view shows it once it applies
         self.blind_asked.emit(on)
 
 
@@ -543,7 +543,7 @@ class FormPanel(Card):
         whole = QWidget()
         column = vbox(head, Rule(), (self.area, 1), spacing=8, margins=0, parent=whole)
         column.addWidget(Rule())
-        column.addWidget(self.said)  # above the buttons, which stay in their place when it appears
+        column.addWidget(self.said)  # above the buttons, so that they stay in place when it appears
         add_parts(column, self.back, self.open)
         self.hidden = MaskedPanel(HIDDEN, "Parameters would reveal which is which.")
         self._stack = QStackedLayout()

@@ -39,7 +39,7 @@ class Actions(Card):
         self._signs = True
         row = hbox(self.pause, self.repeat, STRETCH, self.end, self.close_session, spacing=10)
         for button in (self.pause, self.repeat, self.end, self.close_session):
-            button.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)  # its padding gives way
+            button.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)  # its padding shrinks
         self.close_session.hide()
         add_parts(self.column, row, self.hint)
 

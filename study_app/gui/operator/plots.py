@@ -25,8 +25,8 @@ from study_app.gui.widgets.live_plots import (
 
 FIELD = QSize(320, 210)
 """What the card asks for, whether it shows the force or hides it."""
-LEAST_SHARE = 1 / 16  # of the limit: a plot of less would show noise as large as force
-NARROWS_BELOW = 0.8  # of the reach that would do, so that a force at its edge does not make the scale come and go
+LEAST_SHARE = 1 / 16  # share of the limit: a smaller range would show noise as large as force
+NARROWS_BELOW = 0.8  # hysteresis of the range, so that a force at its edge does not toggle the scale
 FILL_ALPHA = 46
 
 

@@ -24,7 +24,7 @@ STATES: dict[State, tuple[Tone, str]] = {
     "trouble": ("bad", "warning"),
     "ended": ("ok", "check"),
 }
-OTHER_WINDOW = "F6"  # not every desktop has a key for it, above all not in full screen
+OTHER_WINDOW = "F6"  # not every desktop has a key for this, above all in full screen
 BLINDINGS = {"double": ("lock", "Double-blind"), "single": ("eye", "Single-blind")}
 SAVED_RECENTLY_S = 2.0
 TRIALS_PX = 120

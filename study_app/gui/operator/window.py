@@ -39,8 +39,8 @@ LOW_BELOW, LOWER_BELOW, LEAST_BELOW = 870, 750, 705
 STOPS: dict[Height, int] = {"high": 250, "low": 236, "lower": 236, "least": 236}
 NOTES: dict[Height, int] = {"high": NOTES_SHOWN, "low": 2, "lower": 1, "least": 0}
 DEVICE_ROWS: dict[Height, int] = {"high": ALL_ROWS, "low": 3, "lower": 2, "least": 2}
-ACROSS_FROM = 640  # so wide a middle has four tiles, and two plots, side by side
-SIGNS_FROM = 690  # so wide a row of buttons has room for their signs
+ACROSS_FROM = 640  # minimum width for four tiles, and two plots, side by side
+SIGNS_FROM = 690  # minimum width of the buttons with icons
 GAP = 10
 ENDS: Final = (("aborted", "Another reason"), ("withdrawn", "The participant withdrew"))
 
@@ -178,7 +178,7 @@ class OperatorWindow(Themed, QMainWindow):
         self.stop = StopPanel(felt=felt, device_button=stop_button)
         self.buttons = Actions()
         self.question: Question | None = None
-        self._asks_about = ""  # the setting that the question is about
+        self._asks_about = ""  # the setting of the open question
         self._failures: set[str] = set()
         self.escape = EscapeKey(self, anywhere=True)
         self.arrangement = Arrangement(self)
@@ -190,7 +190,7 @@ class OperatorWindow(Themed, QMainWindow):
 
     def _connect(self) -> None:
         ask, buttons = self.ask, self.buttons
-        # Pressed, not clicked: the force goes with the finger's first touch.
+        # Pressed, not clicked: the force stops at the first touch.
         for signal, what in (
             (self.stop.stop.pressed, "stop"),
             (self.escape.held, "stop"),
@@ -224,7 +224,7 @@ class OperatorWindow(Themed, QMainWindow):
 
     def tell_of_failure(self, error: BaseException) -> None:
         """Report once that a part of the window failed."""
-        clear_frames(error.__traceback__)  # they may hold a painter, and Qt would paint no window any more
+        clear_frames(error.__traceback__)  # frames may hold a painter, and Qt would then paint no window
         if (what := f"{type(error).__name__}: {PASSED_ON.sub('', str(error))}") not in self._failures:
             self._failures.add(what)
             self.show_message("A part of this window failed", f"{what}. The session continues.")
@@ -237,7 +237,7 @@ class OperatorWindow(Themed, QMainWindow):
         self.banner.show_view(view)
         self.may_close = view.over
         if self.question is not None and self._asks_about not in {"", _setting(view) if view.may_repeat else None}:
-            self.question.reject()  # the trial it was about is over: its answer would hit the next one
+            self.question.reject()  # its trial is over: the answer would apply to the next one
         for part in (self.stop, self.header, self.buttons):
             part.show_view(view)
         for show in (self.rail.now, self.rail.tally, self.tiles, self.notes, self.rail, self.device):

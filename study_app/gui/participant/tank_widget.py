@@ -51,8 +51,8 @@ from study_app.session.tasks import TankView, new_tracker
 
 # Where the tank lies in the window, in shares of it.
 AREA = (0.075, 0.122, 0.85, 0.712)
-NEAR_RADII = 2.0  # of a target: within them the ball is before or behind it
-ALWAYS = QRegion(0, 0, 1, 1)  # a frame in which nothing moved is a frame too
+NEAR_RADII = 2.0  # in target radii: distance within which the ball is before or behind a target
+ALWAYS = QRegion(0, 0, 1, 1)  # a frame without motion counts, too
 
 
 def look(page: TaskPage, captions: Captions, width: int, height: int) -> tuple[Box, Camera]:
@@ -187,7 +187,7 @@ class TankWidget(QWidget):
         self.things = things
         if self._pane is None:
             self._drawn_ns, self._showing = None, True
-            self.repaint(changed)  # whatever waits to be done would make the view older
+            self.repaint(changed)  # pending work would make the view older
             self._showing = False
             self._tell()
         else:

@@ -189,8 +189,8 @@ WINDOWED_SIZE = QSize(1366, 768)
 PILOT_FRAME = 10
 WAITING_MS = 15
 TIME_UP_MS = 1500  # "Time is up" is shown for so long before the questions
-AHEAD_MS = 100  # after a page came, what comes next is painted
-SETTLING_MS = 100  # from one of the program's windows to the next, none may have the keyboard for so long
+AHEAD_MS = 100  # delay after a page before painting the next one ahead
+SETTLING_MS = 100  # longest time without a focused window when the focus moves between the program's windows
 
 
 class ParticipantWindow(QWidget):
@@ -293,7 +293,7 @@ class ParticipantWindow(QWidget):
 
     def open_on(self, screen: QScreen | None = None) -> None:
         """Open the window on ``screen`` (None: the system's choice), full-screen unless windowed."""
-        give_role(self, QAccessible.Role.Window)  # again: what was connected to its methods since has taken it away
+        give_role(self, QAccessible.Role.Window)  # again: later connections to its methods removed it
         if screen is not None:
             self.setScreen(screen)
             self.move(screen.geometry().topLeft())
@@ -353,10 +353,10 @@ class ParticipantWindow(QWidget):
                 self._capture.take(made, made.page.workspace_m)
         else:
             made.focus_first()
-        old.hide()  # only now, or Qt would lead the keyboard somewhere itself
+        old.hide()  # only now, or Qt would move the focus itself
         old.deleteLater()
         if isinstance(made, TankWidget):
-            made.repaint()  # whole, lest its first view wait for that
+            made.repaint()  # repaint everything, so that its first view does not wait
         self._ahead.start()
 
     def show_view(self, view: TankView) -> None:
@@ -461,7 +461,7 @@ class ParticipantWindow(QWidget):
         if isinstance(page, TaskPage):
             return self._make_tank(page)
         context = self._context
-        if isinstance(page, PausePage):  # on a picture of the page before; a pause on a pause shows the first one's
+        if isinstance(page, PausePage):  # on a picture of the previous page; a second pause keeps the first one's
             grabbed = old.grab() if old.width() > 0 else None
             made: PageWidget = PauseWidget(page, context, old.under if isinstance(old, PauseWidget) else grabbed)
         elif isinstance(page, QuestionnairePage):

@@ -165,7 +165,7 @@ ROW_HEIGHT = 42
 DOT = 13.0
 LEFT = 70
 NAME, BAR = 148, 160
-LEAST_WORDS = 160  # narrower, wrapped words would ask for room that they do not need
+LEAST_WORDS = 160  # narrower, wrapped text would request too much room
 LOOKS: dict[str, tuple[str, Ink, str]] = {
     "ok": ("check", "ok", "passed"),
     "warning": ("warning", "warn", "warning"),
@@ -316,7 +316,7 @@ class PreflightWindow(QWidget):
         self.start.setEnabled(not view.busy and not view.failures)
         self.again.setEnabled(not view.busy)
         if self._busy and not view.busy:
-            self.start.setFocus()  # what was pressed lost the keyboard to Cancel meanwhile
+            self.start.setFocus()  # the pressed button lost the focus to Cancel meanwhile
         self._busy = view.busy
         if [row.check for row in self.rows] != list(view.checks):
             self.rows = check_rows(view.checks, self.rows, self.checks.column)

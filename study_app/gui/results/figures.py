@@ -155,7 +155,7 @@ def themed_svg(svg: bytes, colours: Mapping[str, str], theme: Theme) -> bytes:
     edge = theme.ctl if theme.dark else theme.surface
     paper = {**letters, b"stroke: " + WHITE: f"stroke: {edge}".encode(), WHITE: theme.surface.encode()}
     family = b"font-family: " + FAMILIES[0].encode()
-    parts = LETTERS.split(svg)  # every second one is a text
+    parts = LETTERS.split(svg)  # every second part is a text
     accent = colours.get("accent", "#").lower().encode()
     parts[::2] = [_dyed(part, paper, accent) for part in parts[::2]]
     parts[1::2] = [FAMILY.sub(family, _dyed(part, letters, accent)) for part in parts[1::2]]
@@ -453,7 +453,7 @@ class FiguresPanel(QScrollArea):
 
     def fit(self) -> None:
         """Set the figures' width; smaller if two of them fit side by side then."""
-        bar = 0 if self._whole else self.verticalScrollBar().sizeHint().width()  # there or not: or they would flutter
+        bar = 0 if self._whole else self.verticalScrollBar().sizeHint().width()  # reserved: figures would flicker
         width = min(self.width() - bar - AROUND, MOST_WIDTH)
         first = [card.drawing for card in self.cards if card.drawing is not None][:AT_ONCE]
         if first and not self._whole:

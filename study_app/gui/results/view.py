@@ -732,7 +732,7 @@ class ResultsPlace(Place):
         sentence = f"{refused.sentence}."
         if isinstance(order, Decided):
             self.message.emit(REFUSALS[type(order)], sentence)
-            self._read(order.folder)  # it may have changed meanwhile, and what was being read was given up
+            self._read(order.folder)  # it may have changed meanwhile, and its reading was cancelled
         elif refused.stopped:
             all_drawn = self._blocks and len(self._redrawn) >= self._blocks
             trouble = (

@@ -102,7 +102,7 @@ def sessions(results: Path, answers_of: Mapping[str, int]) -> tuple[SessionFacts
     """
     facts: list[SessionFacts] = []
     for data in sorted(results.glob("*/data")):
-        with contextlib.suppress(StoreError):  # not ours, or not readable: the commands say why when asked about it
+        with contextlib.suppress(StoreError):  # not ours, or not readable: the commands report why when asked about it
             rows = participant_rows(StudyFolder(data.parent))
             facts += session_facts(data.parent, rows, _exclusions(data.parent), answers_of)
     return tuple(sorted(facts, key=lambda session: (not session.needs_care, -session.started.timestamp())))

@@ -61,7 +61,7 @@ from study_app.video.sources import USUAL
 
 LEAST_S: Final = 2.0
 KEPT_S: Final = 10.0
-LATE: Final = 1.5  # so many refreshes of the screen apart, at least one was missed
+LATE: Final = 1.5  # gap in refreshes from which at least one was missed
 
 
 class FrameTimes:
@@ -331,7 +331,7 @@ FIELDS = (
         file_filter="Certificates (*.pem *.crt *.cer)", parse=_there, write=_or_empty,
     ),
 )  # fmt: skip
-OF_PROGRAM = tuple(  # what has a title in `MachineSettings`: one of a few words, or a switch
+OF_PROGRAM = tuple(  # the fields of `MachineSettings` with a title: a choice or a switch
     choice(name, setting.title, {word: word.capitalize() for word in words})
     if (words := get_args(setting.annotation))
     else Field(name, setting.title, "switch")

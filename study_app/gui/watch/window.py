@@ -280,14 +280,16 @@ class WatchWindow(Themed, QDialog):
         vbox(head, self.lacking, (self.room, 1), foot, spacing=10, margins=(24, 16, 24, 16), parent=self)
         for button in (self.play, self.export, self.close_button, *self.steps.values()):
             button.setAutoDefault(False)
-            button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leaves the keys with the time line
+            button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # after a click, keys still go to the time line
         self._enable(False)
 
     def _connect(self) -> None:
         actions = {PLAY.id: PLAY.action(self.room, self.toggle)}
         for command, kind, way in STEPS:
             actions[command.id] = command.action(self.room, partial(self.step, kind, way))  # type: ignore[arg-type]
-        actions[PLAY.id].setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)  # else a button's own key
+        actions[PLAY.id].setShortcutContext(
+            Qt.ShortcutContext.WidgetWithChildrenShortcut
+        )  # else the key presses the button
         for name, button in {PLAY.id: self.play, **self.steps}.items():
             press(button, actions[name])
         self.interval.activated.connect(lambda at: self._read(at + 1))

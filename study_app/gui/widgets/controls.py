@@ -103,7 +103,7 @@ class ActionButton(Themed, PressedByEnter):
         self.setText(text)
         if self._key:
             self.setShortcut(self._key)  # setText clears it
-        self.updateGeometry()  # words that stay ask for no other room, but a sign that comes or goes does
+        self.updateGeometry()  # the same text needs no layout, but an icon that appears or disappears does
         self.update()
 
     def sizeHint(self) -> QSize:

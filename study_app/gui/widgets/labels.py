@@ -95,7 +95,7 @@ class Clamped(QLabel):
         self.setFont(font(role))
         self.setProperty("role", ink)
         self.setWordWrap(steady)
-        if not steady:  # a column with a label that wraps is as high as it would like to be, where it can scroll
+        if not steady:  # a scrollable column with a wrapping label takes its preferred height
             self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.setAccessibleName(text)

@@ -47,7 +47,7 @@ def pen(colour: str, width: float = STROKE, dash: tuple[float, float] | None = N
     made = QPen(QColor(colour), width)
     made.setCosmetic(True)
     made.setCapStyle(Qt.PenCapStyle.FlatCap)
-    made.setJoinStyle(Qt.PenJoinStyle.BevelJoin)  # so many points lie on a curve that joins are not seen, but paid for
+    made.setJoinStyle(Qt.PenJoinStyle.BevelJoin)  # a curve has so many points that joins are invisible, but costly
     if dash is not None:
         made.setDashPattern(list(dash))
     return made

@@ -133,7 +133,7 @@ class NumberField(QLineEdit):
 
 STEPS = 200
 PAGE = 20
-FIGURES = 3  # that a slider's number has: more would be false precision
+FIGURES = 3  # significant digits of a slider's number: more would be false precision
 KNOB = 7.5
 TRACK = 4.0
 MARGIN = KNOB + 4  # room for knob and focus ring at both ends

@@ -104,7 +104,7 @@ class QuestionWords(QWidget):
         high, note_high = self._heights(width)
         top = (self.height() - high - note_high + 1) // 2
         painter = page_painter(self)
-        painter.setLayoutDirection(Qt.LayoutDirection.LayoutDirectionAuto)  # words are in their own language's
+        painter.setLayoutDirection(Qt.LayoutDirection.LayoutDirectionAuto)  # the text has its own language's direction
         ink = PARTICIPANT.warn if self.missing else PARTICIPANT.text3
         note_top, note_left = top + high, left + self._note_left
         text_face, note_face, number_face = self._faces
@@ -725,7 +725,7 @@ class EntryKeys(Widget):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         escape = event.key() == Qt.Key.Key_Escape
         if escape and (question := question_of(self)) is not None:
-            question.finish()  # before the page gives way to a pause
+            question.finish()  # before a pause replaces the page
         if escape or self.leaves_to_page(event):
             event.ignore()
         else:

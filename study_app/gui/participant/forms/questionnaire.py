@@ -100,7 +100,7 @@ def grid(width: float, height: float, asked: Asked, margin: float, *, text_scale
     gap = (42 if roomy else 24) * scale if asked.judge else 0.0
     number, after = NUMBER * text, AFTER_STATEMENT * scale
     wide = content - number - after - judge - gap
-    statements = 400 * scale if text <= scale else 480 * text  # as much as these need, cells give way to them
+    statements = 400 * scale if text <= scale else 480 * text  # statements get as much as they need; cells shrink first
     narrowest = max(52 * scale, asked.word * text / 2 + 2)  # a label may be twice as wide as its column
     fewest = min(max((wide - statements) / POINTS, narrowest), max(98 * scale, narrowest))
     pitch = min(max((wide - asked.statement * text - 8) / POINTS, fewest), 120 * max(scale, 0.8 * text))
@@ -116,7 +116,7 @@ def grid(width: float, height: float, asked: Asked, margin: float, *, text_scale
     )
 
 
-SHRINKING = (1.0, 0.94, 0.88, 0.82, 0.76)  # of words that are larger than they must be, in a window that is too small
+SHRINKING = (1.0, 0.94, 0.88, 0.82, 0.76)  # factors tried on enlarged text if the window is too small
 WRAP_LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap)
 
 Fitted: TypeAlias = tuple[QFont, QFont, float, float]
@@ -250,7 +250,7 @@ SHARES = (1.0, 1.2, 1.4, 1.6, 1.8)
 def label_height(labels: tuple[str, ...], widest: float) -> float:
     """Return the height of labels at scale 1 wrapped at ``widest`` px [px]."""
     metrics = QFontMetricsF(font("label", weight=600))
-    room = QRectF(0, 0, min(LABEL_WIDTH, 0.95 * widest), 1e3)  # letters of other sizes are not quite in proportion
+    room = QRectF(0, 0, min(LABEL_WIDTH, 0.95 * widest), 1e3)  # letter widths are not quite proportional to the size
     return max((metrics.boundingRect(room, WRAP_LEFT, text).height() for text in labels), default=0.0)
 
 

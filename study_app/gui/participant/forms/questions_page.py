@@ -75,7 +75,7 @@ class Foot(QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         """Draw a line, and below it from the end: the count of answers, the keys, and what is missing."""
         painter = page_painter(self)
-        painter.setLayoutDirection(Qt.LayoutDirection.LayoutDirectionAuto)  # words are in their own language's
+        painter.setLayoutDirection(Qt.LayoutDirection.LayoutDirectionAuto)  # the text has its own language's direction
         painter.fillRect(0, 0, self.width(), LINE, QColor(PARTICIPANT.border))
         gap = round(GAP * self._scale)
         line = self._row.contentsRect()
@@ -376,7 +376,7 @@ class QuestionsPage(PageWidget):
     def _tell(self) -> None:
         asked = self.asked
         here = self.focusWidget()
-        question = question_of(here) if here is not None else self._first  # where the keyboard will be
+        question = question_of(here) if here is not None else self._first  # the part that will get the focus
         keys = "" if question is None else question.answer_keys
         self.foot.show_state(self.message, sum(field.is_answered for field in asked), len(asked), keys)
 
@@ -440,8 +440,8 @@ class QuestionsPage(PageWidget):
             self.event_made.emit(event)
 
 
-MOST_OVER = 0.2  # of the page's height that a part may be too high and still be tried with smaller words
-SHRINKING = (0.94, 0.88, 0.82)  # of words that are larger than they must be, where all questions then fit
+MOST_OVER = 0.2  # excess height, as a share of the page, up to which smaller text is tried
+SHRINKING = (0.94, 0.88, 0.82)  # factors tried on enlarged text so that all questions fit
 
 Parts = list[list[QuestionField]]
 

@@ -35,7 +35,7 @@ from study_app.session.pages import Progress
 if TYPE_CHECKING:
     Button = QAbstractButton
 else:
-    Button = object  # Qt permits one class of its own in a class
+    Button = object  # Qt permits only one Qt base class
 
 DESIGNED_FOR = (1366.0, 768.0)
 MOST_SCALE = 2.4
@@ -448,7 +448,7 @@ class LanguageSwitch(QGroupBox):
         for button in self.buttons:
             button.setChecked(button.language == present)
             policy = Qt.FocusPolicy.StrongFocus if button.isChecked() else Qt.FocusPolicy.ClickFocus
-            button.setFocusPolicy(policy)  # Qt does so itself, but not for a button that is checked this early
+            button.setFocusPolicy(policy)  # Qt does this itself, but not for a button that is checked this early
             button.clicked.connect(lambda _=False, code=button.language: self._choose(code, present))
 
     def set_scale(self, scale: float) -> None:

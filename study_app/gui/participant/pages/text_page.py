@@ -30,7 +30,7 @@ LINE_PERCENT = 140
 SCROLLBAR = 16
 LINE_STEP = 48
 GIVING_WAY = ((1.0, True), (0.94, True), (0.89, True), (0.89, False))  # size of the text, whether with a badge
-MUST_BE_READ = ((1.0, True), (1.0, False))  # where words are as small as they may be
+MUST_BE_READ = ((1.0, True), (1.0, False))  # where text has its minimum size
 LINE_KEYS = {Qt.Key.Key_Up: -1, Qt.Key.Key_Down: 1}
 PAGE_KEYS = {Qt.Key.Key_PageUp: -1, Qt.Key.Key_PageDown: 1}
 
@@ -240,11 +240,11 @@ class TextWidget(ReadingPage):
         self.languages: LanguageSwitch | None = None
         if page.languages:
             self.languages = LanguageSwitch(page.languages, page.language, wording.choose_language, self)
-            later = Qt.ConnectionType.QueuedConnection  # the page goes, and must not while its button hears a key
+            later = Qt.ConnectionType.QueuedConnection  # the page must not close while its button handles a key
             self.languages.chosen.connect(self._choose_language, later)
             for language in self.languages.buttons:
                 assert self.button is not None  # noqa: S101  # these pages have one
-                QWidget.setTabOrder(language, self.button)  # above the text, so before its button
+                QWidget.setTabOrder(language, self.button)  # above the text, so before its button in the focus order
         self.decline = DeclineButton(wording.decline, self) if self._consent else None
         if self.decline is not None:
             self.decline.clicked.connect(self._decline)
@@ -360,7 +360,7 @@ class TextWidget(ReadingPage):
             self.event_made.emit(Continue(self._clock()))
 
 
-VEIL = 0.80  # how much of the page under a pause is hidden
+VEIL = 0.80  # opacity of the pause above the page
 
 
 class PauseWidget(ReadingPage):

@@ -100,7 +100,7 @@ class Captions:
         base = caption_scale(width, height)
         least = words_scale(width, height, self._text_scale) if self._text_scale > 1 else 1.0
         self._scale = max(base, LEAST_SCALE * least)
-        self._fine = max(self._scale, least if self._text_scale > 1 else FINE)  # small words shrink less than the tank
+        self._fine = max(self._scale, least if self._text_scale > 1 else FINE)  # small text shrinks less than the tank
         self._instruction_font = font("instruction", scale=self._scale)
         self._count_font = font("number", scale=self._scale)
         self._small = self._pause_font = font("statement", scale=self._fine)
@@ -221,7 +221,7 @@ class Captions:
         if self._page.adjusts:
             return hint
         if todo.paced or (self._page.interval is not None and self._page.interval.resting):
-            return hint  # a count would distract from the pace, whose end is no surprise
+            return hint  # a countdown would distract from the paced task, whose end is predictable
         elapsed_s = task.elapsed_s if task else 0.0  # before the first view nothing has happened yet
         left = math.ceil(todo.limit_s - elapsed_s)
         if left <= 0:
