@@ -53,7 +53,7 @@ class DesignerController(QObject):
 
     def __init__(self, results: Path) -> None:
         place = DesignerPlace()
-        super().__init__(place)  # it goes with its place, before a timer or thread would show what is gone
+        super().__init__(place)  # parented to the page, so that no timer or thread outlives its widgets
         self.place = place
         self.editing = editing = Editing(results, self)
         self.runs = KnownRuns(editing)
@@ -248,7 +248,7 @@ class DesignerController(QObject):
             self.show_outline()
         self.place.show_step(step)
 
-    # what is shown
+    # display
 
     def show(self) -> None:
         """Show the open study: header, form, file and problems now, the outline after a pause in typing."""

@@ -76,7 +76,7 @@ class NoticeCard(Card):
             return
         self.notice = notice
         if notice is None and self.isAncestorOf(self.window().focusWidget()):
-            self.left.emit()  # else Qt hands the keyboard to the next part
+            self.left.emit()  # else Qt moves the focus to the next part
         self.setVisible(notice is not None)
         for part in (*self.buttons.values(), *self._lines):
             remove_widget(part)
@@ -95,7 +95,7 @@ class NoticeCard(Card):
             made = ActionButton(icon, text, cap=cap, role=ROLES.get(action, ""), height=36)
             made.clicked.connect(lambda _checked=False, action=action: self.asked.emit(action))
             self._buttons.addWidget(made)
-            made.show()  # at once: a part that is not shown cannot take the keyboard
+            made.show()  # at once: a hidden part cannot take the focus
             self.buttons[action] = made
         if self._of_playing and self.buttons:
             next(iter(self.buttons.values())).setFocus()  # of the window, once it is active again
@@ -218,7 +218,7 @@ class StudyChoice:
     file: str
     source: str
     shipped: bool = False  # whether it ships with the program
-    original: str = ""  # the name of the study that it is a copy of; "" where it is not known to be one
+    original: str = ""  # the name of the study that it copies; "" if none is known
 
     @property
     def words(self) -> str:
@@ -231,10 +231,10 @@ class HeaderState:
     """The header."""
 
     studies: tuple[StudyChoice, ...] = ()  # what can be opened
-    chosen: str = ""  # what is open, by its source; "" where nothing is
+    chosen: str = ""  # the source of the open study; "" if none
     problems: tuple[Tone, str, str] = ("ok", "check", "No problems")  # tone, icon and words of the chip
-    draft: str = ""  # what is said of the draft, "" where nothing is
-    # what would be undone and redone; "" where nothing is
+    draft: str = ""  # the note on the draft, "" without one
+    # the names of the steps to undo and redo; "" without one
     undo: str = ""
     redo: str = ""
     can_save: bool = False  # whether the file differs and may be written

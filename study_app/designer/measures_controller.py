@@ -175,7 +175,7 @@ class MeasuresController(QObject):
         if self._client is None:
             try:
                 self._client = self.make()
-            except OSError as error:  # no process to be had: the designer goes on without these numbers
+            except OSError as error:  # no process could be started: the designer works without these numbers
                 log.info("the worker of simulations does not start: %s", error)
                 self._fail(FAILED)
                 return

@@ -94,10 +94,10 @@ class OutlineRow:
     note: str = ""  # at its right: a time, a count, or its `brief` fact
     depth: int = 0  # below the heading of its section
     faults: int = 0  # within it
-    name: str = ""  # what a screen reader says of it
-    step: Path = ()  # its entry in the list that orders it; () where it cannot be moved
-    field: Path = ()  # the field of it that was found, () where none was looked for
-    named: bool = False  # whether what was looked for is in its title or id
+    name: str = ""  # the text for screen readers
+    step: Path = ()  # its entry in the list that orders it; () if it cannot be moved
+    field: Path = ()  # the matching field; () without a search
+    named: bool = False  # whether its title or id matches the search
 
 
 def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> tuple[OutlineRow, ...]:

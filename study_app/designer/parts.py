@@ -71,7 +71,7 @@ class Segments(Themed, QWidget):
 
     def _add_button(self) -> None:
         made, at = _Segment(), len(self.buttons)
-        made.setAccessibleName(self._name)  # until it has words
+        made.setAccessibleName(self._name)  # until it has a label
         made.setAccessibleDescription(self._name)
         made.clicked.connect(lambda: self.chosen.emit(self._values[at]))
         self._row.addWidget(made)

@@ -36,8 +36,8 @@ class ProblemRow:
     """One problem."""
 
     fault: Fault  # what is wrong, by path
-    element: Path  # the element whose form shows it; () where the file cannot be read
-    # what element and field are called ("Block Liquids, Order"), and the name of the element's icon
+    element: Path  # the element whose form shows it; () if the file cannot be read
+    # names of element and field ("Block Liquids, Order"), and the element's icon
     name: str
     icon: str
     # the sentence of ``check``, and its hint
@@ -242,7 +242,7 @@ class ProblemLine(Coloured, QWidget):
             made = RepairButton(self.row, sentence)
             made.clicked.connect(lambda _checked=False, made=made: self.repair_asked.emit(made.text()))
             self._repairs.addWidget(made)
-            made.show()  # at once: Tab passes what a layout is still to show
+            made.show()  # at once: Tab skips widgets that a layout has not shown yet
             self.repairs.append(made)
 
     def apply_theme(self, theme: Theme) -> None:
@@ -335,7 +335,7 @@ class ProblemsCard(Card):
         self.setFixedHeight(max(wanted, self.height()) if self.under_pointer else wanted)
         if listed == self._listed:
             return
-        if self.under_pointer and self.lines:  # no line moves: others are disabled or come when it leaves
+        if self.under_pointer and self.lines:  # no line moves while the pointer is over the list
             still = {row.identity: row for row in listed}
             for line in self.lines:
                 row = still.get(line.row.identity)
@@ -371,7 +371,7 @@ class ProblemsCard(Card):
 
     def leaveEvent(self, event: QEvent) -> None:
         super().leaveEvent(event)
-        QTimer.singleShot(0, self, self._show)  # Qt also says so where what is under the pointer is replaced
+        QTimer.singleShot(0, self, self._show)  # Qt also reports this when the widget under the pointer is replaced
         if not self.rows:
             self.close_asked.emit()
 

@@ -49,7 +49,7 @@ class Saving(QObject):
         self.editing, self.place, self.runs = editing, place, runs
         self.banner: Notice | None = None
         self._notice: Notice | None = None
-        self._lasts: bool | None = None  # while the study is edited (True), until it is (False), until it is closed
+        self._lasts: bool | None = None  # while edited (True), until edited (False), until closed (None)
         self.card: SaveCard | None = None
         self._others, self._trouble = 0, ""
         self._drafting = QTimer(self)

@@ -99,7 +99,7 @@ class KnownRuns(QObject):
 
 def _read(results: Path, study: str, file: Path) -> tuple[str, tuple[Run, ...], Mapping[tuple[str, str], int]]:
     known = runs_of_study(results, study)
-    with contextlib.suppress(StoreError):  # a draft that cannot be written says so
+    with contextlib.suppress(StoreError):  # a draft that cannot be written reports itself
         keep_run_content(file, known)
     return study, known, recorded_items(known)
 
@@ -363,7 +363,7 @@ class Changes(Card):
 
     def _found_choices(self, opened: Document) -> tuple[tuple[str, str], ...]:
         file = ""
-        with suppress(StoreError):  # a file that cannot be read is no version to compare with
+        with suppress(StoreError):  # an unreadable file is not offered for comparison
             if opened.base and opened.file.exists():
                 if opened.changed_outside():
                     file = "The file as another program wrote it"

@@ -59,7 +59,7 @@ class PanePage:
     body: QWidget  # what the tab shows; its focus proxy takes the keyboard
     aside: QWidget | None = None  # controls at the right of the tabs, while the page is shown
     with_facts: bool = True  # whether the facts stay below the page
-    # returns how high the body is at most; the facts take the rest [px]
+    # returns the maximum height of the body; the facts take the rest [px]
     most_px: Callable[[], int] = lambda: QWIDGETSIZE_MAX
     tip: str = ""  # the tip of its tab
 
@@ -400,7 +400,7 @@ class Arrangement(QWidget):
         if not self.file.editor.hasFocus():
             self.show_tab("file")
             return
-        last = self.form.focusWidget()  # where the file was over the form, the form gets its keyboard from Qt
+        last = self.form.focusWidget()  # if the file covered the form, Qt returns the focus to the form
         self.show_side("form")
         if last is not None and last.isVisible() and last.isEnabled():
             last.setFocus(SHORTCUT)
@@ -531,7 +531,7 @@ class DesignerPlace(Place):
     def form_path(self) -> ElementPath:
         return () if self.view.form is None else self.view.form.path
 
-    # what is shown
+    # display
 
     def show_view(self, view: DesignerView) -> None:
         """Show a study; only what has changed is made anew."""
@@ -598,7 +598,7 @@ class DesignerPlace(Place):
             self.prompt = None
             held = closing.isAncestorOf(self.focusWidget())
             remove_widget(closing)
-            if held:  # else Qt hands the keyboard to the rail
+            if held:  # else Qt moves the focus to the rail
                 self.parts.focus_element() if elsewhere else self.parts.return_keyboard()
 
     def flush(self) -> None:
@@ -651,7 +651,7 @@ class DesignerPlace(Place):
         if step.said:
             say(self, step.said)
         beside = not self.parts.drawer and self.outline.isAncestorOf(self.focusWidget())
-        if step.fresh and not (step.fresh == "copy" and beside):  # after a copy in an open outline, the keyboard stays
+        if step.fresh and not (step.fresh == "copy" and beside):  # after a copy in an open outline, the focus stays
             self.parts.show_side("form")
             self.form.focus_first_text(filled=step.fresh == "copy")  # a copy has its texts
 
@@ -668,7 +668,7 @@ class DesignerPlace(Place):
             button.setFocus(Qt.FocusReason.ShortcutFocusReason)
             for area in (self.form.area, self.problems.area):
                 if area.isAncestorOf(button):
-                    area.ensureWidgetVisible(button, 0, 8)  # its field stays in sight
+                    area.ensureWidgetVisible(button, 0, 8)  # its field stays visible
 
     def _open_problem(self, row: ProblemRow) -> None:
         self.problems.show()
@@ -704,7 +704,7 @@ class DesignerPlace(Place):
     def focusNextPrevChild(self, forward: bool) -> bool:
         """Let Tab follow the reading order of visible parts, then go to the start of the window; Shift+Tab back."""
         self.flush()
-        QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)  # parts made just now have their places
+        QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)  # new parts are laid out
         in_order, here = list(stops(self)), self.window().focusWidget()
         if here not in in_order:
             if not (forward and in_order and here is not None and here.isAncestorOf(self.stack)):  # the place itself

@@ -420,8 +420,8 @@ class Standing:
     """How a study's content stands to those that participants were run with."""
 
     version: str  # to save it as: its own, or the next free one
-    was: str = ""  # the version that was run last, "" where none was
-    sessions: int = 0  # were run with this very content
+    was: str = ""  # the version that was run last, "" if none was
+    sessions: int = 0  # sessions that were run with this content
     asks: bool = False  # whether saving asks first: the content differs from the one that was run
     others: int = 0  # sessions that were run with the study's own version and another content
 

@@ -262,7 +262,7 @@ class FoundField:
     element: Path
     field: Path  # in the element
     label: str
-    # what was found: 0 its label, 1 what is chosen in it, 2 another choice, 3 only the sentence of a choice
+    # the match: 0 its label, 1 its chosen value, 2 another choice, 3 only the sentence of a choice
     rank: int = LABEL
 
 

@@ -54,12 +54,12 @@ class Step:
 
     words: str  # what it does
     edits: tuple[Edit, ...]  # its edits
-    select: Path | None = None  # what is selected after it; None stands for the same
-    continues: object = None  # what it may continue: typing in one field is one step
-    text: str | None = None  # the file's text that the edits are made in, None for the text that there is
+    select: Path | None = None  # the selection after it; None keeps the present one
+    continues: object = None  # the step that it may continue: typing in one field is one step
+    text: str | None = None  # the text to edit, None for the present text
     _: KW_ONLY
-    said: str = ""  # what a screen reader says of it
-    fresh: Literal["", "new", "copy"] = ""  # whether what is selected after it is new: a text takes the keyboard
+    said: str = ""  # the text for screen readers
+    fresh: Literal["", "new", "copy"] = ""  # whether the selection is new: its first text takes the keyboard focus
 
 
 @dataclass(frozen=True, slots=True)

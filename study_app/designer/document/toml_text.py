@@ -328,7 +328,7 @@ def tables(path: tuple[str | int, ...], value: Mapping[str, Any], newline: str, 
 
 def _string(value: str, like: str, newline: str) -> str:
     if "\n" in value and "\r" not in value:
-        # tomlkit writes another line break before a text that begins with one: with the sign, none does.
+        # tomlkit adds a line break before a text that begins with one; the leading sign prevents it.
         body = tomlkit.string(f"-{value}", multiline=True).as_string()[4:-3]
         return f'"""{newline}{body.replace(chr(10), newline)}"""'
     if like.startswith("'") and _LITERAL.fullmatch(value):

@@ -182,7 +182,7 @@ class RowWidget(Themed, QWidget):
         self.words.setBuddy(self.field)
         removes = f"Remove {row.label} from the file"
         self.remove = IconButton("cross", removes, with_key(removes, "remove"), size=FIELD_PX, role="plain")
-        self.remove.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # no stop of Tab at each field
+        self.remove.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # no Tab stop at each field
         self.remove.clicked.connect(self._remove)
         room = self.remove.sizePolicy()
         room.setRetainSizeWhenHidden(True)
@@ -204,7 +204,7 @@ class RowWidget(Themed, QWidget):
         labelled = not bare and not (heads and row.required)
         if labelled or bare:
             add_layout(column, across)
-        if not labelled:  # the names of the languages, or the editor, say what it is
+        if not labelled:  # the names of the languages, or the editor, already label it
             self.words.setParent(self)
             self.words.hide()
         if self.keys is not None:
@@ -313,11 +313,11 @@ class RowWidget(Themed, QWidget):
             made.typed.connect(self._type)
             name_bars(made)
             self._buttons.addWidget(made, 0, Qt.AlignmentFlag.AlignRight)
-            made.show()  # at once: Tab passes what a layout is still to show
+            made.show()  # at once: Tab skips widgets that a layout has not shown yet
             self.repairs.append(made)
         if held is not None and not self.repairs:
             self.field.take_keyboard()
-        elif held is not None:  # the same words again, where they are still offered
+        elif held is not None:  # the same repair again, if it is still offered
             min(self.repairs, key=lambda button: button.text() != held).setFocus(Qt.FocusReason.OtherFocusReason)
         for button in before:
             remove_widget(button)
@@ -625,7 +625,7 @@ class FormCard(Card):
         )
         if before is not None and not stays:
             self.flush()
-            if self.form is not before:  # what was typed is in a later form, which is shown by now
+            if self.form is not before:  # a later form with the typed text is already shown
                 return
         if read_only != self.read_only:
             self._drop(self._parts)
@@ -667,13 +667,13 @@ class FormCard(Card):
                 self.adds |= {(*form.path, *inner): made for inner, made in part.buttons.items()}
         gone = next((part for part in old.values() if inside_form and part.isAncestorOf(keyboard)), None)
         if gone is not None and keyboard is not None:
-            keyboard.clearFocus()  # else Qt hands the keyboard on
+            keyboard.clearFocus()  # else Qt moves the keyboard focus
         self._drop(old)
         for place, part in enumerate(self._parts.values()):
             if self.sections.indexOf(part) != place:
                 self.sections.insertWidget(place, part)
                 name_bars(part)
-                part.show()  # at once: a layout shows it later, and what is hidden takes no keyboard
+                part.show()  # at once: a layout shows it later, and a hidden widget takes no focus
         if gone is not None:
             self._refocus(form, before, gone)
 
@@ -827,7 +827,7 @@ class FormCard(Card):
         return [button for row in self.rows for button in row.repairs if button.problem == problem]
 
     def _come(self, row: RowWidget) -> None:
-        self._focused = row if row in self.rows else self._focused  # its own step may just have replaced it
+        self._focused = row if row in self.rows else self._focused  # its own step may have replaced the row
         row.say()
         self.show_help()
 

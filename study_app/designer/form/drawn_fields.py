@@ -66,11 +66,11 @@ class LevelAxis:
     most: float
     logarithmic: bool  # whether levels are in ratio, not even
     levels: tuple[float, ...]  # the levels between which a method chooses
-    factor: float  # what a level is multiplied by where it is written
+    factor: float  # the factor of written levels
     unit: str  # the unit of a written level
     caption: str  # what a level is, and how the levels are spaced
     standard: str  # the highest standard in words, "" without one
-    # where the force limit ("norm") and the slope limit begin, if that is near the levels
+    # the levels of the force limit ("norm") and the slope limit, if near
     limits: Mapping[Limit, AxisLimit]
     ticks: Ticks  # levels at which the axis is written at
     sentence: str  # the axis in a sentence
@@ -224,8 +224,8 @@ class Phase:
     name: str
     words: str
     duration_s: float  # how long it takes [s]
-    field: Path = ()  # where the file says so; () where the program does
-    about: bool = False  # whether it takes about as long
+    field: Path = ()  # its place in the file; () if the program sets it
+    about: bool = False  # whether the duration is approximate
 
     @property
     def opens(self) -> str:

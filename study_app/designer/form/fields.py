@@ -162,7 +162,7 @@ class _Typed(_Base):
         super().focusOutEvent(event)
         if event.reason() != Qt.FocusReason.MouseFocusReason:
             self.flush()
-            QTimer.singleShot(0, self, self.left.emit)  # once the keyboard is elsewhere: the form may be made anew
+            QTimer.singleShot(0, self, self.left.emit)  # after the focus has moved: the form may be made anew
         else:
             self._rest.start(CLICK_MS)
 
@@ -194,7 +194,7 @@ class TypedLine(_Typed, QLineEdit):
         return self.text()
 
     def at_end(self) -> bool:
-        last = len(self.text().encode("utf-16-le", "surrogatepass")) // 2  # in the units of Qt: some letters have two
+        last = len(self.text().encode("utf-16-le", "surrogatepass")) // 2  # in UTF-16 units, as Qt counts
         return self.selectedText() == self.text() or (not self.hasSelectedText() and self.cursorPosition() == last)
 
     def show_text(self, text: str) -> None:
@@ -242,7 +242,7 @@ class TypedText(_Typed, QPlainTextEdit):
     def show_text(self, text: str) -> None:
         if not self.pending and text != self.words():
             self._showing = True
-            self.setPlainText(text)  # Qt makes a paragraph of each separator of lines: the words may be others
+            self.setPlainText(text)  # Qt makes a paragraph of each line separator, so the text may differ
             self._showing = False
 
 
@@ -426,7 +426,7 @@ class LineField(Field):
                 self.refusal = f"{unclear}. {kept(row.value)}"
         self.line.show_refused(bool(self.refusal))
         if self.refusal or before:
-            self.came.emit()  # the form shows what is wrong with it, or no longer
+            self.came.emit()  # the form shows or removes its faults
         if not self.refusal and (text.strip() or row.kind == "text" or row.required):
             self.set_value(value, typing=True)
 
@@ -693,7 +693,7 @@ class SpecialEditor:
     adds: Callable[[Field], QWidget] | None = None  # makes what shows its facts, an `Extra`
     wide: bool = False  # whether it takes the width of the form, with the label above it
     labelled: bool = True  # whether the label is shown; a screen reader says it in any case
-    # returns what makes another editor necessary, beyond what does for every row
+    # returns the state that, when it changes, requires a new editor
     structure: Callable[[FormRow], object] = lambda _row: None
-    # returns what it shows beyond the value of its row, of a study that may have faults: a frozen value
+    # returns the facts that it shows beyond its row's value, as a frozen value; the study may have faults
     facts: Callable[[Study, Row], Any] | None = None

@@ -44,10 +44,10 @@ CAPTION: Final = f"force at {HAND_MPS:g} m/s of the hand"
 class ConditionLine:
     """One condition of a block."""
 
-    liquid: Path | None  # the place of its liquid, None where it has several or is not in the study
-    note: str  # its liquid where it is named otherwise, and by how much the picture is late
-    force: str  # its force with unit, "–" where it is not known
-    clipped: bool = False  # whether a limit takes part of the force away
+    liquid: Path | None  # the place of its liquid, None if it has several or is not in the study
+    note: str  # its liquid if the name differs, and the visual delay
+    force: str  # its force with unit, "–" if unknown
+    clipped: bool = False  # whether a limit clips the force
 
 
 def _line(study: Study, name: Any) -> ConditionLine:
@@ -243,7 +243,7 @@ class EntryList(Field):
             self._change(RemoveKey(self.place(at)), min(at, len(self.rows) - 2))
 
     def _duplicate(self) -> None:
-        if self.chosen >= 0 and self.row.kind != "references":  # a name that is listed twice is a fault
+        if self.chosen >= 0 and self.row.kind != "references":  # listing a name twice is a fault
             self._change(DuplicateElement(self.place(self.chosen), stays=True), self.chosen + 1)
 
 

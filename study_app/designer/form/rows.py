@@ -24,8 +24,8 @@ class QuestionLine:
     # its kind, and the name of its icon
     kind: str
     icon: str
-    texts: tuple[str, ...]  # its text in each language of the study, "" where it is missing
-    note: str = ""  # when it is shown, "" where it always is
+    texts: tuple[str, ...]  # its text in each language of the study, "" if missing
+    note: str = ""  # when it is shown, "" if always
     faults: int = 0  # how many faults it has
 
 
@@ -103,7 +103,7 @@ class FormRow(Row):
     """One row of the form."""
 
     place: str = ""  # its place in the file, such as ``blocks.liquids.order``, with its line
-    faults: tuple[str, ...] = ()  # what is wrong with it, in the words of ``check``
+    faults: tuple[str, ...] = ()  # its faults, in the sentences of ``check``
     languages: tuple[tuple[str, str], ...] = ()  # code and name of each language of the study, for texts
     entries: tuple[Entry, ...] = ()  # what a list holds, or what references name
     target: Path | None = None  # what a reference names
@@ -112,7 +112,7 @@ class FormRow(Row):
     # keys of which exactly one is given, with their labels: this row's and the other one
     keys: tuple[tuple[str, str], ...] = ()
     untranslated: tuple[UntranslatedText, ...] = ()  # in which languages a text is not translated yet
-    facts: Any = None  # what its special editor shows beyond the value; None where it has none
+    facts: Any = None  # the facts shown by its special editor; None without one
 
     @property
     def removable(self) -> bool:
@@ -154,25 +154,25 @@ class Form:
     """The form of one element."""
 
     path: Path  # the element
-    # what it is called, the name of its icon, and what it is: "Block"
+    # its title, the name of its icon, and its kind: "Block"
     title: str
     icon: str
     kind: str
-    id: str | None = None  # its name in the file, None where it has none of its own
+    id: str | None = None  # its name in the file, None if it has none
     sections: tuple[Section, ...] = ()  # its rows
-    # what is wrong with it that belongs to no row, and what is wrong with its id
+    # faults that belong to no row, and faults of its id
     faults: tuple[str, ...] = ()
     id_faults: tuple[str, ...] = ()
-    # its place in the session or list and how many there are, from 1; None where it has no order
+    # its position in the session or list, from 1, and their number; None without an order
     position: tuple[int, int] | None = None
-    # the questions of the questionnaire that it is in, itself included; none where it is no question
+    # the questions of its questionnaire, itself included; none if it is no question
     questions: QuestionLines = NO_QUESTIONS
     # the section and the elements that it is in, with their titles, and itself
     around: tuple[tuple[Path, str], ...] = ()
-    feel: str = ""  # what the button says that opens the lab with its liquids, "" where it has none
-    series: bool = False  # whether there can be a series of it: elements that differ in one of its numbers
-    used: str = ""  # how many other elements use it (`used_by`); "" where that is not said
-    asks: tuple[tuple[str, Request], ...] = ()  # when a questionnaire can be asked, with the steps that add it there
+    feel: str = ""  # the label of the button that opens the lab with its liquids, "" if it has none
+    series: bool = False  # whether a series of it is possible: elements that differ in one number
+    used: str = ""  # how many other elements use it (`used_by`); "" if that is not shown
+    asks: tuple[tuple[str, Request], ...] = ()  # places where a questionnaire can be added
     # whether nothing can be edited but the text of the file, in which the study cannot be read
     unreadable: bool = False
 

@@ -428,7 +428,7 @@ class Hypothesis(QWidget):
     """One hypothesis; ``changed`` carries its table as it is chosen."""
 
     changed = Signal(object)
-    refused = Signal(str)  # why the bound that was typed is none; "" where it is one
+    refused = Signal(str)  # why the typed bound is refused; "" if it is valid
 
     def __init__(self, name: str) -> None:
         super().__init__()

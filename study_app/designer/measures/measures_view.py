@@ -386,7 +386,7 @@ def force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[s
 def detectable_card(study: Study, block: Block, who: str, simulated: Simulated) -> MeasureCard:
     """Return the smallest difference of each statement that studies of so many participants (``who``) detect."""
     title, detectable = "Smallest differences", simulated.detectable
-    if not valid_part(study).forces:  # what is answered depends on them
+    if not valid_part(study).forces:  # the answers depend on them
         return lines_card(title, who, (), (("neutral", "minus", NO_FORCES),))
     if detectable is None and simulated.failed:
         return lines_card(title, who, (), (FAILED, ("neutral", "info", simulated.failed)))

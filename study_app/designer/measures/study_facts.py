@@ -161,11 +161,11 @@ def restored_part(study: Study, before: Mapping[str, Any]) -> ValidPart:
                 if value is None:
                     return ValidPart(None, whole=False)
             if value_at(document, place) is None and value is None:
-                continue  # another fault of the same element left it out
+                continue  # another fault of the same element already removed it
             whole = whole and known
             forces = forces and (fault.kind == "unknown key" or fault.path[:1] not in _OF_FORCES)
             edit = Unset(place) if value is None else Set(place, value)
-            with suppress(Refused):  # what it is in was left out
+            with suppress(Refused):  # its table was removed
                 document = frozen(meaning(document, edit))
         protocol, faults = examined(document)
         if protocol is not None:
@@ -181,7 +181,7 @@ def _restored(document: Any, fault: Fault, before: Mapping[str, Any]) -> tuple[P
     sound = value_at(before, _path_before(document, path, before))
     if fault.kind == "one language" and isinstance(value, str):
         return path, dict.fromkeys(languages_of(document), value)
-    if fault.kind == "alike":  # each place gets its number of marks: the text looks the same and reads as no other
+    if fault.kind == "alike":  # invisible marks make the text unique
         marks = _MARK * (1 + max((step for step in path if isinstance(step, int)), default=0))
         texts = value.items() if isinstance(value, Mapping) else ()
         return path, {code: f"{text}{marks}" for code, text in texts} or f"{value}{marks}"
@@ -272,12 +272,12 @@ class Facts:
     range_s: tuple[float, float] | None = None  # how long the shortest and the longest session will take [s]
     # how long each page, form and block will take [s], by its id
     steps_s: dict[str, float] = field(default_factory=dict)
-    # how many a complete session has at most, practice included
+    # the maximum number in a complete session, practice included
     trials: int | None = None
     answers: int | None = None
     breaks: int | None = None
     forces_n: dict[str, float] = field(default_factory=dict)  # force of each liquid [N] against a hand at 0.1 m/s
-    # how many texts each language lacks; none where it lacks none
+    # the number of missing texts of each language that lacks some
     missing: dict[str, int] = field(default_factory=dict)
     # the warnings of ``check``, but those that take simulated observers, and what is to be translated
     warnings: tuple[str, ...] = ()

@@ -56,16 +56,16 @@ SIZES: Final = (
 class ParticipantView:
     """What the tab shows."""
 
-    page: Page | None = None  # None where it cannot be shown
+    page: Page | None = None  # None if it cannot be shown
     language: str = "en"
     languages: tuple[str, ...] = ()  # those of the study
     step: str = ""  # as "Liquids, trial 1 of 6"
     has_before: bool = False  # whether there is a step before it
     has_after: bool = False
     moments: tuple[tuple[Moment, str], ...] = ()  # the pages of the step, with their words
-    moment: Moment | None = None  # the one that is shown
-    focused: str | None = None  # the id of the question that is selected
-    note: str = ""  # what cannot be shown and why, "" where all is
+    moment: Moment | None = None  # the shown page
+    focused: str | None = None  # the id of the selected question
+    note: str = ""  # what cannot be shown and why, "" if nothing
     photodiode: bool = True  # whether the tank has a corner for one
 
     @property

@@ -127,7 +127,7 @@ class LivePage(Coloured, QGraphicsView):
         self._frames.setInterval(FRAME_MS)
         self._frames.timeout.connect(self.frame_due)
 
-    # what is shown
+    # display
 
     def show_view(self, view: ParticipantView) -> None:
         """Show a page; if only its answers differ, it stays with the typed text."""
@@ -411,7 +411,7 @@ class ParticipantPreview(Card):
         self._ball_of: object = None
         self._since_s = 0.0
         self._photodiode = False
-        self._after_form = delayed(self, 0, self._follow)  # of another selection the form is painted first
+        self._after_form = delayed(self, 0, self._follow)  # after another selection the form is painted first
         editing.opened_other.connect(self._begin)
         editing.changed.connect(self._after_form.start)
         editing.edited.connect(self._follow)
@@ -443,7 +443,7 @@ class ParticipantPreview(Card):
         trial = step.index if isinstance(step, Trial) else 1
         return StepPosition(step_name(step), trial, self._language, shown.shown.schedule.seed)
 
-    # what is asked for
+    # requests
 
     def enter_page(self) -> None:
         self._come_forward()
@@ -506,7 +506,7 @@ class ParticipantPreview(Card):
             self._side = "tank"
             self.go(1)
 
-    # following the study
+    # updates
 
     def _begin(self) -> None:
         self._found = self._moment = self._protocol = self._study = self._valid = None
@@ -580,7 +580,7 @@ class ParticipantPreview(Card):
             self._protocol, step_name(step), step.index if isinstance(step, Trial) else 1, previous.session
         )
 
-    # what is shown
+    # display
 
     def _show(self) -> None:
         self._update()
