@@ -44,7 +44,7 @@ import sys, time
 began, worked = time.perf_counter(), time.process_time()
 from pathlib import Path
 from PySide6.QtCore import QEventLoop, QTimer
-from study_app.app.timing import collecting_here
+from study_app.app.timing import collecting_in_this_thread
 from study_app.app.session.live_session import LiveSession
 from study_app.gui.application import application_here
 from study_app.gui.theme.theme import LIGHT
@@ -59,10 +59,10 @@ def look():
         timer.stop()
         lasted_s, core_s = time.perf_counter() - began, time.process_time() - worked
         print(f"    windows after {lasted_s:.1f} s, {core_s:.1f} s of a core; 2 s of measuring are in it", flush=True)
-        QTimer.singleShot(500, live.bridge.leave_now)
+        QTimer.singleShot(500, live.bridge.leave_without_asking)
 timer.timeout.connect(look)
 timer.start()
-with collecting_here():
+with collecting_in_this_thread():
     QTimer.singleShot(0, live.open)
     loop.exec()
     live.wait()
@@ -73,13 +73,13 @@ sys.exit(live.code)
 
 HELP = """
 from study_app.gui.application import application_here
-from study_app.gui.help.view import HelpPlace, entries
+from study_app.gui.help.view import HelpPlace, help_entries
 application_here()
 place = HelpPlace()
-for entry in entries():
+for entry in help_entries():
     place.open_page(entry.page)
     assert place.reader.toPlainText().strip(), entry.page
-print(f"    {len(entries())} pages")
+print(f"    {len(help_entries())} pages")
 """
 
 COMPILING = """

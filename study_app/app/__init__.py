@@ -12,11 +12,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from study_app.gui.display.display_check import qt_imported
+from study_app.gui.display.display_check import naming_missing_library
 
 
 @contextmanager
-def _uncollected() -> Iterator[None]:
+def _without_collections() -> Iterator[None]:
     """Import without garbage collection, which takes a tenth of the start-up time and frees nothing."""
     before = gc.isenabled()
     gc.disable()
@@ -28,17 +28,17 @@ def _uncollected() -> Iterator[None]:
             gc.enable()
 
 
-with qt_imported(), _uncollected():
+with naming_missing_library(), _without_collections():
     from study_app.app.session.live_session import BUG, CANCELLED, LiveSession, resume, run
 
 
 def __getattr__(name: str) -> Any:
     """Load the main window where it is asked for: a session by command begins without it."""
-    if name != "home":
+    if name != "run_home_window":
         raise AttributeError(name)
-    with qt_imported(), _uncollected():
-        from study_app.app.main_controller import home  # noqa: PLC0415
-    return home
+    with naming_missing_library(), _without_collections():
+        from study_app.app.main_controller import run_home_window  # noqa: PLC0415
+    return run_home_window
 
 
-__all__ = ["BUG", "CANCELLED", "LiveSession", "home", "resume", "run"]
+__all__ = ["BUG", "CANCELLED", "LiveSession", "resume", "run", "run_home_window"]

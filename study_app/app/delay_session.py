@@ -19,15 +19,15 @@ from PySide6.QtCore import QCoreApplication, QEventLoop, QObject, Qt, QTimer, Si
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
-from study_app.app.failures import ended_from_outside
+from study_app.app.failures import ending_on_signals
 from study_app.app.session.bridge import (
     SessionBridge,
     connect_windows,
-    make_cockpit,
+    make_operator_window,
     make_participant_window,
     show_windows,
 )
-from study_app.app.timing import collecting_here
+from study_app.app.timing import collecting_in_this_thread
 from study_app.devices.hand import hand_of
 from study_app.devices.rig import open_rig, study_settings
 from study_app.errors import SessionError, StudyError
@@ -35,7 +35,7 @@ from study_app.evidence.computer import LoadName, busy_cores
 from study_app.evidence.computer import machine as machine_here
 from study_app.evidence.timing.delays import BESIDE, DELAYS_S, VIRTUAL_HZ, Delayed, Shown
 from study_app.gui.application import application_here
-from study_app.gui.display.screens import WITHOUT_OPENGL, choose_screens, place
+from study_app.gui.display.screens import WITHOUT_OPENGL, choose_screens, place_window
 from study_app.gui.operator.servo_health import ServoHealth
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
@@ -119,7 +119,9 @@ def study_of_delays(seconds: float) -> bytes:
     return _STUDY.format(conditions=conditions, seconds=seconds, names=listed).encode()
 
 
-def delays(seconds: float, load: LoadName, *, progress: Callable[[str], object] = lambda _line: None) -> Delayed:
+def measure_delays(
+    seconds: float, load: LoadName, *, progress: Callable[[str], object] = lambda _line: None
+) -> Delayed:
     """Show each delay for ``seconds`` on virtual screens, and on the real one if there is one; return the measurements.
 
     Parameters
@@ -142,7 +144,7 @@ def delays(seconds: float, load: LoadName, *, progress: Callable[[str], object] 
         rates.append(None)
     loads: tuple[LoadName, ...] = ("none",) if load == "none" else ("none", load)
     shown: list[Shown] = []
-    with collecting_here():
+    with collecting_in_this_thread():
         for refresh_hz in rates:
             for background in loads:
                 with (
@@ -182,7 +184,7 @@ class _Showing:
         schedule = build_schedule(self._protocol, self._chosen.participant, self._chosen.seed)
         try:
             with open_store(self._chosen, self._protocol, self._source, rig, {}) as store:
-                operator = make_cockpit(self._chosen, self._protocol, rig, LIGHT)
+                operator = make_operator_window(self._chosen, self._protocol, rig, LIGHT)
                 screens = choose_screens(self._chosen.screen)
                 participant = make_participant_window(
                     self._chosen,
@@ -196,8 +198,8 @@ class _Showing:
                 bridge = connect_windows(self._chosen, plan, store, rig, operator, participant, refresh_hz=rate_hz)
                 for _ in show_windows(bridge, partial(choose_screens, self._chosen.screen)):
                     pass
-                self._size(bridge)
-                self._run(bridge)
+                self._resize_windows(bridge)
+                self._run_until_finished(bridge)
                 paced = bridge.paced
         finally:
             rig.stop()
@@ -205,35 +207,35 @@ class _Showing:
             raise KeyboardInterrupt
         if bridge.trouble:
             raise SessionError(f"the session of delays broke: {bridge.trouble}")
-        return self._read(store, schedule, paced)
+        return self._read_delays(store, schedule, paced)
 
-    def _size(self, bridge: SessionBridge) -> None:
+    def _resize_windows(self, bridge: SessionBridge) -> None:
         if self._refresh_hz is not None:
             bridge.participant.setGeometry(0, 0, *SIZE_PX)
         bridge.operator.resize(*OPERATOR_PX)
         if self._load == "none":
             bridge.operator.hide()
 
-    def _run(self, bridge: SessionBridge) -> None:
+    def _run_until_finished(self, bridge: SessionBridge) -> None:
         loop = QEventLoop()
         bridge.done.connect(loop.quit)
 
         def end(_number: int) -> None:
             self._ended = True
-            bridge.leave_now()
+            bridge.leave_without_asking()
 
         def follow(_state: object) -> None:
             if bridge.runner.finished:
                 QTimer.singleShot(0, bridge.operator, lambda: bridge.operator.ask("close"))
 
         bridge.runner.on_change(follow)
-        with ended_from_outside(end):
+        with ending_on_signals(end):
             QApplication.processEvents()  # show the windows before the first trial, as after a text page
             bridge.start()
             loop.exec()
         QApplication.processEvents()
 
-    def _read(self, store: SessionStore, schedule: Schedule, paced: str) -> tuple[Shown, ...]:
+    def _read_delays(self, store: SessionStore, schedule: Schedule, paced: str) -> tuple[Shown, ...]:
         refresh_hz = self._refresh_hz or choose_screens(None)[0].refreshRate()
         screen = f"{'virtual' if self._refresh_hz is not None else 'this screen'}, {refresh_hz:.4g} Hz"
         shown = []
@@ -270,7 +272,7 @@ class WindowsThread(QObject):
         paints = load != "none"
         self._application = application_here() if paints else QCoreApplication.instance() or QCoreApplication([])
         self._painting = Painting() if paints else None
-        self._asked.connect(self._do, Qt.ConnectionType.QueuedConnection)
+        self._asked.connect(self._call, Qt.ConnectionType.QueuedConnection)
 
     @property
     def frames(self) -> int:
@@ -281,9 +283,9 @@ class WindowsThread(QObject):
         loop, heart = QEventLoop(), QTimer()
         heart.timeout.connect(lambda: None)
         heart.start(HEARTBEAT_MS)
-        with collecting_here(), ThreadPoolExecutor(1, thread_name_prefix="timing") as thread:
+        with collecting_in_this_thread(), ThreadPoolExecutor(1, thread_name_prefix="timing") as thread:
             if self._painting is not None:
-                self._painting.begin()
+                self._painting.open_windows()
             future = thread.submit(work)
             future.add_done_callback(lambda _future: self._asked.emit(loop.quit))
             try:
@@ -292,19 +294,19 @@ class WindowsThread(QObject):
                 wait((future,))
                 heart.stop()
                 if self._painting is not None:
-                    self._painting.end()
+                    self._painting.close_windows()
         return future.result()
 
     def timer(self, period_ms: int, count: int, fire: Callable[[], object]) -> int:
         """Call ``fire`` from a precise Qt timer; return the start time [ns]. ``work`` calls this from its thread."""
         fired: Future[int] = Future()
-        self._asked.emit(partial(self._begin, period_ms, count, fire, fired))
+        self._asked.emit(partial(self._start_timer, period_ms, count, fire, fired))
         return fired.result()
 
-    def _do(self, asked: Callable[[], object]) -> None:
+    def _call(self, asked: Callable[[], object]) -> None:
         asked()
 
-    def _begin(self, period_ms: int, count: int, fire: Callable[[], object], fired: Future[int]) -> None:
+    def _start_timer(self, period_ms: int, count: int, fire: Callable[[], object], fired: Future[int]) -> None:
         timer, left, start_ns = QTimer(self, timerType=Qt.TimerType.PreciseTimer), count, time.monotonic_ns()
 
         def tick() -> None:
@@ -344,16 +346,16 @@ class Painting(QObject):
         self._reader = self._servo.telemetry.reader()
         self._servo.advance(1)
         self.health = ServoHealth(self._servo.rate_hz)
-        self.participant, self.operator = self._windows()
-        self.participant.painted.connect(self._painted)
+        self.participant, self.operator = self._make_windows()
+        self.participant.painted.connect(self._count_frame)
         self._began_ns = 0
         self._timers = [
-            self._timer(FRAME_MS, self._frame),
-            self._timer(TRACE_MS, lambda: self.operator.show_traces(self.health, self._servo.now_ns() * 1e-9)),
-            self._timer(TILES_MS, lambda: self.operator.show_lateness(self.health)),
+            self._make_timer(FRAME_MS, self._draw_frame),
+            self._make_timer(TRACE_MS, lambda: self.operator.show_traces(self.health, self._servo.now_ns() * 1e-9)),
+            self._make_timer(TILES_MS, lambda: self.operator.show_lateness(self.health)),
         ]
 
-    def _windows(self) -> tuple[ParticipantWindow, OperatorWindow]:
+    def _make_windows(self) -> tuple[ParticipantWindow, OperatorWindow]:
         protocol = load("rek2024")
         shown_on, operated_on = choose_screens(None)
         operator = OperatorWindow(
@@ -363,7 +365,7 @@ class Painting(QObject):
             pointer=False,
         )
         participant = ParticipantWindow(words("en"), clock=time.monotonic, windowed=shown_on is operated_on)
-        place(operator, operated_on, corner=shown_on is operated_on)
+        place_window(operator, operated_on, corner=shown_on is operated_on)
         task = Explore(kind="explore", min_s=0.0, max_s=3600.0, instruction="The servo is being timed.")
         self._page = TaskPage(
             trial=1,
@@ -375,7 +377,7 @@ class Painting(QObject):
         )
         return participant, operator
 
-    def begin(self) -> None:
+    def open_windows(self) -> None:
         self.operator.show()
         self.participant.open_on(choose_screens(None)[0])
         self.participant.show_page(self._page)
@@ -383,7 +385,7 @@ class Painting(QObject):
         for timer in self._timers:
             timer.start()
 
-    def end(self) -> None:
+    def close_windows(self) -> None:
         """Close the windows in the thread that made them."""
         for timer in self._timers:
             timer.stop()
@@ -393,24 +395,24 @@ class Painting(QObject):
             window.close()
             window.deleteLater()
 
-    def _timer(self, interval_ms: int, slot: Callable[[], None]) -> QTimer:
+    def _make_timer(self, interval_ms: int, slot: Callable[[], None]) -> QTimer:
         timer = QTimer(self, interval=interval_ms)
         if interval_ms == FRAME_MS:
             timer.setTimerType(Qt.TimerType.PreciseTimer)
         timer.timeout.connect(slot)
         return timer
 
-    def _frame(self) -> None:
+    def _draw_frame(self) -> None:
         """Advance the hand by the time since the last frame and draw it."""
         now_ns = self._servo.now_ns()
         behind = (time.monotonic_ns() - self._began_ns) // 1_000_000 - now_ns // 1_000_000
         self._servo.advance(int(min(max(behind, 1), LONGEST_FRAME_TICKS)))
-        self.health.take(self._reader.read())
+        self.health.add_samples(self._reader.read())
         position_m, shown_ns = self._servo.telemetry.position_at(self._servo.now_ns())
-        self.health.hand(self._servo.now_ns() * 1e-9, position_m)
+        self.health.add_hand_position(self._servo.now_ns() * 1e-9, position_m)
         task = TaskView(lit=None, reached=0, of=None, dwell=0.0, elapsed_s=shown_ns * 1e-9)
         self.participant.show_view(TankView(position_m, task, shown_ns))
 
-    def _painted(self, _sample_ns: int) -> None:
+    def _count_frame(self, _sample_ns: int) -> None:
         self.frames += 1
-        self.health.frame(time.monotonic_ns())
+        self.health.add_frame(time.monotonic_ns())

@@ -19,7 +19,7 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal, SignalInstance
 from PySide6.QtGui import QGuiApplication, QSessionManager
 from PySide6.QtWidgets import QGraphicsItem, QStyledItemDelegate, QWidget
 
-from study_app.app.timing import end_at_once
+from study_app.app.timing import disable_collection
 from study_app.ending_signals import ENDING_SIGNALS
 from study_app.errors import SessionError
 from study_app.haptics.runtime.clocks.grants import allow_suspension, refuse_suspension
@@ -43,7 +43,7 @@ class UncaughtExceptions:
 
     def install(self) -> None:
         guard_painting()
-        self.previous, sys.excepthook = sys.excepthook, self.hook
+        self.previous, sys.excepthook = sys.excepthook, self.handle_exception
 
     def remove(self) -> None:
         sys.excepthook = self.previous
@@ -54,7 +54,7 @@ class UncaughtExceptions:
     def __exit__(self, *_: object) -> None:
         self.remove()
 
-    def hook(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    def handle_exception(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         if not self._handle(error):
             self.previous(kind, error, trace)
 
@@ -72,10 +72,10 @@ def guard_painting() -> None:
         for name in PAINTING:
             method = vars(kind).get(name)
             if isinstance(method, FunctionType) and not hasattr(method, "__wrapped__"):
-                setattr(kind, name, _told(method))
+                setattr(kind, name, _reporting_exceptions(method))
 
 
-def _told(method: Callable[..., None]) -> Callable[..., None]:
+def _reporting_exceptions(method: Callable[..., None]) -> Callable[..., None]:
     @wraps(method)
     def painted(*arguments: object) -> None:
         try:
@@ -100,12 +100,12 @@ class ThreadExceptions(QObject):
         self._ended.connect(self.ended, Qt.ConnectionType.QueuedConnection)
 
     def install(self) -> None:
-        self._previous, threading.excepthook = threading.excepthook, self._hook
+        self._previous, threading.excepthook = threading.excepthook, self._handle_exception
 
     def remove(self) -> None:
         threading.excepthook = self._previous
 
-    def _hook(self, what: threading.ExceptHookArgs) -> None:
+    def _handle_exception(self, what: threading.ExceptHookArgs) -> None:
         """Log the exception, in the thread that it ended."""
         name = what.thread.name if what.thread is not None else "unknown"
         log.error("the thread %r ended: %s", name, what.exc_value, exc_info=what.exc_value)
@@ -202,7 +202,7 @@ def log_off_signal() -> SignalInstance:
 
 
 @contextmanager
-def ended_from_outside(end: Callable[[int], None]) -> Iterator[None]:
+def ending_on_signals(end: Callable[[int], None]) -> Iterator[None]:
     """Call ``end`` once, with the signal's number, on Ctrl+C, a request to terminate or a log-off.
 
     Signals are heard from the event loop. A log-off waits for ``end``, and for nothing else. Ctrl-Z does nothing: what
@@ -216,14 +216,14 @@ def ended_from_outside(end: Callable[[int], None]) -> Iterator[None]:
     def hear(number: int, _frame: object) -> None:
         if not heard:
             heard.append(number)
-            end_at_once()
+            disable_collection()
             QTimer.singleShot(0, lambda: end(number))
 
     def log_off(manager: QSessionManager) -> None:
         manager.setRestartHint(QSessionManager.RestartHint.RestartNever)
         if not heard:
             heard.append(HANG_UP)
-            end_at_once()
+            disable_collection()
             end(HANG_UP)
 
     before = {number: signal.signal(number, hear) for number in ENDING_SIGNALS}

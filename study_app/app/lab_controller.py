@@ -29,7 +29,7 @@ from study_app.gui.home.startup_window import LONG_AFTER_S
 from study_app.gui.kit.devices import device_choices
 from study_app.gui.lab.lab_state import CostRow, DeviceShown, ErrorRow, LabView, Now
 from study_app.gui.lab.view import LabPlace
-from study_app.gui.widgets.background import Background, delayed
+from study_app.gui.widgets.background import Background, delayed_call
 from study_app.haptics.model.effects import NAMED
 from study_app.haptics.model.scene import Scene
 from study_app.lab.ab_comparison import Setting, Side, Workbench
@@ -81,13 +81,13 @@ class Prices:
         self.errors: Errors | None = None
         self.waits = False
 
-    def forget(self) -> None:
+    def discard_answers(self) -> None:
         """Discard the answers: the setting has changed."""
         self._asked, self.costs, self.errors, self.waits = -1, None, None, False
 
-    def ask(self, scene: Scene) -> None:
-        """Request cost and error of a setting; `take` reads the answers."""
-        self.forget()
+    def request(self, scene: Scene) -> None:
+        """Request cost and error of a setting; `read_answers` reads the answers."""
+        self.discard_answers()
         if self._appraiser is not None and not self._appraiser.works:
             self.close()
         if self._appraiser is None:
@@ -98,7 +98,7 @@ class Prices:
                 return
         self._asked, self.waits = self._appraiser.order(Question(scene)), True
 
-    def take(self) -> None:
+    def read_answers(self) -> None:
         for number, answer in () if self._appraiser is None else self._appraiser.answers():
             if number != self._asked:
                 continue
@@ -142,9 +142,9 @@ class LabOpening(QObject):
         self._wanted: str | None = None
         self._cancelled = threading.Event()
         self._began_s = 0.0
-        self._start = delayed(self, STARTS_AFTER_MS, self._begin)
+        self._start = delayed_call(self, STARTS_AFTER_MS, self._start_opening)
         self._background = Background(self)
-        self._background.done.connect(self._end)
+        self._background.done.connect(self._hand_over_device)
 
     @property
     def busy_with(self) -> str | None:
@@ -152,11 +152,11 @@ class LabOpening(QObject):
         return self._wanted
 
     @property
-    def lasts_s(self) -> float:
+    def elapsed_s(self) -> float:
         """The time since the device began to open [s]; 0 if none is being opened."""
         return time.monotonic() - self._began_s if self._background.busy and self._wanted is not None else 0.0
 
-    def want(self, name: str) -> None:
+    def request_device(self, name: str) -> None:
         """Open a device; cancel one that is still being opened."""
         self.cancel()
         self._wanted = name
@@ -174,13 +174,13 @@ class LabOpening(QObject):
         self._background.wait(patience_s)
         QCoreApplication.sendPostedEvents()
 
-    def _begin(self) -> None:
+    def _start_opening(self) -> None:
         assert self._wanted is not None  # noqa: S101 - begun only where something is wanted
         self._cancelled, self._began_s = threading.Event(), time.monotonic()
-        self._background.run(partial(self._open, self._wanted, self._cancelled))
+        self._background.run(partial(self._open_device, self._wanted, self._cancelled))
 
-    def _open(self, name: str, cancelled: threading.Event) -> tuple[object, threading.Event]:
-        """Compile, open and start the device in its own thread; return the outcome for ``_end``."""
+    def _open_device(self, name: str, cancelled: threading.Event) -> tuple[object, threading.Event]:
+        """Compile, open and start the device in its own thread; return the outcome for ``_hand_over_device``."""
         try:
             loads = self._open_live is None
             if self._open_live is None:
@@ -194,7 +194,7 @@ class LabOpening(QObject):
             made = error
         return made, cancelled
 
-    def _end(self, done: tuple[object, threading.Event]) -> None:
+    def _hand_over_device(self, done: tuple[object, threading.Event]) -> None:
         """Emit the opened device, or close it if it is no longer requested."""
         made, cancelled = done
         if not cancelled.is_set():
@@ -207,7 +207,7 @@ class LabOpening(QObject):
             except Exception as error:  # noqa: BLE001 - reported: it may push, and the next one does not wait
                 self.failed.emit(error)
         if self._wanted is not None:
-            self._begin()
+            self._start_opening()
 
 
 class LabSaving(QObject):
@@ -224,17 +224,17 @@ class LabSaving(QObject):
         self.liquids = liquids
         self.said = ""
         self._before: threading.Thread | None = None
-        self._done.connect(self._tell, Qt.ConnectionType.QueuedConnection)
+        self._done.connect(self._report_outcome, Qt.ConnectionType.QueuedConnection)
 
-    def save(self, path: Path, setting: Setting) -> None:
+    def save_preset(self, path: Path, setting: Setting) -> None:
         at_hand = (*(it.source for it in self.liquids), str(path))
         # Not a pool, whose threads Python waits for at its end: a drive may never answer.
         self._before = threading.Thread(
-            target=self._write, args=(self._before, path, setting, at_hand), name="preset", daemon=True
+            target=self._write_preset, args=(self._before, path, setting, at_hand), name="preset", daemon=True
         )
         self._before.start()
 
-    def open(self, path: Path) -> Choice:
+    def open_liquids(self, path: Path) -> Choice:
         """Add the liquids of a file to those at hand; return the first.
 
         Raises
@@ -253,7 +253,9 @@ class LabSaving(QObject):
             self._before.join(patience_s)
             QCoreApplication.sendPostedEvents(self)
 
-    def _write(self, before: threading.Thread | None, path: Path, setting: Setting, at_hand: tuple[str, ...]) -> None:
+    def _write_preset(
+        self, before: threading.Thread | None, path: Path, setting: Setting, at_hand: tuple[str, ...]
+    ) -> None:
         if before is not None:
             before.join()
         try:
@@ -263,7 +265,7 @@ class LabSaving(QObject):
             outcome = error
         self._done.emit(outcome)
 
-    def _tell(self, outcome: Exception | tuple[str, tuple[Choice, ...]]) -> None:
+    def _report_outcome(self, outcome: Exception | tuple[str, tuple[Choice, ...]]) -> None:
         if isinstance(outcome, Exception):
             self.failed.emit(outcome)
             return
@@ -316,28 +318,28 @@ class LabController(QObject):
         self.chance = chance if chance is not None else random.SystemRandom()
         self._said = ""
         self.uncaught = UncaughtExceptions(self._handle_uncaught)
-        self.frames = self._timer(FRAME_MS, self._frame)
-        self._due = self._timer(0, self._frame, once=True)
-        self._cost_due = self._timer(APPRAISE_AFTER_MS, self._ask_price, once=True)
+        self.frames = self._make_timer(FRAME_MS, self._draw_frame)
+        self._due = self._make_timer(0, self._draw_frame, once=True)
+        self._cost_due = self._make_timer(APPRAISE_AFTER_MS, self._request_prices, once=True)
         self._connect()
 
-    def _timer(self, interval_ms: int, slot: Callable[[], None], *, once: bool = False) -> QTimer:
+    def _make_timer(self, interval_ms: int, slot: Callable[[], None], *, once: bool = False) -> QTimer:
         timer = QTimer(self, interval=interval_ms, singleShot=once, timerType=Qt.TimerType.PreciseTimer)
         timer.timeout.connect(slot)
         return timer
 
     def _connect(self) -> None:
         for signal, slot in (
-            (self.place.asked, self._asked),
-            (self._opening.opened, self._begin),
+            (self.place.asked, self._handle_request),
+            (self._opening.opened, self._start_feeling),
             (self._opening.failed, self.fail),
             (self._opening.said, partial(setattr, self, "_said")),
-            (self._saving.failed, self._could_not_save),
+            (self._saving.failed, self._show_saving_error),
         ):
             signal.connect(slot)
 
     @guarded
-    def _asked(self, what: str, details: tuple[Any, ...]) -> None:
+    def _handle_request(self, what: str, details: tuple[Any, ...]) -> None:
         """Carry out a request of the lab's window."""
         bench, live = self.bench, self.live
         match what, *details:
@@ -346,34 +348,34 @@ class LabController(QObject):
             case "leave", *_:
                 self.leave()
             case "change", name, value, held:
-                self._try(lambda: bench.change(name, value, held=held), name)
+                self._try_edit(lambda: bench.change(name, value, held=held), name)
             case "liquid", side, chosen:
-                self._choose(side, chosen)
+                self._choose_liquid(side, chosen)
             case "copy", *_:
-                self._try(bench.copy_to_other, "")
+                self._try_edit(bench.copy_to_other, "")
             case "switch", *_:  # release a held knob at once: it belonged to the other side
-                self.feel(bench.switch())
-                self._show()
+                self.feel_workbench(bench.switch())
+                self._show_view()
             case "blind", True:
-                self.feel(bench.blinded(self.chance), anew=True)
+                self.feel_workbench(bench.blinded(self.chance), anew=True)
             case "blind", *_:
-                self.feel(bench.revealed())
+                self.feel_workbench(bench.revealed())
             case "undo" | "redo", *_:
-                self.feel(bench.undo() if what == "undo" else bench.redo())
+                self.feel_workbench(bench.undo() if what == "undo" else bench.redo())
             case "device", name:
-                self._open(name)
+                self._open_device(name)
             case "cancel", *_:
-                self._cancel()
+                self._cancel_opening()
             case "stop", *_ if live is not None:
                 live.stop_force()
             case "stop", *_ if self._opening.busy_with is not None:  # a device would bring its own force
-                self._cancel()
+                self._cancel_opening()
             case "diagnose", *_:  # the main window then opens the diagnosis, which needs the device
                 self.trouble = self.view().trouble
-                self._let_go()
+                self._close_device()
             case "fade in", *_:
                 if self.live is None or self.live.servo.fault is not None:
-                    self._open(self.device)
+                    self._open_device(self.device)
                 else:
                     self.live.fade_in()
             case "path", name if live is not None:
@@ -383,7 +385,7 @@ class LabController(QObject):
             case "press", buttons if live is not None:
                 live.press(buttons)
             case "save", path, setting:
-                self._save(path, setting)
+                self._save_preset(path, setting)
             case "preset", path:
                 self._open_preset(path)
 
@@ -400,7 +402,7 @@ class LabController(QObject):
             timer.stop()
         self._opening.cancel()
         try:
-            self._let_go()
+            self._close_device()
         except StudyError as error:
             log.warning("the servo did not stop properly: %s", error)
             self.place.message.emit("The device was not released properly", f"{error}.")
@@ -421,7 +423,7 @@ class LabController(QObject):
         """
         self._opening.cancel()
         try:
-            self._let_go()
+            self._close_device()
         except StudyError as second:
             log.warning("the servo did not stop properly: %s", second)
         traceback.clear_frames(error.__traceback__)
@@ -440,7 +442,7 @@ class LabController(QObject):
         else:
             state = "opening" if opening is not None else "ready" if live is not None else "closed"
         scene = bench.in_hand.scene
-        progress = self._said or (COMPILING if self._opening.lasts_s > LONG_AFTER_S else "")
+        progress = self._said or (COMPILING if self._opening.elapsed_s > LONG_AFTER_S else "")
         shown: dict[str, Any] = {}
         if live is not None and reading is not None:
             half_x, half_y, half_z = live.device.workspace_m
@@ -481,10 +483,10 @@ class LabController(QObject):
             **shown,
         )
 
-    def feel_of_study(self, a: Setting, b: Setting, study: str) -> None:
+    def feel_study_liquids(self, a: Setting, b: Setting, study: str) -> None:
         """Feel liquids of the study in the designer, which takes changes back; ``study`` is "" if it cannot."""
         self.study = study
-        self.feel(Workbench(a, b), anew=True)
+        self.feel_workbench(Workbench(a, b), anew=True)
 
     def _enter(self) -> None:
         if self._entered:
@@ -492,25 +494,25 @@ class LabController(QObject):
         self._entered = True
         self.uncaught.install()
         self.frames.start()
-        self._open(self.device)
+        self._open_device(self.device)
 
     @guarded
-    def _frame(self) -> None:
+    def _draw_frame(self) -> None:
         if self.live is not None:
             self.live.poll()
-        self._prices.take()
-        self._show()
+        self._prices.read_answers()
+        self._show_view()
 
-    def _show(self) -> None:
+    def _show_view(self) -> None:
         self.place.show_view(self.view())
 
-    def _open(self, name: str) -> None:
-        self._let_go()
+    def _open_device(self, name: str) -> None:
+        self._close_device()
         self.device, self.trouble, self._said = name, "", ""
-        self._opening.want(name)
+        self._opening.request_device(name)
 
     @guarded
-    def _begin(self, live: Live) -> None:
+    def _start_feeling(self, live: Live) -> None:
         if not self._entered:
             live.close()
             return
@@ -518,14 +520,14 @@ class LabController(QObject):
         live.feel(self.bench)
         self._cost_due.start()
 
-    def _cancel(self) -> None:
+    def _cancel_opening(self) -> None:
         self._opening.cancel()
         self.trouble = "No device is open"
 
-    def _choose(self, side: Side, choice: Choice) -> None:
-        self._try(lambda: self.bench.choose(side, displayed_name(choice.liquid), choice.scene), "")
+    def _choose_liquid(self, side: Side, choice: Choice) -> None:
+        self._try_edit(lambda: self.bench.choose(side, displayed_name(choice.liquid), choice.scene), "")
 
-    def _try(self, edit: Callable[[], Workbench], name: str) -> None:
+    def _try_edit(self, edit: Callable[[], Workbench], name: str) -> None:
         """Make an edit; if it is refused, keep the reason for its parameter."""
         try:
             bench = edit()
@@ -535,14 +537,14 @@ class LabController(QObject):
             else:
                 self.trouble = str(error)
             return
-        self.feel(bench)
+        self.feel_workbench(bench)
 
-    def feel(self, bench: Workbench, *, anew: bool = False) -> None:
+    def feel_workbench(self, bench: Workbench, *, anew: bool = False) -> None:
         """Present a workbench at once, and measure its cost after a pause without edits."""
         before, self.bench, self._refused = self.bench, bench, None
-        self._forget_trouble()
+        self._clear_trouble()
         if bench.in_hand.scene != before.in_hand.scene:
-            self._prices.forget()
+            self._prices.discard_answers()
             self._cost_due.start()
         if self.live is not None:
             self.live.feel(bench, anew=anew)
@@ -551,38 +553,38 @@ class LabController(QObject):
                 self._due.start(math.ceil(1e3 * waits_s))
 
     @guarded
-    def _ask_price(self) -> None:
-        self._prices.ask(self.bench.in_hand.scene)
+    def _request_prices(self) -> None:
+        self._prices.request(self.bench.in_hand.scene)
 
-    def _save(self, path: Path, setting: Setting) -> None:
+    def _save_preset(self, path: Path, setting: Setting) -> None:
         if self.bench.blind:
             self.trouble = "no preset can be saved during a blind comparison: end it first"
             return
-        self._forget_trouble()
-        self._saving.save(path, setting)
+        self._clear_trouble()
+        self._saving.save_preset(path, setting)
 
     def _open_preset(self, path: Path) -> None:
         """Feel the first liquid of a file; the file's other liquids become available."""
         try:
-            first = self._saving.open(path)
+            first = self._saving.open_liquids(path)
         except StudyError as error:
             self.trouble = str(error)
             return
-        self._choose(self.bench.presented, first)
+        self._choose_liquid(self.bench.presented, first)
 
     @guarded
-    def _could_not_save(self, error: Exception) -> None:
+    def _show_saving_error(self, error: Exception) -> None:
         """Show why a preset could not be written; the force continues. Other exceptions are bugs and are raised."""
         if not isinstance(error, StudyError):
             raise error
         self.trouble = str(error)
 
-    def _forget_trouble(self) -> None:
+    def _clear_trouble(self) -> None:
         """Clear the last problem, unless it says why no device is open."""
         if self.live is not None:
             self.trouble = ""
 
-    def _let_go(self) -> None:
+    def _close_device(self) -> None:
         live, self.live = self.live, None
         if live is not None:
             live.close()

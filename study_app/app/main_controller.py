@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import QEventLoop, QObject, QTimer, Signal
 from PySide6.QtGui import QGuiApplication, QKeySequence, QShortcut
 
-from study_app.app.failures import BY_SIGNAL_S, Patience, UncaughtExceptions, ended_from_outside, guard_painting
+from study_app.app.failures import BY_SIGNAL_S, Patience, UncaughtExceptions, ending_on_signals, guard_painting
 from study_app.app.session.live_session import BUG, OPENING_PATIENCE_S, LiveSession
-from study_app.app.timing import collecting_here
+from study_app.app.timing import collecting_in_this_thread
 from study_app.devices.registry import descriptor_of
 from study_app.errors import DeviceError, StoreError
 from study_app.gui.application import application_here
 from study_app.gui.devices.view import DevicesPlace
-from study_app.gui.display.screens import place
+from study_app.gui.display.screens import place_window
 from study_app.gui.home.dialogs import WorkspaceDialog
-from study_app.gui.home.main_window import MainWindow, bug_words
+from study_app.gui.home.main_window import MainWindow, bug_sentence
 from study_app.gui.home.study_facts import DraftWords
 from study_app.gui.home.view import HomePlace
 from study_app.gui.kit.devices import device_named, screen_number, settings_here, theme_named
@@ -65,62 +65,64 @@ class WorkstationController(QObject):
 
     def make_place(self) -> MachinePlace:
         place = self.place = MachinePlace()
-        place.changed.connect(self.change)
-        place.offset_measured.connect(self.measured)
+        place.changed.connect(self.change_settings)
+        place.offset_measured.connect(self.store_display_offset)
         place.undo_asked.connect(self.undo)
-        self._show()
+        self._show_settings()
         return place
 
-    def change(self, values: dict[str, Any]) -> None:
+    def change_settings(self, values: dict[str, Any]) -> None:
         before = {name: getattr(self.settings, name) for name in MachineSettings.model_fields}
         made = MachineSettings.model_validate(before | values)
         if made == self.settings:
-            self._show()
+            self._show_settings()
             return
         changed = next(iter(values)).removesuffix("_mm").replace("_", " ").replace("lsl", "LSL")
         self._before.append((changed, self.settings))
-        self._keep(made)
+        self._save_settings(made)
 
     def remember_operator(self, operator: str) -> None:
         """Store these initials as the default of the next session; undo ignores this."""
         if operator and operator != self.settings.operator:
-            self._keep(self.settings.model_copy(update={"operator": operator}))
+            self._save_settings(self.settings.model_copy(update={"operator": operator}))
 
     def remember_protocol(self, protocol: Path) -> None:
         """Store a protocol file among the recent ones; undo ignores this."""
         made = self.settings.with_recent(protocol)
         if made != self.settings:
-            self._keep(made)
+            self._save_settings(made)
 
-    def measured(self, mean_ms: float, spread_ms: float, how: str, screen: str) -> None:
+    def store_display_offset(self, mean_ms: float, spread_ms: float, how: str, screen: str) -> None:
         offset = {"mean_ms": mean_ms, "spread_ms": spread_ms, "how": how, "screen": screen}
-        self.change({"display_offset": DisplayOffset.model_validate(offset | {"measured": date.today().isoformat()})})
+        self.change_settings(
+            {"display_offset": DisplayOffset.model_validate(offset | {"measured": date.today().isoformat()})}
+        )
 
     def undo(self) -> None:
         if self._before:
             kept = {"operator": self.settings.operator, "recent": self.settings.recent}
-            self._keep(self._before.pop()[1].model_copy(update=kept))
+            self._save_settings(self._before.pop()[1].model_copy(update=kept))
 
     @property
-    def undo_called(self) -> str:
+    def undo_name(self) -> str:
         """The name of the change that undo takes back; "" if there is none."""
         return self._before[-1][0] if self._before else ""
 
-    def _keep(self, settings: MachineSettings) -> None:
+    def _save_settings(self, settings: MachineSettings) -> None:
         self.settings = settings
         try:
             workstation.save_settings(settings)
         except StoreError as error:
             self.troubled.emit("This machine's settings could not be saved", f"{error}.")
-        self._show()
+        self._show_settings()
         self.changed.emit(settings)
 
-    def _show(self) -> None:
+    def _show_settings(self) -> None:
         if self.place is not None:
             self.place.show_settings(
                 self.settings,
                 folder=str(workspace().folder.absolute()),
-                undo=self.undo_called,
+                undo=self.undo_name,
                 kept_in=str(settings_file()),
             )
 
@@ -143,7 +145,9 @@ LOOK_AFTER_MS = 300  # the window is painted by then
 JOBS_PATIENCE_S = 5.0
 
 
-def home(results: Path | None = None, *, then: Callable[[MainController], None] = lambda _visit: None) -> int:
+def run_home_window(
+    results: Path | None = None, *, then: Callable[[MainController], None] = lambda _visit: None
+) -> int:
     """Open the home window on the results folder; return the exit code when it is closed.
 
     By default the folder is the workspace's. ``then`` is called once the window stands.
@@ -156,7 +160,7 @@ def home(results: Path | None = None, *, then: Callable[[MainController], None] 
     application = application_here()
     controller = MainController(results)
     uncaught = UncaughtExceptions(controller.show_bug)
-    with collecting_here(), ended_from_outside(controller.end_by_signal), uncaught:
+    with collecting_in_this_thread(), ending_on_signals(controller.end_by_signal), uncaught:
         controller.open()
         then(controller)
         controller.loop.exec()
@@ -185,13 +189,13 @@ class MainController(QObject):
         self.question: WorkspaceDialog | None = None
         self.check: ComputerCheck | None = None
         makers: dict[str, Callable[[], Place]] = {
-            "home": self._home,
-            "designer": self._designer,
-            "results": self._results,
-            "lab": self._lab,
-            "devices": self._devices,
-            "machine": self._machine,
-            "help": self._help,
+            "home": self._make_home_place,
+            "designer": self._make_designer_place,
+            "results": self._make_results_place,
+            "lab": self._make_lab_place,
+            "devices": self._make_devices_place,
+            "machine": self._make_machine_place,
+            "help": self._make_help_place,
         }
         self.window = MainWindow(
             {name: _with_guarded_painting(make) for name, make in makers.items()},
@@ -210,18 +214,18 @@ class MainController(QObject):
         self._bugs: set[str] = set()
         self.results_place: ResultsPlace | None = None
         self.window.closed.connect(lambda: self.loop.quit() if self.live is None else None)
-        self.window.theme_changed.connect(lambda theme: self.machine.change({"theme": theme.name}))
-        self.machine.changed.connect(self._machine_changed)
+        self.window.theme_changed.connect(lambda theme: self.machine.change_settings({"theme": theme.name}))
+        self.machine.changed.connect(self._apply_settings)
         QShortcut(QKeySequence(QKeySequence.StandardKey.HelpContents), self.window, self.show_help)
         self.machine.troubled.connect(self.window.show_message)
         self.devices.troubled.connect(self.window.show_message)
         self._opened = QTimer(self, singleShot=True, interval=LOOK_AFTER_MS)
-        self._opened.timeout.connect(self.devices.look)
+        self._opened.timeout.connect(self.devices.look_for_devices)
         self._opened.timeout.connect(self.preload)
 
     def open(self) -> None:
         """Show the window, no larger than the screen, then look for devices."""
-        place(self.window, self.window.screen(), corner=False)
+        place_window(self.window, self.window.screen(), corner=False)
         self.window.show()
         if self.machine.trouble:
             self.window.show_message("The default settings are used", f"{self.machine.trouble}.")
@@ -234,7 +238,7 @@ class MainController(QObject):
 
     def show_bug(self, error: BaseException) -> bool:
         """Show an exception that no slot caught, once, unless a session shows it; return False: it is printed, too."""
-        bug, said = bug_words(error), error is self.window.not_opened
+        bug, said = bug_sentence(error), error is self.window.not_opened
         if self.live is None and self.window.isVisible() and not said and bug not in self._bugs:
             self._bugs.add(bug)
             self.window.show_message("The last action failed", bug)
@@ -246,7 +250,7 @@ class MainController(QObject):
         except StoreError as error:
             self.window.show_message("This folder cannot be used as the workspace", f"{error}.")
             return
-        self.machine.change({"workspace": str(folder.absolute())})
+        self.machine.change_settings({"workspace": str(folder.absolute())})
         self.check_computer()
 
     def check_computer(self) -> None:
@@ -258,7 +262,7 @@ class MainController(QObject):
         self.check.window.open()
         self.check.measure()
 
-    def _machine(self) -> MachinePlace:
+    def _make_machine_place(self) -> MachinePlace:
         made = self.machine.make_place()
         made.check_asked.connect(self.check_computer)
         return made
@@ -267,7 +271,7 @@ class MainController(QObject):
         """Load the modules of lab and designer in the background, so that the first visit rarely waits."""
         self._loading.run(load_modules)
 
-    def _lab(self) -> LabPlace:
+    def _make_lab_place(self) -> LabPlace:
         self._loading.wait()  # two threads that load modules of one import cycle may see them half loaded
         from study_app.app.lab_controller import LabController  # noqa: PLC0415 - pyqtgraph: only once it is needed
         from study_app.gui.lab.view import LabPlace  # noqa: PLC0415
@@ -275,21 +279,21 @@ class MainController(QObject):
         made = LabPlace()
         settings = self.machine.settings
         self.lab = LabController(made, device=settings.device, options=settings.device_options)
-        made.put_back_asked.connect(self._put_back)
-        made.asked.connect(self._lab_asked)
+        made.put_back_asked.connect(self._put_liquid_back)
+        made.asked.connect(self._prepare_lab_request)
         return made
 
-    def _lab_asked(self, what: str, _details: object) -> None:
+    def _prepare_lab_request(self, what: str, _details: object) -> None:
         if what in {"enter", "device", "fade in"}:
             self.devices.end_diagnosis()  # the diagnosis would hold the device
         elif what == "diagnose" and self.lab is not None:
             self.devices.diagnose(self.lab.device)
 
-    def _put_back(self, side: Side, setting: Setting) -> None:
+    def _put_liquid_back(self, side: Side, setting: Setting) -> None:
         if self.designer is not None:
-            self.designer.feeling.put_back(side, setting)
+            self.designer.feeling.put_liquid_back(side, setting)
 
-    def _designer(self) -> DesignerPlace:
+    def _make_designer_place(self) -> DesignerPlace:
         self._loading.wait()
         from study_app.app.session.playing import Playing  # noqa: PLC0415 - only once they are needed
         from study_app.designer.controller import DesignerController  # noqa: PLC0415
@@ -298,7 +302,7 @@ class MainController(QObject):
         self.playing = Playing(self.designer)
         for saved in (self.designer.saving.saved, self.playing.kept):
             saved.connect(self._home_place.show_studies)
-        self.designer.feeling.asked.connect(self._feel)
+        self.designer.feeling.asked.connect(self._feel_liquids)
         self.designer.place.form.foot.glossary.clicked.connect(lambda: self.show_help("glossary"))
         self.designer.place.keys_asked.connect(lambda: self.show_help("designer-keys"))
         self.designer.editing.opened_other.connect(self._forget_study)
@@ -315,9 +319,11 @@ class MainController(QObject):
             lambda designer: designer.changes.compare_with_session(session.study, session.folder),
         )
 
-    def begin_study(self, source: str = "", name: str = "") -> None:
+    def begin_new_study(self, source: str = "", name: str = "") -> None:
         """Open the page for new studies in the designer; with ``name`` create the study at once."""
-        self._go_to_designer(lambda it: it.ask_for_new(source), lambda it: it.begin(source, name) if name else None)
+        self._go_to_designer(
+            lambda it: it.show_new_page(source), lambda it: it.begin_study(source, name) if name else None
+        )
 
     def _go_to_designer(self, *actions: Callable[[DesignerController], object]) -> None:
         self.window.go("designer")
@@ -325,30 +331,30 @@ class MainController(QObject):
         for act in actions:
             act(self.designer)
 
-    def _feel(self, liquids: LabLiquids) -> None:
+    def _feel_liquids(self, liquids: LabLiquids) -> None:
         self.window.go("lab")
         assert self.lab is not None  # noqa: S101 - as above
-        self.lab.feel_of_study(liquids.a, liquids.b, liquids.study)
+        self.lab.feel_study_liquids(liquids.a, liquids.b, liquids.study)
 
     def _forget_study(self) -> None:
         """Another study is open in the designer: the lab no longer offers to put liquids back."""
         if self.lab is not None:
             self.lab.study = ""
 
-    def _home(self) -> HomePlace:
+    def _make_home_place(self) -> HomePlace:
         made = HomePlace(self.results, _draft_words)
-        made.session_asked.connect(self._start)
+        made.session_asked.connect(self._start_session)
         made.results_asked.connect(self.show_study)
         made.protocol_opened.connect(self.machine.remember_protocol)
         made.edit_asked.connect(self.open_designer)
-        made.new_asked.connect(self.begin_study)
+        made.new_asked.connect(self.begin_new_study)
         made.device.display.clicked.connect(self._test_display)
         self._home_place = made
         return made
 
-    def _devices(self) -> DevicesPlace:
+    def _make_devices_place(self) -> DevicesPlace:
         self.devices = DevicesPlace(self.machine.settings)
-        self.devices.changed.connect(self.machine.change)
+        self.devices.changed.connect(self.machine.change_settings)
         self.devices.looked.connect(self._show_machine)
         self._show_machine()
         return self.devices
@@ -358,7 +364,7 @@ class MainController(QObject):
         settings = self.machine.settings
         self._home_place.show_machine(settings, device_named(settings.device, self.devices.shown))
 
-    def _machine_changed(self, settings: MachineSettings) -> None:
+    def _apply_settings(self, settings: MachineSettings) -> None:
         """Apply changed settings of this machine, except those that the command line set."""
         self.window.show_theme(theme_named(settings.theme))
         here = workspace()
@@ -381,17 +387,17 @@ class MainController(QObject):
         """Go to the results of a study."""
         self.window.place("results")
         assert self.results_place is not None  # noqa: S101 - just made
-        self.results_place.choose(folder)
+        self.results_place.choose_study(folder)
         self.window.go("results")
 
-    def _results(self) -> ResultsPlace:
+    def _make_results_place(self) -> ResultsPlace:
         from study_app.gui.results.view import ResultsPlace  # noqa: PLC0415 - only once it is needed
 
         self.results_place = ResultsPlace(self.results)
         self.results_place.version_asked.connect(self.show_version)
         return self.results_place
 
-    def _help(self) -> HelpPlace:
+    def _make_help_place(self) -> HelpPlace:
         from study_app.gui.help.view import HelpPlace  # noqa: PLC0415 - only once it is needed
 
         self.help = HelpPlace()
@@ -417,7 +423,7 @@ class MainController(QObject):
         for part in (self.playing, self.lab):
             if part is not None:
                 part.end(patience)
-        self.devices.end(patience.left_s)
+        self.devices.stop_looking(patience.left_s)
         for live in self._called_off:
             live.wait(patience.left_s)
         wait_for_jobs(min(patience.left_s, JOBS_PATIENCE_S))
@@ -431,39 +437,39 @@ class MainController(QObject):
         self.window.close()
         self.loop.quit()
 
-    def _start(self, chosen: NewSession) -> None:
+    def _start_session(self, chosen: NewSession) -> None:
         if self.live is not None:
             return
         self.devices.end_diagnosis()  # the diagnosis would hold the device
         self.machine.remember_operator(chosen.operator)
         self.live = LiveSession(chosen, self.window.theme, asks=True)
-        self.live.over.connect(self._return)
-        self.window.rest()
+        self.live.over.connect(self._return_from_session)
+        self.window.hide_for_session()
         self.live.open()
 
-    def _return(self) -> None:
+    def _return_from_session(self) -> None:
         live, self.live = self.live, None
         if live is None:
             return
-        self._called_off = [earlier for earlier in (*self._called_off, live) if earlier.opening]
+        self._called_off = [earlier for earlier in (*self._called_off, live) if earlier.is_opening]
         if self.code:
             return
         if live.theme is not self.window.theme:  # the theme may have been changed in the operator's window
-            self.machine.change({"theme": live.theme.name})
-        if live.began and self.results_place is not None:
-            self.results_place.choose(live.chosen.results)
-        self.window.come_back()
-        if isinstance(live.error, DeviceError) and not live.began:
+            self.machine.change_settings({"theme": live.theme.name})
+        if live.has_begun and self.results_place is not None:
+            self.results_place.choose_study(live.chosen.results)
+        self.window.return_from_session()
+        if isinstance(live.error, DeviceError) and not live.has_begun:
             name = live.chosen.device
             examined = descriptor_of(name).doctor is not None
             self.window.ask_about_device(
                 "The session did not start",
                 f"{live.error}.",
-                partial(self._start, live.chosen),
+                partial(self._start_session, live.chosen),
                 partial(self.devices.diagnose, name) if examined else None,
             )
         elif live.error is not None:
-            title = "The session did not finish" if live.began else "The session did not start"
+            title = "The session did not finish" if live.has_begun else "The session did not start"
             self.window.show_message(title, f"{live.error}.")
         elif live.code == BUG:
             self.window.show_message("A bug in the program stopped the session", "The terminal shows the details.")

@@ -27,7 +27,7 @@ class DeferredTask:
     done_ns: int | None = None
     took_ns: int = 0
 
-    def waits_ns(self, now_ns: int) -> int:
+    def overdue_ns(self, now_ns: int) -> int:
         """Return the time since the task was due [ns]; negative before."""
         if self.done_ns is None:
             return self.period_ns
@@ -48,21 +48,21 @@ class FrameBudget:
         self.tasks = [DeferredTask(do=do, period_ns=round(period_s * 1e9)) for do, period_s in works]
         self._now_ns = now_ns
 
-    def use(self, until_ns: int) -> None:
+    def run_due_tasks(self, until_ns: int) -> None:
         """Run due tasks that will end by ``until_ns``; of tasks that are long overdue, one in any case."""
         hurried = False
         for work in self.tasks:
             now_ns = self._now_ns()
-            waited_ns = work.waits_ns(now_ns)
+            waited_ns = work.overdue_ns(now_ns)
             if waited_ns < 0:
                 continue
             if now_ns + work.took_ns > until_ns:
                 if hurried or waited_ns < MOST_PERIODS * work.period_ns:
                     continue
                 hurried = True
-            self._do(work, now_ns)
+            self._run_task(work, now_ns)
 
-    def _do(self, work: DeferredTask, began_ns: int) -> None:
+    def _run_task(self, work: DeferredTask, began_ns: int) -> None:
         work.done_ns = began_ns
         work.do()
         work.took_ns = max(self._now_ns() - began_ns, round(FORGETS * work.took_ns))
@@ -113,13 +113,13 @@ def unfreeze_garbage() -> None:
 _ends_at_once = threading.Event()
 
 
-def end_at_once() -> None:
+def disable_collection() -> None:
     """Disable collection: the program ends, and a full collection takes seconds under load."""
     _ends_at_once.set()
 
 
 @contextmanager
-def collecting_here() -> Iterator[None]:
+def collecting_in_this_thread() -> Iterator[None]:
     """Run collections in this thread, which runs Qt's event loop, and in no other."""
     before = gc.isenabled()
     _ends_at_once.clear()
@@ -151,7 +151,7 @@ class ThreadPriority:
     def raise_priority(self) -> bool:
         """Raise this thread's priority above other programs'; return whether the system permitted it."""
         if sys.platform == "win32":
-            return _prefer(ABOVE_NORMAL)
+            return _set_windows_priority(ABOVE_NORMAL)
         if sys.platform == "darwin":
             return True  # the windows' thread already has interactive priority there
         thread = threading.get_native_id()
@@ -170,13 +170,13 @@ class ThreadPriority:
 
     def restore(self) -> None:
         if sys.platform == "win32":
-            _prefer(NORMAL)
+            _set_windows_priority(NORMAL)
         elif sys.platform != "darwin" and self._before is not None:
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), self._before)
             self._before = None
 
 
-def _prefer(level: int) -> bool:
+def _set_windows_priority(level: int) -> bool:
     """Set the priority of this thread on Windows."""
     windows = getattr(ctypes, "windll", None)
     if windows is None:

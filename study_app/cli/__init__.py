@@ -45,7 +45,7 @@ def commands(context: click.Context) -> None:
     if context.invoked_subcommand is None:
         from study_app import app
 
-        context.exit(app.home())
+        context.exit(app.run_home_window())
 
 
 for module in (demo, study, data, power, model, evidence):
@@ -61,7 +61,7 @@ def _shortened(message: str) -> str:
     return re.sub(rf"(\S{{{SHOWN}}})\S+", r"\1…", message)
 
 
-def _leave(ended: list[int]) -> None:
+def _exit_at_once(ended: list[int]) -> None:
     if ended:
         try:
             logging.shutdown()
@@ -76,7 +76,7 @@ def main() -> None:
     A program that was ended by a signal does not free Qt's objects and Python's modules: that takes seconds under load.
     """
     ended: list[int] = []
-    atexit.register(_leave, ended)  # registered first, so it is called last
+    atexit.register(_exit_at_once, ended)  # registered first, so it is called last
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # none is used, and searching them reads every package
     if isinstance(sys.stdout, io.TextIOWrapper):  # a pipe or an old console may lack a letter
         sys.stdout.reconfigure(errors="backslashreplace")

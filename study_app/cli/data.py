@@ -14,7 +14,7 @@ from study_app.cli.options import (
     SESSION,
     Target,
     echo_files,
-    end_if,
+    exit_if,
     progress,
     takes_session,
     takes_study,
@@ -65,18 +65,18 @@ def export(
         files = export_study(results, to, extras=extras, warn=partial(click.echo, err=True), failed=failed.append)
     echo_files(files)
     if validator is not None:
-        _validate(validator, to)
-    _say(failed)
+        _run_validator(validator, to)
+    _report_failed_sections(failed)
 
 
-def _say(failed: list[str]) -> None:
+def _report_failed_sections(failed: list[str]) -> None:
     """Print the sections of a report that failed; end with exit code 3 if there are any."""
     for line in failed:
         click.echo(line, err=True)
-    end_if(failed)
+    exit_if(failed)
 
 
-def _validate(validator: Path, to: Path) -> None:
+def _run_validator(validator: Path, to: Path) -> None:
     import subprocess
 
     from study_app.analysis.export.psychds_dataset import FOLDER
@@ -85,7 +85,7 @@ def _validate(validator: Path, to: Path) -> None:
         ended = subprocess.run([validator.absolute(), to / FOLDER], check=False)  # noqa: S603 - named by the user
     except OSError as error:
         raise click.UsageError(f"{validator} cannot be run: {error.strerror}; give an executable file") from error
-    end_if(ended.returncode)
+    exit_if(ended.returncode)
 
 
 @click.command()
@@ -116,7 +116,7 @@ def report(results: Path, to: Path) -> None:
     with progress() as show:
         files = write_report(results, to, progress=show, warn=partial(click.echo, err=True), failed=failed.append)
     click.echo(f"{files[0]}  and {counted(len(files) - 1, 'more file')} in its folder")
-    _say(failed)
+    _report_failed_sections(failed)
 
 
 @click.command()
@@ -220,7 +220,7 @@ def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[
         click.echo(f"warning: {sentence}", err=True)
 
 
-def _site(_context: click.Context, _parameter: click.Parameter, texts: tuple[str, ...]) -> dict[str, Path]:
+def _parse_sites(_context: click.Context, _parameter: click.Parameter, texts: tuple[str, ...]) -> dict[str, Path]:
     sites: dict[str, Path] = {}
     for text in texts:
         name, equals, folder = text.partition("=")
@@ -233,7 +233,7 @@ def _site(_context: click.Context, _parameter: click.Parameter, texts: tuple[str
 
 
 @click.command()
-@click.argument("sites", nargs=-1, required=True, callback=_site, metavar="NAME=RESULTS...")
+@click.argument("sites", nargs=-1, required=True, callback=_parse_sites, metavar="NAME=RESULTS...")
 @click.option("--to", required=True, type=Target(), metavar="DIR", help="New folder, or a merged study to add to.")
 def merge(sites: dict[str, Path], to: Path) -> None:
     """Merge the study folders of several sites that ran the same protocol; they are copied unchanged.
@@ -280,7 +280,7 @@ def reproduce(session: Path) -> None:
         click.echo(line)
     same = "reproduced: trials and statements have the order of the receipt"
     click.echo("orders or levels differ" if reproduction.differences else same)
-    end_if(reproduction.differences)
+    exit_if(reproduction.differences)
 
 
 @click.command()
@@ -315,8 +315,10 @@ def verify(results: Path, fingerprints: Path | None, xdf: Path | None) -> None:
     for line in measured:
         click.echo(line)
     running = f", {verification.running} running" if verification.running else ""
-    click.echo(f"{counted(verification.sessions, 'session')}{running}: {'sound' if verification.is_sound else 'not sound'}")
-    end_if(not verification.is_sound)
+    click.echo(
+        f"{counted(verification.sessions, 'session')}{running}: {'sound' if verification.is_sound else 'not sound'}"
+    )
+    exit_if(not verification.is_sound)
 
 
 @click.command()
@@ -387,4 +389,4 @@ def replay(session: Path) -> None:
         )
     else:
         click.echo(verdict)
-    end_if(not replayed.proved)
+    exit_if(not replayed.proved)

@@ -7,7 +7,7 @@ from typing import Final
 
 import click
 
-from study_app.cli.options import EXIT_FOUND, end_if, keep_offered_workspace, progress
+from study_app.cli.options import EXIT_FOUND, exit_if, keep_offered_workspace, progress
 from study_app.number_text import counted
 
 STUDY: Final = "demo"
@@ -43,8 +43,8 @@ def demo(context: click.Context, *, no_window: bool) -> None:
     if (report / "report.html").is_file():
         click.echo(f"Report with figures and tables: {report / 'report.html'}")
     if not no_window:
-        context.exit(_show(study) or (EXIT_FOUND if failed else 0))
-    end_if(failed)
+        context.exit(_show_results(study) or (EXIT_FOUND if failed else 0))
+    exit_if(failed)
 
 
 def _run_sessions(study: Path) -> None:
@@ -59,12 +59,12 @@ def _run_sessions(study: Path) -> None:
         click.echo("Preparing the force model: compiled once on this computer, for up to a minute")
         with progress() as show:
             show("compiling")
-            _compile(protocol)
+            _compile_everything(protocol)
     for participant in PARTICIPANTS:
         finish_session(protocol, participant, seed=SEED, device=DEVICE, results=study, progress=click.echo)
 
 
-def _compile(protocol: Path) -> None:
+def _compile_everything(protocol: Path) -> None:
     """Compile driver and emulator here and the servo in another process, which saves 13 s of processor time."""
     from study_app.workers.executors import Workers, open_executor
 
@@ -118,7 +118,7 @@ def _write_report(study: Path, to: Path) -> list[str]:
     return failed
 
 
-def _show(study: Path) -> int:
+def _show_results(study: Path) -> int:
     """Open the program on the results and return its exit code; or say how to open it, and return 0."""
     from study_app.errors import DisplayError
     from study_app.gui.display.display_check import check_display, missing_for_windows
@@ -130,7 +130,7 @@ def _show(study: Path) -> int:
             from study_app import app
 
             click.echo("Opening the program on these results; close its window to end")
-            return int(app.home(then=lambda visit: visit.show_study(study)))
+            return int(app.run_home_window(then=lambda visit: visit.show_study(study)))
         reason = f"QT_QPA_PLATFORM={platform} shows no window"
     except DisplayError as error:
         reason = missing_for_windows() or str(error)

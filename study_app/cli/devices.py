@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from study_app.cli.options import TakesDeviceOptions, end_if
+from study_app.cli.options import TakesDeviceOptions, exit_if
 from study_app.errors import DeviceError
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def plugins() -> None:
                 click.echo(f"    {entry.kind:<9} {entry.name}{f': {entry.fault}; {UPDATE}' if entry.fault else ''}")
     if not entries:
         click.echo("No plug-in is installed; docs/plug-ins.md says how to make one.")
-    end_if(any(entry.fault for entry in entries))
+    exit_if(any(entry.fault for entry in entries))
 
 
 @devices.command(cls=TakesDeviceOptions)
@@ -87,7 +87,7 @@ def doctor(name: str, faults: tuple[str, ...], to: Path | None, device_options: 
     code 3 if something is wrong. The zip file contains this report, versions, settings, log and last error, but no
     participant IDs, answers or liquids.
     """
-    click.echo(_PREPARING)  # the next imports and compiled next takes long the first time
+    click.echo(_PREPARING)  # the next imports and compilations take long the first time
     from study_app.devices.doctor import report_lines
     from study_app.devices.registry import check_options, doctor_of
 
@@ -100,7 +100,7 @@ def doctor(name: str, faults: tuple[str, ...], to: Path | None, device_options: 
 
         write_support(to, "\n".join(report_lines(diagnosis)).strip() + "\n")
         click.echo(f"Written: {to}")
-    end_if(not diagnosis.well)
+    exit_if(not diagnosis.well)
 
 
 @devices.command()
@@ -122,7 +122,7 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
     from study_app.devices.falcon.mechanics import DEFAULT_GEOMETRY, geometry_named
 
     measures = geometry_named(geometry or DEFAULT_GEOMETRY)
-    device, emulator = _falcon(name, firmware, grams)
+    device, emulator = _falcon_and_emulator(name, firmware, grams)
     with device:
         grip = calibration.Grip(device, virtual=emulator is not None)
         weight_n = (grams or 0.0) / 1000 * calibration.GRAVITY_MPS2
@@ -134,12 +134,12 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
         )
         serial = device.describe()["serial"]
     calibrated = calibration.fit(measures, notes.counts, notes.forces_n, notes.units)
-    for line in _calibrated(calibrated, notes):
+    for line in _calibration_lines(calibrated, notes):
         click.echo(line)
     if calibrated.residual_n > calibration.MOST_RESIDUAL_N:
         unexplained = f"More than {calibration.MOST_RESIDUAL_N} N is unexplained"
         click.echo(f"{unexplained}, so nothing was saved. Repeat the calibration.")
-        end_if(True)
+        exit_if(True)
     click.echo(f"Saved in {calibration.save_calibration(serial or '', calibrated)}.")
 
 
@@ -182,7 +182,7 @@ def bench(name: str, to: Path | None, device_options: dict[str, str | Path]) -> 
             progress=click.echo,
             clock=VirtualClock() if simulated else SystemClock(),
         )
-    _keep_bench(results, folder, simulated=descriptor.simulated)
+    _save_bench(results, folder, simulated=descriptor.simulated)
 
 
 def _ask_operator(terminal: Terminal) -> AskOperator:
@@ -190,8 +190,8 @@ def _ask_operator(terminal: Terminal) -> AskOperator:
     return lambda kind, question: terminal.ask(kind if kind == "let-go" else "reading", question)
 
 
-def _keep_bench(results: Found, folder: Path, *, simulated: bool) -> None:
-    """Write the report, and keep the numbers in this machine's settings where the device is a real one."""
+def _save_bench(results: Found, folder: Path, *, simulated: bool) -> None:
+    """Write the report; for a real device store the numbers in this machine's settings."""
     from study_app.devices.bench.procedure import as_json, as_markdown, workstation_results
     from study_app.store import workstation
     from study_app.store.atomic import write_file
@@ -206,14 +206,14 @@ def _keep_bench(results: Found, folder: Path, *, simulated: bool) -> None:
         return
     if not results.fits:
         click.echo("Nothing was kept for receipts: mass, damping and friction do not explain how the handle moved.")
-        end_if(True)
+        exit_if(True)
     report = str((folder / "bench.md").resolve())
     bench = workstation.DeviceBench.model_validate({**workstation_results(results, day), "report": report})
     workstation.save_settings(workstation.load_or_default()[0].with_bench(bench))
     click.echo("Saved in this machine's settings: receipts of later sessions record it, and Devices shows it.")
 
 
-def _falcon(name: str, firmware: Path | None, grams: float | None) -> tuple[FalconDevice, Emulator | None]:
+def _falcon_and_emulator(name: str, firmware: Path | None, grams: float | None) -> tuple[FalconDevice, Emulator | None]:
     """Return the Falcon, not yet open, and the emulator behind it, if there is one."""
     from study_app.devices.descriptor import OpenRequest
     from study_app.devices.driver import framed_device
@@ -235,7 +235,7 @@ def _falcon(name: str, firmware: Path | None, grams: float | None) -> tuple[Falc
     return EmulatedFalcon(firmware=firmware, progress=click.echo, emulator=emulator), emulator
 
 
-def _calibrated(fit: Calibration, notes: Notes) -> list[str]:
+def _calibration_lines(fit: Calibration, notes: Notes) -> list[str]:
     from study_app.devices.falcon.calibration import UNCALIBRATED_UNITS_PER_NM, residual_forces
 
     lines = ["", "rest  load [N]  unexplained x, y, z [N]"]
@@ -263,7 +263,7 @@ class Terminal:
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
         self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
-        threading.Thread(target=self._listen, daemon=True).start()
+        threading.Thread(target=self._read_lines, daemon=True).start()
 
     def ask(self, kind: str, question: str) -> Callable[[], str | None]:
         """Ask a question and return a function that reads the answer; lines typed before it do not count."""
@@ -284,7 +284,7 @@ class Terminal:
 
         return answered
 
-    def _listen(self) -> None:
+    def _read_lines(self) -> None:
         typed = b""
         with suppress(OSError):  # in the background nothing can be read from a terminal
             while more := os.read(self._descriptor, 1024):

@@ -20,10 +20,10 @@ from study_app.cli.options import (
     ShowProgress,
     Target,
     echo_files,
-    end_if,
     exclude_each_other,
     executor_for,
-    prepare,
+    exit_if,
+    make_output_folder,
     progress,
     takes_workers,
 )
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 EXIT_UNDECIDED = 4
 
 
-def present(result: Evidence, to: Path | None, *, with_text: bool = True) -> None:
+def present_evidence(result: Evidence, to: Path | None, *, with_text: bool = True) -> None:
     """Print evidence and write it into a folder, if one was given.
 
     The exit code is 3 if a limit is missed, and 4 if one is undecided. ``with_text``: print the text in any case, not
@@ -54,7 +54,7 @@ def present(result: Evidence, to: Path | None, *, with_text: bool = True) -> Non
         echo_files(result.write(to))
     if result.closing:
         click.echo(result.closing)
-    end_if(result.missed)
+    exit_if(result.missed)
     if result.undecided:
         click.get_current_context().exit(EXIT_UNDECIDED)
 
@@ -90,37 +90,37 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
     if every:
         exclude_each_other(liquids=every, liquid=liquid)
         exclude_each_other(liquids=every, path=None if path == DEFAULT_PATH else path)
-        _survey(scene, to)
+        _print_survey(scene, to)
         return
     from study_app.evidence.accuracy.accuracy_report import evidence
     from study_app.evidence.accuracy.comparison import accuracy as measure
 
-    numerical, physical, notes = _subjects(scene, liquid)
+    numerical, physical, notes = _scenes_to_compare(scene, liquid)
     subject = numerical or physical
     motion = motion_along(path, subject) if subject is not None else None
     if motion is None:
         raise click.UsageError(f"nothing can be measured: {'; '.join(notes)}")
-    prepare(to)
+    make_output_folder(to)
     named = "stirring" if path == DEFAULT_PATH else path
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
         measured = measure(numerical, physical, motion, named=named, notes=notes, progress=show)
-    present(evidence(measured), to, with_text=False)
+    present_evidence(evidence(measured), to, with_text=False)
 
 
-def _survey(file: str | None, to: Path | None) -> None:
+def _print_survey(file: str | None, to: Path | None) -> None:
     """Print or write the error of the force of every liquid of a file."""
     from study_app.evidence.accuracy.survey import evidence, survey
     from study_app.protocol.load import load_scenes
 
-    prepare(to)
+    make_output_folder(to)
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
         errors = survey(load_scenes(file or REAL), show)
     if not errors:
         raise click.UsageError(f"{file}: no liquid has a viscosity, so there is no physical reference to compare with")
-    present(evidence(errors), to, with_text=False)
+    present_evidence(evidence(errors), to, with_text=False)
 
 
-def _subjects(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scene | None, tuple[str, ...]]:
+def _scenes_to_compare(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scene | None, tuple[str, ...]]:
     """Return the scene that defines the force, the scene of the real liquid, and notes on what is missing."""
     from study_app.protocol.load import load_scene, load_scenes
 
@@ -201,14 +201,14 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
     exclude_each_other(solve=solve, score=score)
     if solve and to is None:
         raise click.UsageError("--solve needs --to: the folder for the solver's tables")
-    prepare(to)
+    make_output_folder(to)
     if score:
         with progress(lambda text: click.echo(text, err=True)) as show:
             scored = fits.score_all(show)
-        present(scored, to)
+        present_evidence(scored, to)
         return
     if materials:
-        _materials(to, workers, solve=solve)
+        _print_material_errors(to, workers, solve=solve)
         return
     with progress(lambda text: click.echo(text, err=True)) as show:
         solved: tuple[Path, ...] = ()
@@ -222,17 +222,17 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
         else:
             result = fits.evidence(tables, drag, fits.fit_all(tables, show))
     echo_files(solved)
-    present(result, to, with_text=False)
+    present_evidence(result, to, with_text=False)
 
 
-def _materials(to: Path | None, workers: Workers, *, solve: bool) -> None:
+def _print_material_errors(to: Path | None, workers: Workers, *, solve: bool) -> None:
     """Print or write the law's error in Herschel–Bulkley liquids, with the stored table or a new one."""
     from study_app.evidence.cfd.yield_flow import evidence, solve_materials, stored_materials
 
     if solve and to is not None:
         with progress(lambda text: click.echo(text, err=True)) as show, executor_for(workers) as executor:
             click.echo(solve_materials(to, executor, show))
-    present(evidence(stored_materials(to if solve else None)), to, with_text=False)
+    present_evidence(evidence(stored_materials(to if solve else None)), to, with_text=False)
 
 
 @click.command()
@@ -285,33 +285,33 @@ def stability(
 
     parts = {"withheld": withheld, "delivered": delivered, "velocity": velocity}
     exclude_each_other(to=to, case=line, table=table, delayed=delayed, only=only, **parts)
-    prepare(to)
+    make_output_folder(to)
     if line is not None:
         case = parse(line)
         click.echo(str(case))
         verdicts = stability_report.verdicts_on(case)
         click.echo("\n".join(stability_report.in_words(verdict) for verdict in verdicts))
-        end_if(not verdicts[-1].stable)
+        exit_if(not verdicts[-1].stable)
         return
     if table is not None:
         with progress() as show, executor_for(workers) as executor:
             limits = stability_report.limits(
                 executor, lambda done, of: show(f"{done} of {of} limits", done / of), table.name
             )
-        present(limits, table.parent)
+        present_evidence(limits, table.parent)
         return
     if delayed is not None:
         from study_app.evidence.stability import force_delay
 
         with progress() as show:
             entries = force_delay.measure(progress=lambda done: show(f"{done} delays"))
-        present(force_delay.evidence(entries, delayed.name), delayed.parent)
+        present_evidence(force_delay.evidence(entries, delayed.name), delayed.parent)
         return
     if any(parts.values()):
         part = next(name for name, chosen in parts.items() if chosen)
         with progress() as show, executor_for(workers) as executor:
             measured = _measure(part, executor, show)
-        present(measured, None)
+        present_evidence(measured, None)
         return
     chosen = groups(seed, cases) if only is None else tuple(it for it in groups(seed, cases) if only in it.name)
     if not chosen:
@@ -334,7 +334,7 @@ def stability(
     if swept.unstable:
         click.echo("\nunstable with safety on; repeat one with --case:", err=True)
         click.echo("\n".join(str(verdict.case) for verdict in swept.unstable), err=True)
-    end_if(swept.unstable)
+    exit_if(swept.unstable)
 
 
 def _measure(part: str, executor: Executor, show: ShowProgress) -> Evidence:
@@ -413,7 +413,7 @@ def timing(
         check_seconds(seconds, "outlets are measured")
     if other == "delays":
         _choose_display()
-    prepare(to)
+    make_output_folder(to)
 
     def measured(ending: threading.Event, show: ShowProgress) -> Evidence:
         if other == "devices":
@@ -434,11 +434,11 @@ def timing(
         return ports.evidence(ports.measure(triggers or "", seconds, ending=ending, progress=show))
 
     if other == "delays":
-        from study_app.app.delay_session import delays
+        from study_app.app.delay_session import measure_delays
         from study_app.evidence.timing.delays import evidence
 
         with progress(partial(click.echo, err=True)) as show:
-            result = evidence(delays(seconds, load, progress=show))
+            result = evidence(measure_delays(seconds, load, progress=show))
     else:
         windows = windows_thread(load) if load != "none" or not other else None
         with ending_by_signal() as (ending, _), progress(partial(click.echo, err=True)) as show:
@@ -449,7 +449,7 @@ def timing(
 
                 timed = measurement.timing(seconds, load, windows, spin_us=spin_us, ending=ending, progress=show)
                 result = report.evidence(timed)
-    present(result, to)
+    present_evidence(result, to)
 
 
 def _choose_display() -> None:
@@ -509,7 +509,7 @@ def soak(
     from study_app.protocol.load import load_scenes
 
     scenes = load_scenes(protocol)
-    prepare(to)
+    make_output_folder(to)
     with ending_by_signal() as (ending, received):
         result = under_load(
             load,
@@ -518,7 +518,7 @@ def soak(
         )
     if result.ticks > 0:
         click.echo()
-    present(result.evidence(), to)
+    present_evidence(result.evidence(), to)
     if received:
         context.exit(128 + received[0])
 
@@ -554,7 +554,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     from study_app.protocol.load import load
     from study_app.session.simulated.rehearsal import condition_features
 
-    prepare(to)
+    make_output_folder(to)
     rates: tuple[Rate, ...] = ()
     begun, done = time.monotonic(), 0
 
@@ -580,7 +580,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
                 show(f"{done} studies")
     except KeyboardInterrupt:
         click.echo("ended early", err=True)
-    present(evidence(rates, f"{done} studies in {time.monotonic() - begun:.0f} s"), to)
+    present_evidence(evidence(rates, f"{done} studies in {time.monotonic() - begun:.0f} s"), to)
 
 
 @click.command()
@@ -619,14 +619,14 @@ def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], worke
         chosen = [(source_bytes(name), known_value(Path(name).stem, load(name))) for name in files or NAMES]
     except ValueError as error:
         raise click.UsageError(str(error)) from error
-    prepare(to)
+    make_output_folder(to)
     begun = time.monotonic()
     with progress() as show, executor_for(workers) as executor:
         verdicts = validate_values(chosen, studies, seeds, executor, show)
     used_s = sum(os.times()[:4])  # with the workers', which have ended
     took = f"{time.monotonic() - begun:.0f} s, {used_s:.0f} s of processor time"
     heading = f"{studies} studies of each protocol and seed ({', '.join(map(str, seeds))}), in {took}"
-    present(evidence(verdicts, heading), to)
+    present_evidence(evidence(verdicts, heading), to)
 
 
 @click.command("delay-thresholds")
@@ -643,4 +643,4 @@ def delay_thresholds(people: int, seed: int, to: Path | None) -> None:
     with progress() as show:
         show("simulating people")
         comparison = compare(people, seed)
-    present(evidence(comparison), to)
+    present_evidence(evidence(comparison), to)

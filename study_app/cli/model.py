@@ -33,20 +33,20 @@ def simulate(scene: str, liquid: str, path: str, to: Path, changes: tuple[str, .
     from study_app import api
     from study_app.store import csv_files
 
-    table = api.simulate_force(scene, liquid, path, **_values(changes))
+    table = api.simulate_force(scene, liquid, path, **_parse_changes(changes))
     csv_files.write_columns(to, table)
     click.echo(f"{to}: {len(table)} rows")
 
 
-def _changed(file: str, liquid: str, changes: tuple[str, ...]) -> Scene:
+def _changed_scene(file: str, liquid: str, changes: tuple[str, ...]) -> Scene:
     """Return the scene of one liquid of a file, with each --set."""
     from study_app.haptics.model.overrides import override_all
     from study_app.protocol.load import load_scene
 
-    return override_all(load_scene(file, liquid), _values(changes))
+    return override_all(load_scene(file, liquid), _parse_changes(changes))
 
 
-def _values(changes: tuple[str, ...]) -> dict[str, str]:
+def _parse_changes(changes: tuple[str, ...]) -> dict[str, str]:
     values = {}
     for change in changes:
         name, separator, value = change.partition("=")
@@ -119,7 +119,7 @@ def identify(
     from study_app.lab.identify import preset as identified
     from study_app.lab.identify.fit import CurveFit, Fit, fit, fit_curve
 
-    chosen = _changed(scene, liquid, changes)
+    chosen = _changed_scene(scene, liquid, changes)
     read = measurements.read(measured)
     fitted = [name.strip() for name in names.split(",")]
     fitted_liquid: Fit | CurveFit

@@ -71,7 +71,7 @@ class GroupedCommands(click.Group):
             if any(word.partition("=")[0] == old for word in args):
                 click.echo(f"{old} is {new} now" if new else f"{old} is no longer needed", err=True)
             renamed = [word for word in args if word != old or new]
-            args[:] = [_renamed(word, old, new) for word in renamed]
+            args[:] = [_current_option(word, old, new) for word in renamed]
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -85,7 +85,7 @@ class GroupedCommands(click.Group):
                 )
 
 
-def _renamed(word: str, old: str, new: str) -> str:
+def _current_option(word: str, old: str, new: str) -> str:
     """Return a word of the command line with the option's current name; without a name only the value."""
     option, equals, value = word.partition("=")
     return word if option != old else f"{new}{equals}{value}" if new else value
@@ -199,7 +199,7 @@ def keep_offered_workspace() -> None:
         click.echo(f"workspace of this machine: {offered.folder} (liquid-study workspace DIR changes it)", err=True)
 
 
-def end_if(problems: object) -> None:
+def exit_if(problems: object) -> None:
     """End the command with exit code 3 if a check found a problem."""
     if problems:
         raise click.exceptions.Exit(EXIT_FOUND)
@@ -211,7 +211,7 @@ def echo_files(written: Iterable[Path]) -> None:
         click.echo(path)
 
 
-def prepare(to: Path | None) -> None:
+def make_output_folder(to: Path | None) -> None:
     """Make the folder to write into, if one was given, before a long computation."""
     from study_app.store.atomic import make_folder
 
@@ -262,7 +262,7 @@ def takes_workers(function: Command) -> Command:
         type=click.IntRange(-1),
         default=-1,
         metavar="N",
-        callback=_not_zero,
+        callback=_check_worker_count,
         help="Worker processes on this computer; default: one per core.",
     )
     @click.option(
@@ -284,7 +284,7 @@ def takes_workers(function: Command) -> Command:
     return run  # type: ignore[return-value]
 
 
-def _not_zero(_context: click.Context, _option: click.Parameter, value: int) -> int:
+def _check_worker_count(_context: click.Context, _option: click.Parameter, value: int) -> int:
     if value == 0:
         raise click.BadParameter("0 workers cannot compute: give 1 or more, or -1 for one per core")
     return value

@@ -35,7 +35,7 @@ TRIALS = (1, 1000)
 STUDIES, THRESHOLD_STUDIES = 1000, 200
 
 
-def _numbers(value: str, least: int, most: int, what: str) -> tuple[int, ...]:
+def _parse_numbers(value: str, least: int, most: int, what: str) -> tuple[int, ...]:
     """Return a list of numbers, ascending."""
     try:
         numbers = sorted({int(part) for part in value.split(",")})
@@ -52,13 +52,15 @@ def _numbers(value: str, least: int, most: int, what: str) -> tuple[int, ...]:
     "--sizes",
     default=",".join(map(str, SIZES)),
     show_default=True,
-    callback=lambda _context, _option, value: _numbers(value, 2, MOST, "numbers of participants"),
+    callback=lambda _context, _option, value: _parse_numbers(value, 2, MOST, "numbers of participants"),
     metavar="N,N,…",
     help="Numbers of participants; by default also the planned one.",
 )
 @click.option(
     "--trials",
-    callback=lambda _context, _option, value: () if value is None else _numbers(value, *TRIALS, "numbers of trials"),
+    callback=lambda _context, _option, value: (
+        () if value is None else _parse_numbers(value, *TRIALS, "numbers of trials")
+    ),
     metavar="N,N,…",
     help="Trials of each standard, comparison or rated level, for studies of thresholds, d′, ratings or magnitude "
     "estimation; default: the protocol's.",
@@ -121,21 +123,21 @@ def power(
     try:
         with progress() as show, executor_for(workers) as executor:
             if planned and (trials or not compares_statements(study)):
-                steps = _of_thresholds(study, planned, sizes, studies or THRESHOLD_STUDIES, seed, show, executor)
+                steps = _threshold_precision(study, planned, sizes, studies or THRESHOLD_STUDIES, seed, show, executor)
             else:
-                steps = _of_statements(study, sizes, studies or STUDIES, seed, show, executor)
+                steps = _statement_power(study, sizes, studies or STUDIES, seed, show, executor)
             for estimate in steps:
                 show(f"{estimate.studies} of {estimate.asked} studies of each size", estimate.studies / estimate.asked)
     except KeyboardInterrupt:
         cancelled = True
     if estimate is not None:
-        _write(estimate, to)
+        _write_estimate(estimate, to)
     if cancelled:
         click.echo("ended early" if estimate else "ended before the first studies were complete", err=True)
         click.get_current_context().exit(EXIT_CANCELLED)
 
 
-def _of_statements(
+def _statement_power(
     study: Protocol, sizes: tuple[int, ...], studies: int, seed: int, show: ShowProgress, executor: Executor
 ) -> Iterator[Powers]:
     """Yield the power of the statements' tests, from more and more studies."""
@@ -149,7 +151,7 @@ def _of_statements(
         yield powers(planned, sizes, done, studies, seed, counts)
 
 
-def _of_thresholds(
+def _threshold_precision(
     study: Protocol,
     planned: PrecisionPlans,
     sizes: tuple[int, ...],
@@ -166,7 +168,7 @@ def _of_thresholds(
         yield Precisions(protocol=study, sizes=sizes, studies=done, asked=studies, seed=seed, found=precision)
 
 
-def _write(estimate: Powers | Precisions, to: Path | None) -> None:
+def _write_estimate(estimate: Powers | Precisions, to: Path | None) -> None:
     """Print the tables; write them and the figures into a folder."""
     from study_app.analysis.planning.power_curves import Powers, power_markdown, write_power
     from study_app.analysis.planning.threshold_studies import threshold_csv, threshold_markdown

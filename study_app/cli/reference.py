@@ -28,27 +28,27 @@ DEVICE_KINDS = {"felt": "with force", "seen": "without force", "simulated": "sim
 def kinds_markdown() -> str:
     """Return a Markdown table for each kind that has a descriptor."""
     tables = (
-        ("Questions", ("`kind`", "question", "its own keys", "value in tables"), _questions()),
-        ("Standard questionnaires", ("`instrument`", "texts", "scores", "source; compared with"), _instruments()),
-        ("Designs", ("`kind`", "question or answer"), _described(designs.KINDS)),
-        ("Methods", ("`kind`", "next level"), _described(methods.KINDS)),
-        ("Effects", ("effect", "what it is", "format", "`auto`", "not with"), _effects()),
-        ("Limiters", ("bit", "limiter", "column", "what it says"), _limiters()),
+        ("Questions", ("`kind`", "question", "its own keys", "value in tables"), _question_rows()),
+        ("Standard questionnaires", ("`instrument`", "texts", "scores", "source; compared with"), _instrument_rows()),
+        ("Designs", ("`kind`", "question or answer"), _kind_descriptions(designs.KINDS)),
+        ("Methods", ("`kind`", "next level"), _kind_descriptions(methods.KINDS)),
+        ("Effects", ("effect", "what it is", "format", "`auto`", "not with"), _effect_rows()),
+        ("Limiters", ("bit", "limiter", "column", "what it says"), _limiter_rows()),
         ("Trigger codes", ("code", "event of the journal"), ((str(code), f"`{name}`") for name, code in CODES.items())),
-        ("Devices", ("`--device`", "device", "kind", "options"), _devices()),
-        ("Checks of a device, in order", ("`devices doctor`", "without it", "cause; cure"), _checks()),
+        ("Devices", ("`--device`", "device", "kind", "options"), _device_rows()),
+        ("Checks of a device, in order", ("`devices doctor`", "without it", "cause; cure"), _check_rows()),
         (
             "Templates",
             ("`--template`", "title", "question"),
             ((f"`{name}`", *description) for name, description in TEMPLATES.items()),
         ),
     )
-    return "\n".join(line for heading, columns, rows in tables for line in _table(heading, columns, rows))
+    return "\n".join(line for heading, columns, rows in tables for line in _table_lines(heading, columns, rows))
 
 
 def delayed_force_markdown() -> str:
     """Return the delivered share of a delayed force and the longest delay with 95 %, by liquid and hand."""
-    entries = [entry for entry in delayed_force.table() if entry.estimator == "kalman"]
+    entries = [entry for entry in delayed_force.stored_table() if entry.estimator == "kalman"]
     delays = [delay for delay in sorted({entry.delay_ms for entry in entries}) if delay >= LEAST_DELAY_MS]
     left = {(entry.liquid, entry.hand, entry.delay_ms): f"{entry.left_percent:.0f}" for entry in entries}
     liquids = dict.fromkeys(entry.liquid for entry in entries)
@@ -57,7 +57,9 @@ def delayed_force_markdown() -> str:
         (labels[name], *(f"{left[name, 'light', delay]} ({left[name, 'middle', delay]})" for delay in delays))
         for name in liquids
     )
-    longest = ((labels[name], *(f"{delayed_force.longest_ms(name, *how):g}" for how in LOOPS)) for name in liquids)
+    longest = (
+        (labels[name], *(f"{delayed_force.longest_delay_ms(name, *how):g}" for how in LOOPS)) for name in liquids
+    )
     tables = (
         (
             "Force left [%], light hand (middle hand), `kalman`",
@@ -66,29 +68,29 @@ def delayed_force_markdown() -> str:
         ),
         ("Longest delay [ms] at which at most 5 % is withheld", ("liquid", *map(", ".join, LOOPS)), longest),
     )
-    return "\n".join(line for heading, columns, rows in tables for line in _table(heading, columns, rows))
+    return "\n".join(line for heading, columns, rows in tables for line in _table_lines(heading, columns, rows))
 
 
-def _table(heading: str, columns: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
+def _table_lines(heading: str, columns: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
     yield from (f"## {heading}", "", f"| {' | '.join(columns)} |", f"|{' --- |' * len(columns)}")
     yield from (f"| {' | '.join(map(_cell, row))} |" for row in rows)
     yield ""
 
 
-def _described(kinds: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
+def _kind_descriptions(kinds: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
     return ((f"`{name}`", " ".join((kind.__doc__ or "").split())) for name, kind in kinds.items())
 
 
-def _questions() -> Iterator[tuple[str, ...]]:
+def _question_rows() -> Iterator[tuple[str, ...]]:
     common = {*questions.Question.model_fields, "kind"}
-    for name, description in _described(questions.KINDS):
+    for name, description in _kind_descriptions(questions.KINDS):
         kind = questions.KINDS[name.strip("`")]
         keys = (field.alias or key for key, field in kind.model_fields.items() if key not in common)
         shown = "no `kind`" if name == f"`{questions.STATEMENT}`" else name
         yield shown, description, ", ".join(f"`{key}`" for key in keys), kind.value_type
 
 
-def _instruments() -> Iterator[tuple[str, ...]]:
+def _instrument_rows() -> Iterator[tuple[str, ...]]:
     for name in instruments():
         about = instrument(name)
         doubt = f"; from memory: {about['from_memory']}" if "from_memory" in about else ""
@@ -97,25 +99,25 @@ def _instruments() -> Iterator[tuple[str, ...]]:
         yield f"`{name}`", texts, scores, f"{about['source']}; {about['compared']}{doubt}"
 
 
-def _effects() -> Iterator[tuple[str, ...]]:
+def _effect_rows() -> Iterator[tuple[str, ...]]:
     for effect in EFFECTS:
         description = sys.modules[effect.bound_n.__module__].__doc__ or ""
         excluded = ", ".join(f"`{name}`" for name in effect.excludes)
         yield f"`{effect.name}`", description, str(effect.format), "yes" if effect.automatic else "no", excluded
 
 
-def _limiters() -> Iterator[tuple[str, ...]]:
+def _limiter_rows() -> Iterator[tuple[str, ...]]:
     for it in sorted(LIMITERS):
         yield str(it.bit), it.label, f"`limiter_{it.name}`", it.meaning
 
 
-def _devices() -> Iterator[tuple[str, ...]]:
+def _device_rows() -> Iterator[tuple[str, ...]]:
     for device in DEVICES:
         options = ", ".join(f"`--{option.name}`" for option in device.options)
         yield f"`{device.name}`", device.title, DEVICE_KINDS[device.kind], options
 
 
-def _checks() -> Iterator[tuple[str, ...]]:
+def _check_rows() -> Iterator[tuple[str, ...]]:
     for device in DEVICES:
         for finding in device.doctor.findings() if device.doctor and device.kind != "simulated" else ():
             yield (
@@ -132,7 +134,7 @@ def commands_markdown() -> str:
         lines += [f"## {heading}", ""]
         for name in names.split():
             for path, command in _with_subcommands((PROGRAM, name), commands.commands[name]):
-                lines += [*_command(path, command), ""]
+                lines += [*_command_lines(path, command), ""]
     return "\n".join(lines)
 
 
@@ -143,7 +145,7 @@ def _with_subcommands(path: tuple[str, ...], command: click.Command) -> Iterator
             yield from _with_subcommands((*path, name), below)
 
 
-def _command(path: tuple[str, ...], command: click.Command) -> Iterator[str]:
+def _command_lines(path: tuple[str, ...], command: click.Command) -> Iterator[str]:
     context = click.Context(command, info_name=" ".join(path))
     yield f"### {' '.join(path[1:])}"
     yield ""
@@ -154,7 +156,7 @@ def _command(path: tuple[str, ...], command: click.Command) -> Iterator[str]:
     if options:
         yield "| option | default | meaning |"
         yield "| --- | --- | --- |"
-        yield from (_option(option, context) for option in options)
+        yield from (_option_row(option, context) for option in options)
 
 
 def _paragraphs(text: str) -> list[str]:
@@ -162,7 +164,7 @@ def _paragraphs(text: str) -> list[str]:
     return [_cell(paragraph) for paragraph in lines.split("\n\n")]
 
 
-def _option(option: click.Option, context: click.Context) -> str:
+def _option_row(option: click.Option, context: click.Context) -> str:
     named = option.metavar or re.sub(r"(INTEGER|FLOAT)( RANGE)?", "N", option.make_metavar(context))
     metavar = "" if option.is_flag else f" {named}"
     names = ", ".join(f"`{name}{metavar}`" for name in option.opts).replace("|", "\\|")

@@ -65,7 +65,7 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
     else:
         import time
 
-        from study_app.protocol.source.files import find
+        from study_app.protocol.source.files import protocol_file
         from study_app.protocol.warnings.untranslated import describe_untranslated
         from study_app.session.simulated.paced_levels import undelivered_levels
         from study_app.session.simulated.predicted_delivery import predicted_delivery
@@ -74,7 +74,7 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
 
         study = load.load(protocol, delay_ticks=delay_ticks)
         camera = workstation.load_or_default()[0].camera
-        file = find(protocol)
+        file = protocol_file(protocol)
         missing = missing_on_computer(study, file.parent, camera, time.monotonic_ns)
         click.echo(describe.describe(study, delay_ticks, workstation.device_without_force()))
         document, _ = load.read_document(load.source_bytes(protocol), protocol)
@@ -106,8 +106,8 @@ def new(name: str, template: str, *, no_window: bool) -> None:
     if not no_window:
         from study_app import app
 
-        new_study.check_free(name)
-        code = app.home(then=lambda visit: visit.begin_study(f"template:{template}", name))
+        new_study.check_free_name(name)
+        code = app.run_home_window(then=lambda visit: visit.begin_new_study(f"template:{template}", name))
         click.get_current_context().exit(code)
     file = new_study.write_new(study, name)
     click.echo(f"{file}: edit it, then run liquid-study check {name}")
@@ -118,11 +118,11 @@ def new(name: str, template: str, *, no_window: bool) -> None:
 def edit(protocol: str) -> None:
     """Open a study in the study designer."""
     from study_app import app
-    from study_app.protocol.source.files import find
+    from study_app.protocol.source.files import protocol_file
 
-    file = find(protocol)
+    file = protocol_file(protocol)
     named = protocol if file.name != Path(protocol).name else str(file)
-    click.get_current_context().exit(app.home(then=lambda visit: visit.open_designer(named)))
+    click.get_current_context().exit(app.run_home_window(then=lambda visit: visit.open_designer(named)))
 
 
 @click.command()
@@ -133,9 +133,9 @@ def edit(protocol: str) -> None:
 def design(protocol: str, participants: int, first: str, seed: int) -> None:
     """Count positions and carry-over in the orders of N participants, before the study starts."""
     from study_app.protocol.load import load
-    from study_app.protocol.orders.balance import balances, describe_balance, numbered
+    from study_app.protocol.orders.balance import balances, describe_balance, numbered_participants
 
-    judged = balances(load(protocol), numbered(participants, first), seed)
+    judged = balances(load(protocol), numbered_participants(participants, first), seed)
     click.echo("\n\n".join(map(describe_balance, judged)))
 
 
@@ -251,14 +251,14 @@ def workspace(folder: Path | None) -> None:
 def studies() -> None:
     """List the known protocols and the studies in the workspace."""
     from study_app.errors import ProtocolError, StoreError
-    from study_app.protocol.load import at_hand, is_scene_file, load
+    from study_app.protocol.load import is_scene_file, known_protocols, load
     from study_app.store.merged import folders_of, sessions_in
     from study_app.store.workstation import recent_protocols
     from study_app.workspace import workspace as workspace_here
 
     here = workspace_here()
     click.echo(f"Protocols in {here.protocols.absolute()}, shipped ones, and recently opened ones")
-    for name in (*at_hand(), *recent_protocols()):
+    for name in (*known_protocols(), *recent_protocols()):
         try:
             if is_scene_file(name):
                 click.echo(f"  {name}  (liquid file)")
@@ -268,7 +268,7 @@ def studies() -> None:
         except ProtocolError as error:
             click.echo(f"  {name}  cannot be used: {error.problems[0]}")
     click.echo(f"Studies in {here.results.absolute()}")
-    for folder in _studies(here.results):
+    for folder in _study_folders(here.results):
         try:
             places = folders_of(folder)
         except StoreError as error:
@@ -290,7 +290,7 @@ def sessions(named: str | None, results: Path | None) -> None:
     from study_app.workspace import workspace as workspace_here
 
     at = workspace_here().results
-    folders = list(_studies(at)) if named is None and results is None else [study_at(named, results)]
+    folders = list(_study_folders(at)) if named is None and results is None else [study_at(named, results)]
     for folder in folders:
         if not folder.is_dir():
             raise StoreError(f"{folder} is not a folder: name one that liquid-study studies lists, or its path")
@@ -311,7 +311,7 @@ def _local_time(written: str | None) -> str:
     return datetime.fromisoformat(written).astimezone().isoformat(" ", "minutes") if written else ""
 
 
-def _studies(results: Path) -> Iterator[Path]:
+def _study_folders(results: Path) -> Iterator[Path]:
     from study_app.store.tables.study_files import study_folders
 
     if results.is_dir():

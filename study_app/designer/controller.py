@@ -14,34 +14,34 @@ from study_app.designer.document.document import (
     NO_ANSWERS,
     Answers,
     Document,
-    answered,
     open_file,
     open_new,
     open_unsaved,
     template,
+    with_answers,
 )
-from study_app.designer.document.fields import renamed
+from study_app.designer.document.fields import edits_to_rename
 from study_app.designer.document.steps import DeleteElement, Do, RenameElement, Request, Step, Task
-from study_app.designer.document.study import read
+from study_app.designer.document.study import read_study
 from study_app.designer.document.toml_text import Refused
 from study_app.designer.editing import Editing
 from study_app.designer.file import file_text
-from study_app.designer.form.form import form
+from study_app.designer.form.form import form_of
 from study_app.designer.header import DesignerView, HeaderState, StudyChoice
 from study_app.designer.measures.study_facts import facts
 from study_app.designer.measures_controller import MeasuresController
-from study_app.designer.new_study_page import header_state, new_choices, source_of, studies
-from study_app.designer.outline import addable, outline_rows
+from study_app.designer.new_study_page import header_state, new_choices, source_of, study_choices
+from study_app.designer.outline import addable_elements, outline_rows
 from study_app.designer.participant.playable import Feeling
 from study_app.designer.participant.preview import ParticipantPreview
 from study_app.designer.problems import ProblemRow, RepairSearch, problem_rows, warning_rows
-from study_app.designer.prompts import DeleteCard, SeriesCard, naming
+from study_app.designer.prompts import DeleteCard, SeriesCard, naming_places
 from study_app.designer.saving import Saving
 from study_app.designer.versions import Changes, KnownRuns, Renaming
 from study_app.designer.window import DesignerPlace
 from study_app.errors import StudyError
 from study_app.protocol.source.document import Path as Place
-from study_app.protocol.source.files import find
+from study_app.protocol.source.files import protocol_file
 from study_app.store.drafts import draft_of
 from study_app.store.study_settings import keep_original
 
@@ -73,22 +73,22 @@ class DesignerController(QObject):
         place.entered.connect(self.enter)
         self._does: dict[Task, Callable[..., object]] = {
             "select": editing.select, "back": editing.go_back, "undo": editing.undo, "redo": editing.redo,
-            "save": self.saving.save, "banner": self.saving.answer_banner, "open": self.open, "new": self.ask_for_new,
-            "begin": self.begin, "find": self.find, "add": self._show_addable, "delete": self.ask_to_delete,
-            "series": self.ask_for_series, "judge id": self._judge_id,
-            "repair": self.repair, "repairs": self._repairs.show,
+            "save": self.saving.save, "banner": self.saving.answer_banner, "open": self.open, "new": self.show_new_page,
+            "begin": self.begin_study, "find": self.find_elements, "add": self._show_addable,
+            "delete": self.ask_to_delete, "series": self.show_series_card, "judge id": self._judge_id,
+            "repair": self.make_repair, "repairs": self._repairs.show_repairs,
         }  # fmt: skip
-        place.asked.connect(self.take)
-        place.new_page.copy_asked.connect(self.ask_for_new)
-        editing.changed.connect(self.show)
+        place.asked.connect(self.handle_request)
+        place.new_page.copy_asked.connect(self.show_new_page)
+        editing.changed.connect(self.show_study)
         self.preview = ParticipantPreview(editing, place)
         editing.edited.connect(self._resting.start)
-        editing.refused.connect(self._refuse)
+        editing.refused.connect(self._show_refusal)
         editing.made.connect(self._show_step)
         self.saving.kept.connect(self._show_header)
-        self.saving.copy_asked.connect(self.ask_for_new)
-        self.saving.continued.connect(self._take)
-        self.saving.discarded.connect(self._close)
+        self.saving.copy_asked.connect(self.show_new_page)
+        self.saving.continued.connect(self._show_document)
+        self.saving.discarded.connect(self._close_document)
         self.saving.compare_asked.connect(self.changes.compare_with)
         self.runs.changed.connect(self._show_header)
         self._repairs.found.connect(place.show_repairs)
@@ -96,28 +96,28 @@ class DesignerController(QObject):
         self.measures.warned.connect(self._show_header)
         self.measures.warned.connect(self._show_warnings)
 
-    def take(self, asked: Request | Do) -> None:
+    def handle_request(self, asked: Request | Do) -> None:
         """Carry out a request or task of the designer's page."""
         if isinstance(asked, Do):
             self._does[asked.what](*asked.arguments)
         else:
-            self.editing.ask(asked)
+            self.editing.handle_request(asked)
 
     # opening
 
     def enter(self) -> None:
         """Reload the list of studies; load a file that another program changed if nothing was edited."""
-        self._choices = studies(self.editing.opened)
+        self._choices = study_choices(self.editing.opened)
         self.saving.look_again()
-        self.runs.look()
-        self.show()
+        self.runs.read_in_background()
+        self.show_study()
 
     def open(self, source: str) -> None:
         """Open a study of the workspace, a shipped one or a file; an open study keeps its undo steps."""
         self.place.message_over.emit()
         self.saving.leave()
         try:
-            file = Path(source) if Path(source).suffix == ".toml" else find(source)
+            file = Path(source) if Path(source).suffix == ".toml" else protocol_file(source)
             if self.editing.opened is not None and self.editing.opened.file.resolve() == file.resolve():
                 self.place.close_new()
                 if not self.editing.opened.base:
@@ -132,27 +132,27 @@ class DesignerController(QObject):
             self.place.message.emit(f"{Path(source).stem}.toml cannot be opened", f"{error}.")
             self._show_header()
             return
-        self._take(opened)
+        self._show_document(opened)
 
-    def begin(self, source: str, name: str, answers: Answers = NO_ANSWERS) -> None:
+    def begin_study(self, source: str, name: str, answers: Answers = NO_ANSWERS) -> None:
         """Create a study under a name, as a copy of a template ("template:NAME") or of another study."""
         try:
             if source.startswith("template:"):
                 study, copy_of = template(source.removeprefix("template:")), ""
             else:
-                file = find(source)
-                study, copy_of = read(file.read_bytes(), file.parent), file.stem
-            opened = open_new(answered(study, answers), name)
+                file = protocol_file(source)
+                study, copy_of = read_study(file.read_bytes(), file.parent), file.stem
+            opened = open_new(with_answers(study, answers), name)
         except StudyError as error:
             self.place.new_page.refuse(f"{error}.")
             return
         self.saving.leave()
         keep_original(opened.file, copy_of)
         opened.note_edit(0.0)
-        self._take(opened)
+        self._show_document(opened)
         self.saving.leave()
 
-    def ask_for_new(self, source: str = "") -> None:
+    def show_new_page(self, source: str = "") -> None:
         self.place.message_over.emit()
         try:
             choices = new_choices(source)
@@ -161,29 +161,29 @@ class DesignerController(QObject):
             return
         self.place.show_new(choices, source)
 
-    def _take(self, opened: Document) -> None:
+    def _show_document(self, opened: Document) -> None:
         if (before := self.editing.opened) is not None:
             self._others[before.file.resolve()] = before
-        self._choices = studies(opened)
+        self._choices = study_choices(opened)
         self._warnings = ()
         self.editing.open(opened)
         self.place.begin_study()
         self.place.close_new()
-        self.show()
+        self.show_study()
         self.show_outline()
-        if opened.study.unreadable:
+        if opened.study.is_unreadable:
             self.place.show_tab("file")  # also where the fault has no line
             self.place.open_next_problem()
         else:
             self.place.parts.focus_element()
 
-    def _close(self) -> None:
+    def _close_document(self) -> None:
         if (closed := self.editing.opened) is not None:
             self._others.pop(closed.file.resolve(), None)
         self.editing.open(None)
-        self._choices = studies(None)
+        self._choices = study_choices(None)
         self.place.begin_study()
-        self.show()
+        self.show_study()
         self.place.nothing.new.setFocus()
 
     # steps that ask first
@@ -193,14 +193,14 @@ class DesignerController(QObject):
         opened = self.editing.writable
         if opened is None or len(path) < 2:
             return
-        if places := naming(opened.study, path):
+        if places := naming_places(opened.study, path):
             card = DeleteCard(opened.study, path, places)
-            card.answered.connect(self.editing.ask)
+            card.answered.connect(self.editing.handle_request)
             self.place.show_prompt(card, card.first)
         else:
-            self.editing.ask(DeleteElement(path))
+            self.editing.handle_request(DeleteElement(path))
 
-    def ask_for_series(self, path: Place) -> None:
+    def show_series_card(self, path: Place) -> None:
         if (opened := self.editing.opened) is None:
             return
         numbers = number_rows(opened.study.document, path)
@@ -210,19 +210,19 @@ class DesignerController(QObject):
             return
         self.editing.select(path)
         card = SeriesCard(opened.study, path, numbers)
-        card.answered.connect(self.editing.ask)
+        card.answered.connect(self.editing.handle_request)
         self.place.show_prompt(card, card.first)
 
-    def repair(self, row: ProblemRow, sentence: str) -> None:
-        offered = self._repairs.repair(row, sentence)
+    def make_repair(self, row: ProblemRow, sentence: str) -> None:
+        offered = self._repairs.find_repair(row, sentence)
         if offered is None:
             return
         try:
-            self.editing.make(sentence, *offered.edits, select=row.element or None)
+            self.editing.make_step(sentence, *offered.edits, select=row.element or None)
         except Refused as refusal:
             self.place.message.emit("This repair cannot be made", f"{refusal}.")
 
-    def _refuse(self, path: Place, sentence: str, asked: Request) -> None:
+    def _show_refusal(self, path: Place, sentence: str, asked: Request) -> None:
         if isinstance(asked, RenameElement):
             self._judge_id(path, asked.name)
         else:
@@ -230,7 +230,7 @@ class DesignerController(QObject):
 
     def _show_addable(self) -> None:
         if (opened := self.editing.writable) is not None:
-            self.place.show_addable(addable(opened.study, opened.selected))
+            self.place.show_addable(addable_elements(opened.study, opened.selected))
 
     def _judge_id(self, path: Place, name: str) -> None:
         opened, why = self.editing.writable, ""
@@ -238,7 +238,7 @@ class DesignerController(QObject):
             return
         try:
             if name != str(path[-1]):
-                renamed(opened.study.document, path, name, self.editing.recorded(path))
+                edits_to_rename(opened.study.document, path, name, self.editing.recorded(path))
         except Refused as refusal:
             why = f"{refusal}."
         self.place.form.head.refuse(why)
@@ -250,26 +250,26 @@ class DesignerController(QObject):
 
     # display
 
-    def show(self) -> None:
+    def show_study(self) -> None:
         """Show the open study: header, form, file and problems now, the outline after a pause in typing."""
         opened = self.editing.opened
         if opened is None:
-            self.place.show_view(DesignerView(self._header()))
+            self.place.show_view(DesignerView(self._header_state()))
             return
         study, selected = opened.study, opened.selected
         problems = problem_rows(study)
         self.place.show_view(
             DesignerView(
-                self._header(),
-                form(study, selected),
+                self._header_state(),
+                form_of(study, selected),
                 file_text(study, opened.file.name, selected),
                 problems,
                 self.saving.banner,
             )
         )
-        self._repairs.begin(study, () if opened.read_only else problems)
+        self._repairs.begin_search(study, () if opened.read_only else problems)
 
-    def find(self, text: str) -> None:
+    def find_elements(self, text: str) -> None:
         self._find = text
         self.show_outline()
 
@@ -290,15 +290,15 @@ class DesignerController(QObject):
             warned = (*self._warnings, *self.measures.warnings)
             self.place.problems.show_warnings(warning_rows(opened.study, warned))
 
-    def _header(self) -> HeaderState:
+    def _header_state(self) -> HeaderState:
         warnings = len({*self._warnings, *self.measures.warnings})
         opened = self.editing.opened
         if opened is not None:
             source = source_of(opened.file)
             known = next((choice.title for choice in self._choices if choice.source == source), None)
             if known != (opened.title or opened.file.stem):  # another title, or a file saved for the first time
-                self._choices = studies(opened)
+                self._choices = study_choices(opened)
         return header_state(opened, self._choices, warnings, self.runs.chip)
 
     def _show_header(self) -> None:
-        self.place.header.show_state(self._header())
+        self.place.header.show_state(self._header_state())

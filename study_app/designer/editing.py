@@ -6,8 +6,8 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 
 from study_app.designer.document.document import Document
-from study_app.designer.document.elements import there
-from study_app.designer.document.fields import id_at, renamed, suggested_id
+from study_app.designer.document.elements import existing_path
+from study_app.designer.document.fields import edits_to_rename, id_at, suggested_id
 from study_app.designer.document.steps import AddElement, AddNamed, LeaveText, Recorded, Request, Situation, with_path
 from study_app.designer.document.toml_edits import Edit
 from study_app.designer.document.toml_text import Refused
@@ -48,7 +48,7 @@ class Editing(QObject):
     def open(self, opened: Document | None) -> None:
         self.opened = opened
         if opened is not None:
-            opened.rest()
+            opened.end_step()
         self._back, self._added = [], ((), "", "")
         self.opened_other.emit()
 
@@ -60,7 +60,7 @@ class Editing(QObject):
         self.suggest_id()
         if not back:
             self._back.append(opened.selected)
-        opened.rest()
+        opened.end_step()
         opened.selected = with_path(path, before, opened.selected)
         self._keep_selection()
         self.changed.emit()
@@ -71,9 +71,9 @@ class Editing(QObject):
 
     def _keep_selection(self) -> None:
         if (opened := self.opened) is not None:
-            opened.selected = there(opened.study.document, opened.selected)
+            opened.selected = existing_path(opened.study.document, opened.selected)
 
-    def ask(self, asked: Request) -> None:
+    def handle_request(self, asked: Request) -> None:
         """Carry out a step that a view requests; emit ``refused`` with the reason if it cannot be made."""
         opened = self.writable
         if opened is None:
@@ -91,7 +91,7 @@ class Editing(QObject):
         if isinstance(asked, AddElement | AddNamed):
             document, added = opened.study.document, opened.selected
             self._added = added, id_at(document, added), suggested_id(document, added)
-        self._note()
+        self._note_edit()
         self.made.emit(step)
 
     def suggest_id(self) -> None:
@@ -105,33 +105,33 @@ class Editing(QObject):
             return
         self._added = ((), "", "")
         after = path if isinstance(path[-1], int) else (*path[:-1], wanted)
-        edits = renamed(opened.study.document, path, wanted, recorded)
+        edits = edits_to_rename(opened.study.document, path, wanted, recorded)
         select = with_path(opened.selected, path, after)
         opened.edit(f"Rename to {wanted}", *edits, select=select, key=opened.last[0])
-        self._note()
+        self._note_edit()
 
-    def make(self, name: str, *edits: Edit, text: str | None = None, select: Place | None = None) -> None:
+    def make_step(self, name: str, *edits: Edit, text: str | None = None, select: Place | None = None) -> None:
         """Make a step of edits or of another text; a refused step changes nothing."""
         if (opened := self.writable) is not None:
             opened.edit(name, *edits, text=text, select=select)
-            self._note()
+            self._note_edit()
 
     def undo(self) -> None:
         if (opened := self.writable) is not None:
             opened.undo()
-            self._note()
+            self._note_edit()
 
     def redo(self) -> None:
         if (opened := self.writable) is not None:
             opened.redo()
-            self._note()
+            self._note_edit()
 
-    def _note(self) -> None:
+    def _note_edit(self) -> None:
         if self.opened is not None:
             self.opened.note_edit(time.monotonic())
-            self.announce()
+            self.announce_edit()
 
-    def announce(self) -> None:
+    def announce_edit(self) -> None:
         self._keep_selection()
         self.changed.emit()
         self.edited.emit()

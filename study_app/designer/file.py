@@ -25,7 +25,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QFrame, QPlainTextEdit, QWidget
 
 from study_app.designer.document.study import Study
-from study_app.designer.document.toml_text import common_ends, shown, spans_of
+from study_app.designer.document.toml_text import common_ends, spans_of, with_line_feeds
 from study_app.designer.form.fields import HAND_ON_MS, KEYS_OF_PLACE
 from study_app.designer.parts import cut_text
 from study_app.gui.theme.icons import draw_icon
@@ -75,13 +75,14 @@ def file_text(study: Study, name: str, path: Path) -> FileText:
     if study.is_toml and path:
         pieces = spans_of(study.text).pieces(path)
         lines = [
-            (_line(study.text, piece.start), _line(study.text, max(piece.start, piece.end - 1))) for piece in pieces
+            (_line_number(study.text, piece.start), _line_number(study.text, max(piece.start, piece.end - 1)))
+            for piece in pieces
         ]
         selected = tuple(lines)
-    return FileText(name, shown(study.text), selected, faulty)
+    return FileText(name, with_line_feeds(study.text), selected, faulty)
 
 
-def _line(text: str, place: int) -> int:
+def _line_number(text: str, place: int) -> int:
     return text.count("\n", 0, place)
 
 
@@ -157,14 +158,14 @@ class FileEditor(Coloured, QPlainTextEdit):
         self._rest = QTimer(self)
         self._rest.setSingleShot(True)
         self._rest.timeout.connect(self.flush)
-        self.textChanged.connect(self._note)
+        self.textChanged.connect(self._note_typing)
         self.updateRequest.connect(self._scroll_gutter)
         self.blockCountChanged.connect(lambda _count: self._place_gutter())
         self._place_gutter()
 
     def words(self) -> str:
         """Return the text; Qt's own plain text would lose spaces that do not break."""
-        self._catch_up()
+        self._show_late_file()
         return self.document().toRawText().replace("\u2029", "\n")
 
     def show_file(self, file: FileText, *, scroll: bool) -> None:
@@ -173,25 +174,25 @@ class FileEditor(Coloured, QPlainTextEdit):
         if not self.pending:
             self._late = scroll or bool(self._late)
             if self.isVisible():
-                self._catch_up()
+                self._show_late_file()
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
-        self._catch_up()
+        self._show_late_file()
 
-    def _catch_up(self) -> None:
+    def _show_late_file(self) -> None:
         if self._late is None:
             return
         scroll, self._late = self._late, None
         old, new = self.words(), self.shown.text
         if old != new:
-            self._replace(old, new)
-        self._mark()
+            self._replace_text(old, new)
+        self._repaint_marks()
         if scroll and self.shown.selected and not self.hasFocus():
             self.go_to(self.shown.selected[0][0])
 
     def go_to(self, line: int) -> None:
-        self._catch_up()
+        self._show_late_file()
         block = self.document().findBlockByNumber(line)
         if block.isValid():
             cursor = QTextCursor(block)
@@ -204,13 +205,13 @@ class FileEditor(Coloured, QPlainTextEdit):
             self.pending = False
             self.typed.emit(self.words())
 
-    def _note(self) -> None:
+    def _note_typing(self) -> None:
         if not self._showing:
             self.pending = True
             if not self._rest.isActive():
                 self._rest.start(HAND_ON_MS)
 
-    def _replace(self, old: str, new: str) -> None:
+    def _replace_text(self, old: str, new: str) -> None:
         first, last = common_ends(old, new)
         self._showing = True
         cursor = QTextCursor(self.document())
@@ -223,9 +224,9 @@ class FileEditor(Coloured, QPlainTextEdit):
         self._showing = True
         self._colours.apply_theme(theme)
         self._showing = False
-        self._mark()
+        self._repaint_marks()
 
-    def _mark(self) -> None:
+    def _repaint_marks(self) -> None:
         self.viewport().update()
         self._gutter.update()
 
@@ -235,14 +236,14 @@ class FileEditor(Coloured, QPlainTextEdit):
         for line, top, height in visible_lines(self):
             if line in self.shown.faulty:
                 painter.fillRect(QRectF(0, top, width, height), QColor(self.theme.bad_bg))
-            elif self._selected(line):
+            elif self._is_selected(line):
                 painter.fillRect(QRectF(0, top, width, height), QColor(self.theme.selected))
-            if self._selected(line):
+            if self._is_selected(line):
                 painter.fillRect(QRectF(0, top, 2, height), QColor(self.theme.accent))
         painter.end()
         super().paintEvent(event)
 
-    def _selected(self, line: int) -> bool:
+    def _is_selected(self, line: int) -> bool:
         return any(first <= line <= last for first, last in self.shown.selected)
 
     def gutter_px(self) -> int:

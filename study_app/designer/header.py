@@ -14,11 +14,11 @@ from study_app.designer.form.rows import Form
 from study_app.designer.measures.cards import INKS
 from study_app.designer.problems import ProblemRow
 from study_app.designer.version_rows import VersionChip
-from study_app.gui.kit.commands import key_cap, keys_of, tip, with_key
+from study_app.gui.kit.commands import command_tip, key_cap, keys_of, with_key
 from study_app.gui.kit.dialogs import choose_protocol
 from study_app.gui.theme.theme import RADIUS_CARD, SHADOW, Tone, font
 from study_app.gui.theme.themed import Themed, remove_widget
-from study_app.gui.widgets.accessible import say
+from study_app.gui.widgets.accessible import announce
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Icon, chip_size, paint_chip, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton, PressedByEnter
@@ -86,7 +86,7 @@ class NoticeCard(Card):
         if notice is None:
             return
         self.setAccessibleDescription(notice.words)
-        say(self, notice.words)
+        announce(self, notice.words)
         self.icon.show_icon(notice.icon, INKS[notice.tone])
         self._lines = [label(line, "label", "text2", wraps=True) for line in notice.listed]
         add_parts(self._listed, *self._lines)
@@ -134,14 +134,14 @@ class PlayDevices:
         return dict(self.choices).get(self.chosen, "")
 
 
-def asks_for_device(title: str, step: str, *, has_force: bool) -> Notice:
+def device_question(title: str, step: str, *, has_force: bool) -> Notice:
     """Return the question before a device other than the simulated hand is used."""
     force = "The force fades in when a trial begins; hold" if has_force else "It has no force. Hold"
     question = f"Play from {step}, with the device {title}? {force} Esc to stop."
     return Notice(question, (("play", "Play"), ("close", "Cancel")), "warn", "device")
 
 
-def refuses(problems: tuple[str, ...]) -> Notice:
+def refusal_notice(problems: tuple[str, ...]) -> Notice:
     """Return the notice with the problems that prevent playing from here."""
     more = (f"and {len(problems) - MOST_PROBLEMS} more",) if len(problems) > MOST_PROBLEMS else ()
     sentence = "The study cannot be played from here: correct these problems first"
@@ -149,18 +149,18 @@ def refuses(problems: tuple[str, ...]) -> Notice:
     return Notice(sentence, actions, "bad", "warning", (*problems[:MOST_PROBLEMS], *more))
 
 
-def under_way(step: str, title: str) -> Notice:
+def playing_notice(step: str, title: str) -> Notice:
     """Return the notice that is shown while a pilot is played."""
     sentence = f"Playing from {step}, with the device {title}. Hold Esc to stop."
     return Notice(sentence, (("stop", "Stop"),), "ok", "play")
 
 
-def ended(step: str, how: str) -> Notice:
+def ended_notice(step: str, how: str) -> Notice:
     """Return the question whether the data of a played pilot are kept."""
     return Notice(f"Played from {step}: {how}. Its data are deleted unless you keep them.", KEEP, "neutral", "flag")
 
 
-def kept(folder: str) -> Notice:
+def kept_notice(folder: str) -> Notice:
     """Return the notice with the folder of a kept pilot."""
     return Notice(f"Kept as a pilot in {folder}.", (("close", "Close"),), "ok", "check")
 
@@ -179,7 +179,7 @@ class PlayControls(QWidget):
         self.devices = PlayDevices()
         self.play = ActionButton("play", PLAY, key=keys_of("play")[0])
         self.play.setAccessibleName(PLAY)
-        self.play.setToolTip(tip("play"))
+        self.play.setToolTip(command_tip("play"))
         self.device = IconButton("device", "Device to play with")
         self.menu = QMenu(self)
         self.menu.setFont(font("label"))
@@ -360,7 +360,7 @@ class DesignerHeader(QWidget):
         self.study.setMaxVisibleItems(24)
         self.study.setPlaceholderText("Choose a study")
         self.problems = ChipButton("show the list")
-        self.problems.setToolTip(f"{tip('problems')}; {tip('next problem')}")
+        self.problems.setToolTip(f"{command_tip('problems')}; {command_tip('next problem')}")
         self.version = ChipButton("show the changes")
         self.draft = Chip("neutral", "save", "")
         self.keys = IconButton("question", "Keys")
@@ -377,12 +377,12 @@ class DesignerHeader(QWidget):
         self.title.setContentsMargins(0, 0, 6, 0)  # room that goes with it where it is hidden
         left = self.title, self.study, self.problems, self.draft, self.version
         add_parts(self._row, *left, STRETCH, self.keys, self.undo, self.redo, self.play, self.save)
-        self.study.activated.connect(self._choose)
+        self.study.activated.connect(self._choose_study)
         self.show_state(self.state)
 
     def show_state(self, state: HeaderState) -> None:
         before, self.state = self.state, state
-        self._announce(before, state)
+        self._announce_changes(before, state)
         if state.studies != before.studies or state.chosen != before.chosen or not self.study.count():
             with QSignalBlocker(self.study):
                 self.study.clear()
@@ -400,14 +400,14 @@ class DesignerHeader(QWidget):
         self.version.setToolTip(state.version.tip)
         for button, action, what in ((self.undo, "undo", state.undo), (self.redo, "redo", state.redo)):
             text = ": ".join(filter(None, (action.capitalize(), what)))
-            self._enable(button, on=bool(what) and not state.read_only)
+            self._set_enabled(button, on=bool(what) and not state.read_only)
             button.setAccessibleName(text)
             button.setToolTip(with_key(text, action))
         self.save.show_action("save", state.version.save)
-        self._enable(self.save, on=state.can_save)
+        self._set_enabled(self.save, on=state.can_save)
         self._make_room()
 
-    def _enable(self, button: QWidget, *, on: bool) -> None:
+    def _set_enabled(self, button: QWidget, *, on: bool) -> None:
         """Enable or disable a button without moving the keyboard focus, as Qt would."""
         if not on and self.window().focusWidget() is button:
             self.keyboard_left.emit()
@@ -428,14 +428,14 @@ class DesignerHeader(QWidget):
             self._row.invalidate()
             part.setVisible(part.isVisibleTo(self) and self._row.minimumSize().width() + more <= self.width())
 
-    def _announce(self, before: HeaderState, state: HeaderState) -> None:
+    def _announce_changes(self, before: HeaderState, state: HeaderState) -> None:
         """Announce changes that happen by themselves, once: problems, and that a draft is kept."""
         if not state.chosen or state.chosen != before.chosen:
             return
         if state.problems != before.problems:
-            say(self, state.problems[2])
+            announce(self, state.problems[2])
         if state.draft.startswith("Draft") and not before.draft.startswith("Draft"):
-            say(self, state.draft)
+            announce(self, state.draft)
 
     def focusInEvent(self, _event: QFocusEvent) -> None:
         self.keyboard_left.emit()
@@ -445,7 +445,7 @@ class DesignerHeader(QWidget):
         self.play.play.show_action("play", PLAY if self.width() >= WIDE_FROM else PLAY_NARROW)
         self._make_room()
 
-    def _choose(self, at: int) -> None:
+    def _choose_study(self, at: int) -> None:
         source = self.study.itemData(at)
         self.study.setCurrentIndex(self.study.findData(self.state.chosen) if self.state.chosen else -1)
         if source == NEW:

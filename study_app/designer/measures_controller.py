@@ -17,8 +17,8 @@ from study_app.designer.measures.simulation import (
     MeasureClient,
     Simulated,
     Simulation,
-    advises,
     focus_of,
+    needs_precision_check,
     participants_of,
     planned_of,
     precision_of,
@@ -29,7 +29,7 @@ from study_app.designer.measures.simulation import (
 from study_app.designer.measures.study_facts import facts, valid_part
 from study_app.designer.problems import ProblemRow, RepairSearch, problem_rows
 from study_app.designer.window import DesignerPlace
-from study_app.gui.widgets.background import delayed
+from study_app.gui.widgets.background import delayed_call
 from study_app.number_text import capitalised
 from study_app.protocol.model import Protocol
 from study_app.workers.server import Crashed
@@ -59,20 +59,20 @@ class MeasuresController(QObject):
         self._wanted: Simulation | None = None
         self._failed = ""
         self._answers: dict[Simulation, Simulated] = {}
-        self.rest = delayed(self, REST_MS, self._order)
+        self.rest = delayed_call(self, REST_MS, self._send_order)
         self._look = QTimer(self)
         self._look.setInterval(LOOK_MS)
-        self._look.timeout.connect(self._take)
+        self._look.timeout.connect(self._take_answers)
         self._sound: Study | None = None
         self._participants: int | None = None
         self._thresholds: dict[str, float] = {}
         self._lapses = LAPSES
         self._focus = Focus()
         self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
-        self._idle = delayed(self, IDLE_MS, self.show)
-        editing.opened_other.connect(self._forget)
+        self._idle = delayed_call(self, IDLE_MS, self.show_measures)
+        editing.opened_other.connect(self._forget_study)
         editing.changed.connect(self._idle.start)
-        repairs.found.connect(self._repairs_found)
+        repairs.found.connect(self._keep_repairs)
         place.pane.tab_shown.connect(self._idle.start)
         place.entered.connect(self._idle.start)
         place.left.connect(self.leave)
@@ -85,11 +85,11 @@ class MeasuresController(QObject):
         for part in (measures, place.pane.facts):
             part.open_asked.connect(editing.select)
 
-    def show(self) -> None:
+    def show_measures(self) -> None:
         """Show the study's present numbers, and order the missing ones."""
         opened = self._editing.opened
         if opened is None or not self._place.isVisible():
-            self._want(None)
+            self._request(None)
             return
         path, problems = opened.selected, problem_rows(opened.study)
         if opened.study.formed is not None:
@@ -103,21 +103,21 @@ class MeasuresController(QObject):
         controls = self._controls(opened.study, protocol, focus)
         if protocol is not None:
             measured = self._is_looked_at and (valid.forces or focus.plan is not None)
-            self._want(simulation_of(protocol, focus if measured else Focus(), controls))
+            self._request(simulation_of(protocol, focus if measured else Focus(), controls))
         else:
-            self._want(None)
-        if protocol is None or not advises(protocol):
-            self._warn(())
+            self._request(None)
+        if protocol is None or not needs_precision_check(protocol):
+            self._set_warnings(())
         repairs = {row: self._repairs.get(row, ()) for row in problems}
         earlier = study is not opened.study
-        view = measures_view(study, facts(study), path, controls, self._simulated(), repairs, earlier=earlier)
+        view = measures_view(study, facts(study), path, controls, self._latest_answer(), repairs, earlier=earlier)
         self._place.measures.show_measures(view)
         self._place.pane.facts.show_measures(view)
 
     def leave(self) -> None:
         """End the process: it must not share the processor with a session."""
         self._idle.stop()
-        self._want(None)
+        self._request(None)
         self._close()
 
     @property
@@ -125,7 +125,7 @@ class MeasuresController(QObject):
         pane = self._place.pane
         return pane.isVisible() and (pane.tab == "measures" or pane.facts.isVisible())
 
-    def _forget(self) -> None:
+    def _forget_study(self) -> None:
         self._participants, self._lapses, self._sound = None, LAPSES, None
         self._thresholds, self._answers, self._repairs = {}, {}, {}
         self._idle.start()
@@ -149,10 +149,10 @@ class MeasuresController(QObject):
     # simulations
 
     @property
-    def waits(self) -> bool:
+    def is_waiting(self) -> bool:
         return self.rest.isActive() or self._look.isActive()
 
-    def _want(self, wanted: Simulation | None) -> None:
+    def _request(self, wanted: Simulation | None) -> None:
         """Request a simulation; cancel one for another element or version."""
         if wanted == self._wanted:
             return
@@ -163,11 +163,11 @@ class MeasuresController(QObject):
             if self._client is not None:
                 self._client.stop()
         if wanted is not None and wanted in self._answers:
-            self._warn(self._answers[wanted].warnings)
+            self._set_warnings(self._answers[wanted].warnings)
         elif wanted is not None:
             self.rest.start()
 
-    def _order(self) -> None:
+    def _send_order(self) -> None:
         if self._wanted is None:
             return
         if self._client is not None and not self._client.works:
@@ -177,12 +177,12 @@ class MeasuresController(QObject):
                 self._client = self.make()
             except OSError as error:  # no process could be started: the designer works without these numbers
                 log.info("the worker of simulations does not start: %s", error)
-                self._fail(FAILED)
+                self._show_failure(FAILED)
                 return
         self._ordered = self._client.order(self._wanted)
         self._look.start()
 
-    def _take(self) -> None:
+    def _take_answers(self) -> None:
         wanted = self._wanted
         if self._client is None or wanted is None:
             return
@@ -192,22 +192,22 @@ class MeasuresController(QObject):
             self._look.stop()
             if isinstance(answer, Simulated):
                 self._answers[wanted] = answer
-                self._warn(answer.warnings)
+                self._set_warnings(answer.warnings)
                 self._idle.start()
             elif isinstance(answer, Crashed) or not answer.stopped:
-                self._fail(answer.sentence)
+                self._show_failure(answer.sentence)
 
-    def _fail(self, sentence: str) -> None:
+    def _show_failure(self, sentence: str) -> None:
         log.info("simulations failed: %s", sentence)
         self._failed = f"{capitalised(sentence)}."
         self._idle.start()
 
-    def _warn(self, warnings: tuple[str, ...]) -> None:
+    def _set_warnings(self, warnings: tuple[str, ...]) -> None:
         if warnings != self.warnings:
             self.warnings = warnings
             self.warned.emit()
 
-    def _simulated(self) -> Simulated:
+    def _latest_answer(self) -> Simulated:
         """Return the current simulation's answer; until it is complete, the last answer of the same block."""
         wanted = self._wanted
         if wanted is None:
@@ -226,7 +226,7 @@ class MeasuresController(QObject):
         if client is not None:
             client.close()
 
-    def _repairs_found(self, row: ProblemRow, sentences: tuple[str, ...]) -> None:
+    def _keep_repairs(self, row: ProblemRow, sentences: tuple[str, ...]) -> None:
         self._repairs[row] = sentences
         self._idle.start()
 
@@ -234,15 +234,15 @@ class MeasuresController(QObject):
         if (opened := self._editing.opened) is not None:
             asked = min(MOST_PARTICIPANTS, max(2, round(number)))
             self._participants = None if asked == participants_of(opened.study) else asked
-            self.show()
+            self.show_measures()
 
     def _take_threshold(self, number: float) -> None:
         if self._focus.plan is not None and self._focus.block is not None:
             wording = LevelWords(self._focus.plan.stimulus, self._focus.plan.design)
             low, high = self._focus.plan.stimulus.levels
             self._thresholds[self._focus.block.id] = min(high, max(low, number / wording.factor))
-            self.show()
+            self.show_measures()
 
     def _take_lapses(self, number: float) -> None:
         self._lapses = min(0.2, max(0.0, number / 100))
-        self.show()
+        self.show_measures()

@@ -36,18 +36,18 @@ from PySide6.QtWidgets import (
 from study_app.designer.document.document import Answers, Document, taken_names, template
 from study_app.designer.document.elements import study_title, title_of
 from study_app.designer.document.fields import row_at, unit_of
-from study_app.designer.document.study import Study, read
+from study_app.designer.document.study import Study, read_study
 from study_app.designer.header import HeaderState, StudyChoice, problems_chip
 from study_app.designer.outline import icon_of
-from study_app.designer.parts import cut_text, dense
+from study_app.designer.parts import cut_text, make_dense
 from study_app.designer.templates import FOLDER, QUESTIONS, templates
 from study_app.designer.version_rows import VersionChip
 from study_app.errors import StudyError
-from study_app.gui.home.study_facts import holds_liquids_alone, is_shipped, sources
-from study_app.gui.kit.commands import key_cap, tip
+from study_app.gui.home.study_facts import holds_liquids_alone, is_shipped, known_sources
+from study_app.gui.kit.commands import command_tip, key_cap
 from study_app.gui.kit.dialogs import choose_protocol
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, SHADOW, TANK, font
-from study_app.gui.theme.themed import Themed, name_bars, remove_widget, replace_inside
+from study_app.gui.theme.themed import Themed, name_scroll_bars, remove_widget, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.boxes import grid as grid_of
 from study_app.gui.widgets.cards import Card, Chip, Icon, Rule, fill_rounded, scrolled, smooth_painter
@@ -62,7 +62,7 @@ from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s, step_duration_s
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.document import names
-from study_app.protocol.source.files import find, shipped, shipped_file
+from study_app.protocol.source.files import protocol_file, shipped, shipped_file
 from study_app.protocol.wording.languages import LANGUAGES, languages_of
 from study_app.store.drafts import draft_of, drafted_files, unsaved_files
 from study_app.store.study_settings import kept_original
@@ -180,12 +180,12 @@ def languages_offered() -> tuple[tuple[str, str], ...]:
 
 def template_choice(name: str, study: Study) -> TemplateChoice:
     """Return the description of a template for the page of new studies."""
-    title, description = _described(study.document)
+    title, description = _title_and_description(study.document)
     shown, question = TEMPLATES.get(name, (name, description))
     protocol = study.protocol
     choice = TemplateChoice(
         source=f"template:{name}", title=shown, description=question, recovery=known_answers().get(name),
-        study_title=title, languages=languages_of(study.document), questions=tuple(_questions(name, study)),
+        study_title=title, languages=languages_of(study.document), questions=tuple(_own_questions(name, study)),
     )  # fmt: skip
     if protocol is None:
         return choice
@@ -202,25 +202,25 @@ def template_choice(name: str, study: Study) -> TemplateChoice:
     )
     blind = "Double-blind" if protocol.study.blinding == "double" else "Single-blind"
     tags = (("device", f"Up to {protocol.device.force_limit_n:g} N"), ("lock", blind))
-    return replace(choice, figures=tuple(_figures(protocol)), tags=tags, session=tuple(session))
+    return replace(choice, figures=tuple(_figure_texts(protocol)), tags=tags, session=tuple(session))
 
 
 def copy_choice(source: str, document: Mapping[str, Any], note: str, name: str) -> TemplateChoice:
     """Return the description of a study that can be copied."""
-    title, description = _described(document)
+    title, description = _title_and_description(document)
     return TemplateChoice(
         source=source, title=title or source, description=description, copy=True, note=note, name=name,
         study_title=title, languages=languages_of(document),
     )  # fmt: skip
 
 
-def _described(document: Mapping[str, Any]) -> tuple[str, str]:
+def _title_and_description(document: Mapping[str, Any]) -> tuple[str, str]:
     head = document.get("study", {})
     description = head.get("description", "") if isinstance(head, Mapping) else ""
     return study_title(document), " ".join(str(description).split())
 
 
-def _figures(protocol: Protocol) -> Iterator[tuple[str, str]]:
+def _figure_texts(protocol: Protocol) -> Iterator[tuple[str, str]]:
     trials = sum(block.trials for block in orders_of(protocol).blocks)
     yield "clock", duration(expected_duration_s(protocol))
     people = None if protocol.analysis is None else protocol.analysis.participants
@@ -229,7 +229,7 @@ def _figures(protocol: Protocol) -> Iterator[tuple[str, str]]:
     yield "layers", counted(trials, "trial")
 
 
-def _questions(name: str, study: Study) -> Iterator[OwnQuestion]:
+def _own_questions(name: str, study: Study) -> Iterator[OwnQuestion]:
     for question, path in QUESTIONS.get(name, ()):
         row = row_at(study.document, path)
         if row is not None:
@@ -251,22 +251,22 @@ def _unit_of(study: Study, path: Place) -> str:
     return "times" if path[-1] == "repetitions" else ""
 
 
-def studies(opened: Document | None) -> tuple[StudyChoice, ...]:
+def study_choices(opened: Document | None) -> tuple[StudyChoice, ...]:
     """Return the studies that can be opened: the open one, unsaved drafts, recent files, known names.
 
     They are in the order of their titles; studies that ship with the program come last.
     """
-    known = dict.fromkeys([*map(str, unsaved_files(workspace().protocols)), *sources()])
+    known = dict.fromkeys([*map(str, unsaved_files(workspace().protocols)), *known_sources()])
     own = "" if opened is None else source_of(opened.file)
     if opened is not None:
         known[own] = None
     drafted = {file.resolve() for file in drafted_files()}
     choices = []
     for source in known:
-        file = _resolved(source)
+        file = _resolved_file(source)
         if Path(source).suffix == ".toml" and Path(source).exists() and holds_liquids_alone(source):
             continue
-        title = _title(file, drafted=file in drafted) if opened is None or source != own else opened.title
+        title = _listed_title(file, drafted=file in drafted) if opened is None or source != own else opened.title
         stem = Path(source).stem
         ships, original = is_shipped(source), "" if file is None else kept_original(file)
         choices.append(
@@ -275,10 +275,10 @@ def studies(opened: Document | None) -> tuple[StudyChoice, ...]:
     return tuple(sorted(choices, key=lambda choice: (choice.shipped, choice.title.casefold(), choice.source)))
 
 
-def _title(file: Path | None, *, drafted: bool) -> str:
+def _listed_title(file: Path | None, *, drafted: bool) -> str:
     """Return the title of a study, or of its draft; "" if it has none or cannot be read."""
     if file is not None and drafted and (draft := draft_of(file)) is not None:
-        return study_title(read(draft.text.encode(), file.parent).document)
+        return study_title(read_study(draft.text.encode(), file.parent).document)
     try:
         state = None if file is None else file.stat()
     except OSError:
@@ -319,7 +319,7 @@ def header_state(
 
 def source_of(file: Path) -> str:
     """Return the name that opens a study's file, else its path."""
-    found_file = _file(file.stem)
+    found_file = _protocol_file(file.stem)
     return file.stem if found_file is not None and found_file.resolve() == file.resolve() else str(file)
 
 
@@ -333,7 +333,7 @@ def new_choices(source: str = "") -> tuple[TemplateChoice, ...]:
     taken = taken_names()
     copied = dict.fromkeys([source, *shipped()] if source and not source.startswith("template:") else shipped())
     for name in copied:
-        file = shipped_file(name) if name in shipped() else find(name)
+        file = shipped_file(name) if name in shipped() else protocol_file(name)
         note = SHIPPED if name in shipped() else str(file.name)
         document, _places = read_document(file.read_bytes(), name)
         stem = re.sub(f"{COPY}[0-9]*$", "", short_name_of(file.stem)) or "study"
@@ -347,14 +347,14 @@ def _template_choice(name: str) -> TemplateChoice:
     return template_choice(name, template(name))
 
 
-def _resolved(source: str) -> Path | None:
-    file = Path(source) if Path(source).suffix == ".toml" else _file(source)
+def _resolved_file(source: str) -> Path | None:
+    file = Path(source) if Path(source).suffix == ".toml" else _protocol_file(source)
     return None if file is None else file.resolve()
 
 
-def _file(source: str) -> Path | None:
+def _protocol_file(source: str) -> Path | None:
     try:
-        return find(source)
+        return protocol_file(source)
     except StudyError:
         return None
 
@@ -437,7 +437,9 @@ class TemplateButton(Themed, QAbstractButton):
             if self._empty:
                 described.setAlignment(aligned)
                 title.setAlignment(aligned)
-            counts = hbox(*(part for figure in choice.figures for part in self._figure(*figure)), STRETCH, spacing=6)
+            counts = hbox(
+                *(part for figure in choice.figures for part in self._figure_parts(*figure)), STRETCH, spacing=6
+            )
             below = vbox(title, described, STRETCH, counts, spacing=4, margins=(16, 10, 16, 10))
             picture_row = (hbox(STRETCH, above, STRETCH, margins=(0, 70, 0, 8)),) if self._empty else (above,)
             vbox(*picture_row, (below, 1), spacing=0, margins=RING + 1, parent=self)
@@ -445,7 +447,7 @@ class TemplateButton(Themed, QAbstractButton):
             part.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
 
     @staticmethod
-    def _figure(icon: str, spoken: str) -> tuple[QWidget | int, ...]:
+    def _figure_parts(icon: str, spoken: str) -> tuple[QWidget | int, ...]:
         return Icon(icon, "text2", 16), label(spoken.removesuffix(PLANNED), "small", "text2", weight=500), 8
 
     def _lay_out_copy(self) -> None:
@@ -521,15 +523,15 @@ class Questions(Themed, QWidget):
     def __init__(self) -> None:
         super().__init__()
         self._choice: TemplateChoice | None = None
-        self.title, self.name = self._field("Title"), self._field("Short name of the new study")
-        self._propose()
-        self.title.textChanged.connect(self._propose)
+        self.title, self.name = self._make_field("Title"), self._make_field("Short name of the new study")
+        self._show_proposed_name()
+        self.title.textChanged.connect(self._show_proposed_name)
         self.languages: dict[str, Check] = {}
         self.own: dict[OwnQuestion, QLineEdit] = {}
         self._grid = grid_of(8, 8, margins=0, parent=self)
         self._grid.setColumnStretch(1, 1)
         for row, (title, field) in enumerate((("Title", self.title), ("Short name", self.name))):
-            self._add(row, title, field)
+            self._add_field(row, title, field)
         box = QWidget()
         checks = grid_of(2, 2, margins=0, parent=box)
         for at, (code, name) in enumerate(languages_offered()):
@@ -546,12 +548,12 @@ class Questions(Themed, QWidget):
         self._grid.addWidget(box, 3, 0, 1, 2)
         self._own: list[QWidget] = []
 
-    def _field(self, name: str) -> QLineEdit:
-        made = dense(QLineEdit(), name, FIELD_PX)
+    def _make_field(self, name: str) -> QLineEdit:
+        made = make_dense(QLineEdit(), name, FIELD_PX)
         made.returnPressed.connect(self.entered)
         return made
 
-    def _add(self, row: int, title: str, field: QWidget) -> QWidget:
+    def _add_field(self, row: int, title: str, field: QWidget) -> QWidget:
         shown = label(title, "label", wraps=True)
         shown.setFixedWidth(WORDS_PX)
         self._grid.addWidget(shown, row, 0)
@@ -569,14 +571,14 @@ class Questions(Themed, QWidget):
         if before is not None and before.source == choice.source:
             return
         self.title.setPlaceholderText(choice.study_title)
-        self._propose()
+        self._show_proposed_name()
         for code, check in self.languages.items():
             check.setChecked(code in choice.languages)
         for part in self._own:
             remove_widget(part)
         self._own, self.own = [], {}
         for row, question in enumerate(choice.questions, start=4):
-            field = self._field(question.words)
+            field = self._make_field(question.words)
             field.setText(question.value)
             field.setToolTip(question.bounds)
             field.setAccessibleDescription(question.bounds)
@@ -584,11 +586,11 @@ class Questions(Themed, QWidget):
             across = hbox((field, 1), spacing=8, margins=0, parent=beside)
             if question.unit:
                 across.addWidget(label(question.unit, "label", "text2"))
-            self._own += [self._add(row, question.words, beside), beside]
+            self._own += [self._add_field(row, question.words, beside), beside]
             self.own[question] = field
-            name_bars(beside)
+            name_scroll_bars(beside)
 
-    def _propose(self) -> None:
+    def _show_proposed_name(self) -> None:
         self.name.setPlaceholderText(self._proposed or NAME_HINT)
 
     def _show_first_texts(self) -> None:
@@ -642,8 +644,8 @@ class NoStudyCard(Card):
     def __init__(self) -> None:
         super().__init__(padding=28, gap=12)
         self.new = ActionButton("plus", "New study …", cap=key_cap("new"), role="primary")
-        self.new.setAccessibleName(tip("new"))
-        self.new.setToolTip(tip("new"))
+        self.new.setAccessibleName(command_tip("new"))
+        self.new.setToolTip(command_tip("new"))
         parts = (
             Icon("designer", "accent", 44),
             label("No study is open", "card"),
@@ -685,7 +687,7 @@ class ChosenCard(Card):
         if choice.session:
             column.addWidget(label("The session", "strong"))
         for icon, title, time in choice.session:
-            add_layout(column, _step(icon, title, time))
+            add_layout(column, _step_line(icon, title, time))
         if choice.session:
             column.addWidget(Rule())
         if choice.recovery is not None:
@@ -701,7 +703,7 @@ class ChosenCard(Card):
                 Rule(),
             )
         for old, new in zip(before, (self.about, self.details), strict=True):
-            name_bars(new)
+            name_scroll_bars(new)
             self.inside.insertWidget(self.inside.indexOf(old), new)
             remove_widget(old)
         self.questions.show_choice(choice)
@@ -716,7 +718,7 @@ def _column(of: QWidget, *parts: QWidget | QLayout) -> QVBoxLayout:
     return vbox(*parts, spacing=8, margins=0, parent=of)
 
 
-def _step(icon: str, title: str, time: str) -> QHBoxLayout:
+def _step_line(icon: str, title: str, time: str) -> QHBoxLayout:
     shown = cut_text(title, "label")
     return hbox(Icon(icon, "text2", 16), (shown, 1), figures(time, "label", "text2"), spacing=10)
 
@@ -744,8 +746,8 @@ class NewStudyPage(Themed, QWidget):
         self.card = ChosenCard()
         self.name, self.make, self.refusal = self.card.questions.name, self.card.make, self.card.refusal
         vbox(head, (hbox((self.area, 1), self.card, spacing=12), 1), spacing=12, margins=0, parent=self)
-        self.card.make.clicked.connect(self._begin)
-        self.card.questions.entered.connect(self._begin)
+        self.card.make.clicked.connect(self._ask_to_begin)
+        self.card.questions.entered.connect(self._ask_to_begin)
         self._group.buttonToggled.connect(lambda _button, on: self._show_choice() if on else None)
 
     def show_choices(self, choices: tuple[TemplateChoice, ...], chosen: str) -> None:
@@ -763,7 +765,7 @@ class NewStudyPage(Themed, QWidget):
             columns = across if self.width() >= NARROW_BELOW else 2
             for at, choice in enumerate(choice for choice in choices if choice.copy == copies):
                 made = TemplateButton(choice)
-                made.came.connect(partial(self._come, made))
+                made.came.connect(partial(self._show_focused_card, made))
                 self._group.addButton(made)
                 grid.addWidget(made, at // columns, at % columns)
                 self.buttons.append(made)
@@ -771,7 +773,7 @@ class NewStudyPage(Themed, QWidget):
                 grid.setColumnStretch(number, 1)
             add_layout(column, grid)
         column.addStretch()
-        name_bars(inside)
+        name_scroll_bars(inside)
         replace_inside(self.area, inside)
         self.refuse("")
         first = next((button for button in self.buttons if button.choice.source == chosen), self.buttons[0])
@@ -780,7 +782,7 @@ class NewStudyPage(Themed, QWidget):
         first.setChecked(True)
         QTimer.singleShot(0, first, lambda: self.area.ensureWidgetVisible(first))  # once it has its place
 
-    def _come(self, button: TemplateButton, by_mouse: bool) -> None:
+    def _show_focused_card(self, button: TemplateButton, by_mouse: bool) -> None:
         """Show the card that has keyboard focus. A mouse click leaves the focus in the form."""
         if by_mouse:
             (last_focused(self.card) or self.card.questions.title).setFocus()
@@ -796,16 +798,16 @@ class NewStudyPage(Themed, QWidget):
             self.copy_asked.emit(chosen)
 
     def _show_choice(self) -> None:
-        chosen = self._chosen()
+        chosen = self._chosen_template()
         if chosen is not None:
             self.refuse("")
             self.card.show_choice(chosen)
 
-    def _chosen(self) -> TemplateChoice | None:
+    def _chosen_template(self) -> TemplateChoice | None:
         return next((button.choice for button in self.buttons if button.isChecked()), None)
 
-    def _begin(self) -> None:
-        chosen, answers = self._chosen(), self.card.questions.answers()
+    def _ask_to_begin(self) -> None:
+        chosen, answers = self._chosen_template(), self.card.questions.answers()
         if isinstance(answers, str):
             self.refuse(f"{answers}.")
         elif chosen is not None:
@@ -814,7 +816,7 @@ class NewStudyPage(Themed, QWidget):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         begins = isinstance(self.focusWidget(), Check | TemplateButton)
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and begins:
-            self._begin()
+            self._ask_to_begin()
         elif event.key() == Qt.Key.Key_Escape:
             self.given_up.emit()
         else:
@@ -825,5 +827,5 @@ class NewStudyPage(Themed, QWidget):
         narrow = self.width() < NARROW_BELOW
         self.card.setFixedWidth(SIDE_NARROW_PX if narrow else SIDE_PX)
         if self._choices and (event.oldSize().width() < NARROW_BELOW) != narrow:
-            chosen = self._chosen()
+            chosen = self._chosen_template()
             self.show_choices(self._choices, "" if chosen is None else chosen.source)

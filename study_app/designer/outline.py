@@ -38,29 +38,29 @@ from study_app.designer.document.elements import (
     SEQUENCE,
     Element,
     FoundField,
-    brief,
-    found,
     found_in_elements,
+    has_text,
     outline,
+    search_words,
+    short_note,
     title_of,
-    words_sought,
 )
-from study_app.designer.document.fields import label_of, node_at, rows, singular, tags
+from study_app.designer.document.fields import element_noun, label_of, node_at, rows, tags
 from study_app.designer.document.steps import AddElement, AddInstrument
 from study_app.designer.document.study import Study
-from study_app.designer.parts import dense
-from study_app.gui.kit.commands import key_cap, keys_of, tip, with_key
+from study_app.designer.parts import make_dense
+from study_app.gui.kit.commands import command_tip, key_cap, keys_of, with_key
 from study_app.gui.theme.icons import draw_icon, icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Coloured, Themed
-from study_app.gui.widgets.accessible import plain_tip, say
+from study_app.gui.widgets.accessible import announce, plain_tip
 from study_app.gui.widgets.boxes import add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, fill_rounded
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.number_text import counted, duration
 from study_app.protocol.checks.cross_references import OWN
-from study_app.protocol.formats import TABLES, is_second
+from study_app.protocol.formats import TABLES, is_format_2
 from study_app.protocol.questionnaires import instrument, instruments
 from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.wording.languages import languages_of
@@ -91,7 +91,7 @@ class OutlineRow:
     path: Path  # () for the heading of a section
     title: str
     icon: str = ""
-    note: str = ""  # at its right: a time, a count, or its `brief` fact
+    note: str = ""  # at its right: a time, a count, or its `short_note` fact
     depth: int = 0  # below the heading of its section
     faults: int = 0  # within it
     name: str = ""  # the text for screen readers
@@ -106,9 +106,9 @@ def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> 
     ``times_s``: how long each step takes [s], by its id; empty while the study has faults; ``find``: what an element's
     title, id or one of its texts must hold, or the label or a choice of one of its fields.
     """
-    if study.unreadable:
+    if study.is_unreadable:
         only = Element(FIRST, title_of({}, FIRST), FIRST[0], faults=len(study.faults))
-        return (_row(study, only, {}, in_session=False),)
+        return (_outline_row(study, only, {}, in_session=False),)
     shown, text = outline(study), find.strip()
     fields = found_in_elements(study, text)
     rows: list[OutlineRow] = []
@@ -117,10 +117,12 @@ def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> 
     own = [element for element in shown.study if element.path == FIRST]
     for heading, elements in (("", own), (SESSION, shown.session), (PARTS, shown.parts), (SETTINGS, settings)):
         named = [replace(element, title=titles[element.path]) for element in elements]
-        inner = [_row(study, element, times_s, in_session=heading == SESSION) for element in named]
+        inner = [_outline_row(study, element, times_s, in_session=heading == SESSION) for element in named]
         if text:
             inner = [row for row in inner if len(row.path) > 1 or heading != PARTS]
-            inner = [kept for row in inner if (kept := _found(study, row, text, fields.get(row.path))) is not None]
+            inner = [
+                kept for row in inner if (kept := _matching_row(study, row, text, fields.get(row.path))) is not None
+            ]
         total = duration(sum(times_s.values())) if times_s and heading == SESSION else ""
         if inner:
             rows += [*([OutlineRow(path=(), title=heading, note=total, name=heading)] if heading else []), *inner]
@@ -138,13 +140,13 @@ def _titles(elements: Sequence[Element]) -> dict[Path, str]:
     }
 
 
-def _found(study: Study, row: OutlineRow, text: str, field: FoundField | None) -> OutlineRow | None:
+def _matching_row(study: Study, row: OutlineRow, text: str, field: FoundField | None) -> OutlineRow | None:
     """Return a matching row with the label of its matching field; None if the element does not match."""
-    named = found(study.document, row.path, text, named=True)
+    named = has_text(study.document, row.path, text, named=True)
     if field is not None and (field.rank == LABEL or not named):
         title, name = f"{row.title} · {field.label}", f"{row.name}, field {field.label}"
         return replace(row, title=title, name=name, field=field.field, named=named)
-    return replace(row, named=named) if named or found(study.document, row.path, text) else None
+    return replace(row, named=named) if named or has_text(study.document, row.path, text) else None
 
 
 def icon_of(path: Path, document: Mapping[str, Any]) -> str:
@@ -155,7 +157,7 @@ def icon_of(path: Path, document: Mapping[str, Any]) -> str:
     return "list" if "items" in path else ICONS.get(str(path[0]), "ring") if path else "ring"
 
 
-def _row(study: Study, element: Element, times_s: Mapping[str, float], *, in_session: bool) -> OutlineRow:
+def _outline_row(study: Study, element: Element, times_s: Mapping[str, float], *, in_session: bool) -> OutlineRow:
     path, note, kind = element.path, "", str(element.path[0])
     if in_session and len(path) == 1:
         listed = value_at(study.document, path)
@@ -163,7 +165,7 @@ def _row(study: Study, element: Element, times_s: Mapping[str, float], *, in_ses
     elif in_session and element.depth == 0:
         note = duration(times_s[element.id]) if element.id in times_s else ""
     elif in_session:
-        note = brief(study.document, path)
+        note = short_note(study.document, path)
     elif element.depth == 0 and kind in SECTIONS_OF_TABLES:
         count = len(names(study.document, kind))
         note = str(count) if count else "none"
@@ -172,7 +174,7 @@ def _row(study: Study, element: Element, times_s: Mapping[str, float], *, in_ses
     elif path == ("device",) and isinstance(limit := value_at(study.document, FORCE_LIMIT), int | float):
         note = f"{limit:g} N"
     faults = counted(element.faults, "problem") if element.faults else ""
-    sort = singular(kind) if len(path) == 2 else "question" if "items" in path else ""
+    sort = element_noun(kind) if len(path) == 2 else "question" if "items" in path else ""
     at = ""
     if element.step and isinstance(element.step[-1], int):
         count = len(value_at(study.document, element.step[:-1]))
@@ -211,32 +213,32 @@ class Addable:
     help: str = ""
 
 
-def addable(study: Study, selected: Path) -> tuple[Addable, ...]:
+def addable_elements(study: Study, selected: Path) -> tuple[Addable, ...]:
     """Return the addable elements: for lists of the selected element, its section, then the other sections."""
     document = study.document
     around = selected[:2] if len(selected) > 1 else ()
     lists = [row.path for row in rows(document, around) if row.kind == "list"] if around else []
-    second = is_second(document)
+    second = is_format_2(document)
     sections = [
         row.path for row in rows(document, ()) if row.kind == "tables" and (second or row.path[0] not in TABLES)
     ]
     sections.sort(key=lambda path: path[:1] != selected[:1])
-    entries = [_of_list(study, path) for path in lists]
+    entries = [_addable_entry(study, path) for path in lists]
     entries += [
         Addable(
-            words=label_of(singular(path[0])),
+            words=label_of(element_noun(path[0])),
             icon=icon_of(path, study.document),
             asks=AddElement(path),
             help=HELP.get(str(path[0]), f"To {label_of(path[0]).lower()}"),
         )
         for path in sections
     ]
-    entries += _questions(study, around) if not any(path[0] == QUESTIONNAIRES for path in lists) else ()
-    entries += _instruments() if second else ()
+    entries += _addable_questions(study, around) if not any(path[0] == QUESTIONNAIRES for path in lists) else ()
+    entries += _addable_instruments() if second else ()
     return tuple(entries)
 
 
-def _questions(study: Study, around: Path) -> Iterator[Addable]:
+def _addable_questions(study: Study, around: Path) -> Iterator[Addable]:
     """Yield a question for each questionnaire that can get one, or only for the one that the element names.
 
     Where there are several, each says of which it is.
@@ -245,13 +247,13 @@ def _questions(study: Study, around: Path) -> Iterator[Addable]:
     tables = names(study.document, QUESTIONNAIRES)
     every = [name for name in tables if value_at(study.document, (QUESTIONNAIRES, name, "instrument")) is None]
     for name in (named,) if named in every else every:
-        first = _of_list(study, (QUESTIONNAIRES, str(name), "items"))
+        first = _addable_entry(study, (QUESTIONNAIRES, str(name), "items"))
         title = title_of(study.document, (QUESTIONNAIRES, str(name)))
         yield first if len(every) == 1 else replace(first, words=f"{first.words} of {title}")
 
 
 @cache
-def _instruments() -> tuple[Addable, ...]:
+def _addable_instruments() -> tuple[Addable, ...]:
     """Return the standard questionnaires, with publisher and licence of their texts."""
     entries = []
     for name in instruments():
@@ -263,13 +265,13 @@ def _instruments() -> tuple[Addable, ...]:
     return tuple(entries)
 
 
-def _of_list(study: Study, path: Path) -> Addable:
+def _addable_entry(study: Study, path: Path) -> Addable:
     """Return the entry that adds to a list, found by each of its kinds."""
-    known = tags(node_at(study.document, (*path, 0)))[1] if is_second(study.document) else ()
+    known = tags(node_at(study.document, (*path, 0)))[1] if is_format_2(study.document) else ()
     kinds = ", ".join(label_of(kind).lower() for kind in known if kind)
     to = f"To {title_of(study.document, path[:2])}{kinds and f'; kinds: {kinds}'}"
     return Addable(
-        words=label_of(singular(path[-1])), icon=icon_of(path, study.document), asks=AddElement(path), help=to
+        words=label_of(element_noun(path[-1])), icon=icon_of(path, study.document), asks=AddElement(path), help=to
     )
 
 
@@ -287,7 +289,7 @@ class AddList(Themed, QFrame):
         self.setAccessibleName("Add")
         self.setProperty("role", "card")
         self._every: tuple[Addable, ...] = ()
-        self.words = dense(QLineEdit(), "Filter what can be added", 36)
+        self.words = make_dense(QLineEdit(), "Filter what can be added", 36)
         self.words.setPlaceholderText("Type to filter")
         self.list = QListWidget()
         self.list.setAccessibleName("What can be added")
@@ -300,7 +302,7 @@ class AddList(Themed, QFrame):
         self.help.setMinimumHeight(HELP_PX)
         self.help.setAlignment(Qt.AlignmentFlag.AlignTop)
         vbox(self.words, (self.list, 1), self.help, spacing=8, margins=10, parent=self)
-        self.words.textChanged.connect(self._type)
+        self.words.textChanged.connect(self._filter)
         self.words.installEventFilter(self)
         self.list.currentItemChanged.connect(lambda item: self.help.setText(item.toolTip() if item else ""))
         self.list.itemClicked.connect(lambda _item: self._choose())
@@ -310,7 +312,7 @@ class AddList(Themed, QFrame):
         """Show the addable elements with the lower left corner at a screen position."""
         self._every = every
         self.words.clear()
-        self._type("")
+        self._filter("")
         height = min(HIGHEST, 82 + HELP_PX + ADD_ROW_PX * len(every))
         screen = self.screen().availableGeometry()
         at = QPoint(min(above.x(), screen.right() - WIDTH), max(screen.top(), above.y() - height))
@@ -318,14 +320,16 @@ class AddList(Themed, QFrame):
         self.show()
         self.words.setFocus(Qt.FocusReason.PopupFocusReason)
 
-    def _type(self, text: str) -> None:
-        wanted = words_sought(text)
+    def _filter(self, text: str) -> None:
+        wanted = search_words(text)
         self.list.clear()
-        fitting = [entry for entry in self._every if all(part in f"{entry.text} {entry.help}".casefold() for part in wanted)]
+        fitting = [
+            entry for entry in self._every if all(part in f"{entry.words} {entry.help}".casefold() for part in wanted)
+        ]
         typed = text.casefold().split()
-        fitting.sort(key=lambda entry: entry.text.casefold().split()[: len(typed)] != typed)  # whole text come first
+        fitting.sort(key=lambda entry: entry.words.casefold().split()[: len(typed)] != typed)  # whole words come first
         for entry in fitting:
-            item = QListWidgetItem(icon(entry.icon, self.theme.text2, 18), entry.text)
+            item = QListWidgetItem(icon(entry.icon, self.theme.text2, 18), entry.words)
             item.setData(Qt.ItemDataRole.UserRole, entry)
             item.setToolTip(plain_tip(entry.help))
             item.setData(Qt.ItemDataRole.AccessibleDescriptionRole, entry.help)
@@ -333,7 +337,7 @@ class AddList(Themed, QFrame):
             self.list.addItem(item)
         self.list.setCurrentRow(0)
         if not self.list.count():
-            self.help.setText(f"Nothing that can be added here has this name. {tip('find')}")
+            self.help.setText(f"Nothing that can be added here has this name. {command_tip('find')}")
 
     def _choose(self) -> None:
         if (item := self.list.currentItem()) is not None:
@@ -382,7 +386,7 @@ class RowPainter(QStyledItemDelegate):
         painter.save()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if row.path:
-            self._element(painter, place, row, option.state, index)  # type: ignore[attr-defined]
+            self._paint_element(painter, place, row, option.state, index)  # type: ignore[attr-defined]
         else:
             middle = Qt.AlignmentFlag.AlignVCenter
             painter.setPen(QColor(self.theme.text2))
@@ -391,7 +395,7 @@ class RowPainter(QStyledItemDelegate):
             painter.drawText(place.adjusted(8, 6, -10, 0), middle | Qt.AlignmentFlag.AlignRight, row.note)
         painter.restore()
 
-    def _element(
+    def _paint_element(
         self, painter: QPainter, place: QRectF, row: OutlineRow, state: QStyle.StateFlag, index: Index
     ) -> None:
         t = self.theme
@@ -489,7 +493,7 @@ class Tree(Themed, QTreeView):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if self.dragged and event.key() == Qt.Key.Key_Escape:
-            self._let_go()
+            self._end_drag()
         elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self.entered_row.emit()
         else:
@@ -521,23 +525,23 @@ class Tree(Themed, QTreeView):
             bar, height = self.verticalScrollBar(), self.viewport().height()
             if at.y() < EDGE_PX or at.y() > height - EDGE_PX:
                 bar.setValue(bar.value() + (-12 if at.y() < EDGE_PX else 12))
-            self.target = self._target(at)
+            self.target = self._drop_target(at)
             self.viewport().update()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         dragged, target = self.dragged, self.target
-        self._let_go()
+        self._end_drag()
         if not dragged:
             super().mouseReleaseEvent(event)
         elif target is not None:
             self.dropped.emit(dragged, target[0])
 
-    def _let_go(self) -> None:
+    def _end_drag(self) -> None:
         self.dragged, self.target, self._pressed = (), None, None
         self.viewport().unsetCursor()
         self.viewport().update()
 
-    def _target(self, at: QPoint) -> tuple[ElementPath, float] | None:
+    def _drop_target(self, at: QPoint) -> tuple[ElementPath, float] | None:
         """Return the place of the entry after the drop line, and the line's height."""
         place = self.dragged[:-1]
         places: list[tuple[ElementPath, float]] = []
@@ -548,12 +552,12 @@ class Tree(Themed, QTreeView):
             if row.step and row.step[:-1] == place:
                 places.append((row.step, box.top()))
                 end = (*place, int(row.step[-1]) + 1), box.bottom()
-            elif end is not None and row.path and self._below(index, place):
+            elif end is not None and row.path and self._is_below(index, place):
                 end = end[0], box.bottom()
             index = self.indexBelow(index)
         return min((*places, *([end] if end else ())), key=lambda place: abs(place[1] - at.y()), default=None)
 
-    def _below(self, index: QModelIndex, place: ElementPath) -> bool:
+    def _is_below(self, index: QModelIndex, place: ElementPath) -> bool:
         """Return whether a row is shown below an entry of a list."""
         above = index.parent()
         while above.isValid():
@@ -590,8 +594,8 @@ class OutlineCard(Coloured, Card):
         self.rows: tuple[OutlineRow, ...] = ()
         self._opened: set[object] = set()
         self._filling = self._finding = False
-        self.words = dense(QLineEdit(), "Find in the study", 36)
-        self.words.setPlaceholderText(tip("find"))
+        self.words = make_dense(QLineEdit(), "Find in the study", 36)
+        self.words.setPlaceholderText(command_tip("find"))
         self.words.setClearButtonEnabled(True)
         self._sign = self.words.addAction(
             icon("search", self.theme.text2, 16), QLineEdit.ActionPosition.LeadingPosition
@@ -614,8 +618,8 @@ class OutlineCard(Coloured, Card):
         self.words.installEventFilter(self)
         self.tree.selectionModel().currentChanged.connect(self._choose)
         self.tree.clicked.connect(self._click)
-        self.tree.expanded.connect(lambda index: None if self._finding else self._opened.add(self._key(index)))
-        self.tree.collapsed.connect(lambda index: self._opened.discard(self._key(index)))
+        self.tree.expanded.connect(lambda index: None if self._finding else self._opened.add(self._row_key(index)))
+        self.tree.collapsed.connect(lambda index: self._opened.discard(self._row_key(index)))
         self.tree.entered_row.connect(lambda: None if self._open_field() else self.form_asked.emit())
 
     def apply_theme(self, theme: Theme) -> None:
@@ -631,7 +635,7 @@ class OutlineCard(Coloured, Card):
 
     def show_outline(self, rows: tuple[OutlineRow, ...], selected: object) -> None:
         """Show rows; open branches stay open. If nothing matches, a line says so."""
-        self._say_whether_found(rows)
+        self._show_whether_found(rows)
         if rows != self.rows:
             current = self.tree.currentIndex()
             before = current.data(ROW_ROLE).path if current.isValid() else None
@@ -653,24 +657,24 @@ class OutlineCard(Coloured, Card):
                 above.append(item)
             self._finding = bool(self.words.text().strip())
             for index in self.indexes():
-                if self._key(index) in self._opened or self._finding:
+                if self._row_key(index) in self._opened or self._finding:
                     self.tree.expand(index)
             self._finding = False
             self.tree.doItemsLayout()  # without it there is nothing to scroll
             self.tree.verticalScrollBar().setValue(scrolled)
             self._filling = False
-            self.mark(selected, reveals=selected != before)
-        self.mark(selected)
+            self.mark_row(selected, reveals=selected != before)
+        self.mark_row(selected)
 
-    def _say_whether_found(self, rows: tuple[OutlineRow, ...]) -> None:
+    def _show_whether_found(self, rows: tuple[OutlineRow, ...]) -> None:
         text = self.words.text().strip()
         sentence = f'Nothing called "{text}" in this study' if text and not rows else ""
         if sentence and sentence != self.nothing.whole:
-            say(self.words, sentence)
+            announce(self.words, sentence)
         self.nothing.show_text(sentence)
         self.nothing.setVisible(bool(sentence))
 
-    def mark(self, path: object, *, reveals: bool = True) -> None:
+    def mark_row(self, path: object, *, reveals: bool = True) -> None:
         """Mark the row of an element; ``reveals`` opens its branch and scrolls to it."""
         current = self.tree.currentIndex()
         if current.isValid() and current.data(ROW_ROLE).path == path:
@@ -704,7 +708,7 @@ class OutlineCard(Coloured, Card):
             waiting[:0] = [self.items.index(row, 0, index) for row in range(self.items.rowCount(index))]
         return indexes
 
-    def _key(self, index: Index) -> object:
+    def _row_key(self, index: Index) -> object:
         row, parent = index.data(ROW_ROLE), index.parent()
         return row.path, row.depth, parent.data(ROW_ROLE).path if parent.isValid() else None
 

@@ -91,7 +91,7 @@ FIELD_PX = 34
 W = TypeVar("W", bound=QWidget)
 
 
-def dense(part: W, name: str, height: int = FIELD_PX) -> W:
+def make_dense(part: W, name: str, height: int = FIELD_PX) -> W:
     """Give a field or list the designer's low form and an accessible name."""
     part.setAccessibleName(name)
     part.setProperty("dense", "true")

@@ -16,7 +16,7 @@ from study_app.designer.document.fields import label_of
 from study_app.designer.document.study import Study
 from study_app.designer.outline import icon_of
 from study_app.designer.parts import Segments, small_button
-from study_app.gui.kit.commands import key_cap, tip
+from study_app.gui.kit.commands import command_tip, key_cap
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Coloured, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
@@ -74,7 +74,7 @@ def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
             for fault, problem in zip(study.faults, study.problems, strict=True)
         )
     places = places_of(study.text)
-    rows = [_row(study, fault, places.line(fault.path)) for fault in study.faults]
+    rows = [_problem_row(study, fault, places.line(fault.path)) for fault in study.faults]
     return tuple(sorted(rows, key=lambda row: row.line or 0))
 
 
@@ -83,13 +83,13 @@ def warning_rows(study: Study, sentences: Iterable[str]) -> tuple[ProblemRow, ..
     places = places_of(study.text) if study.is_toml else None
     rows = []
     for sentence in dict.fromkeys(sentences):
-        path, text = _placed(study, sentence)
+        path, text = _place_and_sentence(study, sentence)
         line = None if places is None else places.line(path)
-        rows.append(replace(_row(study, Fault(path, text), line), warning=True))
+        rows.append(replace(_problem_row(study, Fault(path, text), line), warning=True))
     return tuple(rows)
 
 
-def _placed(study: Study, sentence: str) -> tuple[Path, str]:
+def _place_and_sentence(study: Study, sentence: str) -> tuple[Path, str]:
     """Return the place of a warning and its sentence."""
     if (stated := _PLACE.match(sentence)) is not None:
         return tuple(int(step) - 1 if step.isdecimal() else step for step in stated[1].split(".")), stated[2]
@@ -100,7 +100,7 @@ def _placed(study: Study, sentence: str) -> tuple[Path, str]:
     return FIRST, sentence
 
 
-def _row(study: Study, fault: Fault, line: int | None) -> ProblemRow:
+def _problem_row(study: Study, fault: Fault, line: int | None) -> ProblemRow:
     element = element_of(study, fault.path)
     inside = fault.path[len(element) :]
     message = capitalised(fault.message)
@@ -133,9 +133,9 @@ class RepairSearch(QObject):
         self._known: dict[ProblemRow, tuple[Repair, ...]] = {}
         self._timer = QTimer(self)
         self._timer.setSingleShot(True)
-        self._timer.timeout.connect(self._find)
+        self._timer.timeout.connect(self._search_next)
 
-    def begin(self, study: Study, problems: tuple[ProblemRow, ...]) -> None:
+    def begin_search(self, study: Study, problems: tuple[ProblemRow, ...]) -> None:
         if study is self._study:
             return
         self._study, self._known, self._problems = study, {}, problems
@@ -145,24 +145,24 @@ class RepairSearch(QObject):
         else:
             self._timer.stop()
 
-    def repair(self, row: ProblemRow, sentence: str) -> Repair | None:
+    def find_repair(self, row: ProblemRow, sentence: str) -> Repair | None:
         """Return a repair by its sentence; after an edit it is searched for at once."""
-        self._look(row)
+        self._find_repairs(row)
         return next((repair for repair in self._known.get(row, ()) if repair.words == sentence), None)
 
-    def show(self, row: ProblemRow) -> None:
-        self._look(row)
+    def show_repairs(self, row: ProblemRow) -> None:
+        self._find_repairs(row)
         if row in self._known:
             self.found.emit(row, tuple(repair.words for repair in self._known[row]))
 
-    def _look(self, row: ProblemRow) -> None:
+    def _find_repairs(self, row: ProblemRow) -> None:
         study = self._study
         if row in self._problems and row not in self._known and study is not None and study.is_toml:
             self._known[row] = (*repairs(study, row.fault), *additions_for(study, row.fault))
 
-    def _find(self) -> None:
+    def _search_next(self) -> None:
         if self._waiting:
-            self.show(self._waiting.pop(0))
+            self.show_repairs(self._waiting.pop(0))
         if self._waiting:
             self._timer.start(0)
 
@@ -177,9 +177,9 @@ class RepairButton(ActionButton):
         self.setProperty("dense", "true")
         self.setFont(font("label"))
         self.problem = problem
-        self.offer(sentence)
+        self.show_repair(sentence)
 
-    def offer(self, sentence: str) -> None:
+    def show_repair(self, sentence: str) -> None:
         self.show_action("", sentence)
         self.setAccessibleName(f"{sentence}: {self.problem.name}")
 
@@ -237,7 +237,7 @@ class ProblemLine(Coloured, QWidget):
 
     def show_repairs(self, repairs: tuple[str, ...]) -> None:
         for button, sentence in zip(self.repairs, repairs, strict=False):
-            button.offer(sentence)
+            button.show_repair(sentence)
         for sentence in repairs[len(self.repairs) : 2]:
             made = RepairButton(self.row, sentence)
             made.clicked.connect(lambda _checked=False, made=made: self.repair_asked.emit(made.text()))
@@ -285,9 +285,9 @@ class ProblemsCard(Card):
         self._number = 0
         self.heading = label("", "card")
         self.limit = Segments("Problems of")
-        self.limit.chosen.connect(self._limit)
+        self.limit.chosen.connect(self._limit_to_element)
         self.next = small_button("", "Next", cap=key_cap("next problem"), height=36)
-        self.next.setToolTip(tip("next problem"))
+        self.next.setToolTip(command_tip("next problem"))
         self.close_button = IconButton("cross", "Close the list of problems", size=36, role="plain")
         titles = self.heading, label("the same as liquid-study check prints", "small", "text2")
         top = hbox(*titles, STRETCH, self.limit, self.next, self.close_button, spacing=10)
@@ -310,18 +310,18 @@ class ProblemsCard(Card):
         """Show problems; ``element`` is selected. The list closes when the last problem is solved."""
         had, self.problems, self._element = bool(self.problems), rows, element
         self.repairs = {row: sentences for row, sentences in self.repairs.items() if row in rows}
-        self._show(closes=had)
+        self._show_lines(closes=had)
 
     def show_warnings(self, rows: tuple[ProblemRow, ...]) -> None:
         """Show other warnings; the list closes when the last one is solved."""
         had, self._had, self._warnings = self._had or bool(self.rows), False, rows
-        self._show(closes=had)
+        self._show_lines(closes=had)
 
     @property
     def rows(self) -> tuple[ProblemRow, ...]:
         return (*self.problems, *self._warnings)
 
-    def _show(self, *, closes: bool = False) -> None:
+    def _show_lines(self, *, closes: bool = False) -> None:
         rows = self.rows
         if closes and not rows and not self.under_pointer:
             self.hide()
@@ -357,7 +357,7 @@ class ProblemsCard(Card):
     def _add_line(self, row: ProblemRow) -> None:
         narrow = (self.parentWidget() or self).width() < NARROW_BELOW
         made = ProblemLine(row, self.repairs.get(row, ()), narrow=narrow)
-        made.opened.connect(lambda: self.open(made.row))
+        made.opened.connect(lambda: self.open_problem(made.row))
         made.repair_asked.connect(lambda sentence: self.repair_asked.emit(made.row, sentence))
         made.here = row == self.at
         for part in (made, Rule()):
@@ -371,7 +371,9 @@ class ProblemsCard(Card):
 
     def leaveEvent(self, event: QEvent) -> None:
         super().leaveEvent(event)
-        QTimer.singleShot(0, self, self._show)  # Qt also reports this when the widget under the pointer is replaced
+        QTimer.singleShot(
+            0, self, self._show_lines
+        )  # Qt also reports this when the widget under the pointer is replaced
         if not self.rows:
             self.close_asked.emit()
 
@@ -382,7 +384,7 @@ class ProblemsCard(Card):
                 line.show_repairs(repairs)
 
     @property
-    def coming(self) -> tuple[ProblemRow, ...]:
+    def rows_after_current(self) -> tuple[ProblemRow, ...]:
         """The rows after the current one; if the last is solved, from the row that took its place."""
         at = self.rows.index(self.at) + 1 if self.at in self.rows else self._number
         at %= max(1, len(self.rows))
@@ -392,11 +394,11 @@ class ProblemsCard(Card):
         return [button for line in self.lines for button in line.repairs if line.row == problem]
 
     def set_current(self, row: ProblemRow) -> None:
-        """Make a problem the current one; ``coming`` begins after it."""
+        """Make a problem the current one; `rows_after_current` begins after it."""
         if row in self.rows:
             self.at, self._number = row, self.rows.index(row)
 
-    def open(self, row: ProblemRow) -> None:
+    def open_problem(self, row: ProblemRow) -> None:
         self.set_current(row)
         for line in self.lines:
             line.here = line.row == row
@@ -405,7 +407,7 @@ class ProblemsCard(Card):
                 self.area.ensureWidgetVisible(line)
         self.opened.emit(row)
 
-    def _limit(self, here_only: object) -> None:
+    def _limit_to_element(self, here_only: object) -> None:
         self._here_only, self._listed = bool(here_only), None
         self.lines = []
-        self._show()
+        self._show_lines()

@@ -7,11 +7,11 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QLineEdit, QScrollArea, QWidget
 
 from study_app.designer.document.elements import element_of, kind_and_title, title_of
-from study_app.designer.document.fields import Row, label_of, left_without, references_to, with_references
+from study_app.designer.document.fields import Row, label_of, orphaned_keys, references_to, with_references
 from study_app.designer.document.steps import DeleteElement, MakeSeries, Situation, index_of
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_text import Refused
-from study_app.designer.parts import dense
+from study_app.designer.parts import make_dense
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton, Choice
@@ -46,16 +46,16 @@ class Prompt(Card):
             super().keyPressEvent(event)
 
 
-def naming(study: Study, path: Path) -> tuple[str, ...]:
+def naming_places(study: Study, path: Path) -> tuple[str, ...]:
     """Return the places outside an element that refer to it, in words."""
     document = study.document
-    places = (*references_to(document, path), *left_without(document, [path]))
+    places = (*references_to(document, path), *orphaned_keys(document, [path]))
     outside = [place for place in places if place[: len(path)] != path]
-    named = (f"{kind_and_title(document, element_of(study, place))}: {_field(study, place)}" for place in outside)
+    named = (f"{kind_and_title(document, element_of(study, place))}: {_field_label(study, place)}" for place in outside)
     return tuple(dict.fromkeys(named))
 
 
-def _field(study: Study, place: Path) -> str:
+def _field_label(study: Study, place: Path) -> str:
     inside = ", ".join(label_of(step) for step in place[len(element_of(study, place)) :])
     if value_at(study.document, place) is None:
         return f"{inside} (the only one)"
@@ -86,7 +86,7 @@ class DeleteCard(Prompt):
         self.all.clicked.connect(lambda: self.answered.emit(DeleteElement(path, "all")))
         self.gaps = ActionButton("", "Leave the gaps", height=40)
         self.gaps.clicked.connect(lambda: self.answered.emit(DeleteElement(path, "gaps")))
-        self.other = dense(Choice(), "Use another one in its place", 40)
+        self.other = make_dense(Choice(), "Use another one in its place", 40)
         self.other.setPlaceholderText("Use another …")
         self.other.setMinimumWidth(180)
         for name in names(document, str(path[0])) if len(path) == 2 else ():
@@ -125,28 +125,28 @@ class SeriesCard(Prompt):
             f"Type a value for each copy of {title}; copies are listed in the blocks that list the original.",
         )
         self.study, self.path, self.numbers = study, path, numbers
-        self.number = dense(Choice(), "Number that differs")
+        self.number = make_dense(Choice(), "Number that differs")
         for row in numbers:
             number_title = ", ".join(label_of(step) for step in row.path[2:])
             self.number.addItem(f"{number_title} [{row.unit}]" if row.unit else number_title)
-        self.values = dense(QLineEdit(), "Values of the copies")
+        self.values = make_dense(QLineEdit(), "Values of the copies")
         self.values.setPlaceholderText("60 120 240")
         self.copies = label("", "label", wraps=True)
         self.make = ActionButton("bars", "Make the copies", role="primary", height=40)
         self.buttons.addWidget(self.make)
         add_parts(self.column, hbox(self.number, (self.values, 1), spacing=10), self.copies, self.buttons)
-        self.values.textChanged.connect(self._show)
-        self.number.activated.connect(self._show)
+        self.values.textChanged.connect(self._show_titles)
+        self.number.activated.connect(self._show_titles)
         self.values.returnPressed.connect(self.make.click)
         self.make.clicked.connect(lambda: self.answered.emit(self._request()))
         self.first: QWidget = self.values
-        self._show()
+        self._show_titles()
 
     def _request(self) -> MakeSeries:
         values = tuple(value for _, value in typed_numbers(self.values.text()))
         return MakeSeries(self.path, self.numbers[self.number.currentIndex()].path, values)
 
-    def _show(self) -> None:
+    def _show_titles(self) -> None:
         """Show the titles of the copies, or why none can be made."""
         said, why = "", ""
         try:

@@ -15,10 +15,10 @@ from study_app.designer.header import Notice
 from study_app.designer.new_study_page import source_of
 from study_app.designer.prompts import ConfirmCard
 from study_app.designer.version_rows import FILE, Comparison
-from study_app.designer.versions import KnownRuns, SaveCard, compare, newest, version_of
+from study_app.designer.versions import KnownRuns, SaveCard, compare, latest_run, version_of
 from study_app.designer.window import DesignerPlace
 from study_app.errors import StudyError
-from study_app.gui.home.study_facts import time_words
+from study_app.gui.home.study_facts import time_text
 from study_app.number_text import counted
 from study_app.store.drafts import draft_of
 from study_app.store.study_settings import keep_original
@@ -57,32 +57,32 @@ class Saving(QObject):
         self._drafting.timeout.connect(self.write_draft)
         application = QGuiApplication.instance()
         assert isinstance(application, QGuiApplication)  # noqa: S101 - a window has one
-        application.applicationStateChanged.connect(self._come_back)
-        editing.opened_other.connect(self._begin)
+        application.applicationStateChanged.connect(self._look_after_return)
+        editing.opened_other.connect(self._show_opened)
         editing.edited.connect(self._end_notice)
         place.left.connect(self.leave)
 
     # the banner
 
-    def _begin(self) -> None:
-        self._note(None)
+    def _show_opened(self) -> None:
+        self._show_notice(None)
         self.banner, opened = None, self.editing.opened
         if opened is None:
             return
         self._drafting.start(DRAFT_MS)
         self._others, self._trouble = opened.keeper.others, ""
         self.offer_to_discard()
-        self.banner = _banner(opened) or self._notice
+        self.banner = _banner_notice(opened) or self._notice
 
     def offer_to_discard(self) -> None:
         """Show the time of the restored draft; for a study that was never saved each time it is opened."""
         opened = self.editing.opened
         draft = None if opened is None else opened.draft if opened.base else draft_of(opened.file)
         if opened is not None and draft is not None and opened.edited:
-            sentence = f"Draft of {time_words(draft.kept_at)}, {'not' if opened.base else 'never'} saved"
-            self._note(sentence, ("discard", "Discard the draft"), lasts=True)
+            sentence = f"Draft of {time_text(draft.kept_at)}, {'not' if opened.base else 'never'} saved"
+            self._show_notice(sentence, ("discard", "Discard the draft"), lasts=True)
 
-    def _note(self, sentence: str | None, *actions: tuple[str, str], lasts: bool | None = None) -> None:
+    def _show_notice(self, sentence: str | None, *actions: tuple[str, str], lasts: bool | None = None) -> None:
         """Show a notice unless another one needs an answer; None removes it, ``lasts`` sets its duration."""
         self._notice, self._lasts = None if sentence is None else Notice(sentence, actions, closes=True), lasts
 
@@ -93,9 +93,9 @@ class Saving(QObject):
             self._close_notice(opened)
 
     def _close_notice(self, opened: Document) -> None:
-        self._note(None)
+        self._show_notice(None)
         opened.draft = None  # it is not announced again
-        self.banner = _banner(opened)
+        self.banner = _banner_notice(opened)
         self.place.banner.show_notice(self.banner)
 
     def look_again(self) -> None:
@@ -108,13 +108,13 @@ class Saving(QObject):
             return
         before = opened.read_only, self.banner
         opened.read_only = opened.why_read_only(self.editing.results)
-        if not opened.edited and opened.file.exists() and _changed_outside(opened):
-            self._try(opened, opened.take_outside)
-        self.banner = _banner(opened) or self._notice
+        if not opened.edited and opened.file.exists() and _is_changed_outside(opened):
+            self._try_action(opened, opened.take_file_content)
+        self.banner = _banner_notice(opened) or self._notice
         if before != (opened.read_only, self.banner):
-            self.editing.announce()
+            self.editing.announce_edit()
 
-    def _come_back(self, state: Qt.ApplicationState) -> None:
+    def _look_after_return(self, state: Qt.ApplicationState) -> None:
         """Check the file when the program becomes active: another one may have written it."""
         if state == Qt.ApplicationState.ApplicationActive and self.place.isVisible():
             self.place.flush()
@@ -132,7 +132,7 @@ class Saving(QObject):
             return
         if action == "compare":
             drafts = [version.hash for version in kept_versions(opened.file) if version.origin == "draft"]
-            self.compare_asked.emit(FILE if _changed_outside(opened) or not drafts else drafts[-1])
+            self.compare_asked.emit(FILE if _is_changed_outside(opened) or not drafts else drafts[-1])
             return
         if action == "close":
             self._close_notice(opened)
@@ -141,24 +141,24 @@ class Saving(QObject):
             lost = "was never saved: without its draft nothing of this study is left. This cannot be undone."
             title = f"Discard “{opened.title or opened.file.stem}”?"
             card = ConfirmCard(title, f"{opened.file.name} {lost}", "Discard the draft", "trash")
-            card.answered.connect(self.give_up)
+            card.answered.connect(self.discard_study)
             self.place.show_prompt(card, card.first)
             return
-        self._note(None)
+        self._show_notice(None)
         if action == "keep":
-            self._try(opened, lambda: opened.keep_mine(time.monotonic()))
+            self._try_action(opened, lambda: opened.keep_edits(time.monotonic()))
         elif action == "take":
-            self._try(opened, opened.take_outside)
+            self._try_action(opened, opened.take_file_content)
         else:
-            self._try(opened, opened.discard_draft)
+            self._try_action(opened, opened.discard_draft)
 
-    def give_up(self) -> None:
+    def discard_study(self) -> None:
         self.place.flush()
         opened = self.editing.opened
         if opened is None or opened.base:
             return
         try:
-            opened.give_up()
+            opened.discard()
         except StudyError as error:
             self.place.message.emit("The draft was not discarded", f"{error}.")
             return
@@ -176,13 +176,13 @@ class Saving(QObject):
             return
         known = self.runs.read()
         standing = opened.standing(known)
-        if standing.asks and not _changed_outside(opened):
-            self._ask(opened, standing)
+        if standing.asks and not _is_changed_outside(opened):
+            self._show_save_card(opened, standing)
         else:
-            self._write(opened)
+            self._save_file(opened)
 
-    def _ask(self, opened: Document, standing: Standing) -> None:
-        run = newest(self.runs.known)
+    def _show_save_card(self, opened: Document, standing: Standing) -> None:
+        run = latest_run(self.runs.known)
         comparison = Comparison() if run is None else compare(version_of(opened, run), opened.study)
         problems = len(opened.study.faults)
         self.card = card = SaveCard(standing, self.runs.known, comparison, problems)
@@ -205,14 +205,14 @@ class Saving(QObject):
                 self.card.refuse(f"{refusal}.")
             return
         self.place.close_prompt()
-        self._write(opened)
+        self._save_file(opened)
 
     def save_as_another(self, name: str) -> None:
         opened = self.editing.writable
         if opened is None:
             return
         try:
-            made = opened.saved_as(name)
+            made = opened.copy_as(name)
         except StudyError as refusal:
             if self.card is not None:
                 self.card.refuse(f"{refusal}.")
@@ -221,9 +221,9 @@ class Saving(QObject):
         self.place.close_prompt()
         keep_original(made.file, opened.file.stem)
         self.continued.emit(made)
-        self._write(made)
+        self._save_file(made)
 
-    def _write(self, opened: Document) -> None:
+    def _save_file(self, opened: Document) -> None:
         try:
             opened.save(self.runs.read())
         except ChangedOutsideError:
@@ -231,11 +231,11 @@ class Saving(QObject):
             return
         except StudyError as error:
             self.place.message.emit("The study was not saved", f"{error}.")
-            self.editing.announce()
+            self.editing.announce_edit()
             return
         count = len(opened.study.faults)
         said = f"Saved. It cannot be run yet: {counted(count, 'problem')}" if count else None
-        self._note(said, ("problems", "Show the list"), lasts=False)
+        self._show_notice(said, ("problems", "Show the list"), lasts=False)
         self._show_banner(opened)
         self.saved.emit(opened.file)
 
@@ -264,12 +264,12 @@ class Saving(QObject):
         if opened.keeper.others > self._others:
             self._others = opened.keeper.others
             said = "Another window of the program edits this study, too: its unsaved edits are kept as a version"
-            self._note(said, ("compare", "Compare"))
+            self._show_notice(said, ("compare", "Compare"))
             self._show_banner(opened)
         if written:
             self.kept.emit()
 
-    def _try(self, opened: Document, act: Callable[[], object]) -> None:
+    def _try_action(self, opened: Document, act: Callable[[], object]) -> None:
         try:
             act()
         except StudyError as error:
@@ -277,11 +277,11 @@ class Saving(QObject):
         self._show_banner(opened)
 
     def _show_banner(self, opened: Document) -> None:
-        self.banner = _banner(opened) or self._notice
-        self.editing.announce()
+        self.banner = _banner_notice(opened) or self._notice
+        self.editing.announce_edit()
 
 
-def _banner(opened: Document) -> Notice | None:
+def _banner_notice(opened: Document) -> Notice | None:
     """Return why a study is read-only, or that another program changed its file; None if neither applies."""
     if opened.read_only:
         return Notice(opened.read_only, (("copy", "Make a copy …"),))
@@ -300,7 +300,7 @@ def _banner(opened: Document) -> Notice | None:
     )
 
 
-def _changed_outside(opened: Document) -> bool:
+def _is_changed_outside(opened: Document) -> bool:
     """Return whether the file can be read and differs from the content that is being edited."""
     try:
         return opened.changed_outside()

@@ -12,7 +12,7 @@ from study_app.designer.document.document import Standing
 from study_app.designer.document.elements import element_of, study_title, title_of
 from study_app.designer.document.fields import label_of
 from study_app.designer.document.study import Study
-from study_app.gui.sessions.session_facts import started_words
+from study_app.gui.sessions.session_facts import start_time_text
 from study_app.gui.theme.theme import Tone
 from study_app.number_text import counted
 from study_app.protocol.differences import document_differences
@@ -47,7 +47,7 @@ class Comparison:
 def version_chip(standing: Standing, known: Iterable[Run]) -> VersionChip:
     """Return the chip of a study with this standing."""
     known = tuple(known)
-    tip = "\n".join(f"Version {run.version}: {counts(run)}" for run in known)
+    tip = "\n".join(f"Version {run.version}: {run_counts(run)}" for run in known)
     save = f"Save {standing.version} …" if standing.asks else "Save"
     if not standing.was:
         text = "Piloted" if any(run.pilots for run in known) else "Rehearsed" if known else "Not run yet"
@@ -60,7 +60,7 @@ def version_chip(standing: Standing, known: Iterable[Run]) -> VersionChip:
     return VersionChip(tone="accent", icon="pen", words=f"{standing.version}, was {standing.was}", tip=tip, save=save)
 
 
-def counts(run: Run) -> str:
+def run_counts(run: Run) -> str:
     """Return "12 sessions, 2 pilots, 1 rehearsal", without zero counts."""
     numbers = ((run.sessions, "session"), (run.pilots, "pilot"), (run.rehearsals, "rehearsal"))
     return ", ".join(counted(number, word) for number, word in numbers if number)
@@ -75,14 +75,16 @@ def version_choices(
     """
     choices = [(FILE, file)] if file else []
     ran = {run.hash for run in known}
-    choices += [(run.hash, f"{run.version}: {counts(run)}, last {_when(run.last, now)}") for run in reversed(known)]
+    choices += [
+        (run.hash, f"{run.version}: {run_counts(run)}, last {_time_text(run.last, now)}") for run in reversed(known)
+    ]
     saved = [version for version in kept if version.hash not in ran][-MOST_KEPT:]
-    choices += [(version.hash, _kept_words(version, now)) for version in reversed(saved)]
+    choices += [(version.hash, _kept_label(version, now)) for version in reversed(saved)]
     return tuple(choices)
 
 
-def _kept_words(version: Kept, now: datetime) -> str:
-    when = _when(version.at, now)
+def _kept_label(version: Kept, now: datetime) -> str:
+    when = _time_text(version.at, now)
     if version.origin == "draft":
         return f"Unsaved edits of another window, {when}"
     stated = _STATED.search((kept_content(version.hash) or b"").decode("utf-8", "replace"))
@@ -90,9 +92,9 @@ def _kept_words(version: Kept, now: datetime) -> str:
     return f"{stated[1] if stated else 'No version'}: {how} {when}"
 
 
-def _when(moment: str, now: datetime) -> str:
+def _time_text(moment: str, now: datetime) -> str:
     try:
-        text = started_words(datetime.fromisoformat(moment).astimezone(now.tzinfo), now)
+        text = start_time_text(datetime.fromisoformat(moment).astimezone(now.tzinfo), now)
     except ValueError:
         return "at an unknown time"
     return f"{text[:1].lower()}{text[1:]}"
@@ -107,7 +109,7 @@ def draft_title(draft: str, folder: Path) -> str:
     return study_title(Study(draft, folder).document)
 
 
-def edited_words(saved: str, draft: str, folder: Path) -> str:
+def edited_elements_text(saved: str, draft: str, folder: Path) -> str:
     """Return the elements in which a draft differs from its file: ": Water, Welcome and 2 more"."""
     study = Study(draft, folder)
     try:

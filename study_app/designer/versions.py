@@ -16,17 +16,17 @@ from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QWidget
 
 from study_app.designer.document.document import Document, Standing
 from study_app.designer.document.study import Study
-from study_app.designer.document.toml_text import shown
+from study_app.designer.document.toml_text import with_line_feeds
 from study_app.designer.editing import Editing
 from study_app.designer.file import Colours
-from study_app.designer.parts import dense, small_button
+from study_app.designer.parts import make_dense, small_button
 from study_app.designer.prompts import ConfirmCard, Prompt
-from study_app.designer.version_rows import FILE, Comparison, VersionChip, counts, version_chip, version_choices
+from study_app.designer.version_rows import FILE, Comparison, VersionChip, run_counts, version_chip, version_choices
 from study_app.designer.window import DesignerPlace, PanePage
 from study_app.errors import StoreError
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Coloured
-from study_app.gui.widgets.background import Background, delayed
+from study_app.gui.widgets.background import Background, delayed_call
 from study_app.gui.widgets.boxes import add_layout, add_parts, hbox
 from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.controls import ActionButton, Choice
@@ -35,7 +35,7 @@ from study_app.number_text import capitalised, counted
 from study_app.protocol.differences import differences
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.document import value_at
-from study_app.protocol.source.files import unbundled, with_liquid_files
+from study_app.protocol.source.files import unbundle, with_liquid_files
 from study_app.store.folders import SessionFolder
 from study_app.store.receipt import without_conditions
 from study_app.store.study_runs import Run, keep_run_content, recorded_items, run_of, runs_of_study, source_of
@@ -59,15 +59,15 @@ class KnownRuns(QObject):
         self.items: Mapping[tuple[str, str], int] = {}
         self.chip = VersionChip()
         self._reader = Background(self)
-        self._reader.done.connect(self._take)
-        self._resting = delayed(self, LOOK_MS, self._stand)
-        editing.opened_other.connect(self._begin)
+        self._reader.done.connect(self._take_runs)
+        self._resting = delayed_call(self, LOOK_MS, self._show_standing)
+        editing.opened_other.connect(self._forget_runs)
         editing.edited.connect(self._resting.start)
 
-    def look(self) -> None:
+    def read_in_background(self) -> None:
         """Read in the background which sessions there are."""
         if (opened := self.editing.opened) is not None:
-            self._reader.run(partial(_read, self.editing.results, opened.name, opened.file))
+            self._reader.run(partial(_read_runs, self.editing.results, opened.name, opened.file))
 
     def read(self) -> tuple[Run, ...]:
         if (opened := self.editing.opened) is not None:
@@ -77,19 +77,19 @@ class KnownRuns(QObject):
     def standing(self) -> Standing | None:
         return None if self.editing.opened is None else self.editing.opened.standing(self.known)
 
-    def _begin(self) -> None:
+    def _forget_runs(self) -> None:
         self.known, self.items, self.chip = (), {}, VersionChip()
-        self.look()
+        self.read_in_background()
 
-    def _take(self, answer: tuple[str, tuple[Run, ...], Mapping[tuple[str, str], int]]) -> None:
+    def _take_runs(self, answer: tuple[str, tuple[Run, ...], Mapping[tuple[str, str], int]]) -> None:
         if self.editing.opened is not None and self.editing.opened.name == answer[0]:
             fresh = answer[1:] != (self.known, self.items)
             _, self.known, self.items = answer
-            self._stand()
+            self._show_standing()
             if fresh:
                 self.changed.emit()
 
-    def _stand(self) -> None:
+    def _show_standing(self) -> None:
         standing = self.standing()
         chip = VersionChip() if standing is None else version_chip(standing, self.known)
         if chip != self.chip:
@@ -97,7 +97,7 @@ class KnownRuns(QObject):
             self.changed.emit()
 
 
-def _read(results: Path, study: str, file: Path) -> tuple[str, tuple[Run, ...], Mapping[tuple[str, str], int]]:
+def _read_runs(results: Path, study: str, file: Path) -> tuple[str, tuple[Run, ...], Mapping[tuple[str, str], int]]:
     known = runs_of_study(results, study)
     with contextlib.suppress(StoreError):  # a draft that cannot be written reports itself
         keep_run_content(file, known)
@@ -144,7 +144,7 @@ class SaveCard(Prompt):
     changes_asked = Signal()
 
     def __init__(self, standing: Standing, known: Iterable[Run], difference: Comparison, problems: int) -> None:
-        sessions = "; ".join(f"{counts(run)} with version {run.version}" for run in known if run.sessions)
+        sessions = "; ".join(f"{run_counts(run)} with version {run.version}" for run in known if run.sessions)
         super().__init__(
             "Save another version",
             f"This study was run: {sessions}. A version that was run is never overwritten: the study is saved under "
@@ -175,10 +175,10 @@ class SaveCard(Prompt):
         self._naming = False
         self._show_name(naming=False)
         self.first: QWidget = self.save
-        self.version.textEdited.connect(lambda _text: self._say())
-        self.version.returnPressed.connect(self._save)
-        self.name.returnPressed.connect(self._save)
-        self.save.clicked.connect(self._save)
+        self.version.textEdited.connect(lambda _text: self._show_action())
+        self.version.returnPressed.connect(self._ask_to_save)
+        self.name.returnPressed.connect(self._ask_to_save)
+        self.save.clicked.connect(self._ask_to_save)
         self.another.clicked.connect(lambda: self._show_name(naming=True))
         self.changes.clicked.connect(self.changes_asked)
 
@@ -192,16 +192,16 @@ class SaveCard(Prompt):
         for part in (self._of_name, self.name):
             part.setVisible(naming)
         self.another.setVisible(not naming)
-        self._say()
+        self._show_action()
         if naming:
             self.name.setFocus()
 
-    def _say(self) -> None:
+    def _show_action(self) -> None:
         self.refuse("")
         text = "Save the new study" if self._naming else f"Save {self.version.text().strip()}"
         self.save.show_action("save", text)
 
-    def _save(self) -> None:
+    def _ask_to_save(self) -> None:
         if self._naming:
             self.another_asked.emit(self.name.text().strip())
         else:
@@ -234,7 +234,7 @@ class Version(NamedTuple):
 
     @property
     def text(self) -> str | None:
-        return None if self.source is None else unbundled(self.source.encode())[0].decode()
+        return None if self.source is None else unbundle(self.source.encode())[0].decode()
 
 
 def version_of(opened: Document, run: Run) -> Version:
@@ -268,14 +268,14 @@ def compare(version: Version, study: Study) -> Comparison:
             return Comparison((), FAULTY)
         return Comparison(differences(held, json.loads(json.dumps(without_conditions(study.protocol)))), NO_COPY)
     now = study.text
-    if unbundled(version.source.encode())[1]:  # kept with its liquid files
+    if unbundle(version.source.encode())[1]:  # kept with its liquid files
         now = with_liquid_files(now.encode(), study.folder).decode()
-    before, after = (shown(text).split("\n") for text in (version.source, now))
+    before, after = (with_line_feeds(text).split("\n") for text in (version.source, now))
     _, _, *lines = unified_diff(before, after, lineterm="") if before != after else ("", "")
     return Comparison(tuple(lines), "" if lines else EQUAL)
 
 
-def newest(known: Iterable[Run]) -> Run | None:
+def latest_run(known: Iterable[Run]) -> Run | None:
     """Return the version that participants were run with last, else the last pilot or rehearsal."""
     ran = tuple(known)
     return next((run for run in reversed(ran) if run.sessions), ran[-1] if ran else None)
@@ -293,7 +293,7 @@ class Changes(Card):
         self._asked: Run | None = None
         self._choices: tuple[tuple[str, str], ...] = ()
         self.setAccessibleName("Changes")
-        self.version = dense(Choice(), "Version to compare with")
+        self.version = make_dense(Choice(), "Version to compare with")
         self.version.setMinimumWidth(120)
         self.restore = small_button("undo", "Restore", height=34)
         self.restore.setToolTip("Give the study the text of this version, as one step")
@@ -308,14 +308,14 @@ class Changes(Card):
         for part in (self.top, self.note, self.difference):
             part.hide()
         place.pane.add_page(PanePage(name=TAB, words="Changes", body=self, with_facts=False))
-        self._resting = delayed(self, REST_MS, self.compare_now)
+        self._resting = delayed_call(self, REST_MS, self.compare_now)
         place.pane.tab_shown.connect(lambda _tab: self.compare_now())
         place.header.version.clicked.connect(lambda: self.compare_with(""))
-        editing.opened_other.connect(self._begin)
+        editing.opened_other.connect(self._forget_choice)
         editing.edited.connect(self._resting.start)
         runs.changed.connect(self.compare_now)
         self.version.activated.connect(lambda at: self.compare_with(str(self.version.itemData(at))))
-        self.restore.clicked.connect(self._restore)
+        self.restore.clicked.connect(self._restore_version)
 
     def compare_with(self, key: str) -> None:
         self._wanted = key or self._wanted
@@ -331,7 +331,7 @@ class Changes(Card):
         self._asked = run
         self.compare_with(run.hash)
 
-    def _begin(self) -> None:
+    def _forget_choice(self) -> None:
         self._wanted, self._asked = "", None
         self._resting.start()
 
@@ -340,9 +340,9 @@ class Changes(Card):
         opened = self.editing.opened
         if opened is None or self.place.pane.tab != TAB:
             return
-        before, self._choices = (self._choices, self.chosen), self._found_choices(opened)
+        before, self._choices = (self._choices, self.chosen), self._version_choices(opened)
         keys = [key for key, _ in self._choices]
-        newest_run = newest(self.runs.known)
+        newest_run = latest_run(self.runs.known)
         preferred = (self._wanted, "" if newest_run is None else newest_run.hash, *keys)
         self.chosen = next((key for key in preferred if key in keys), "")
         if (self._choices, self.chosen) != before:
@@ -361,7 +361,7 @@ class Changes(Card):
         self.difference.show_lines(comparison.lines)
         self.restore.setEnabled(not opened.read_only and version.text not in {None, opened.study.text})
 
-    def _found_choices(self, opened: Document) -> tuple[tuple[str, str], ...]:
+    def _version_choices(self, opened: Document) -> tuple[tuple[str, str], ...]:
         file = ""
         with suppress(StoreError):  # an unreadable file is not offered for comparison
             if opened.base and opened.file.exists():
@@ -370,9 +370,9 @@ class Changes(Card):
                 elif opened.edited:
                     file = "The file, without the edits"
         now = datetime.now().astimezone()
-        return version_choices(self._known(), kept_versions(opened.file), file, now)
+        return version_choices(self._known_runs(), kept_versions(opened.file), file, now)
 
-    def _known(self) -> tuple[Run, ...]:
+    def _known_runs(self) -> tuple[Run, ...]:
         """Return the run versions, with the requested session's version wherever its results are."""
         known = self.runs.known
         asked = self._asked
@@ -381,15 +381,15 @@ class Changes(Card):
     def _version(self, opened: Document, key: str) -> Version:
         if key == FILE:
             return file_version(opened.file)
-        run = next((run for run in self._known() if run.hash == key), None)
+        run = next((run for run in self._known_runs() if run.hash == key), None)
         return kept_version(key) if run is None else version_of(opened, run)
 
-    def _restore(self) -> None:
+    def _restore_version(self) -> None:
         self.place.flush()
         opened = self.editing.writable
         text = None if opened is None else self._version(opened, self.chosen).text
         if text is not None:
-            self.editing.make(f"Restore {dict(self._choices)[self.chosen]}", text=text)
+            self.editing.make_step(f"Restore {dict(self._choices)[self.chosen]}", text=text)
             self.compare_now()
 
 
@@ -407,43 +407,43 @@ class Renaming(QObject):
         super().__init__(editing)
         self.editing, self.place, self.runs = editing, place, runs
         self._unlocked: Place = ()
-        editing.recorded = self._recorded
-        editing.changed.connect(self._lock)
-        runs.changed.connect(self._lock)
-        place.form.head.unlock_asked.connect(self._explain)
+        editing.recorded = self._recorded_ids
+        editing.changed.connect(self._update_lock)
+        runs.changed.connect(self._update_lock)
+        place.form.head.unlock_asked.connect(self._ask_to_unlock)
 
-    def _id(self, path: Place) -> str:
+    def _item_id(self, path: Place) -> str:
         opened = self.editing.opened
         value = None if opened is None else value_at(opened.study.document, path)
         if not isinstance(value, dict):
             return ""
         return str(value.get("id", path[-1]))
 
-    def _why(self, path: Place) -> str:
+    def _lock_reason(self, path: Place) -> str:
         if len(path) != 4 or path[2] != "items" or path == self._unlocked:
             return ""
-        sessions = self.runs.items.get((str(path[1]), self._id(path)), 0)
+        sessions = self.runs.items.get((str(path[1]), self._item_id(path)), 0)
         return f"Answers of {counted(sessions, 'session')} are recorded under this id." if sessions else ""
 
-    def _recorded(self, element: Place) -> frozenset[str]:
+    def _recorded_ids(self, element: Place) -> frozenset[str]:
         """Return the ids of a question's questionnaire that have recorded answers."""
         known = self.runs.items if element[2:3] == ("items",) else ()
         return frozenset(name for form, name in known if form == element[1])
 
-    def _lock(self) -> None:
+    def _update_lock(self) -> None:
         path = self.editing.selected
         if path != self._unlocked:
             self._unlocked = ()
-        self.place.form.head.show_lock(path, self._why(path))
+        self.place.form.head.show_lock(path, self._lock_reason(path))
 
-    def _explain(self) -> None:
+    def _ask_to_unlock(self) -> None:
         path = self.editing.selected
-        title, why = f"Change the id “{self._id(path)}”?", f"{self._why(path)} With another id:"
+        title, why = f"Change the id “{self._item_id(path)}”?", f"{self._lock_reason(path)} With another id:"
         card = ConfirmCard(title, why, "Change the id", breaks=BREAKS)
         card.answered.connect(lambda _action: self._unlock(path))
         self.place.show_prompt(card, card.first)
 
     def _unlock(self, path: Place) -> None:
         self._unlocked = path
-        self._lock()
+        self._update_lock()
         self.place.form.head.edit_id()

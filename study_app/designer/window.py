@@ -35,10 +35,10 @@ from study_app.designer.outline import Addable, AddList, ElementPath, OutlineCar
 from study_app.designer.parts import Segments, small_button
 from study_app.designer.problems import ProblemRow, ProblemsCard
 from study_app.designer.prompts import Prompt
-from study_app.gui.kit.commands import COMMANDS, add_commands, key_cap, press, tip
+from study_app.gui.kit.commands import COMMANDS, add_commands, command_tip, connect_button, key_cap
 from study_app.gui.theme.theme import SHADOW, font
-from study_app.gui.theme.themed import name_bars, remove_widget
-from study_app.gui.widgets.accessible import say
+from study_app.gui.theme.themed import name_scroll_bars, remove_widget
+from study_app.gui.widgets.accessible import announce
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Icon
 from study_app.gui.widgets.controls import PressedByEnter
@@ -175,8 +175,8 @@ class PathBar(QWidget):
         super().__init__()
         self.setAccessibleName("Path of the element")
         self.outline = small_button("layers", "Outline", cap=key_cap("outline"), height=40)
-        self.outline.setAccessibleName(tip("outline"))
-        self.outline.setToolTip(tip("outline"))
+        self.outline.setAccessibleName(command_tip("outline"))
+        self.outline.setToolTip(command_tip("outline"))
         self.outline.clicked.connect(self.outline_asked)
         self.steps: list[Crumb] = []
         self._parts: list[QWidget] = []
@@ -204,18 +204,18 @@ class PathBar(QWidget):
 SHORTCUT = Qt.FocusReason.ShortcutFocusReason
 
 
-def stops(part: QWidget) -> Iterator[QWidget]:
+def focus_stops(part: QWidget) -> Iterator[QWidget]:
     """Yield the focus stops of a part from top to bottom, parts beside each other from left to right."""
     if part.focusPolicy() & Qt.FocusPolicy.TabFocus and part.focusProxy() is None and part.isEnabled():
         yield part
     inner = (
         child for child in part.children() if isinstance(child, QWidget) and child.isVisible() and not child.isWindow()
     )
-    for child in sorted(inner, key=cmp_to_key(_read_before)):
-        yield from stops(child)
+    for child in sorted(inner, key=cmp_to_key(_reading_order)):
+        yield from focus_stops(child)
 
 
-def _read_before(part: QWidget, other: QWidget) -> int:
+def _reading_order(part: QWidget, other: QWidget) -> int:
     first, second = part.geometry(), other.geometry()
     if first.bottom() < second.top() or second.bottom() < first.top():
         return first.top() - second.top()
@@ -240,7 +240,7 @@ class Arrangement(QWidget):
         self.path = PathBar()
         self.path.outline_asked.connect(self.toggle_drawer)
         self.sides = Segments("Side")
-        self.sides.tips = {"form": tip("form"), "pane": tip("views")}
+        self.sides.tips = {"form": command_tip("form"), "pane": command_tip("views")}
         self.sides.chosen.connect(lambda side: self.show_side(str(side)))
         self.prompts = vbox()
         self._left = vbox((form, 1), spacing=12 - 2 * SHADOW)
@@ -351,7 +351,7 @@ class Arrangement(QWidget):
 
     def focus_row(self, path: ElementPath) -> bool:
         self.show_side("form")
-        return self.form.focus(path)
+        return self.form.focus_row(path)
 
     def focus_element(self) -> None:
         """Focus the selected element's row, or its form if the outline is a drawer."""
@@ -443,13 +443,15 @@ class DesignerPlace(Place):
                 name="measures", words="Measures", body=self.measures, aside=self.measures.controls, with_facts=False
             )
         )
-        self.pane.add_page(PanePage(name="file", words="File", body=self.file, aside=self.file.aside, tip=tip("file")))
+        self.pane.add_page(
+            PanePage(name="file", words="File", body=self.file, aside=self.file.aside, tip=command_tip("file"))
+        )
         self.parts = Arrangement(self.header, self.outline, self.form, self.pane, self.file, self.problems)
         self.sides = self.parts.sides
         self.adding, self.nothing = AddList(self), NoStudyCard()
         self._lay_out()
         self._connect()
-        self._take_keys()
+        self._add_key_commands()
         self.problems.hide()
         self.show_view(DesignerView())
 
@@ -476,21 +478,21 @@ class DesignerPlace(Place):
         outline.form_asked.connect(self.parts.focus_form)
         outline.element_clicked.connect(lambda: self.parts.focus_form() if self.parts.drawer else None)
         outline.tree.dropped.connect(lambda entry, to: self.asked.emit(MoveTo(entry, index_of(to))))
-        self.adding.chosen.connect(lambda entry: self._take_asked(entry.asks))
+        self.adding.chosen.connect(lambda entry: self._handle_request(entry.asks))
         self.parts.path.open_asked.connect(partial(self.finish, "select"))
-        form.asked.connect(self._take_asked)
+        form.asked.connect(self._handle_request)
         form.head.id_typed.connect(partial(self.ask, "judge id"))
         self.file.editor.typed.connect(lambda text: self.asked.emit(RetypeFile(text)))
         self.problems.opened.connect(self._open_problem)
         self.problems.next.clicked.connect(self.open_next_problem)
         for part in (self.problems, form):
-            part.repair_asked.connect(self._repair)
+            part.repair_asked.connect(self._ask_to_repair)
         self.problems.close_asked.connect(self.parts.return_keyboard)  # first, else Qt hands it to the page
         self.problems.close_asked.connect(self.problems.hide)
         self.new_page.begin_asked.connect(partial(self.ask, "begin"))
         self.new_page.given_up.connect(self.close_new)
 
-    def _take_keys(self) -> None:
+    def _add_key_commands(self) -> None:
         head, tree = self.form.head, self.outline.tree
         runs = {
             command.id: (command.within, partial(command.run, self)) for command in COMMANDS if command.run is not None
@@ -502,7 +504,7 @@ class DesignerPlace(Place):
             ("save", self.header.save), ("up", head.up), ("down", head.down), ("duplicate", head.copy),
             ("series", head.series), ("add", self.outline.add), ("duplicate", self.outline.duplicate),
         ):  # fmt: skip
-            press(button, self.commands[name])
+            connect_button(button, self.commands[name])
         head.delete.clicked.connect(self.delete)
         menu = ("add", "duplicate", "up", "down", "rename", "delete")
         tree.addActions([self.commands[name] for name in menu])
@@ -558,7 +560,7 @@ class DesignerPlace(Place):
         self.form.show_repairs(self.problems.repairs)
         self.outline.tree.rows.movable = not view.header.read_only
         if self.outline.rows:
-            self.outline.mark(view.form.path)
+            self.outline.mark_row(view.form.path)
 
     def show_repairs(self, row: ProblemRow, sentences: tuple[str, ...]) -> None:
         self.problems.show_repairs(row, sentences)
@@ -587,7 +589,7 @@ class DesignerPlace(Place):
         self.prompt = prompt
         prompt.answered.connect(lambda _answer: self.close_prompt())
         prompt.given_up.connect(self.close_prompt)
-        name_bars(prompt)
+        name_scroll_bars(prompt)
         self.parts.prompts.addWidget(prompt)
         first.setFocus()
 
@@ -611,9 +613,9 @@ class DesignerPlace(Place):
 
     def finish(self, what: Task, *arguments: Any) -> None:
         """Hand on the typed text, then request a task with the element's resulting id."""
-        self.asked.emit(self._after_typing(Do(what, arguments)))
+        self.asked.emit(self._with_typed_id(Do(what, arguments)))
 
-    def _after_typing(self, asked: Any) -> Any:
+    def _with_typed_id(self, asked: Any) -> Any:
         """Hand on the typed text; return a path or request with the element's resulting id."""
         before = () if self.form.form is None else self.form.form.path
         self.flush()
@@ -632,14 +634,14 @@ class DesignerPlace(Place):
         button = self.outline.add if self.outline.add.isVisible() else self.header
         self.adding.open(every, button.mapToGlobal(button.rect().topLeft()))
 
-    def _take_asked(self, asked: object) -> None:
+    def _handle_request(self, asked: object) -> None:
         """Hand on a request after the typed text; the page carries out its own tasks."""
         if not (isinstance(asked, SetText | LeaveText) or (isinstance(asked, SetValue) and asked.typing)):
-            asked = self._after_typing(asked)
+            asked = self._with_typed_id(asked)
         match asked:
             case Do("write", (path,)):
                 self.ask("select", path)
-                self.form.focus((*path, "text"))
+                self.form.focus_row((*path, "text"))
             case GoTo(element, field):
                 self.ask("select", element)
                 self.parts.focus_field(field)
@@ -649,7 +651,7 @@ class DesignerPlace(Place):
     def show_step(self, step: Step) -> None:
         """Announce a step and focus the first text of a new element."""
         if step.said:
-            say(self, step.said)
+            announce(self, step.said)
         beside = not self.parts.drawer and self.outline.isAncestorOf(self.focusWidget())
         if step.fresh and not (step.fresh == "copy" and beside):  # after a copy in an open outline, the focus stays
             self.parts.show_side("form")
@@ -659,10 +661,10 @@ class DesignerPlace(Place):
         """Open the next problem and focus its repair, if it has one."""
         if self.view.form is not None:
             self.flush()
-        if not (coming := self.problems.coming):
+        if not (coming := self.problems.rows_after_current):
             return
         row = coming[0]
-        self.problems.open(row)
+        self.problems.open_problem(row)
         self.finish("repairs", row)
         for button in (self.form.repairs_of(row) or self.problems.repairs_of(row))[:1]:
             button.setFocus(Qt.FocusReason.ShortcutFocusReason)
@@ -680,7 +682,7 @@ class DesignerPlace(Place):
         if row.line is not None:
             self.file.editor.go_to(row.line - 1)
 
-    def _repair(self, row: ProblemRow, sentence: str) -> None:
+    def _ask_to_repair(self, row: ProblemRow, sentence: str) -> None:
         """Make a repair and go to its field."""
         self.problems.set_current(row)
         self.finish("repair", row, sentence)
@@ -705,7 +707,7 @@ class DesignerPlace(Place):
         """Let Tab follow the reading order of visible parts, then go to the start of the window; Shift+Tab back."""
         self.flush()
         QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)  # new parts are laid out
-        in_order, here = list(stops(self)), self.window().focusWidget()
+        in_order, here = list(focus_stops(self)), self.window().focusWidget()
         if here not in in_order:
             if not (forward and in_order and here is not None and here.isAncestorOf(self.stack)):  # the place itself
                 return super().focusNextPrevChild(forward)
@@ -718,7 +720,7 @@ class DesignerPlace(Place):
         to = (
             in_order[at + (1 if forward else -1)]
             if at + 1 < len(in_order) or not forward
-            else next(stops(self.window()))
+            else next(focus_stops(self.window()))
         )
         to.setFocus(reason)
         return True

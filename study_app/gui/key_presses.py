@@ -52,9 +52,9 @@ class KeyPresses(QObject):
         self._sent: QKeyEvent | None = None  # the event that this filter is sending
         self._settling = QTimer(self, singleShot=True, interval=RELEASE_MS)
         # An overdue timer may come before a press that waits in the queue; a timer without a time comes after it.
-        self._settling.timeout.connect(lambda: QTimer.singleShot(0, self, self._settle_if_due))
-        application.focusWindowChanged.connect(self._watch)
-        self._watch(application.focusWindow())
+        self._settling.timeout.connect(lambda: QTimer.singleShot(0, self, self._deliver_if_due))
+        application.focusWindowChanged.connect(self._watch_window)
+        self._watch_window(application.focusWindow())
 
     def begin_page(self, page: QWidget) -> None:
         """Ignore keys held and clicks made before ``page`` appeared; clicks for 250 ms."""
@@ -73,9 +73,9 @@ class KeyPresses(QObject):
         if event.type() not in {QEvent.Type.KeyPress, QEvent.Type.ShortcutOverride}:
             return False
         key = _physical_key(event)
-        repeats = event.isAutoRepeat() or self._repeats(key, event)
+        repeats = event.isAutoRepeat() or self._is_repeat(key, event)
         if not repeats:
-            self._settle()
+            self._deliver_release()
         if event.type() == QEvent.Type.ShortcutOverride:
             if repeats:
                 event.accept()  # not a shortcut's
@@ -84,36 +84,36 @@ class KeyPresses(QObject):
             return repeats
         if repeats:
             self._release = None
-            self._repeat(watched, key, event)
+            self._send_repeat(watched, key, event)
             return True
         self._receivers[key] = QGuiApplication.focusObject()
         self.changed.emit(watched, event)
         return False
 
-    def _watch(self, window: QWindow | None) -> None:
+    def _watch_window(self, window: QWindow | None) -> None:
         """Filter the events of the focused window, which alone receives keys."""
         if window is not None and window is not self._window:
             window.removeEventFilter(self)  # a window that becomes active again is filtered once
             window.installEventFilter(self)
         self._window = window
 
-    def _repeats(self, key: int, event: QKeyEvent) -> bool:
+    def _is_repeat(self, key: int, event: QKeyEvent) -> bool:
         release = self._release
         return release is not None and release.key == key and release.event.timestamp() == event.timestamp()
 
-    def _repeat(self, window: QObject, key: int, event: QKeyEvent) -> None:
+    def _send_repeat(self, window: QObject, key: int, event: QKeyEvent) -> None:
         """Send a repeat, marked as such, to the widget that received the press."""
         receiver = QGuiApplication.focusObject()
         if receiver is None or self._receivers.get(key) is not receiver:
             return
         if event.key() in MOVING or (event.key() not in ONCE and _takes_text(receiver)):
-            self._send(window, _marked_repeat(event))
+            self._send_event(window, _marked_repeat(event))
 
     def _hold_back(self, event: QKeyEvent) -> bool:
         """Hold a release until it is known to be real; pass on releases that no keyboard made."""
         if event.isAutoRepeat():
             return True
-        self._settle()
+        self._deliver_release()
         if event.nativeScanCode():
             self._release = _Release(_physical_key(event), event.clone())
             self._settling.start()
@@ -121,11 +121,11 @@ class KeyPresses(QObject):
         self.changed.emit(self._window, event)
         return False
 
-    def _settle_if_due(self) -> None:
+    def _deliver_if_due(self) -> None:
         if not self._settling.isActive():
-            self._settle()
+            self._deliver_release()
 
-    def _settle(self) -> None:
+    def _deliver_release(self) -> None:
         """Deliver the held release: it is real."""
         release, self._release = self._release, None
         if release is None:
@@ -134,9 +134,9 @@ class KeyPresses(QObject):
         window = QGuiApplication.focusWindow()
         self.changed.emit(window, release.event)
         if window is not None:
-            self._send(window, release.event)
+            self._send_event(window, release.event)
 
-    def _send(self, window: QObject, event: QKeyEvent) -> None:
+    def _send_event(self, window: QObject, event: QKeyEvent) -> None:
         self._sent = event
         QGuiApplication.sendEvent(window, event)
         self._sent = None

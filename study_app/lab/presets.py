@@ -10,7 +10,7 @@ from study_app.errors import ProtocolError
 from study_app.haptics.model.scene import Scene
 from study_app.lab.ab_comparison import Setting
 from study_app.protocol.load import load_scene, load_scenes, shipped
-from study_app.protocol.scene_file import for_new_file, scene_text
+from study_app.protocol.scene_file import scene_text, with_default_estimator
 from study_app.store.atomic import write_file
 from study_app.workspace import workspace
 
@@ -39,7 +39,7 @@ class Choice:
 
         If its file has the default "ewma", the lab uses "kalman", also in presets saved there.
         """
-        scene = for_new_file(self.scene)
+        scene = with_default_estimator(self.scene)
         return Setting(displayed_name(self.liquid), scene, scene)
 
 

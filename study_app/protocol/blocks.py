@@ -198,7 +198,7 @@ class Block(Table):
                 'is 1: every condition comes once and none can come again, which order = "shuffled" says', "repetitions"
             )
         constraint = Constraint(self.max_repeats, self.min_distance)
-        if (impossible := constraint.impossible(len(self.conditions), self.repetitions)) is not None:
+        if (impossible := constraint.impossible_key(len(self.conditions), self.repetitions)) is not None:
             key, sentence = impossible
             raise invalid(sentence, key)
         return self

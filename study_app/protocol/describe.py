@@ -17,7 +17,7 @@ from study_app.protocol.model import Block, Condition, Limits, Protocol
 from study_app.protocol.orders.balance import block_order_words, planned_participants
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
 from study_app.protocol.orders.durations import Variant, block_duration_s, expected_duration_s, variants
-from study_app.protocol.presented.presentation import link_words
+from study_app.protocol.presented.presentation import link_descriptions
 from study_app.protocol.presented.presented_levels import FASTER, highest_damping
 from study_app.protocol.quantities import quantity
 from study_app.protocol.questionnaires import instrument
@@ -59,7 +59,7 @@ def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force
     language = protocol.study.languages[0]
     effects = [line for name in protocol.liquids for line in (*describe_gate(protocol.scene_of(name)), "")]
     conditions = [
-        (name, " + ".join(condition.liquid_ids), ", ".join(_drawn(condition)))
+        (name, " + ".join(condition.liquid_ids), ", ".join(_drawing_notes(condition)))
         for name, condition in protocol.conditions.items()
     ]
     warned = [f"  {sentence}" for sentence in warnings(protocol, without_force=without_force)]
@@ -69,13 +69,16 @@ def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force
         decided = list(protocol.analysis.described(named))
     people = protocol.simulated_participants
     sections = (
-        _head(protocol, language),
-        *(_session(variant, planned_participants(protocol, variant.group), language) for variant in variants(protocol)),
-        *(_block(protocol, block, language, delay_ticks) for block in protocol.blocks_in_order),
-        _titled("Liquids", _liquids(protocol)),
+        _head_lines(protocol, language),
+        *(
+            _session_lines(variant, planned_participants(protocol, variant.group), language)
+            for variant in variants(protocol)
+        ),
+        *(_block_lines(protocol, block, language, delay_ticks) for block in protocol.blocks_in_order),
+        _titled("Liquids", _liquid_rows(protocol)),
         ("Effects in each liquid", *(f"  {line}".rstrip() for line in effects[:-1])),
         _titled("Conditions", conditions),
-        *(_statements(protocol, name, language) for name in protocol.questionnaires),
+        *(_question_lines(protocol, name, language) for name in protocol.questionnaires),
         _titled("Decided about the analysis", decided),
         *([] if people is None else [_titled("Simulated participants", [("Answers", people.described())])]),
         _titled("A trial is valid up to", limit_rows(protocol)),
@@ -110,7 +113,7 @@ def _titled(title: str, rows: Sequence[Sequence[str]]) -> Iterable[str]:
     return (title, *_aligned(rows))
 
 
-def _head(protocol: Protocol, language: str) -> Iterable[str]:
+def _head_lines(protocol: Protocol, language: str) -> Iterable[str]:
     study, device, scene = protocol.study, protocol.device, protocol.scene
     sizes = " × ".join(f"{size:g}" for size in device.workspace_mm)
     ball_mm = scene.body.diameter_m * 1000
@@ -122,9 +125,9 @@ def _head(protocol: Protocol, language: str) -> Iterable[str]:
         ("Parts", f"{protocol.parts}"),
         *([("Groups", GROUP_WORDS[study.group_assignment])] if protocol.groups else ()),
         *(("Group", f"{name}, share {group.share}") for name, group in protocol.groups.items()),
-        ("Answers", f"{spread(counts)} per {'session' if sessions_differ(protocol) else 'participant'}"),
+        ("Answers", f"{number_range(counts)} per {'session' if sessions_differ(protocol) else 'participant'}"),
         ("Blinding", BLINDINGS[study.blinding]),
-        ("Expected duration", f"about {spread(minutes)} min"),
+        ("Expected duration", f"about {number_range(minutes)} min"),
         ("Force limit", f"{device.force_limit_n:g} N"),
         ("Servo", f"{device.rate_hz:g} Hz"),
         ("Tank", f"{sizes} mm of the hand, {scene.scale:g} times as large in the scene"),
@@ -133,13 +136,13 @@ def _head(protocol: Protocol, language: str) -> Iterable[str]:
     return (f"{protocol.text(study.title, language)} ({study.name}, version {study.version})", *_aligned(rows))
 
 
-def spread(numbers: Sequence[int]) -> str:
+def number_range(numbers: Sequence[int]) -> str:
     """Return the number that all kinds of sessions share, or the least and the largest."""
     least, largest = min(numbers), max(numbers)
     return f"{least}" if least == largest else f"{least} to {largest}"
 
 
-def _session(variant: Variant, planned: int | None, language: str) -> Iterable[str]:
+def _session_lines(variant: Variant, planned: int | None, language: str) -> Iterable[str]:
     protocol, title = variant.protocol, "Session"
     if variant.name:
         minutes = f"about {expected_duration_s(protocol) / 60:.0f} min"
@@ -164,14 +167,14 @@ def _session(variant: Variant, planned: int | None, language: str) -> Iterable[s
     return (*_titled(title, rows), f"  Order of blocks: {order}")
 
 
-def _block(protocol: Protocol, block: Block, language: str, delay_ticks: int) -> Iterable[str]:
+def _block_lines(protocol: Protocol, block: Block, language: str, delay_ticks: int) -> Iterable[str]:
     part = "" if block.part is None else f"Part {block.part}: "
     questionnaire, compared = protocol.questionnaire_of(block.id), protocol.compared_in(block.id)
     trials = order_of(protocol, block).trials
     times = f"every condition {block.repetitions} times" if block.repetitions > 1 else ""
     rows = [
-        ("Trials", ", ".join(filter(None, (counted(trials, "trial"), times, _order(block))))),
-        *_beside_the_trials(protocol, block, language),
+        ("Trials", ", ".join(filter(None, (counted(trials, "trial"), times, _order_text(block))))),
+        *_assignment_and_break_rows(protocol, block, language),
         ("Shown as", protocol.text(block.setting_label, language) + (" 1, 2, …" if trials > 1 else "")),
         ("Recorded as", ", ".join(block_codes(protocol, block))),
         ("Conditions", ", ".join(protocol.conditions_in(block.id))),
@@ -230,9 +233,11 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
         pace_mps = task.fastest_stroke(protocol.device.workspace_m).speed_mps
         scene = protocol.scene_for(condition_of(protocol, stimulus))
         values = (*standards, *compared)
-        scenes = [scene] if stimulus.vary in OF_LINK else [override_value(scene, stimulus.vary, one) for one in values]
-        felt_n = [steady_force(one, pace_mps).drag_n for one in scenes]
-        fast_n = max(steady_force(one, FASTER * pace_mps).drag_n for one in scenes[-len(compared) :])
+        scenes = (
+            [scene] if stimulus.vary in OF_LINK else [override_value(scene, stimulus.vary, value) for value in values]
+        )
+        felt_n = [steady_force(level_scene, pace_mps).drag_n for level_scene in scenes]
+        fast_n = max(steady_force(level_scene, FASTER * pace_mps).drag_n for level_scene in scenes[-len(compared) :])
         yield (
             "Force at the pace",
             f"{min(felt_n):.1f} to {max(felt_n):.1f} N at {pace_mps:.3g} m/s, at most {fast_n:.1f} N at {FASTER:g} "
@@ -245,7 +250,7 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
     yield from precision_rows(protocol, block)
 
 
-def _order(block: Block) -> str:
+def _order_text(block: Block) -> str:
     if len(block.conditions) < 2:
         return ""
     match block.order:
@@ -264,7 +269,7 @@ def _order(block: Block) -> str:
             return f"in {name} of {rows} rows"
 
 
-def _beside_the_trials(protocol: Protocol, block: Block, language: str) -> Iterator[tuple[str, str]]:
+def _assignment_and_break_rows(protocol: Protocol, block: Block, language: str) -> Iterator[tuple[str, str]]:
     """Yield the rows about the assignment of square rows and about breaks."""
     if block.order in ("williams", "latin") and len(block.conditions) > 1:
         of_id = "assigned by the number in the participant's id (P007 is number 7), not by the seed"
@@ -277,7 +282,7 @@ def _beside_the_trials(protocol: Protocol, block: Block, language: str) -> Itera
         )
 
 
-def _liquids(protocol: Protocol) -> list[tuple[str, ...]]:
+def _liquid_rows(protocol: Protocol) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = [("", "density", "effects", "wake N", "S", "y", "")]
     used = {liquid for condition in protocol.conditions.values() for liquid in condition.liquid_ids}
     for name, liquid in protocol.liquids.items():
@@ -292,7 +297,7 @@ def _liquids(protocol: Protocol) -> list[tuple[str, ...]]:
     return rows
 
 
-def _drawn(condition: Condition) -> Iterator[str]:
+def _drawing_notes(condition: Condition) -> Iterator[str]:
     """Yield notes on how a condition is drawn and its force sent, if unusual."""
     if condition.delay_ms:
         yield f"seen {condition.delay_ms:g} ms late"
@@ -301,10 +306,10 @@ def _drawn(condition: Condition) -> Iterator[str]:
         yield f"video: {condition.view}{alone}"
     if condition.ball == "hidden":
         yield "ball hidden"
-    yield from link_words(condition.force_delay_ms, condition.force_jitter_ms, condition.force_loss)
+    yield from link_descriptions(condition.force_delay_ms, condition.force_jitter_ms, condition.force_loss)
 
 
-def _statements(protocol: Protocol, name: str, language: str) -> Iterable[str]:
+def _question_lines(protocol: Protocol, name: str, language: str) -> Iterable[str]:
     questionnaire = protocol.questionnaires[name]
     context = questionnaire.context(protocol.scales, language)
     title = f"Questions of {name}"
@@ -316,7 +321,7 @@ def _statements(protocol: Protocol, name: str, language: str) -> Iterable[str]:
     rows = [
         (
             item.id,
-            *(() if title.startswith("Statements") else (_kind(item, context),)),
+            *(() if title.startswith("Statements") else (_question_kind(item, context),)),
             protocol.text(item.text, language),
             "" if item.required else "(may be left out)",
         )
@@ -329,7 +334,7 @@ def _statements(protocol: Protocol, name: str, language: str) -> Iterable[str]:
     return (title, *_aligned(rows), *more)
 
 
-def _kind(item: Question, context: Context) -> str:
+def _question_kind(item: Question, context: Context) -> str:
     """Return the kind of a question with its answers or bounds."""
     levels, bounds = item.levels(context), item.bounds(context)
     if levels:

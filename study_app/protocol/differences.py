@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import block_codes
-from study_app.protocol.source.problems import shown
+from study_app.protocol.source.problems import shown_value
 
 CONDITIONS_DIFFER = "conditions differ"
 
@@ -43,7 +43,7 @@ def differences(old: Protocol | Mapping[str, Any], new: Protocol | Mapping[str, 
     """
     before, after = _tables(old), _tables(new)
     _drop_unknown_comparisons(before, after)
-    hidden = [_take_hidden(tables) for tables in (before, after)]
+    hidden = [_pop_hidden(tables) for tables in (before, after)]
     sentences = [difference.sentence for difference in document_differences(before, after)]
     if any(hidden[0][place] != hidden[1][place] for place in hidden[0].keys() & hidden[1].keys()):
         sentences.append(CONDITIONS_DIFFER)
@@ -76,7 +76,7 @@ def _drop_unknown_comparisons(before: dict[str, Any], after: dict[str, Any]) -> 
                 block.pop("compares", None)
 
 
-def _take_hidden(tables: dict[str, Any]) -> dict[str, Any]:
+def _pop_hidden(tables: dict[str, Any]) -> dict[str, Any]:
     """Remove the values that blinding hides and return them by place."""
     hidden = {name: tables.pop(name) for name in _HIDDEN if name in tables}
     for name, block in tables["blocks"].items():
@@ -87,8 +87,8 @@ def _take_hidden(tables: dict[str, Any]) -> dict[str, Any]:
 
 def _differences(place: Place, old: Any, new: Any) -> Iterator[Difference]:
     """Yield the differences below a place; a key that is None counts as missing."""
-    if _by_id(old) and _by_id(new):
-        yield from _listed(place, old, new)
+    if _has_ids(old) and _has_ids(new):
+        yield from _entry_differences(place, old, new)
     elif isinstance(old, Mapping) and isinstance(new, Mapping):
         for key in dict.fromkeys((*old, *new)):
             yield from _differences((*place, key), old.get(key), new.get(key))
@@ -99,15 +99,15 @@ def _differences(place: Place, old: Any, new: Any) -> Iterator[Difference]:
             for index, (before, after) in enumerate(zip(old, new, strict=True)):
                 yield from _differences((*place, index), before, after)
     elif old is None and new is not None:
-        yield Difference(place, f"new, {shown(new)}")
+        yield Difference(place, f"new, {shown_value(new)}")
     elif new is None and old is not None:
-        yield Difference(place, f"gone, it was {shown(old)}")
+        yield Difference(place, f"gone, it was {shown_value(old)}")
     elif old != new:
-        before, after = shown(old), shown(new)
+        before, after = shown_value(old), shown_value(new)
         yield Difference(place, f"{before} before, {after} now" if before != after else "another text or number")
 
 
-def _by_id(value: Any) -> bool:
+def _has_ids(value: Any) -> bool:
     """Return whether a value is a list of tables with unique ids."""
     if not isinstance(value, list):
         return False
@@ -115,7 +115,9 @@ def _by_id(value: Any) -> bool:
     return all(isinstance(identifier, str) for identifier in ids) and len(set(ids)) == len(ids)
 
 
-def _listed(place: Place, old: Sequence[Mapping[str, Any]], new: Sequence[Mapping[str, Any]]) -> Iterator[Difference]:
+def _entry_differences(
+    place: Place, old: Sequence[Mapping[str, Any]], new: Sequence[Mapping[str, Any]]
+) -> Iterator[Difference]:
     """Yield the differences between tables matched by id, then between the orders of those in both."""
     before, after = ({entry["id"]: entry for entry in entries} for entries in (old, new))
     yield from _differences(place, before, after)

@@ -30,7 +30,7 @@ LEVEL_LIMITS: Final = {
 """Limits of what an interval delivers, and of how many trials may be missing, with their defaults."""
 
 
-def _later(table: type[Table]) -> list[str]:
+def _later_keys(table: type[Table]) -> list[str]:
     """Return the sorted keys of a table that format 1 lacks."""
     return sorted(name for name, field in table.model_fields.items() if field.exclude_if is not None)
 
@@ -53,8 +53,8 @@ NEW_KEYS: Final = (
     *TABLES,
     "simulated_participants",
     *(f"limits.{key}" for key in LEVEL_LIMITS),
-    *(f"blocks.*.{key}" for key in _later(Block)),
-    *(f"analysis.{key}" for key in _later(Analysis)),
+    *(f"blocks.*.{key}" for key in _later_keys(Block)),
+    *(f"analysis.{key}" for key in _later_keys(Analysis)),
 )
 """Keys that belong to format 2, as patterns of places in the file."""
 NEW_VALUES: Final = {
@@ -70,13 +70,13 @@ WORKSPACE_MM: Final = (100.0, 60.0, 60.0)
 DENSITY_KG_M3: Final = 1000.0
 
 
-def is_later(document: Mapping[str, Any]) -> bool:
+def is_unknown_format(document: Mapping[str, Any]) -> bool:
     """Return whether a file has a format that this program does not know: nothing else in it can be judged."""
     stated = document.get("format")
     return isinstance(stated, int) and stated > LATEST
 
 
-def is_second(document: Mapping[str, Any]) -> bool:
+def is_format_2(document: Mapping[str, Any]) -> bool:
     """Return whether a file has format 2."""
     return bool(document.get("format") == 2 and not isinstance(document["format"], bool))
 
@@ -96,14 +96,14 @@ def newer_keys(document: Mapping[str, Any]) -> Iterator[Fault]:
             yield Fault(path, "a questionnaire on its own belongs to format 2", HINT, kind="surplus")
 
 
-def upgraded(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
+def upgrade(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
     """Return a study's document with the defaults of format 2, and faults for newer keys in format 1."""
-    if is_second(document):
-        return completed(document), []
-    return dict(document), [] if is_later(document) else list(newer_keys(document))
+    if is_format_2(document):
+        return with_omitted_keys(document), []
+    return dict(document), [] if is_unknown_format(document) else list(newer_keys(document))
 
 
-def completed(document: Mapping[str, Any]) -> dict[str, Any]:
+def with_omitted_keys(document: Mapping[str, Any]) -> dict[str, Any]:
     """Return a format 2 document with its omitted keys; invalid parts stay as they are."""
     completed = dict(document)
     head = completed.get("study", {})
@@ -111,13 +111,13 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
         completed["study"] = {"version": "1", "languages": ("en",), **head}
         if isinstance(head.get("name"), str):
             completed["study"].setdefault("title", dict.fromkeys(_languages(completed), head["name"]))
-    completed["device"] = _with(completed.get("device", {}), workspace_mm=WORKSPACE_MM)
+    completed["device"] = _with_defaults(completed.get("device", {}), workspace_mm=WORKSPACE_MM)
     if any(
         "stimulus" in block or "design" in block
         for _, block in entries(completed, "blocks.*")
         if isinstance(block, Mapping)
     ):
-        completed["limits"] = _with(completed.get("limits", {}), **LEVEL_LIMITS)
+        completed["limits"] = _with_defaults(completed.get("limits", {}), **LEVEL_LIMITS)
     completed = with_scene_defaults(completed)
     if isinstance(liquids := completed.get("liquids", {}), dict):
         completed.setdefault("conditions", {name: {"liquid": name} for name in liquids})
@@ -133,13 +133,13 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
 def with_scene_defaults(document: Mapping[str, Any]) -> dict[str, Any]:
     """Return a format 2 document with the omitted estimator and densities of dampers."""
     completed = dict(document)
-    completed["scene"] = _with(completed.get("scene", {}), velocity={"kind": ESTIMATOR})
+    completed["scene"] = _with_defaults(completed.get("scene", {}), velocity={"kind": ESTIMATOR})
     if isinstance(liquids := completed.get("liquids", {}), dict):
         completed["liquids"] = {name: _with_density(table) for name, table in liquids.items()}
     return completed
 
 
-def needed_by(scene: Scene) -> int:
+def format_of_scene(scene: Scene) -> int:
     """Return the format in which a scene file must be written."""
     newer = any(
         liquid.drag.law == "linear" or "unsteady_drag" in liquid.effects or liquid.non_newtonian is not None
@@ -157,7 +157,7 @@ OMITTED: Final = {
 """Keys of the file and of its tables that a file of format 2 may leave out."""
 
 
-def relax(schema: dict[str, Any]) -> None:
+def relax_schema(schema: dict[str, Any]) -> None:
     """Require the keys of `OMITTED` in a protocol's JSON Schema for format 1 only."""
     tables = {"study": "StudyHead", "device": "DeviceNeeds", "blocks": "Block"}
     asked: dict[str, Any] = {}
@@ -174,7 +174,7 @@ def relax(schema: dict[str, Any]) -> None:
     questions["then"] = {"required": questions.pop("required")}
 
 
-def _with(table: Any, **defaults: Any) -> Any:
+def _with_defaults(table: Any, **defaults: Any) -> Any:
     return {**defaults, **table} if isinstance(table, dict) else table
 
 
@@ -190,7 +190,7 @@ def _with_density(liquid: Any) -> Any:
         return liquid
     drag = liquid.get("drag")
     damper = isinstance(drag, Mapping) and drag.get("law") == "linear" and liquid.get("effects", ("drag",)) == ("drag",)
-    return _with(liquid, density_kg_m3=DENSITY_KG_M3) if damper else liquid
+    return _with_defaults(liquid, density_kg_m3=DENSITY_KG_M3) if damper else liquid
 
 
 def _with_numbers(blocks: Mapping[str, Any], tasks: tuple[str, ...], languages: tuple[str, ...]) -> dict[str, Any]:

@@ -81,7 +81,7 @@ def steps_of(protocol: HasSteps, group: str | None, session: int) -> Steps:
         own = () if group is None else protocol.groups[group].sequence
         return own or protocol.sequence
     if session > len(sequences):
-        raise beyond_last(session, len(sequences))
+        raise session_number_error(session, len(sequences))
     return sequences[session - 1]
 
 
@@ -90,25 +90,25 @@ def _sequences(protocol: HasSteps, group: str | None) -> Sequences:
     return protocol.sequences if own is None or not (own.sequence or own.sequences) else own.sequences
 
 
-def beyond_last(session: int, last: int) -> StudyError:
+def session_number_error(session: int, last: int) -> StudyError:
     """Return the error about a session number beyond the last session."""
     permitted = "1, the only session" if last == 1 else f"1 to {last}"
     return StudyError(f"session {session}: a participant of this study has {last} (sequences); permitted: {permitted}")
 
 
-def refuse_beyond_last(protocol: HasSteps, session: int) -> None:
+def check_session_number(protocol: HasSteps, session: int) -> None:
     """Raise StudyError if no group has this session."""
     counts = [session_count(protocol, group) for group in protocol.groups or (None,)]
     known = [count for count in counts if count is not None]
     if len(known) == len(counts) and session > max(known):
-        raise beyond_last(session, max(known))
+        raise session_number_error(session, max(known))
 
 
 def every_step(protocol: HasSteps) -> Steps:
     """Return the steps of all groups and sessions, each once, in order of first use; one sequence unchanged."""
     if not sessions_differ(protocol):
         return protocol.sequence
-    of_groups = (_of_group(protocol, group) for group in protocol.groups or (None,))
+    of_groups = (_steps_of_group(protocol, group) for group in protocol.groups or (None,))
     return tuple(dict.fromkeys(step for steps in of_groups for step in steps))
 
 
@@ -136,14 +136,14 @@ def follows(
 
 def groups_with(protocol: HasSteps, step: str) -> tuple[str, ...]:
     """Return the groups whose sessions contain a step; empty in a study without groups."""
-    return tuple(group for group in protocol.groups if step in _of_group(protocol, group))
+    return tuple(group for group in protocol.groups if step in _steps_of_group(protocol, group))
 
 
-def _of_group(protocol: HasSteps, group: str | None) -> Steps:
+def _steps_of_group(protocol: HasSteps, group: str | None) -> Steps:
     return sum(_sequences(protocol, group) or (steps_of(protocol, group, 1),), ())
 
 
-def numbered_parts(steps: Iterable[str], parts: Mapping[str, int | None]) -> dict[str, int]:
+def parts_by_block(steps: Iterable[str], parts: Mapping[str, int | None]) -> dict[str, int]:
     """Return the part number of each block in a session with these steps: 1, 2 … in order of appearance."""
     numbers: dict[int, int] = {}
     part_numbers: dict[str, int] = {}

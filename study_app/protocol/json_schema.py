@@ -14,7 +14,7 @@ from pydantic.json_schema import CoreModeRef, DefsRef, GenerateJsonSchema
 from pydantic_core import to_jsonable_python
 
 from study_app.documentation import anchor_of
-from study_app.protocol.formats import relax
+from study_app.protocol.formats import relax_schema
 from study_app.protocol.model import Protocol
 
 LIQUID_FILE = "A liquid file with one liquid, in place of the keys of this table: its path, relative to this file."
@@ -56,7 +56,7 @@ def schema(of: type[BaseModel] = Protocol) -> dict[str, Any]:
                     part["properties"]["file"] = {"type": "string", "description": LIQUID_FILE}
                     part["if"], part["then"] = {"not": {"anyOf": NEED_NO_DENSITY}}, {"required": part.pop("required")}
     if of is Protocol:
-        relax(described)
+        relax_schema(described)
         items = described["$defs"]["Questionnaire"]["properties"]["items"]["items"]
         items["anyOf"] = items.pop("oneOf")  # a statement, which has no kind, is a text too, whose kind has a default
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}
@@ -95,19 +95,19 @@ _BOUNDS: Final = {
 def format_markdown() -> str:
     """Return every table of a protocol file, with each key's values, default and meaning, as Markdown."""
     root = schema()
-    places = _places(root)
+    places = _model_places(root)
     headings = _headings(root, places)
-    lines = ["## Top of the file", "", *_table(root, root, headings)]
+    lines = ["## Top of the file", "", *_table_lines(root, root, headings)]
     for name, heading in headings.items():
         node = root["$defs"][name]
-        lines += ["", f"## {heading}", "", _plain(node.get("description", "")), ""]
+        lines += ["", f"## {heading}", "", _cell_text(node.get("description", "")), ""]
         if len(places[name]) > 1:
             lines += [f"In {', '.join(f'`{place}`' for place in places[name])}.", ""]
-        lines += _table(node, root, headings)
+        lines += _table_lines(node, root, headings)
     return "\n".join(lines) + "\n"
 
 
-def _places(root: Node) -> dict[str, list[str]]:
+def _model_places(root: Node) -> dict[str, list[str]]:
     """Return the places of each model in the file, in file order, such as ``blocks.NAME.catch``."""
     places: dict[str, list[str]] = {}
 
@@ -140,12 +140,12 @@ def _headings(root: Node, places: Mapping[str, list[str]]) -> dict[str, str]:
     """Return the heading of each model: its first place, with a distinguishing value if several share it."""
     firsts = [paths[0] for paths in places.values()]
     return {
-        name: paths[0] if firsts.count(paths[0]) == 1 else f"{paths[0]}, {_apart(root['$defs'][name])}"
+        name: paths[0] if firsts.count(paths[0]) == 1 else f"{paths[0]}, {_distinguishing_value(root['$defs'][name])}"
         for name, paths in places.items()
     }
 
 
-def _apart(node: Node) -> str:
+def _distinguishing_value(node: Node) -> str:
     for key in ("kind", "law", "instrument"):
         part = node.get("properties", {}).get(key, {})
         values = [part["const"]] if "const" in part else part.get("enum", [])
@@ -154,15 +154,16 @@ def _apart(node: Node) -> str:
     return str(node["title"])
 
 
-def _table(node: Node, root: Node, headings: Mapping[str, str]) -> list[str]:
+def _table_lines(node: Node, root: Node, headings: Mapping[str, str]) -> list[str]:
     rows = [
-        f"| `{key}` | {_values(part, headings)} | {_default(key, part, node)} | {_plain(_meaning(part, root))} |"
+        f"| `{key}` | {_values_text(part, headings)} | {_default_text(key, part, node)} "
+        f"| {_cell_text(_meaning(part, root))} |"
         for key, part in node.get("properties", {}).items()
     ]
     return ["| key | value | default | meaning |", "| --- | --- | --- | --- |", *rows]
 
 
-def _values(node: Node, headings: Mapping[str, str]) -> str:
+def _values_text(node: Node, headings: Mapping[str, str]) -> str:
     texts = dict.fromkeys(_alternatives(node, headings))
     return " or ".join(text for text in texts if text)
 
@@ -177,31 +178,31 @@ def _alternatives(node: Node, headings: Mapping[str, str]) -> Iterator[str]:
     elif "const" in node or "enum" in node:
         yield ", ".join(f"`{json.dumps(value)}`" for value in node.get("enum", [node.get("const")]))
     elif node.get("type") == "array":
-        yield _list(node, headings)
+        yield _list_text(node, headings)
     elif node.get("type") == "object":
         below = [*node.get("patternProperties", {}).values(), node.get("additionalProperties")]
-        inside = [_values(node, headings) for node in below if isinstance(node, Mapping)]
+        inside = [_values_text(node, headings) for node in below if isinstance(node, Mapping)]
         yield (
             f"tables by name, each {inside[0]}" if "patternProperties" in node else f"by language or name: {inside[0]}"
         )
     elif node.get("type") != "null":
-        yield ", ".join((_TYPES.get(node.get("type", ""), "any"), *_bounds(node)))
+        yield ", ".join((_TYPES.get(node.get("type", ""), "any"), *_bound_texts(node)))
 
 
-def _list(node: Node, headings: Mapping[str, str]) -> str:
+def _list_text(node: Node, headings: Mapping[str, str]) -> str:
     inside = node.get("items")
-    of = _values(inside, headings) if isinstance(inside, Mapping) else ""
+    of = _values_text(inside, headings) if isinstance(inside, Mapping) else ""
     if "prefixItems" in node:
-        of = ", ".join(dict.fromkeys(_values(part, headings) for part in node["prefixItems"]))
+        of = ", ".join(dict.fromkeys(_values_text(part, headings) for part in node["prefixItems"]))
         return f"list of {len(node['prefixItems'])}: {of}"
-    return ", ".join((f"list of: {of}", *_bounds(node)))
+    return ", ".join((f"list of: {of}", *_bound_texts(node)))
 
 
-def _bounds(node: Node) -> Iterator[str]:
+def _bound_texts(node: Node) -> Iterator[str]:
     return (template.format(f"{node[key]:g}") for key, template in _BOUNDS.items() if key in node)
 
 
-def _default(key: str, part: Node, node: Node) -> str:
+def _default_text(key: str, part: Node, node: Node) -> str:
     if key in node.get("required", ()):
         return "required"
     value = part.get("default")
@@ -221,7 +222,7 @@ def _meaning(part: Node, root: Node) -> str:
     return str(root["$defs"][models[0]].get("description", "")).split("\n\n", maxsplit=1)[0]
 
 
-def _plain(text: str) -> str:
+def _cell_text(text: str) -> str:
     """Return a description without reStructuredText marks, safe in a table cell."""
     text = re.sub(r":\w+:`([^`]+)`", r"`\1`", text).replace("``", "`").replace("\n", " ")
     return text.replace("|", "\\|").replace("*", "\\*").replace("<", "\\<").replace("[", "\\[")

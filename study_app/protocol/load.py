@@ -13,8 +13,8 @@ from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
 from study_app.haptics.model.scene import Liquid, RateHz, Scene, Withdrawn
 from study_app.protocol import formats
 from study_app.protocol.checks.consistency import check
-from study_app.protocol.checks.designs import designs
-from study_app.protocol.checks.force_limits import paced, returned
+from study_app.protocol.checks.designs import check_designs
+from study_app.protocol.checks.force_limits import check_paced, check_returned_energy
 from study_app.protocol.json_schema import schema
 from study_app.protocol.model import Format, HandForceN, Named, Protocol, SceneDefaults
 from study_app.protocol.questionnaires import with_instruments
@@ -22,31 +22,31 @@ from study_app.protocol.source.document import Path, Places, entries, frozen
 from study_app.protocol.source.files import (
     FOOTAGE_TABLE,
     TABLE,
-    at_hand,
     check_size,
     is_footage,
     is_utf16,
+    known_protocols,
     protocol_hash,
     shipped,
     source_bytes,
-    without_mark,
+    without_byte_order_mark,
 )
 from study_app.protocol.source.problems import Fault, did_you_mean, faults_of
 from study_app.protocol.table import Table
 
 __all__ = [
-    "at_hand",
-    "examined",
     "is_scene_file",
+    "known_protocols",
     "load",
     "load_scene",
     "load_scenes",
-    "located",
+    "located_problems",
     "parse",
     "protocol_hash",
     "read_document",
     "shipped",
     "source_bytes",
+    "validate_document",
 ]
 
 M = TypeVar("M", bound=BaseModel)
@@ -71,7 +71,7 @@ class SceneFile(Table):
 
 
 def load(name_or_path: str | File, *, delay_ticks: int = ASSUMED_TICKS) -> Protocol:
-    """Return the protocol of a file or known name (see ``files.find``); ProtocolError lists every problem of the file.
+    """Return the protocol of a file or known name (`files.protocol_file`); ProtocolError lists all problems of a file.
 
     Levels are checked for a device whose forces act ``delay_ticks`` ticks late.
 
@@ -89,13 +89,15 @@ def load(name_or_path: str | File, *, delay_ticks: int = ASSUMED_TICKS) -> Proto
 def parse(source: bytes, name: str, *, delay_ticks: int = ASSUMED_TICKS) -> Protocol:
     """Return the protocol in ``source``; messages call it ``name``, the rest is as in `load`."""
     document, places = read_document(source, name)
-    protocol, faults = examined(document, delay_ticks=delay_ticks)
+    protocol, faults = validate_document(document, delay_ticks=delay_ticks)
     if protocol is None or faults:
-        raise ProtocolError(name, located(faults, places))
+        raise ProtocolError(name, located_problems(faults, places))
     return protocol
 
 
-def examined(document: dict[str, Any], *, delay_ticks: int = ASSUMED_TICKS) -> tuple[Protocol | None, list[Fault]]:
+def validate_document(
+    document: dict[str, Any], *, delay_ticks: int = ASSUMED_TICKS
+) -> tuple[Protocol | None, list[Fault]]:
     """Return the protocol of a document that `read_document` read, and its faults.
 
     There is a protocol where the only faults are forces beyond a limit, so that these can be shown; else, with faults,
@@ -103,25 +105,25 @@ def examined(document: dict[str, Any], *, delay_ticks: int = ASSUMED_TICKS) -> t
     """
     document, faults = _with_liquids_of_files(document)
     document, missing = _with_footage(document)
-    document, newer = formats.upgraded(document)
+    document, newer = formats.upgrade(document)
     document, unfilled = (document, []) if newer else with_instruments(document)
     faults += missing + unfilled
     broken = [*(fault.path[:2] for fault in faults), *(fault.path for fault in newer)]
     faults += newer
-    protocol, wrong = _validated(Protocol, document)
-    faults += _outside(broken, wrong)
-    if not formats.is_later(document):
+    protocol, wrong = _validate(Protocol, document)
+    faults += _faults_outside(broken, wrong)
+    if not formats.is_unknown_format(document):
         questionnaires = [path for path in broken if path[0] == "questionnaires"]
         sound = None if faults else protocol
-        faults += _outside(questionnaires, check(document, [fault.path for fault in faults], sound))
+        faults += _faults_outside(questionnaires, check(document, [fault.path for fault in faults], sound))
     if protocol is None or faults:
         return None, faults
-    if faults := list(dict.fromkeys(designs(protocol))):
+    if faults := list(dict.fromkeys(check_designs(protocol))):
         return None, faults
-    return protocol, [*paced(protocol, delay_ticks), *returned(protocol)]
+    return protocol, [*check_paced(protocol, delay_ticks), *check_returned_energy(protocol)]
 
 
-def _outside(broken: Iterable[Path], faults: Iterable[Fault]) -> list[Fault]:
+def _faults_outside(broken: Iterable[Path], faults: Iterable[Fault]) -> list[Fault]:
     """Return the faults outside the places that are already broken."""
     known = list(broken)
     return [fault for fault in faults if not any(fault.path[: len(path)] == path for path in known)]
@@ -136,7 +138,7 @@ def load_scene(name_or_path: str | File, liquid_id: str) -> Scene:
     if liquid_id not in scenes:
         fault = Fault(("liquids",), f'there is no liquid "{liquid_id}"', did_you_mean(liquid_id, scenes))
         name = str(name_or_path)
-        _raise(name, [fault], read_document(source_bytes(name_or_path), name)[1])
+        _raise_faults(name, [fault], read_document(source_bytes(name_or_path), name)[1])
     return scenes[liquid_id]
 
 
@@ -148,21 +150,21 @@ def load_scenes(name_or_path: str | File) -> dict[str, Scene]:
     if _holds_study(document):
         protocol = parse(source, name)
         return {liquid: protocol.scene_of(liquid) for liquid in protocol.liquids}
-    file = SceneFile.model_validate(_sound_scene(document, name, places), strict=True)
+    file = SceneFile.model_validate(_completed_scene(document, name, places), strict=True)
     return {
         name: Scene(**dict(file.scene), liquids=(liquid,), format=file.format) for name, liquid in file.liquids.items()
     }
 
 
-def _sound_scene(document: dict[str, Any], name: str, places: Places) -> dict[str, Any]:
+def _completed_scene(document: dict[str, Any], name: str, places: Places) -> dict[str, Any]:
     """Return the completed document of a scene file; raise ProtocolError if it is invalid."""
     faults: list[Fault] = []
-    if formats.is_second(document):
+    if formats.is_format_2(document):
         document = formats.with_scene_defaults(document)
-    elif not formats.is_later(document):
+    elif not formats.is_unknown_format(document):
         faults = [fault for fault in formats.newer_keys(document) if fault.path[0] in SceneFile.model_fields]
-    _, wrong = _validated(SceneFile, document)
-    _raise(name, faults + _outside([fault.path for fault in faults], wrong), places)
+    _, wrong = _validate(SceneFile, document)
+    _raise_faults(name, faults + _faults_outside([fault.path for fault in faults], wrong), places)
     return document
 
 
@@ -233,7 +235,7 @@ def _liquid_of_file(file: Any, texts: Mapping[str, str]) -> dict[str, Any]:
         )
     try:
         document, places = read_document(texts[file].encode(), file)
-        document = _sound_scene(document, file, places)
+        document = _completed_scene(document, file, places)
     except ProtocolError as error:
         raise _LiquidFileFault(f"{file}: {error.problems[0]}", f"liquid-study check {file}") from error
     (first, *others) = document["liquids"].values()
@@ -248,12 +250,12 @@ def _holds_study(document: Mapping[str, Any]) -> bool:
 
 
 def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
-    """Return their tables of a text, arrays as tuples, and their lines they stand on (ProtocolError if it is no TOML)."""
+    """Return the tables of a text, arrays as tuples, and their lines (ProtocolError if it is no TOML)."""
     check_size(source, name)
     if is_utf16(source):
         raise ProtocolError(name, (Problem("file", "is UTF-16 text", hint="save it as UTF-8"),))
     try:
-        text = without_mark(source).decode("utf-8").replace("\r\n", "\n")
+        text = without_byte_order_mark(source).decode("utf-8").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         line = source.count(b"\n", 0, error.start) + 1
         raise ProtocolError(name, (Problem("file", "is not UTF-8 text", line, hint="save it as UTF-8"),)) from error
@@ -273,9 +275,9 @@ def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
     return document, Places(text)
 
 
-def _validated(model: type[M], document: Mapping[str, Any]) -> tuple[M | None, list[Fault]]:
+def _validate(model: type[M], document: Mapping[str, Any]) -> tuple[M | None, list[Fault]]:
     """Return the validated document, None if it is invalid, and the faults found by its models."""
-    if formats.is_later(document):
+    if formats.is_unknown_format(document):
         known = f"this program reads formats 1 to {formats.LATEST}"
         return None, [Fault(("format",), f"is {document['format']}, {known}", "use a newer version of liquid-study")]
     named = [path for section in ("liquids", "blocks") for path, _ in entries(document, f"{section}.*.id")]
@@ -290,7 +292,7 @@ def _validated(model: type[M], document: Mapping[str, Any]) -> tuple[M | None, l
     return validated, faults
 
 
-def located(faults: Iterable[Fault], places: Places) -> tuple[Problem, ...]:
+def located_problems(faults: Iterable[Fault], places: Places) -> tuple[Problem, ...]:
     """Return faults as problems with their lines, in the order of the lines."""
 
     def shortened(text: str) -> str:
@@ -301,6 +303,6 @@ def located(faults: Iterable[Fault], places: Places) -> tuple[Problem, ...]:
     return tuple(sorted(short, key=lambda problem: problem.line or 0))
 
 
-def _raise(name: str, faults: list[Fault], places: Places) -> None:
+def _raise_faults(name: str, faults: list[Fault], places: Places) -> None:
     if faults:
-        raise ProtocolError(name, located(faults, places))
+        raise ProtocolError(name, located_problems(faults, places))

@@ -59,13 +59,13 @@ HandForceN: TypeAlias = Annotated[
 ]
 
 
-def _whole(value: Any) -> Any:
+def _check_format_number(value: Any) -> Any:
     if type(value) is not int:
         raise invalid("must be 1 or 2, the number of this format", use=("format", 1))
     return value
 
 
-Format: TypeAlias = Annotated[Literal[1, 2], BeforeValidator(_whole)]
+Format: TypeAlias = Annotated[Literal[1, 2], BeforeValidator(_check_format_number)]
 
 
 class Credits(Table):
@@ -217,7 +217,7 @@ class StudyLiquid(Liquid):
 
 
 def scene_with(scene: SceneDefaults, device: DeviceNeeds, liquids: Sequence[StudyLiquid], form: Literal[1, 2]) -> Scene:
-    """Return a scene with these liquids, in a file's format; they share one ball (`checks.consistency.liquids`)."""
+    """Return a scene with these liquids, in a file's format; they share one ball (`consistency.check_liquids`)."""
     return Scene(
         **dict(scene) | {"body": liquids[0].body_in(scene)},
         rate_hz=device.rate_hz,
@@ -451,14 +451,14 @@ class Analysis(Table):
 T = TypeVar("T")
 
 
-def _named(tables: Any) -> Any:
+def _with_ids(tables: Any) -> Any:
     """Set each table's name as its ``id``."""
     if not isinstance(tables, Mapping):
         return tables
     return {name: {**table, "id": name} if isinstance(table, Mapping) else table for name, table in tables.items()}
 
 
-Named: TypeAlias = Annotated[dict[Id, T], BeforeValidator(_named)]
+Named: TypeAlias = Annotated[dict[Id, T], BeforeValidator(_with_ids)]
 
 
 class Protocol(Table):

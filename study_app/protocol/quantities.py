@@ -95,16 +95,18 @@ def quantity(name: str) -> Parameter:
 
 def can_vary(name: str) -> bool:
     """Return whether a number belongs to a condition: to its liquid, region, ball or delay."""
-    return any(name in {known, known.partition(".")[2]} for known in QUANTITIES if _table(known) not in _OF_A_SESSION)
+    return any(
+        name in {known, known.partition(".")[2]} for known in QUANTITIES if _table_name(known) not in _OF_A_SESSION
+    )
 
 
 def quantity_words(name: str) -> str:
     """Return the name of a quantity within a sentence, such as "viscosity" or "wake scaling"."""
     row = quantity(name)
-    effect = NAMED.get(_table(row.name))
+    effect = NAMED.get(_table_name(row.name))
     label = row.label if effect is None or effect.with_liquid else f"{effect.label} {row.label}"
     return label.lower()
 
 
-def _table(name: str) -> str:
+def _table_name(name: str) -> str:
     return name.partition(".")[0]

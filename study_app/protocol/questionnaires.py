@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from study_app.haptics.model.ranges import later, within
 from study_app.protocol.questions import KINDS, STATEMENT, AnyQuestion, Context, Question, Scale, Statement
 from study_app.protocol.source.document import Path, entries, frozen
-from study_app.protocol.source.problems import Fault, unknown
+from study_app.protocol.source.problems import Fault, unknown_name
 from study_app.protocol.table import Id, Localised, Table, invalid
 from study_app.protocol.wording.languages import language_name, missing_text
 
@@ -137,18 +137,18 @@ def with_instruments(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[
         if not isinstance(table, Mapping) or "instrument" not in table:
             continue
         if table["instrument"] in instruments():
-            filled[name], lacking = _filled(("questionnaires", name), table, languages, scales)
+            filled[name], lacking = _fill_in(("questionnaires", name), table, languages, scales)
             faults += lacking
         else:
             path, wrong = ("questionnaires", name, "instrument"), str(table["instrument"])
-            faults.append(unknown(path, f'there is no instrument "{wrong}"', wrong, instruments()))
+            faults.append(unknown_name(path, f'there is no instrument "{wrong}"', wrong, instruments()))
     return {**completed, "questionnaires": filled, **({"scales": scales} if scales else {})}, faults
 
 
-def written_out(of: str, languages: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:
+def instrument_tables(of: str, languages: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the table and the scales that a study writes for an instrument: everything known if texts are missing."""
     table: dict[str, Any] = {"instrument": of}
-    filled, lacking = _filled((), table, languages, {})
+    filled, lacking = _fill_in((), table, languages, {})
     if not lacking:
         return table, {}
     known = instrument(of).get("scales", {}).items()
@@ -164,16 +164,16 @@ def scale_name(of: str, scale: str) -> str:
     return f"{of.replace('-', '_')}_{scale}"
 
 
-def _filled(
+def _fill_in(
     place: Path, table: Mapping[str, Any], languages: tuple[str, ...], scales: dict[str, Any]
 ) -> tuple[dict[str, Any], list[Fault]]:
     """Return a questionnaire with the known parts of its instrument, and faults; adds its scales to ``scales``."""
     of = str(table["instrument"])
     source = instrument(of)
     known = {item["id"]: item for item in source["items"]}
-    own = _by_id(table, "items")
+    own = _tables_by_id(table, "items")
     faults = [
-        unknown((*place, *path, "id"), f'"{name}" is not an item of {of}', name, known)
+        unknown_name((*place, *path, "id"), f'"{name}" is not an item of {of}', name, known)
         for name, (path, _) in own.items()
         if name not in known
     ]
@@ -211,9 +211,9 @@ def _filled(
         fields = KINDS[kind].model_fields
         ask(path, name, whole, *(key for key in ("text", "low", "high") if key in fields))
         if "options" in item and isinstance(written.get("options", ()), list | tuple):
-            choices, possible = _by_id(written, "options"), [option["id"] for option in item["options"]]
+            choices, possible = _tables_by_id(written, "options"), [option["id"] for option in item["options"]]
             faults += [
-                unknown(
+                unknown_name(
                     (*place, *(path or ()), *where, "id"),
                     f'"{option_id}" is not an option of {name}',
                     option_id,
@@ -241,7 +241,9 @@ def _filled(
         else:
             ask(None, f"[scales.{own_name}], {labelled['points']} of them", known_labels, "labels")
     faults += [
-        _unpublished((*place, "instrument"), of, language, lacks) for language, lacks in unwritten.items() if lacks
+        _unpublished_fault((*place, "instrument"), of, language, lacks)
+        for language, lacks in unwritten.items()
+        if lacks
     ]
     scores = {name: dict(score) for name, score in source["scores"].items()}
     return {"scores": scores, **made, "items": tuple(items)}, faults
@@ -257,7 +259,7 @@ def _merged(known: Mapping[str, Any], own: Mapping[str, Any], languages: tuple[s
     return {key: value for key, value in made.items() if value or key not in _TEXTS}
 
 
-def _by_id(table: Mapping[str, Any], key: str) -> dict[str, tuple[Path, Mapping[str, Any]]]:
+def _tables_by_id(table: Mapping[str, Any], key: str) -> dict[str, tuple[Path, Mapping[str, Any]]]:
     """Return the tables of a list that have an id, with their paths."""
     return {
         entry["id"]: (path, entry)
@@ -266,7 +268,7 @@ def _by_id(table: Mapping[str, Any], key: str) -> dict[str, tuple[Path, Mapping[
     }
 
 
-def _unpublished(path: Path, of: str, language: str, lacks: Sequence[tuple[str, str]]) -> Fault:
+def _unpublished_fault(path: Path, of: str, language: str, lacks: Sequence[tuple[str, str]]) -> Fault:
     """Return the fault about texts in a language that neither program nor study has; it names each."""
     keys: dict[str, list[str]] = {}
     for key, thing in dict.fromkeys(lacks):

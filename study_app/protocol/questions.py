@@ -23,7 +23,7 @@ from study_app.protocol.table import (
     characters,
     invalid,
     text_in,
-    unprintable,
+    unprintable_character,
 )
 
 POINTS = 7
@@ -84,7 +84,7 @@ class ShowIf(Table):
         return self
 
 
-def shown(items: Iterable[Question | ItemView], answers: Mapping[str, Value]) -> tuple[str, ...]:
+def shown_questions(items: Iterable[Question | ItemView], answers: Mapping[str, Value]) -> tuple[str, ...]:
     """Return the ids of the shown items in order; ``answers`` are those given so far.
 
     Answers to items that are not shown count for nothing.
@@ -542,7 +542,7 @@ class Text(Question):
             return "the text is empty: write one, or leave the question open"
         if (length := len(characters(answer))) > self.longest:
             return f"the text has {length} characters: write at most {self.longest}"
-        if unprintable(answer, f"\n{DIRECTIONS}") is not None:
+        if unprintable_character(answer, f"\n{DIRECTIONS}") is not None:
             return "the text holds a character that cannot be printed: take it out"
         return None
 

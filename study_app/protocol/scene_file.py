@@ -9,7 +9,7 @@ from typing import Any, Final, TypeAlias
 
 from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.scene import FADE_S, Ewma, Given, Kalman, Liquid, Scene
-from study_app.protocol.formats import needed_by
+from study_app.protocol.formats import format_of_scene
 
 Place: TypeAlias = tuple[str, ...]
 
@@ -23,22 +23,22 @@ def scene_text(scene: Scene, *, said: Sequence[str] = (), notes: Mapping[Place, 
     ``("liquids", "water", "density_kg_m3")``.
     """
     comments = [f"# {line}" for it in said for line in textwrap.wrap(it, _COMMENT_LETTERS)]
-    head = [*comments, *([""] if comments else []), f"format = {needed_by(scene)}"]
+    head = [*comments, *([""] if comments else []), f"format = {format_of_scene(scene)}"]
     left_out = {"format", "liquids", "link"} | ({"velocity"} if isinstance(scene.velocity, Given) else set())
     left_out |= {"fade_s"} if scene.fade_s == FADE_S else set()
     of_scene = scene.model_dump(exclude_none=True, exclude=left_out)
-    lines = [*head, *_tables(("scene",), of_scene, notes or {})]
+    lines = [*head, *_table_lines(("scene",), of_scene, notes or {})]
     for liquid in scene.liquids:
-        lines += _tables(("liquids", liquid.id), _liquid(liquid), notes or {})
+        lines += _table_lines(("liquids", liquid.id), _liquid_table(liquid), notes or {})
     return "\n".join(lines) + "\n"
 
 
-def for_new_file(scene: Scene) -> Scene:
+def with_default_estimator(scene: Scene) -> Scene:
     """Return a scene as the program presents and writes it without a file: "kalman" in place of "ewma"."""
     return scene.model_copy(update={"velocity": Kalman()}) if scene.velocity == Ewma() else scene
 
 
-def _liquid(liquid: Liquid) -> Mapping[str, Any]:
+def _liquid_table(liquid: Liquid) -> Mapping[str, Any]:
     """Return a liquid's table for a scene file, without tables that have no effect and add nothing."""
     idle = {
         effect.name
@@ -49,19 +49,19 @@ def _liquid(liquid: Liquid) -> Mapping[str, Any]:
     return liquid.model_dump(exclude_none=True, exclude={"id", *idle})
 
 
-def _tables(place: Place, table: Mapping[str, Any], notes: Mapping[Place, str]) -> Iterator[str]:
+def _table_lines(place: Place, table: Mapping[str, Any], notes: Mapping[Place, str]) -> Iterator[str]:
     yield ""
     yield f"[{'.'.join(place)}]"
     for key, value in table.items():
         if not isinstance(value, Mapping):
             note = notes.get((*place, key))
-            yield f"{key} = {_written(value)}" + (f"  # {note}" if note else "")
+            yield f"{key} = {_toml_value(value)}" + (f"  # {note}" if note else "")
     for key, value in table.items():
         if isinstance(value, Mapping) and value:
-            yield from _tables((*place, key), value, notes)
+            yield from _table_lines((*place, key), value, notes)
 
 
-def _written(value: object) -> str:
+def _toml_value(value: object) -> str:
     if isinstance(value, tuple):
-        return f"[{', '.join(_written(it) for it in value)}]"
+        return f"[{', '.join(_toml_value(it) for it in value)}]"
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str | bool) else repr(value)

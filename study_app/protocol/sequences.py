@@ -7,7 +7,7 @@ cyclic Latin square is 0, 1, …, n − 1 with each shift: even in positions alo
 
 **Repetitions** go on in the same square. Where a row ends and the next begins, the new row is chosen by how far its
 first code lies from the last one shown: 1, 2, …, n − 1 and round again (backwards in a reversed square). So no code
-follows itself, each repetition is as even as the first, and after as many repetitions as `borders_even` says the
+follows itself, each repetition is as even as the first, and after as many repetitions as `has_even_borders` says the
 borders between them are even too.
 
 **Rows** are assigned by enrolment: the last number in the participant's id (P007 is number 7). Numbers 1 … rows are the
@@ -53,13 +53,13 @@ class Constraint:
     max_repeats: int | None = None
     min_distance: int | None = None
 
-    def holds(self, order: Sequence[object]) -> bool:
+    def permits(self, order: Sequence[object]) -> bool:
         """Return whether an order satisfies the constraint."""
         nearest = shortest_distance(order)
         near = nearest is not None and nearest < (self.min_distance or 1)
         return not near and (self.max_repeats is None or longest_run(order) <= self.max_repeats)
 
-    def impossible(self, codes: int, repetitions: int) -> tuple[str, str] | None:
+    def impossible_key(self, codes: int, repetitions: int) -> tuple[str, str] | None:
         """Return the key that makes every order impossible and a phrase with the possible values; None without one."""
         if repetitions == 1:
             return None
@@ -118,13 +118,13 @@ def row(square: Square, codes: int, number: int, repetitions: int = 1) -> tuple[
     return shown
 
 
-def borders_even(codes: int, repetitions: int) -> bool:
+def has_even_borders(codes: int, repetitions: int) -> bool:
     """Return whether a Williams design's carry-over is even across the borders of its repetitions, too."""
     period = (codes - 1) // 2 if codes % 2 else codes - 1
     return codes == 1 or (repetitions - 1) % period == 0
 
 
-def enrolment(participant: str) -> int | None:
+def enrolment_number(participant: str) -> int | None:
     """Return the last number in a participant's id; None if there is none."""
     numbers = re.findall(r"[0-9]+", participant)
     return int(numbers[-1]) if numbers else None
@@ -135,7 +135,7 @@ def assigned_row(study: str, block: str, rows: int, participant: str, place: int
 
     ``place`` is the number that assigns it (from 1); None: the number in the participant's id.
     """
-    number = enrolment(participant) if place is None else place
+    number = enrolment_number(participant) if place is None else place
     if number is None:
         return int(study_stream(study, f"row/{block}/{participant}").random() * rows)
     rounds, place = divmod(number - 1, rows)
@@ -150,30 +150,30 @@ PROPOSALS = 32
 _STEEPEST = 6
 
 
-def arrange(codes: Sequence[T], repetitions: int, constraint: Constraint, draw: Draw) -> tuple[T, ...]:
+def draw_order(codes: Sequence[T], repetitions: int, constraint: Constraint, draw: Draw) -> tuple[T, ...]:
     """Return every code ``repetitions`` times in a random order that satisfies a constraint.
 
     ``draw`` gives uniform numbers in [0, 1); at most (len(codes) · repetitions + 1) · ``PROPOSALS`` + len(codes) of
     them are drawn. ValueError says that no order keeps the constraint.
     """
-    if (impossible := constraint.impossible(len(codes), repetitions)) is not None:
+    if (impossible := constraint.impossible_key(len(codes), repetitions)) is not None:
         raise ValueError(" ".join(impossible))
     chosen, weight = shuffle(range(len(codes)), draw) * repetitions, Fraction(0)
     for _ in range(PROPOSALS):
-        proposal = propose(len(codes), repetitions, constraint, draw)
+        proposal = propose_order(len(codes), repetitions, constraint, draw)
         if proposal is not None and Fraction(draw()) * weight < proposal[1]:
             chosen, weight = proposal
     return tuple(codes[code] for code in chosen)
 
 
-def propose(codes: int, repetitions: int, constraint: Constraint, draw: Draw) -> Proposal | None:
+def propose_order(codes: int, repetitions: int, constraint: Constraint, draw: Draw) -> Proposal | None:
     """Draw an order from left to right and return it with the inverse of its probability; None in a dead end."""
     apart = max(constraint.min_distance or 1, 2 if constraint.max_repeats == 1 else 1)
     left = Remaining(codes, repetitions, apart, constraint.max_repeats or codes * repetitions)
     steepness = _steepness(codes, repetitions, apart)
     masses = chosen_weights = 1
     for _ in range(codes * repetitions):
-        weights = [(code, left.count[code] ** steepness) for code in left.may_come()]
+        weights = [(code, left.count[code] ** steepness) for code in left.possible_codes()]
         mass = sum(weight for _, weight in weights)
         if not mass:
             return None
@@ -181,7 +181,7 @@ def propose(codes: int, repetitions: int, constraint: Constraint, draw: Draw) ->
         for code, weight in weights:
             place -= weight
             if place < 0:
-                left.take(code)
+                left.use_code(code)
                 chosen_weights *= weight
                 break
         masses *= mass
@@ -214,7 +214,7 @@ class Remaining:
         # Σ min(left, k) − k · apart for k = 0, 1, …: how many more the last k · apart trials could hold.
         self._slack = [k * (codes - apart) for k in range(repetitions + 1)]
 
-    def may_come(self) -> list[int]:
+    def possible_codes(self) -> list[int]:
         """Return the codes that may come next without a dead end."""
         if self._apart > 1:
             recent = self.taken[-(self._apart - 1) :]
@@ -226,7 +226,7 @@ class Remaining:
         urgent = [code for code, left in enumerate(self.count) if left > self._run * (self._total - left)]
         return [code for code in urgent or range(len(self.count)) if self.count[code] and code not in spent]
 
-    def take(self, code: int) -> None:
+    def use_code(self, code: int) -> None:
         """Use a code as the next one."""
         self._in_a_row = self._in_a_row + 1 if self.taken[-1:] == [code] else 1
         for k in range(self.count[code], len(self._slack)):

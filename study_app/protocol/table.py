@@ -82,20 +82,20 @@ def tidy(text: str) -> str:
     return "\n\n".join(" ".join(part.split()) for part in parts if part.strip())
 
 
-def _tidy_each(value: Any) -> Any:
+def _check_each_text(value: Any) -> Any:
     if isinstance(value, str):
-        return _tidied(value)
+        return _checked_text(value)
     if isinstance(value, dict) and value and all(isinstance(text, str) for text in value.values()):
-        return {language: _tidied(text) for language, text in value.items()}
+        return {language: _checked_text(text) for language, text in value.items()}
     raise invalid('a text is a string, or one string per language: {en = "…", nl = "…"}')
 
 
 @lru_cache(maxsize=16_384)  # saves 17 ms of each edit, after which a study is validated
-def _tidied(text: str) -> str:
-    return tidy(_printable(text))
+def _checked_text(text: str) -> str:
+    return tidy(_check_printable(text))
 
 
-def unprintable(text: str, permitted: str = "") -> str | None:
+def unprintable_character(text: str, permitted: str = "") -> str | None:
     """Return the first character that cannot be printed, hides or reorders others; ``permitted`` ones may."""
     hidden = (
         character for character in text if unicodedata.category(character) in UNPRINTABLE or character in DIRECTIONS
@@ -103,16 +103,16 @@ def unprintable(text: str, permitted: str = "") -> str | None:
     return next((character for character in hidden if character not in permitted), None)
 
 
-def _printable(text: str) -> str:
+def _check_printable(text: str) -> str:
     """Return ``text`` if it is legible: something visible, and nothing that hides or reorders other characters."""
-    if (letter := unprintable(text, "\t\n\r")) is not None:
+    if (letter := unprintable_character(text, "\t\n\r")) is not None:
         raise invalid(f"holds the character U+{ord(letter):04X}, which cannot be printed: take it out")
     if not any(unicodedata.category(letter)[0] in VISIBLE for letter in text):
         raise invalid("the text is empty: write one that can be read")
     return text
 
 
-def _not_longer(most: int) -> AfterValidator:
+def _at_most_long(most: int) -> AfterValidator:
     def checked(value: str | dict[str, str]) -> str | dict[str, str]:
         longest = max(map(len, value.values() if isinstance(value, dict) else (value,)))
         if longest > most:
@@ -123,21 +123,21 @@ def _not_longer(most: int) -> AfterValidator:
 
 
 Description: TypeAlias = Annotated[
-    str, AfterValidator(lambda text: _printable(text) if text else text), StringConstraints(max_length=MAX_BODY)
+    str, AfterValidator(lambda text: _check_printable(text) if text else text), StringConstraints(max_length=MAX_BODY)
 ]
 Brief: TypeAlias = Annotated[
-    str, AfterValidator(lambda text: _printable(text) if text else text), StringConstraints(max_length=MAX_TEXT)
+    str, AfterValidator(lambda text: _check_printable(text) if text else text), StringConstraints(max_length=MAX_TEXT)
 ]
 """What may be left empty, and fits in a line or two."""
-Printable: TypeAlias = Annotated[str, AfterValidator(_printable), StringConstraints(max_length=MAX_TEXT)]
+Printable: TypeAlias = Annotated[str, AfterValidator(_check_printable), StringConstraints(max_length=MAX_TEXT)]
 _Text: TypeAlias = Annotated[
     str | dict[str, str],
-    BeforeValidator(_tidy_each),
+    BeforeValidator(_check_each_text),
     Field(description="A text: one string, or one string per language of the study."),
 ]
-Localised: TypeAlias = Annotated[_Text, _not_longer(MAX_TEXT)]
+Localised: TypeAlias = Annotated[_Text, _at_most_long(MAX_TEXT)]
 """A title, a statement, a label: what fits on a page with others."""
-Body: TypeAlias = Annotated[_Text, _not_longer(MAX_BODY), Field(json_schema_extra={"lines": "several"})]
+Body: TypeAlias = Annotated[_Text, _at_most_long(MAX_BODY), Field(json_schema_extra={"lines": "several"})]
 """What fills a page or several; its schema says so to the study designer."""
 
 
@@ -213,9 +213,9 @@ class OfKinds(Generic[K]):
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Return the schema of the union, with what is validated before it."""
         written = core_schema.simple_ser_schema("any")  # each kind writes its own keys
-        return core_schema.with_info_wrap_validator_function(self._validated, handler(source), serialization=written)
+        return core_schema.with_info_wrap_validator_function(self._validate, handler(source), serialization=written)
 
-    def _validated(self, value: Any, own: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
+    def _validate(self, value: Any, own: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
         if isinstance(value, self.base):
             return value
         kind = value.get("kind") if isinstance(value, Mapping) else None

@@ -27,17 +27,20 @@ def without_force(protocol: Protocol) -> Protocol:
     """
     reworded = {"pages": "body", "questionnaires": "intro", "tasks": "instruction"}
     tables = {
-        table: {name: entry.model_copy(update={key: _seen(getattr(entry, key))}) for name, entry in given.items()}
+        table: {
+            name: entry.model_copy(update={key: _without_force_sentences(getattr(entry, key))})
+            for name, entry in given.items()
+        }
         for table, key in reworded.items()
         for given in (getattr(protocol, table),)
     }
     return protocol.model_copy(update=tables)
 
 
-def _seen(text: Any) -> Any:
+def _without_force_sentences(text: Any) -> Any:
     """Return a localised text without its sentences about force."""
     if isinstance(text, Mapping):
-        return {language: _seen(sentence) for language, sentence in text.items()}
+        return {language: _without_force_sentences(sentence) for language, sentence in text.items()}
     for pattern, seen in _PATTERNS if isinstance(text, str) else ():
         text = pattern.sub(seen, text)
     return text

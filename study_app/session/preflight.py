@@ -18,11 +18,11 @@ from study_app.haptics.model.slope_limits import refusal_reason
 from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
 from study_app.number_text import counted
 from study_app.outlets.session_outlets import OutletStatus
-from study_app.protocol.checks.force_limits import beyond_slope_limit, by_stimulus
+from study_app.protocol.checks.force_limits import blocks_by_stimulus, slope_limit_fault
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import recordings_of
 from study_app.protocol.presented.presented_levels import highest_damping
-from study_app.protocol.sequences import enrolment
+from study_app.protocol.sequences import enrolment_number
 from study_app.protocol.warnings.untranslated import UntranslatedText, listed_places
 from study_app.protocol.wording.languages import language_name
 from study_app.store.blinded.sealing import FRAMES_BYTES_PER_S, SAMPLE_BYTES, sealed_bytes
@@ -237,7 +237,7 @@ def _level_check(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     if highest_nspm == 0:
         return
     value, about = f"up to {highest_nspm:g} N·s/m", f"with a delay of {counted(facts.delay_ticks, 'tick')}"
-    problems = (beyond_slope_limit(protocol, alike, facts.delay_ticks) for alike in by_stimulus(protocol))
+    problems = (slope_limit_fault(protocol, alike, facts.delay_ticks) for alike in blocks_by_stimulus(protocol))
     beyond = next(filter(None, problems), None)
     advice = "" if beyond is None else f"{beyond.message}: {beyond.hint}"
     yield Check("Levels", "ok" if beyond is None else "failure", value, about=about, advice=advice)
@@ -364,7 +364,7 @@ def _cost_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
 
     if protocol.assigns_rows and protocol.groups:
         yield Check("Balance", "ok", "place in the group", about="determines the row of the square")
-    elif protocol.assigns_rows and (number := enrolment(facts.participant)) is not None:
+    elif protocol.assigns_rows and (number := enrolment_number(facts.participant)) is not None:
         yield Check("Balance", "ok", f"participant number {number}", about="determines the row of the square")
     elif protocol.assigns_rows:
         advice = f"{facts.participant} has no number, so its row is drawn at random; use ids such as P007."

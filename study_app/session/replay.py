@@ -31,7 +31,7 @@ from study_app.haptics.model.scene import FADE_S, Scene
 from study_app.haptics.runtime.offline import law_along, recompute_scenes
 from study_app.haptics.runtime.pack import adjust_into, pack
 from study_app.protocol.model import Protocol
-from study_app.protocol.presented.presentation import link_seed, presented_by, scene_of
+from study_app.protocol.presented.presentation import link_seed, recorded_presentation, scene_of
 from study_app.protocol.tracks import adjusting_of, design_of
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.store import receipt, recordings
@@ -56,7 +56,7 @@ def scene_presented(
     """
     if interval is None:
         return scene_of(protocol, Stimulated(key.condition(started.block, started.code)), link_seed)
-    due = presented_by(protocol, key.codes, started.fields())
+    due = recorded_presentation(protocol, key.codes, started.fields())
     return scene_of(protocol, due.intervals[interval - 1], link_seed)
 
 
@@ -78,7 +78,7 @@ def steps_of(
     """
     if interval is None or started.level is None or interval != len(started.arrangement or ""):
         return ()
-    presented = presented_by(protocol, key.codes, started.fields()).intervals[interval - 1]
+    presented = recorded_presentation(protocol, key.codes, started.fields()).intervals[interval - 1]
     made = [line for line in lines if isinstance(line, events.Stepped) and line.which == started.which]
     setting = adjusting_of(protocol, protocol.blocks[started.block], started.standard, started.level)
     if setting is None:
@@ -247,7 +247,7 @@ def replay(session_folder: Path) -> Replayed:
             again: dict[str, float | None] = {}
             measured = ended.others
             if interval is not None:
-                presented = presented_by(protocol, key.codes, started.fields()).intervals[interval - 1]
+                presented = recorded_presentation(protocol, key.codes, started.fields()).intervals[interval - 1]
                 again |= recompute_delivered(protocol, presented, started, interval, samples, measured).columns
             if measured.get("delivered_error") is not None and ended.outcome != "interrupted":
                 again["delivered_error"] = recompute_force_error(scene, protocol.device.rate_hz, samples, measured)

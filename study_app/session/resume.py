@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from study_app.errors import ProtocolError, SessionError
-from study_app.protocol.load import at_hand, parse, protocol_hash, source_bytes
+from study_app.protocol.load import known_protocols, parse, protocol_hash, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial, build_schedule
 from study_app.protocol.trials.methods import TrialResult
@@ -91,7 +91,7 @@ def find_protocol(
     It is looked for among ``candidates``, by default those in the workspace, those that ship, and recent ones; ``read``
     returns the bytes of one. SessionError says that none is of that study.
     """
-    names = dict.fromkeys((*at_hand(), *recent_protocols()) if candidates is None else candidates)
+    names = dict.fromkeys((*known_protocols(), *recent_protocols()) if candidates is None else candidates)
     sources: dict[str, bytes] = {}
     for name in names:
         with contextlib.suppress(ProtocolError):  # an unreadable file is not a candidate

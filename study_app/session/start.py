@@ -18,8 +18,8 @@ from study_app.outlets.session_outlets import Outlets, OutletStatus
 from study_app.protocol.load import parse, protocol_hash, read_document, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
-from study_app.protocol.sequences import enrolment
-from study_app.protocol.source.files import find
+from study_app.protocol.sequences import enrolment_number
+from study_app.protocol.source.files import protocol_file
 from study_app.protocol.warnings.untranslated import check_translated, untranslated_on_pages
 from study_app.session.preflight import Masking, Measurements, Screen
 from study_app.session.resume import find_protocol, source_to_resume
@@ -155,7 +155,7 @@ def check_row(row_of: str | None, study: Protocol) -> None:
             f"row of {row_of!r}: no block of {study.study.name} has a Williams or Latin order, so no participant has a "
             "row; leave it out"
         )
-    if not ID_PATTERN.fullmatch(row_of) or enrolment(row_of) is None:
+    if not ID_PATTERN.fullmatch(row_of) or enrolment_number(row_of) is None:
         raise SessionError(
             f"row of {row_of!r}: rows are assigned by the number in a participant's id; give the id of the participant "
             "who is replaced, such as P007"
@@ -224,7 +224,7 @@ def unopened_videos(chosen: NewSession, study: Protocol, camera: str, rig: Rig) 
     """Return the unopened videos of a study, None if it shows none. ``camera`` is that of this computer."""
     if not any(condition.shows_video for condition in study.conditions.values()):
         return None
-    folder = find(chosen.source).parent if chosen.footage is None else chosen.footage
+    folder = protocol_file(chosen.source).parent if chosen.footage is None else chosen.footage
     return Videos(study, folder, camera, rig.servo.now_ns)
 
 

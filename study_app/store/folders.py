@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study_app.errors import StoreError
-from study_app.protocol.table import unprintable
+from study_app.protocol.table import unprintable_character
 
 REBUILT = "rebuilt.txt"
 FINGERPRINTS = "fingerprints.txt"
@@ -202,6 +202,6 @@ def check_name_and_reason(by: str, reason: str, why: str) -> tuple[str, str]:
     for name, text in (("by", by), ("reason", reason)):
         if not text.strip():
             raise StoreError(f"--{name} is empty: {why}")
-        if (letter := unprintable(text, "\t\n\r")) is not None:
+        if (letter := unprintable_character(text, "\t\n\r")) is not None:
             raise StoreError(f"--{name} holds the character U+{ord(letter):04X}, which cannot be printed: take it out")
     return " ".join(by.split()), " ".join(reason.split())

@@ -45,7 +45,7 @@ def test_a_bug_while_it_measures_is_a_sentence_and_leaves_no_window(
         may_fail.wait(10)
         raise RuntimeError("a module is missing")
 
-    monkeypatch.setattr(ComputerCheck, "_look", fail)
+    monkeypatch.setattr(ComputerCheck, "_run_checks", fail)
     visit.check_computer()
     check = visit.check
     assert check is not None

@@ -72,7 +72,7 @@ def room(qapp, monkeypatch):
         made = Room(servo)
         yield made
         if isValid(made.bridge):
-            made.bridge.leave_now()
+            made.bridge.leave_without_asking()
         QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
@@ -115,7 +115,7 @@ def test_a_session_of_delays_is_held_and_its_recordings_are_read(qapp, monkeypat
     monkeypatch.setattr(held, "DELAYS_S", (0.0, 0.2))
     monkeypatch.setattr(held, "VIRTUAL_HZ", (60.0,))
     lines = []
-    found = held.delays(0.5, "gui", progress=lines.append)
+    found = held.measure_delays(0.5, "gui", progress=lines.append)
     assert lines == ["virtual, 60 Hz, tank alone", "virtual, 60 Hz, with the cockpit"]
     assert found.loads == ("none", "gui")
     for load in found.loads:
@@ -130,4 +130,4 @@ def test_a_session_of_delays_is_held_and_its_recordings_are_read(qapp, monkeypat
 @pytest.mark.parametrize("seconds", [0.0, 0.4, 601.0, float("nan")])
 def test_times_that_make_no_sense_are_refused(seconds):
     with pytest.raises(StudyError, match=r"each delay is shown for 0\.5 to 600 s"):
-        held.delays(seconds, "none")
+        held.measure_delays(seconds, "none")

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.slow
 def test_a_study_that_was_asked_for_opens_at_the_first_visit(visit: MainController, qtbot: Any, asked: str) -> None:
     visit.preload()
     if asked == "new":
-        visit.begin_study()
+        visit.begin_new_study()
     else:
         visit.open_designer("demo")
     designer = visit.designer

@@ -142,8 +142,8 @@ def test_what_opens_a_device_ends_a_diagnosis_that_is_under_way(
     visit: MainController, monkeypatch: Any, asked: str
 ) -> None:
     monkeypatch.setattr(main_controller, "LiveSession", Held)
-    monkeypatch.setattr("study_app.gui.devices.view.diagnosis", lambda window, *_device: QDialog(window))
-    monkeypatch.setattr("study_app.app.lab_controller.LabController._open", lambda *_device: None)
+    monkeypatch.setattr("study_app.gui.devices.view.open_diagnosis", lambda window, *_device: QDialog(window))
+    monkeypatch.setattr("study_app.app.lab_controller.LabController._open_device", lambda *_device: None)
     visit.window.place("lab")
     visit.devices.diagnose("falcon")
     dialog = visit.devices.dialog

@@ -113,13 +113,16 @@ def test_results(qtbot: Any, pytestconfig: pytest.Config) -> None:
     place._listening.setInterval(10**8)
     qtbot.addWidget(place)
     asks: dict[str, Any] = {
-        "entered": place.enter, "left": place.leave, "study_asked": place._choose, "remedy_asked": place._mend,
-        "leave_out_asked": lambda asked: place._decide("leaving out", of.LeaveOut, **exclusion(asked)),
-        "take_back_asked": lambda asked: place._decide("taking the exclusion back", of.TakeBack, **exclusion(asked)),
-        "unblind_asked": lambda by, reason: place._decide("opening the key", of.OpenKey, by=by, reason=reason),
-        "tables_asked": lambda *asked: place._write(of.WriteTables, *asked),
-        "report_asked": lambda to, _extras: place._write(of.WriteReport, to), "stop_asked": place._stop_writing,
-        "open_asked": place._opener, "choose": place.choose, "others": place.show_results,
+        "entered": place.enter, "left": place.leave, "study_asked": place._choose_study,
+        "remedy_asked": place._apply_remedy,
+        "leave_out_asked": lambda asked: place._order_decision("leaving out", of.LeaveOut, **exclusion(asked)),
+        "take_back_asked": lambda asked: place._order_decision(
+            "taking the exclusion back", of.TakeBack, **exclusion(asked)
+        ),
+        "unblind_asked": lambda by, reason: place._order_decision("opening the key", of.OpenKey, by=by, reason=reason),
+        "tables_asked": lambda *asked: place._start_writing(of.WriteTables, *asked),
+        "report_asked": lambda to, _extras: place._start_writing(of.WriteReport, to), "stop_asked": place._stop_writing,
+        "open_asked": place._opener, "choose": place.choose_study, "others": place.show_results,
     }  # fmt: skip
     place.message.connect(lambda *words: done.append(f"message {words}"))
     lines, before = [], list[str]()
@@ -129,18 +132,18 @@ def test_results(qtbot: Any, pytestconfig: pytest.Config) -> None:
         match name:
             case "answer" | "slow" | "late" | "none":
                 if name == "none":
-                    place.look()
+                    place.read_studies()
                 reader.told = [(reader.number - (name == "late"), given)]
                 place._since_s -= 10.0 * (name == "slow")
-                place._listen()
+                place._read_answers()
             case "written":
                 workers[-1].told = [(1, given)]
-                place._listen()
+                place._read_answers()
             case "dead":
                 reader.works = False
             case _:
                 asks[name](*given)
-        after = [f"busy: {place.busy} {place._listening.isActive()}", *value_lines(place.view, "view")]
+        after = [f"busy: {place.is_busy} {place._listening.isActive()}", *value_lines(place.view, "view")]
         lines += [f"== {name} {given}", *done, *changed(before, after)]
         before = after
     compare(GOLDEN / "results.txt", lines, pytestconfig)
@@ -166,15 +169,19 @@ def test_settings(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: py
     machine.changed.connect(lambda settings: heard.append(f"changed, kept: {settings == load_settings()}"))
     machine.troubled.connect(lambda *words: heard.append(f"troubled {words[0]}"))
     lines, before = [], list(value_lines(machine.settings, "settings"))
-    actions: dict[str, Any] = {"measured": lambda values: machine.measured(*values)}
-    actions |= {"operator": machine.remember_operator, "protocol": machine.remember_protocol, "change": machine.change}
+    actions: dict[str, Any] = {"measured": lambda values: machine.store_display_offset(*values)}
+    actions |= {
+        "operator": machine.remember_operator,
+        "protocol": machine.remember_protocol,
+        "change": machine.change_settings,
+    }
     for name, value in CHANGES:
         heard.clear()
         machine.undo() if name == "undo" else actions[name](value)
         settings = (
             line.replace(date.today().isoformat(), "TODAY") for line in value_lines(machine.settings, "settings")
         )
-        after = [*settings, f"undo: {machine.undo_called}"]
+        after = [*settings, f"undo: {machine.undo_name}"]
         lines += [f"== {name} {value}", *heard, *changed(before, after)]
         before = after
     compare(GOLDEN / "settings.txt", lines, pytestconfig)
@@ -210,7 +217,7 @@ def test_devices(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: pyt
     place = DevicesPlace(machine.settings, look)
     qtbot.addWidget(place)
     machine.changed.connect(place.show_settings)
-    place.changed.connect(machine.change)
+    place.changed.connect(machine.change_settings)
     place.looked.connect(lambda: heard.append(f"looked {len(place.shown)}"))
     place.troubled.connect(lambda *words: heard.append(f"troubled {words}"))
     lines = [*value_lines(device_named(machine.settings.device, place.shown), "preferred")]
@@ -224,7 +231,7 @@ def test_devices(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: pyt
         if name == "change":
             place.changed.emit(given)
         else:
-            getattr(place, name)(*([] if given is None else [given]))
+            getattr(place, DEVICE_ACTS.get(name, name))(*([] if given is None else [given]))
         if place.looking.busy:
             heard.append(f"looking {place.refresh.isEnabled()}")
             place.looking.wait()
@@ -237,13 +244,16 @@ def test_devices(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: pyt
     compare(GOLDEN / "devices.txt", lines, pytestconfig)
 
 
+DEVICE_ACTS = {"look": "look_for_devices", "end": "stop_looking"}
+
+
 class Live(QObject):
     """A session that records what it is asked and ends when told to."""
 
     over = Signal()
     done: list[str] = []  # noqa: RUF012 - shared on purpose
     error: Exception | None = None
-    began, opening, code = False, True, 0
+    has_begun, is_opening, code = False, True, 0
 
     def __init__(self, chosen: NewSession, theme: Any, *, asks: bool) -> None:
         super().__init__()
@@ -292,14 +302,16 @@ CHOSEN = NewSession(
 STAY: dict[str, Any] = {
     "home": go("home"), "begin": home("session_asked", CHOSEN), "begin twice": home("session_asked", CHOSEN),
     "bug meanwhile": lambda visit: visit.show_bug(ValueError("x")), "called off": ends(),
-    "begin again": home("session_asked", CHOSEN), "not found": ends(error=DeviceNotFound("no Falcon"), opening=False),
-    "begin a third": home("session_asked", CHOSEN), "lost": ends(error=DeviceNotFound("gone"), began=True, theme=DARK),
+    "begin again": home("session_asked", CHOSEN),
+    "not found": ends(error=DeviceNotFound("no Falcon"), is_opening=False),
+    "begin a third": home("session_asked", CHOSEN),
+    "lost": ends(error=DeviceNotFound("gone"), has_begun=True, theme=DARK),
     "begin a fourth": home("session_asked", CHOSEN), "bug of it": ends(code=BUG, theme=DARK),
     "bug": lambda visit: visit.show_bug(ValueError("x")), "same bug": lambda visit: visit.show_bug(ValueError("x")),
     "protocol": home("protocol_opened", Path("/studies/mine.toml")), "results": home("results_asked", STUDY),
     "machine": go("machine"), "help": lambda visit: visit.show_help(), "help again": lambda visit: visit.show_help(),
-    "devices": go("devices"), "workspace": lambda visit: visit.machine.change({"workspace": "/elsewhere"}),
-    "device": lambda visit: visit.machine.change({"device": "scripted"}),
+    "devices": go("devices"), "workspace": lambda visit: visit.machine.change_settings({"workspace": "/elsewhere"}),
+    "device": lambda visit: visit.machine.change_settings({"device": "scripted"}),
     "saved": lambda visit: visit._home_place.show_studies(),
     "trouble": lambda visit: visit.machine.troubled.emit("a", "b"), "begin last": home("session_asked", CHOSEN),
     "signal": lambda visit: visit.end_by_signal(15), "over": ends(), "end": lambda visit: visit.end(),
@@ -308,8 +320,8 @@ STAY: dict[str, Any] = {
 
 def test_the_stay(visit: MainController, monkeypatch: Any, pytestconfig: pytest.Config) -> None:
     monkeypatch.setattr(main_controller, "LiveSession", Live)
-    monkeypatch.setattr(ResultsPlace, "look", lambda self: Live.done.append(f"look at {self.view.chosen}"))
-    monkeypatch.setattr(DevicesPlace, "look", lambda _self: Live.done.append("look for devices"))
+    monkeypatch.setattr(ResultsPlace, "read_studies", lambda self: Live.done.append(f"look at {self.view.chosen}"))
+    monkeypatch.setattr(DevicesPlace, "look_for_devices", lambda _self: Live.done.append("look for devices"))
     lines: list[str] = []
     visit.window.closed.connect(lambda: Live.done.append("closed"))
     for name, step in STAY.items():

@@ -16,7 +16,7 @@ from study_app.app.timing import (
     MOST_SHARE,
     FrameBudget,
     ThreadPriority,
-    collecting_here,
+    collecting_in_this_thread,
     freeze_garbage,
     unfreeze_garbage,
 )
@@ -47,7 +47,7 @@ class Frame:
         for number in range(frames):
             due_ns = start_ns + number * every_ms * MS
             self.now_ns = max(self.now_ns, due_ns) + tank_ms * MS
-            self.slack.use(due_ns + every_ms * MS)
+            self.slack.run_due_tasks(due_ns + every_ms * MS)
             past.append(max(0, self.now_ns - due_ns - every_ms * MS) / MS)
         return past
 
@@ -125,7 +125,7 @@ def allocate_elsewhere() -> list[list[int]]:
 @pytest.mark.usefixtures("automatic_collection")
 def test_no_other_thread_frees_what_belongs_to_windows_open_or_closed(qtbot: Any) -> None:
     open_, closed = [], []
-    with collecting_here():
+    with collecting_in_this_thread():
         assert not gc.isenabled()
         Cycle(open_)
         kept = allocate_elsewhere()

@@ -25,7 +25,7 @@ collected = collections() - before, gc.isenabled(), gc.get_freeze_count() > 0
 from PySide6.QtCore import QObject
 
 for_all = [name for name in ("main_controller", "lab_controller") if f"study_app.app.{name}" in sys.modules]
-assert callable(app.run) and callable(app.home)
+assert callable(app.run) and callable(app.run_home_window)
 
 from study_app.app.main_controller import MainController
 from study_app.app.session import live_session

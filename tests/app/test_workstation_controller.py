@@ -9,7 +9,7 @@ from PySide6.QtGui import QGuiApplication
 from study_app.app.main_controller import MainController, WorkstationController
 from study_app.app.session.live_session import NOT_EXAMINED, LiveSession
 from study_app.devices.descriptor import READY, Backend
-from study_app.gui.kit.devices import described, settings_here, text_scale_on
+from study_app.gui.kit.devices import described_screens, settings_here, text_scale_on
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.session.start import NewSession
 from study_app.store import workstation
@@ -29,7 +29,7 @@ def desk(qapp):
 def test_settings_that_cannot_be_kept_are_told_and_count_all_the_same(desk, qtbot):
     settings_file().parent.write_text("")  # a file where the folder should be
     with qtbot.waitSignal(desk.troubled) as told:
-        desk.change({"theme": "dark"})
+        desk.change_settings({"theme": "dark"})
     assert "could not be saved" in told.args[0]
     assert desk.settings.theme == "dark"
     settings_file().parent.unlink()
@@ -47,7 +47,7 @@ def test_the_receipt_says_distance_width_and_offset_of_the_participants_screen(q
     screen = QGuiApplication.primaryScreen()
     offset = DisplayOffset(mean_ms=20, spread_ms=1, measured="2026-11-20", screen=screen.name())
     settings = MachineSettings(viewing_distance_mm=600, screen_width_mm=300, display_offset=offset)
-    screens = described(settings, screen, screen)
+    screens = described_screens(settings, screen, screen)
     assert screens["participant"]["frames"] == "by the clock", "nothing tells of swaps without a display"
     assert screens["participant"]["viewing_distance_mm"] == 600
     assert screens["participant"]["display_offset"]["mean_ms"] == 20
@@ -61,7 +61,7 @@ def test_a_folder_asked_for_by_command_counts_for_this_stay(qtbot, tmp_path, mon
     asked = MainController(tmp_path / "asked")
     qtbot.addWidget(asked.window)
     assert asked.results == tmp_path / "asked"
-    asked.machine.change({"workspace": str(tmp_path / "other")})
+    asked.machine.change_settings({"workspace": str(tmp_path / "other")})
     assert asked.results == tmp_path / "asked"
     following = MainController()
     qtbot.addWidget(following.window)
@@ -89,7 +89,7 @@ def test_from_the_cockpit_a_falcon_is_examined_and_of_what_is_none_it_is_said(qa
         asked.append((name, held))
         return SimpleNamespace(show=lambda: None)
 
-    monkeypatch.setattr("study_app.gui.devices.diagnosis_dialog.diagnosis", diagnosis)
+    monkeypatch.setattr("study_app.gui.devices.diagnosis_dialog.open_diagnosis", diagnosis)
     live = LiveSession(
         NewSession(
             source="demo",

@@ -160,7 +160,7 @@ import sys
 import PySide6.QtCore
 from study_app import app, cli
 sys.argv = ["liquid-study"]
-app.home = lambda: print("ended") or 130
+app.run_home_window = lambda: print("ended") or 130
 sys.stdout = {output}
 cli.main()
 """

@@ -20,7 +20,7 @@ class Visit:
     def __init__(self) -> None:
         self.asked: list[tuple[str, ...]] = []
 
-    def begin_study(self, source: str, name: str) -> None:
+    def begin_new_study(self, source: str, name: str) -> None:
         self.asked.append(("begin", source, name))
 
     def open_designer(self, source: str) -> None:
@@ -35,7 +35,7 @@ def visit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Visit:
         then(made)
         return 0
 
-    monkeypatch.setattr(app, "home", home)
+    monkeypatch.setattr(app, "run_home_window", home)
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
     return made
 

@@ -31,7 +31,7 @@ def record(designer: Designer, monkeypatch: pytest.MonkeyPatch) -> Callable[...,
         monkeypatch.setattr(f"study_app.designer.{timer}_MS", NEVER_MS)  # each is let go by the record, after an act
     spoken: list[str] = []
     for module in ("header", "window"):
-        monkeypatch.setattr(f"study_app.designer.{module}.say", lambda _by, words: spoken.append(words))
+        monkeypatch.setattr(f"study_app.designer.{module}.announce", lambda _by, words: spoken.append(words))
     return partial(Record, designer, spoken)
 
 

@@ -57,9 +57,9 @@ def adding_and_deleting(record: Record) -> None:
 def problems(record: Record) -> None:
     text = record.text.replace('liquid = "thick"', 'liquid = "thik"').replace("blinding", "blindin", 1)
     text = text.replace("force_limit_n = 6", "force_limit_n = 60").replace("min_s = 5", 'min_s = "5"')
-    record.note("break", lambda: record.designer.editing.ask(RetypeFile(text)))
+    record.note("break", lambda: record.designer.editing.handle_request(RetypeFile(text)))
     record.play('ctrl+4 F8 F8 F8 F8 F8 ctrl+4 Tab Tab Return [Use "blinding": Study, Blindin]')
-    record.note("no TOML", lambda: record.designer.editing.ask(RetypeFile("[study")))
+    record.note("no TOML", lambda: record.designer.editing.handle_request(RetypeFile("[study")))
     record.play("F8 ctrl+z ctrl+z")
 
 
@@ -75,7 +75,7 @@ def new_study(record: Record) -> None:
 
 def on_disk(record: Record) -> None:
     designer = record.designer
-    record.note("edit", lambda: designer.editing.ask(SetValue(("blocks", "liquids", "repetitions"), 3)))
+    record.note("edit", lambda: designer.editing.handle_request(SetValue(("blocks", "liquids", "repetitions"), 3)))
     record.note("changes", lambda: designer.place.show_tab("changes"))
     designer.change(("rate_hz = 1000", "rate_hz = 900"))
     record.note("changed outside", designer.controller.enter, paints=True)
@@ -90,7 +90,7 @@ def on_disk(record: Record) -> None:
 
 
 def series(record: Record) -> None:
-    record.note("list one", lambda: record.designer.editing.ask(SetValue(LISTED, ["thin"])))
+    record.note("list one", lambda: record.designer.editing.handle_request(SetValue(LISTED, ["thin"])))
     record.play("@conditions.thin ctrl+shift+d '5000' Return ctrl+a '60 120 240' Return ctrl+z")
     record.play(" ".join(f"@{path} ctrl+shift+d Escape" for path in ("study", "blocks.liquids", "blocks")))
 
@@ -107,13 +107,13 @@ def finding(record: Record) -> None:
 
 
 def languages(record: Record) -> None:
-    record.note("add", lambda: record.designer.editing.ask(ChangeLanguage("add", "nl")))
+    record.note("add", lambda: record.designer.editing.handle_request(ChangeLanguage("add", "nl")))
     record.play("@pages.welcome ctrl+l ctrl+4 F8 Return ctrl+z")
-    record.note("copy", lambda: record.designer.editing.ask(ChangeLanguage("copy", "nl")))
+    record.note("copy", lambda: record.designer.editing.handle_request(ChangeLanguage("copy", "nl")))
     record.select("pages", "welcome")
     record.note("title", record.designer.field("pages", "welcome", "title").lines["nl"].setFocus)
     record.play("'Een blik' Return ctrl+l ctrl+s @study")
-    record.note("remove", lambda: record.designer.editing.ask(ChangeLanguage("remove", "nl")))
+    record.note("remove", lambda: record.designer.editing.handle_request(ChangeLanguage("remove", "nl")))
 
 
 def small_window(record: Record) -> None:
@@ -124,7 +124,10 @@ def small_window(record: Record) -> None:
 
 def editing(record: Record) -> None:
     record.play("ctrl+1 Insert Down Return ctrl+z @liquids.thin ctrl+1 Delete Return ctrl+d alt+Up F2 'water 2'")
-    record.note("break", lambda: record.designer.editing.ask(RetypeFile(record.text.replace("blinding", "blindin", 1))))
+    record.note(
+        "break",
+        lambda: record.designer.editing.handle_request(RetypeFile(record.text.replace("blinding", "blindin", 1))),
+    )
     record.play("F8 Return ctrl+z shift+F1")
 
 

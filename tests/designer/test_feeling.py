@@ -55,7 +55,7 @@ def test_a_liquid_is_felt_with_unsaved_values_and_put_back_as_one_step(qtbot: An
     editing = visit.designer.editing
     assert editing.opened is not None
     saved = editing.opened.file.read_bytes()
-    editing.make("Denser", Set(("liquids", "thick", "density_kg_m3"), 1500))
+    editing.make_step("Denser", Set(("liquids", "thick", "density_kg_m3"), 1500))
     assert visit.designer.place.form.head.feel.isHidden()  # the first step is a page
     lab = feel(qtbot, visit, "liquids", "thick")
     assert visit.designer.place.form.head.feel.accessibleName() == "Feel Thick"

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 
 def test_forms_leave_no_wrapper_of_an_item_of_their_layouts(qtbot: Any, designer: Any) -> None:
     """An event at the address of an item that Qt has deleted would get the wrapper, and a key would fail."""
-    designer.controller.begin("template:viscosity-jnd", "thicker")
+    designer.controller.begin_study("template:viscosity-jnd", "thicker")
     for row in [("study",), *((name, id) for name, ids in designer.study.document.items()
                               if isinstance(ids, dict) for id in ids if isinstance(ids[id], dict))]:  # fmt: skip
         designer.go_to(*row)
@@ -31,7 +31,7 @@ def test_a_shown_text_that_qt_normalises_is_no_edit(
     qtbot: Any, designer: Any, path: tuple[str | int, ...], text: str
 ) -> None:
     designer.open("kitchen")
-    designer.editing.make("Change", Set(path, {"en": text}))
+    designer.editing.make_step("Change", Set(path, {"en": text}))
     designer.go_to(*path[:-1])
     (line,) = designer.field(*path).findChildren(QPlainTextEdit)
     assert not line.pending
@@ -62,8 +62,8 @@ def test_a_row_that_stays_keeps_its_widget_caret_and_keyboard(qtbot: Any, design
     (line,) = title.field.lines.values()
     line.setFocus()
     line.setCursorPosition(2)
-    designer.editing.ask(AddKey(("blocks", "liquids", "setting_label")))
-    designer.editing.ask(RenameElement(("blocks", "liquids"), "fluids"))
+    designer.editing.handle_request(AddKey(("blocks", "liquids", "setting_label")))
+    designer.editing.handle_request(RenameElement(("blocks", "liquids"), "fluids"))
     assert designer.keyboard is line
     assert (line.cursorPosition(), designer.form_row("blocks", "fluids", "title")) == (2, title)
 
@@ -74,7 +74,7 @@ def test_the_next_element_has_no_selected_entries_and_shows_the_field_with_the_k
     designer.click_on(entries.viewport(), at=entries.visualItemRect(entries.item(0)).center())
     assert entries.selectedItems()
     last = designer.place.form.rows[-1]
-    designer.place.form.focus(last.row.path)
+    designer.place.form.focus_row(last.row.path)
     designer.go_to("blocks", "delays")
     assert designer.field("blocks", "delays", "conditions").list is entries
     assert not entries.selectedItems()

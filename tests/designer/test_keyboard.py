@@ -7,7 +7,7 @@ import pytest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.designer.document.steps import ChangeLanguage
-from study_app.designer.window import stops
+from study_app.designer.window import focus_stops
 from study_app.gui.kit.commands import COMMANDS
 
 pytestmark = pytest.mark.slow
@@ -28,7 +28,7 @@ def dutch(qtbot: Any, designer: Any) -> Any:
     """The study in two languages, with a block selected."""
     designer.open()
     for how in ("add", "copy"):
-        designer.editing.ask(ChangeLanguage(how, "nl"))
+        designer.editing.handle_request(ChangeLanguage(how, "nl"))
     designer.go_to("blocks", "liquids")
     qtbot.waitUntil(lambda: len(designer.controller.preview.languages.buttons) == 2)
     return designer
@@ -56,5 +56,5 @@ def test_tab_goes_to_each_stop_of_a_form_once(dutch: Any, editors: None, path: t
     dutch.place.parts.focus_header()
     seen = passed(dutch, lambda part: part is dutch.place.pane.tabs.buttons[0])
     assert [part.accessibleName() for part in seen if form.inside.isAncestorOf(part)] == [
-        part.accessibleName() for part in stops(form.inside) if part.isVisible() and part.isEnabled()
+        part.accessibleName() for part in focus_stops(form.inside) if part.isVisible() and part.isEnabled()
     ]

@@ -108,20 +108,20 @@ def test_measures_and_the_page_of_a_new_study_fit(
 ) -> None:
     designer.window.show_theme(theme)
     designer.window.resize(*size)
-    designer.controller.ask_for_new()
+    designer.controller.show_new_page()
     page = designer.place.new_page
     for one in page.buttons:
         one.setChecked(True)
         qtbot.wait(1)
         assert fits(page.card.area), one.choice.source
         assert not nameless(page), one.choice.source
-    designer.controller.begin("template:viscosity-jnd", "thicker")
+    designer.controller.begin_study("template:viscosity-jnd", "thicker")
     designer.place.sides.buttons[1].click()
     designer.place.pane.show_tab("measures")
     measures = designer.place.measures
     for path in (("blocks", "viscosity"), ("liquids", "damper"), ("study",), ("designs", "pair"), ("tasks", "stir")):
         designer.go_to(*path)
-        designer.controller.measures.show()
+        designer.controller.measures.show_measures()
         assert measures.shown is not None
         assert fits(measures), path
         assert not nameless(measures), path

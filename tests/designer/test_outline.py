@@ -160,7 +160,7 @@ def test_studies_are_listed_by_title_with_their_files_whatever_was_opened_last(d
 def small(designer: Any) -> Any:
     """A study of many elements in a small window."""
     designer.window.resize(1366, 768)
-    designer.controller.begin("rek2024", "mine")
+    designer.controller.begin_study("rek2024", "mine")
     QApplication.processEvents()
     return designer
 

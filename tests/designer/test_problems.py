@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 def test_repairs_are_pressed_one_after_another_while_the_pointer_stays(designer: Any, qtbot: Any) -> None:
     text = "\n".join(line for line in DEMO.split("\n") if not line.startswith(("density_kg_m3", "min_s", "dwell_s")))
     designer.open()
-    designer.editing.ask(RetypeFile(text))
+    designer.editing.handle_request(RetypeFile(text))
     problems = designer.place.problems
     qtbot.waitUntil(lambda: len(problems.problems) == 4)
     problems.show()

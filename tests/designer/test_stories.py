@@ -59,7 +59,7 @@ def drafts(record: Record) -> None:
     act("leave", lambda: designer.window.go("home"))
     act("come back", lambda: designer.window.go("designer"))
     record.play("ctrl+s")
-    act("copy a shipped one", lambda: designer.controller.begin("demo", "mine"))
+    act("copy a shipped one", lambda: designer.controller.begin_study("demo", "mine"))
     record.play("ctrl+s")
 
 
@@ -83,7 +83,7 @@ def banner(record: Record) -> None:
 def never_saved(record: Record) -> None:
     """A study that was never saved is discarded once that is confirmed."""
     designer = record.designer
-    begin = partial(designer.controller.begin, "template:compare-liquids", "mine")
+    begin = partial(designer.controller.begin_study, "template:compare-liquids", "mine")
     record.note("begin", begin)
     record.note("open another", designer.open)
     record.note("open it again", lambda: designer.open(str(designer.file.with_name("mine.toml"))))
@@ -185,7 +185,7 @@ def failing(record: Record) -> None:
     record.note("save as another", lambda: saving.save_as_another("pantry"))
     full.undo()
     assert kept_original(designer.file.with_name("pantry.toml")) == "kitchen"
-    record.note("begin", lambda: designer.controller.begin("template:compare-liquids", "mine"))
+    record.note("begin", lambda: designer.controller.begin_study("template:compare-liquids", "mine"))
     record.note("open another", designer.open)
     record.note("open it again", lambda: designer.open(str(designer.file.with_name("mine.toml"))))
     stuck = refusing("store.drafts.discard", "the draft cannot be deleted: Permission denied")
@@ -312,13 +312,13 @@ def fields(record: Record) -> None:
     record.play("@conditions.thin :conditions.thin.view 'f' 'ront' Escape")
     record.play(":conditions.thin.force_delay_ms '7' Tab ctrl+z :conditions.thin.force_delay_ms '8' shift+Tab ctrl+z")
     record.select("blocks", "liquids")
-    for one in [row.row.path for row in record.designer.place.form.rows if row.row.removable]:
+    for one in [row.row.path for row in record.designer.place.form.rows if row.row.is_removable]:
         record.play(f":{'.'.join(one)} ctrl+Delete ctrl+z")
 
 
 def adaptive(record: Record) -> None:
     """Fields of a study of levels have the names of the field of study; a refused list of numbers says so."""
-    record.note("begin", lambda: record.designer.controller.begin("template:viscosity-jnd", "thicker"))
+    record.note("begin", lambda: record.designer.controller.begin_study("template:viscosity-jnd", "thicker"))
     record.play("@methods.easy :methods.easy.levels ctrl+a '0.5 x' Return Escape")
     record.select("stimuli", "damping")
     for phase in (0, 1, 3, 4, 5):
@@ -385,7 +385,7 @@ def typed_into_the_file(record: Record) -> None:
 def unreadable(record: Record) -> None:
     """A file that was never readable is opened at the line of its fault, and nothing can be added to it."""
     record.play("[Add an element (Insert)]" if record.designer.place.outline.add.isEnabled() else "Insert")
-    record.note("correct it", lambda: record.designer.editing.make("Correct the file", text=DEMO))
+    record.note("correct it", lambda: record.designer.editing.make_step("Correct the file", text=DEMO))
     record.note("outline", record.designer.controller.show_outline)
 
 
@@ -498,7 +498,7 @@ def asked_when(record: Record) -> None:
 def new_study(record: Record) -> None:
     """A study begins with the answers, as a copy, or under a name that is free; Tab and arrows go through the page."""
     designer, page = record.designer, record.designer.place.new_page
-    ask, questions = designer.controller.ask_for_new, page.card.questions
+    ask, questions = designer.controller.show_new_page, page.card.questions
     record.note("ask", ask)
     record.note("adaptive", next(one for one in page.buttons if one.choice.source == "template:viscosity-jnd").click)
     record.play(f"{'Tab ' * 9}")
@@ -570,7 +570,7 @@ def hypotheses(record: Record) -> None:
 def two_conditions(record: Record) -> None:
     """The steps of docs/two-conditions.md make a study without problems."""
     designer, head = record.designer, record.designer.place.form.head
-    record.note("begin", lambda: designer.controller.begin("template:viscosity-jnd", "thicker"))
+    record.note("begin", lambda: designer.controller.begin_study("template:viscosity-jnd", "thicker"))
     record.play("@blocks.viscosity @conditions.damper")
     record.note("no ball", designer.form_row("conditions", "damper", "ball").remove.click)
     record.note("series", lambda: designer.click_on(head.series))

@@ -33,7 +33,7 @@ def lines(designer: Any) -> list[str]:
 
 def test_a_draft_can_be_continued_where_no_study_is_open(designer: Any) -> None:
     designer.open("kitchen", "device")
-    designer.editing.ask(SetValue(("device", "force_limit_n"), 3.0))
+    designer.editing.handle_request(SetValue(("device", "force_limit_n"), 3.0))
     designer.saving.leave()
     text = designer.text
     another = DesignerController(designer.results)
@@ -59,7 +59,7 @@ def test_a_copy_takes_the_liquid_files_of_its_study_along(designer: Any, tmp_pat
     (elsewhere / "kitchen.toml").write_text(text)
     designer.open(str(elsewhere / "kitchen.toml"))
     assert designer.study.faults == ()
-    designer.controller.begin(str(elsewhere / "kitchen.toml"), "mine")
+    designer.controller.begin_study(str(elsewhere / "kitchen.toml"), "mine")
     designer.saving.save()
     assert designer.editing.opened.file.exists()
     assert (designer.file.parent / "syrup.toml").read_bytes() == (elsewhere / "syrup.toml").read_bytes()
@@ -83,7 +83,7 @@ from study_app.designer.document.steps import SetText
 application = application_here()
 designer = DesignerController(Path(sys.argv[1]))
 designer.open("kitchen")
-designer.editing.ask(SetText(("pages", "welcome", "title"), "en", sys.argv[2]))
+designer.editing.handle_request(SetText(("pages", "welcome", "title"), "en", sys.argv[2]))
 if sys.argv[3] == "save":
     designer.saving.save()
 else:
@@ -98,7 +98,7 @@ def test_two_programs_on_one_study_lose_no_edit_silently(designer: Any) -> None:
         subprocess.run(command, check=True, env={**os.environ, "QT_QPA_PLATFORM": "offscreen"})
 
     designer.open()
-    designer.editing.ask(SetValue(REPETITIONS, 3))
+    designer.editing.handle_request(SetValue(REPETITIONS, 3))
     other("Saved elsewhere", "save")
     assert "Saved elsewhere" in designer.file.read_text()
     designer.saving.save()
@@ -110,7 +110,7 @@ def test_two_programs_on_one_study_lose_no_edit_silently(designer: Any) -> None:
     kept = [kept_content(one.hash) or b"" for one in kept_versions(designer.file)]
     assert any(b"Saved elsewhere" in content for content in kept)
 
-    designer.editing.ask(SetValue(REPETITIONS, 4))
+    designer.editing.handle_request(SetValue(REPETITIONS, 4))
     other("Typed elsewhere", "leave")
     designer.saving.leave()
     assert designer.place.banner.words.text().startswith("Another window of the program edits this study, too")
@@ -130,7 +130,7 @@ def test_changes_begin_with_the_last_session_where_no_participant_was_run(
     run(designer, "P001", early, study=f"kitchen-{kind}-2", started_at="2026-11-19T12:00:00+00:00", **{key: True})
     designer.open()
     qtbot.waitUntil(lambda: bool(designer.controller.runs.known))
-    designer.editing.ask(SetValue(REPETITIONS, 3))
+    designer.editing.handle_request(SetValue(REPETITIONS, 3))
     designer.place.show_tab("changes")
     changes = designer.controller.changes
     assert changes.version.itemText(0) == "The file, without the edits"

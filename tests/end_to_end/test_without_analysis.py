@@ -22,7 +22,7 @@ PLACES = """
 import sys
 from pathlib import Path
 from PySide6.QtCore import QTimer
-from study_app.app.main_controller import home
+from study_app.app.main_controller import run_home_window
 
 def visit_all(visit):
     def step():
@@ -52,7 +52,7 @@ def visit_all(visit):
     visit.timer.timeout.connect(step)
     visit.timer.start()
 
-sys.exit(home(Path(sys.argv[1]), then=visit_all))
+sys.exit(run_home_window(Path(sys.argv[1]), then=visit_all))
 """
 
 

@@ -12,7 +12,7 @@ from study_app.app.main_controller import MainController
 from study_app.app.session.live_session import LiveSession
 from study_app.cli import commands
 from study_app.errors import StoreError
-from study_app.gui.home.study_facts import sources, study_facts
+from study_app.gui.home.study_facts import known_sources, study_facts
 from study_app.protocol.source.files import source_bytes
 from study_app.store.workstation import keep_workspace, load_settings, recent_protocols, remember_protocol
 from study_app.user_folder import settings_file
@@ -47,7 +47,7 @@ def test_a_chosen_workspace_counts_from_every_start_folder(documents, tmp_path, 
     (clone / "protocols" / "mine.toml").write_bytes(source_bytes("demo"))
     start_folder(tmp_path / "elsewhere", monkeypatch)
     assert workspace().folder == clone
-    assert "mine" in sources()
+    assert "mine" in known_sources()
     assert source_bytes("mine") == source_bytes("demo")
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path / "for-one-run"))
     assert workspace().folder == tmp_path / "for-one-run"
@@ -70,7 +70,7 @@ def test_windows_show_the_same_sessions_and_suggest_the_same_id_from_two_start_f
         qtbot.addWidget(visit.window)
         home = visit.window.place("home")
         home.show_sessions()
-        qtbot.waitUntil(lambda home=home: not home.reading)
+        qtbot.waitUntil(lambda home=home: not home.is_reading)
         shown.append([facts.participant for facts in home.sessions.shown])
         home.ask_for_session(study_facts("demo"))
         ids.append(tuple(home.dialog.editors[name].value for name in ("participant", "results")))
@@ -137,7 +137,7 @@ def test_recent_protocols_are_remembered_newest_first_and_only_while_they_exist(
     assert len(recent_protocols()) == 8
     files[9].unlink()
     assert str(files[9]) not in recent_protocols()
-    assert sources()[0] == str(files[4])
+    assert known_sources()[0] == str(files[4])
     inside = workspace().protocols / "inside.toml"
     inside.parent.mkdir(parents=True)
     inside.write_bytes(source_bytes("demo"))
@@ -149,8 +149,8 @@ def test_home_shows_no_card_for_a_liquid_file(tmp_path, monkeypatch):
     start_folder(tmp_path / "start", monkeypatch, "protocols")
     Path("protocols/syrup.toml").write_text("format = 1\n[liquids.syrup]\ndensity_kg_m3 = 1300\neffects = ['drag']\n")
     Path("protocols/broken.toml").write_text("format = 1\n[study]\n")
-    assert "syrup" not in sources()
-    assert "broken" in sources()
+    assert "syrup" not in known_sources()
+    assert "broken" in known_sources()
 
 
 def test_the_first_command_that_writes_keeps_the_offered_workspace_and_says_so_once(documents, tmp_path, monkeypatch):

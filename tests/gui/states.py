@@ -179,7 +179,7 @@ def frames(made: Any) -> None:
     """Paint twenty frames, one of them late."""
     for number in range(20):
         made.clock.now += 16_666_667 * (1 + (number == 9))
-        made.frame()
+        made.draw_frame()
         made.repaint()
     made.show_figures()
 
@@ -188,7 +188,7 @@ DISPLAY_TEST: Actions = {
     "measured": frames,
     "interval refused": typed("interval.control", "9"),
     "interval taken": typed("interval.control", "200"),
-    "toggled": lambda made: (setattr(made.clock, "now", 10**9), made.frame()),
+    "toggled": lambda made: (setattr(made.clock, "now", 10**9), made.draw_frame()),
     "small": lambda made: made.resize(1024, 640),
 }
 
@@ -243,7 +243,7 @@ def opening(qtbot: Any) -> OpeningWindow:
 OPENING: Actions = {
     "long": lambda made: (setattr(made.clock, "now", 72.0), made.findChild(QTimer).timeout.emit()),
     "compiled": lambda made: made.show_compiled(0.4),
-    "the device asks": lambda made: (made.say("Pull the grip out."), made.findChild(QTimer).timeout.emit()),
+    "the device asks": lambda made: (made.show_line("Pull the grip out."), made.findChild(QTimer).timeout.emit()),
     "ready": lambda made: made.finish(),
 }
 

@@ -53,7 +53,7 @@ def works(window: QWidget) -> bool:
     """Whether a job goes on, or a figure is not drawn yet."""
     parts = (part for part in window.findChildren(QWidget) if part.isVisible())
     return any(job.busy for job in window.findChildren(Background)) or not all(
-        getattr(part, "settled", True) for part in parts
+        getattr(part, "is_settled", True) for part in parts
     )
 
 

@@ -22,7 +22,7 @@ from study_app.gui.kit.devices import devices_shown
 from study_app.gui.lab.view import LabPlace
 from study_app.gui.preflight.window import LEAST as LEAST_PREFLIGHT
 from study_app.gui.preflight.window import PreflightView, PreflightWindow, planned_rows
-from study_app.gui.results.figures import unblinded_words
+from study_app.gui.results.figures import unblinding_text
 from study_app.gui.results.view import ResultsPlace
 from study_app.gui.settings import view as settings_view
 from study_app.gui.settings.view import DisplayTest, MachinePlace
@@ -84,7 +84,7 @@ WELL = Measurements(
 )
 SCALED = replace(WELL, screen=Screen(60.0, 1.5))
 GOES_ON = (("Continues at", "Liquid setting 2, attempt\u00a02"), ("Kept", "2 of 8 answers"))
-OPENED = unblinded_words({"at": "2026-11-19", "by": "AK", "reason": "collection closed"})
+OPENED = unblinding_text({"at": "2026-11-19", "by": "AK", "reason": "collection closed"})
 
 
 def shown(qtbot: Any, made: Any, size: tuple[int, int], theme: Any = LIGHT) -> Any:
@@ -178,11 +178,11 @@ def results(qtbot: Any, seen: Any = None) -> ResultsPlace:
     window.show()
     place: Any = window.place("results")
     place._listening.setInterval(10**8)  # there are no answers,
-    place._choose = lambda _folder: None  # so that this study stays
+    place._choose_study = lambda _folder: None  # so that this study stays
     window.go("results")
     place.main = window  # or it would be collected here
     place.show_view(seen or view())
-    qtbot.waitUntil(lambda: all(card.drawing is None or card.drawing.settled for card in place.figures.cards))
+    qtbot.waitUntil(lambda: all(card.drawing is None or card.drawing.is_settled for card in place.figures.cards))
     return place  # type: ignore[no-any-return]
 
 

@@ -19,7 +19,7 @@ from study_app.protocol.describe import describe
 from study_app.protocol.load import load, load_scene, parse
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.scene_file import scene_text
-from study_app.protocol.source.files import bundled, source_bytes, unbundled
+from study_app.protocol.source.files import bundle, source_bytes, unbundle
 from tests.protocol.sound import EVERY_ORDER, SOUND
 
 
@@ -140,13 +140,13 @@ def test_whatever_is_changed_gives_a_protocol_or_a_list_of_problems(changes: lis
     ],
 )
 def test_a_liquid_file_is_found_however_its_key_is_written(text: str) -> None:
-    study, files = unbundled(bundled(text.encode(), lambda name: f"# {name}"))
+    study, files = unbundle(bundle(text.encode(), lambda name: f"# {name}"))
     assert (study, files) == (text.encode(), {"a.toml": "# a.toml"})
 
 
 def test_the_word_in_a_comment_names_no_file() -> None:
     text = b"# This file has no liquid file.\n[liquids.thick]\ndensity_kg_m3 = 1000\n"
-    assert bundled(text, lambda _name: "lost") == text
+    assert bundle(text, lambda _name: "lost") == text
 
 
 DAMPER = '[liquids.damper]\ndrag = { law = "linear", damping_nspm = 12 }\n'

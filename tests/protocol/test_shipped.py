@@ -13,7 +13,7 @@ from study_app.protocol.load import load, load_scene, load_scenes
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule
 from study_app.protocol.source import files
-from study_app.protocol.source.files import at_hand, shipped
+from study_app.protocol.source.files import known_protocols, shipped
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 NAMES = sorted(path.stem for path in PROTOCOLS.glob("*.toml"))
@@ -33,7 +33,7 @@ def test_a_study_made_in_a_checkout_does_not_ship(tmp_path: Path, monkeypatch: p
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
     assert is_shipped("demo")
     assert not is_shipped("mine")
-    assert [name for name in at_hand() if name == "mine"] == ["mine"]
+    assert [name for name in known_protocols() if name == "mine"] == ["mine"]
 
 
 @pytest.mark.parametrize("name", NAMES)

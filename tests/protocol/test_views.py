@@ -8,7 +8,7 @@ import pytest
 from study_app.errors import ProtocolError
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, parse
-from study_app.protocol.source.files import bundled, hashes_in, protocol_hash, source_bytes, unbundled
+from study_app.protocol.source.files import bundle, hashes_in, protocol_hash, source_bytes, unbundle
 
 FOOTAGE = b"not decoded here"
 SEEN = '[conditions.{name}]\nliquid = "thin"\ndelay_ms = {delay}\n{keys}\n\n'
@@ -44,7 +44,7 @@ def test_a_condition_shows_a_camera_or_footage(study: Path) -> None:
 def test_the_studys_hash_covers_the_footage(study: Path) -> None:
     source = source_bytes(study)
     assert source.startswith(study.read_bytes())
-    assert unbundled(source) == (study.read_bytes(), {})
+    assert unbundle(source) == (study.read_bytes(), {})
     assert hashes_in(source) == {"waves/sea.mp4": hashlib.sha256(FOOTAGE).hexdigest()}
     (study.parent / "waves" / "sea.mp4").write_bytes(FOOTAGE + b".")
     changed = source_bytes(study)
@@ -54,10 +54,10 @@ def test_the_studys_hash_covers_the_footage(study: Path) -> None:
 
 def test_footage_and_liquid_files_come_back_from_one_source() -> None:
     text = b'format = 2\n[liquids.a]\nfile = "a.toml"\n[conditions.a]\nview = "a.mp4"\n'
-    source = bundled(text, lambda name: f"# {name}", {"a.mp4": "00ff"})
-    assert unbundled(source) == (text, {"a.toml": "# a.toml"})
+    source = bundle(text, lambda name: f"# {name}", {"a.mp4": "00ff"})
+    assert unbundle(source) == (text, {"a.toml": "# a.toml"})
     assert hashes_in(source) == {"a.mp4": "00ff"}
-    assert bundled(text, lambda _: None) == text
+    assert bundle(text, lambda _: None) == text
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from study_app.app.main_controller import MainController
-from study_app.designer.document.document import Answers, answered, template
+from study_app.designer.document.document import Answers, template, with_answers
 from study_app.gui.theme.theme import Theme
 from study_app.protocol.load import source_bytes
 from tools.screenshots.capture import Camera
@@ -35,7 +35,7 @@ def write_studies(folder: Path) -> None:
     """Write the studies of the pictures: three from templates, and the demo with faults."""
     folder.mkdir(parents=True)
     for name, source, languages in STUDIES:
-        study = answered(template(source), Answers(languages=languages))
+        study = with_answers(template(source), Answers(languages=languages))
         folder.joinpath(f"{name}.toml").write_text(study.text, encoding="utf-8")
     text = source_bytes("demo").decode()
     for sound, broken in FAULTS:
@@ -59,7 +59,7 @@ def take_designer(camera: Camera, results: Path, theme: Theme) -> None:
             place.pane.show_tab(view)
             place.problems.setVisible(scene == "problems")
             _take_sizes(camera, main, f"{scene}-{theme.name}")
-        designer.ask_for_new("template:compare-liquids")
+        designer.show_new_page("template:compare-liquids")
         _take_sizes(camera, main, f"new-{theme.name}")
     finally:
         window.close()
@@ -72,5 +72,5 @@ def _take_sizes(camera: Camera, main: MainController, name: str) -> None:
     for width, height in SIZES:
         main.window.resize(width, height)
         camera.wait(SETTLED_MS)
-        camera.until(lambda: not designer.measures.waits, "the simulations")
+        camera.until(lambda: not designer.measures.is_waiting, "the simulations")
         camera.take(main.window, f"designer-{name}-{width}")

@@ -10,7 +10,7 @@ from typing import Final
 
 from PySide6.QtCore import QtMsgType, qInstallMessageHandler
 
-from study_app.app.timing import collecting_here
+from study_app.app.timing import collecting_in_this_thread
 from study_app.gui.application import application_here
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.user_folder import FOLDER_VARIABLE
@@ -50,7 +50,11 @@ def screenshots(
     qInstallMessageHandler(_pass_on)
     application_here()
     camera = Camera(to.resolve(), progress, sizes)
-    with tempfile.TemporaryDirectory(prefix="liquid-study-") as held, _at_home_in(Path(held)), collecting_here():
+    with (
+        tempfile.TemporaryDirectory(prefix="liquid-study-") as held,
+        _at_home_in(Path(held)),
+        collecting_in_this_thread(),
+    ):
         if only in (None, "places"):
             results = rehearsed(Path(FOLDER_NAME))
             recorded()

@@ -13,7 +13,7 @@ from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Compared, Phase
 from study_app.protocol.model import Analysis, Contrast, Protocol, Published
 from study_app.protocol.orders.block_orders import every_step_of, follows_in
-from study_app.protocol.presented.presentation import link_words
+from study_app.protocol.presented.presentation import link_descriptions
 from study_app.protocol.questionnaires import Score
 from study_app.protocol.questions import Context, Question, Scale, Statement, question_of
 from study_app.protocol.table import text_in
@@ -136,7 +136,7 @@ def _setting(key: Key, block: str, code: str, presented: str) -> Setting:
 
 def _of_condition(condition: Mapping[str, Any], code: str, name: str) -> Setting:
     liquids = " + ".join(condition["liquids"] if condition["liquid"] is None else [condition["liquid"]])
-    link = ", ".join(link_words(*(condition.get(key, 0.0) for key in OF_LINK)))
+    link = ", ".join(link_descriptions(*(condition.get(key, 0.0) for key in OF_LINK)))
     view = condition.get("view", "tank") + (" alone" if condition.get("overlay") == "hidden" else "")
     view = "" if view == "tank" else view
     return Setting(

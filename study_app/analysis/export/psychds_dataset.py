@@ -13,14 +13,14 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export.table_files import codebook_bytes, credit_lines, stated_credits
 from study_app.errors import ProtocolError
 from study_app.protocol.source.files import (
-    at_hand,
-    bundled,
+    bundle,
     file_hash,
-    find,
+    known_protocols,
+    protocol_file,
     protocol_hash,
     source_bytes,
-    unbundled,
-    without_mark,
+    unbundle,
+    without_byte_order_mark,
 )
 from study_app.protocol.table import text_in
 from study_app.store.atomic import open_regular, system_message
@@ -71,16 +71,16 @@ def _footage(study: Study) -> dict[str, str]:
 
 def _study_file(study: str, hashes: set[str], footage: dict[str, str]) -> tuple[Path, bytes, dict[str, str]] | None:
     """Return where the study's file is, it, and the texts of its liquid files; whether its footage is there or not."""
-    for name in at_hand():
+    for name in known_protocols():
         try:
-            file = find(name)
+            file = protocol_file(name)
             if not _is_of(study, file):  # the footage of other studies is not hashed: it may be large
                 continue
             source = source_bytes(name)
         except ProtocolError:  # of another study, perhaps: what cannot be read cannot be shared
             continue
-        content, liquids = unbundled(source)
-        if protocol_hash(bundled(content, liquids.get, footage)) in hashes:
+        content, liquids = unbundle(source)
+        if protocol_hash(bundle(content, liquids.get, footage)) in hashes:
             return file, content, liquids
     return None
 
@@ -94,7 +94,7 @@ def _is_inside(name: str) -> bool:
 def _is_of(study: str, file: Path) -> bool:
     """Return whether a protocol file is of the study of that name."""
     try:
-        head = tomllib.loads(without_mark(file.read_bytes()).decode()).get("study")
+        head = tomllib.loads(without_byte_order_mark(file.read_bytes()).decode()).get("study")
     except (OSError, ValueError, RecursionError):
         return False
     return isinstance(head, dict) and head.get("name") == study

@@ -24,7 +24,7 @@ from study_app.devices.hand import HandOrders, hand_of
 from study_app.devices.registry import descriptor_of
 from study_app.discovery import explained
 from study_app.errors import DeviceError, DisplayError, ServoFault, StudyError, VideoError
-from study_app.gui.display.screens import Frames, has_card, place
+from study_app.gui.display.screens import Frames, has_graphics_card, place_window
 from study_app.gui.operator.operator_view import OperatorView, Session, operator_view, stages
 from study_app.gui.operator.servo_health import Forces, ServoHealth
 from study_app.gui.operator.session_panels import Strip
@@ -203,37 +203,37 @@ class SessionBridge(QObject):
         self._lost = False
         self.uncaught = UncaughtExceptions(self._handle_uncaught)
         self._thread_exceptions = ThreadExceptions(self)
-        self._thread_exceptions.ended.connect(self._tell_of_thread)
+        self._thread_exceptions.ended.connect(self._report_thread_failure)
         self.frames = Frames(refresh_hz, parent=self)
         self.frames.due.connect(self.draw_frame)
         self._thread_priority = ThreadPriority()
         self.budget = FrameBudget(
             ((self.show_tiles, TILES_S), (self.show_traces, TRACES_S), (self.show_forces, TRACES_S))
         )
-        self.runner.on_change(lambda _state: self._changed())
+        self.runner.on_change(lambda _state: self._show_changes())
         self._connect()
 
     def _connect(self) -> None:
         operator, participant = self.operator, self.participant
-        operator.asked.connect(self._asked)
-        self.reconnecting.done.connect(self._reconnected)
-        self.reconnecting.failed.connect(self._not_reconnected)
-        operator.escape.leave_to(participant)
-        participant.event.connect(self._event)
-        participant.left.connect(operator.come_forward)
+        operator.asked.connect(self._handle_request)
+        self.reconnecting.done.connect(self._show_reconnected)
+        self.reconnecting.failed.connect(self._show_reconnection_error)
+        operator.escape.ignore_window(participant)
+        participant.event.connect(self._handle_page_event)
+        participant.left.connect(operator.bring_forward)
         if self.strip is not None:
             self.strip.stop.pressed.connect(self._stop_force)
-            self.strip.operator.clicked.connect(operator.come_forward)
+            self.strip.operator.clicked.connect(operator.bring_forward)
             operator.header.page.show()
-        participant.painted.connect(self._painted)
-        participant.swapped.connect(self.frames.swapped)
+        participant.painted.connect(self._record_painted_frame)
+        participant.swapped.connect(self.frames.note_swap)
         if self.parts.point_to is not None:
-            participant.pointer.connect(self._point)
-            participant.buttons.connect(self._press)
+            participant.pointer.connect(self._move_hand)
+            participant.buttons.connect(self._press_buttons)
 
     @property
     def paced(self) -> str:
-        return self.frames.paced
+        return self.frames.pacing
 
     def present(self, page: Page) -> None:
         """Show a page to the participant; a port of the runner."""
@@ -243,7 +243,7 @@ class SessionBridge(QObject):
         if tank is not None and videos is not None:
             videos.fit(*tank.video.size(tank.devicePixelRatioF()))
         if not isinstance(page, TaskPage):
-            self.health.frames_rest()
+            self.health.pause_frames()
 
     def start(self) -> None:
         self.uncaught.install()
@@ -251,19 +251,19 @@ class SessionBridge(QObject):
         freeze_garbage()
         self._thread_priority.raise_priority()
         self.frames.start()
-        self._begin()
+        self._begin_session()
 
     @guarded_session_slot
-    def _begin(self) -> None:
-        self._post(Begin(self._now()))
+    def _begin_session(self) -> None:
+        self._post_event(Begin(self._now()))
         self.show_tiles()
 
-    def leave_now(self) -> None:
+    def leave_without_asking(self) -> None:
         """Send zero force and close the windows without a question; the session can be resumed."""
         self.parts.servo.stop_force()
         if not self._gone and not self.runner.finished:
-            self._break_off()
-        self._leave()
+            self._pause_trial()
+        self._leave_session()
 
     def watch_screens(self) -> None:
         """From now on, pause when a screen is removed and both windows end up on the same one."""
@@ -277,14 +277,14 @@ class SessionBridge(QObject):
         participant, operator = self.participant, self.operator
         shared = participant.screen().name() == operator.screen().name()
         if shared and self.strip is None and participant.isFullScreen() and not (self._gone or self.runner.finished):
-            self._post(PauseRequested(self._now(), "program"))
-            operator.come_forward()
+            self._post_event(PauseRequested(self._now(), "program"))
+            operator.bring_forward()
             operator.show_message(*SCREEN_REMOVED)
 
     @guarded_session_slot
-    def _break_off(self) -> None:
+    def _pause_trial(self) -> None:
         """Pause, so that the journal records the current trial as interrupted."""
-        self._post(PauseRequested(self._now(), "program"))
+        self._post_event(PauseRequested(self._now(), "program"))
 
     def fail(self, error: BaseException) -> None:
         """Send zero force, then report the failure to the journal, if it still accepts lines, and to the operator."""
@@ -295,12 +295,12 @@ class SessionBridge(QObject):
         if not first:
             return
         self.trouble, self.failure = what, error
-        log.error("the session failed: %s", what, exc_info=_trace_of(raised))
+        log.error("the session failed: %s", what, exc_info=_unexpected_error(raised))
         traceback.clear_frames(raised.__traceback__)  # frames may hold a painter, and Qt would then paint no window
         try:
             if not self.runner.finished:
                 self.runner.post(broken(self._now(), error))
-            self._show()
+            self._show_view()
         except Exception as second:  # noqa: BLE001 - the force is off; the first failure is the one that counts
             log.error("and could not be recorded: %s", second)  # noqa: TRY400 - one line, the first has the trace
 
@@ -314,11 +314,11 @@ class SessionBridge(QObject):
             kinds = {kind for part in parts for kind in type(part).__mro__}
             methods = (unwrap(vars(kind)[name]) for kind in kinds for name in PAINTING if name in vars(kind))
             paints_here = all(getattr(method, "__code__", None) is not frame.f_code for method in methods)
-        (self.operator.tell_of_failure if paints_here else self.fail)(error)
+        (self.operator.report_failure if paints_here else self.fail)(error)
         return paints_here
 
     @guarded_session_slot
-    def _tell_of_thread(self, what: str) -> None:
+    def _report_thread_failure(self, what: str) -> None:
         """Log that a thread has ended with an exception, and tell the operator."""
         self.operator.show_message("A part of the program ended", f"{what}. All answers are kept.")
         self.record_note(f"a thread of the program ended: {what}")
@@ -326,33 +326,33 @@ class SessionBridge(QObject):
     def _now(self) -> float:
         return self.parts.clock()
 
-    def _post(self, event: Event) -> None:
+    def _post_event(self, event: Event) -> None:
         self.runner.post(event)
 
     def draw_frame(self) -> None:
         """Draw the tank, then as much of the rest as fits before the next frame."""
-        self._draw()
-        self.budget.use(self.frames.next_ns)
+        self._draw_tank()
+        self.budget.run_due_tasks(self.frames.next_ns)
 
     @guarded_session_slot
-    def _draw(self) -> None:
+    def _draw_tank(self) -> None:
         """Read the device and draw the tank with the trial's visual delay."""
         self.runner.poll()
         view = self.runner.view(self.parts.servo.now_ns())
         if view is not None:
             self.participant.show_view(view)
-        self._look()
+        self._read_device()
         now_s = self._now()
         if view is not None and self._hand is not None and self._hand.act(now_s, view):
-            self._post(Continue(now_s))
+            self._post_event(Continue(now_s))
 
-    def _look(self) -> None:
+    def _read_device(self) -> None:
         self._count_faults()
         samples = self._samples.read()
-        self.health.take(samples)
+        self.health.add_samples(samples)
         if self.forces is not None:
-            self.forces.take(samples)
-        self.health.hand(self._now(), self.parts.aim_m())
+            self.forces.add_samples(samples)
+        self.health.add_hand_position(self._now(), self.parts.aim_m())
 
     def _count_faults(self) -> None:
         faulty = self.parts.servo.fault is not None
@@ -360,11 +360,11 @@ class SessionBridge(QObject):
         self._faulty = faulty
 
     @guarded_session_slot
-    def _painted(self, sample_ns: int) -> None:
+    def _record_painted_frame(self, sample_ns: int) -> None:
         """Record when a frame was painted, on the servo's clock."""
         painted_ns = self.parts.servo.now_ns()
         self.runner.frame_shown(painted_ns, sample_ns)
-        self.health.frame(painted_ns)
+        self.health.add_frame(painted_ns)
 
     @guarded_session_slot
     def show_traces(self) -> None:
@@ -380,9 +380,9 @@ class SessionBridge(QObject):
     def show_tiles(self) -> None:
         self.health.overruns = self.parts.servo.overruns
         self.operator.show_lateness(self.health)
-        self._show()
+        self._show_view()
 
-    def _changed(self) -> None:
+    def _show_changes(self) -> None:
         """Show the new state; at the end raise the operator's window above the participant's."""
         if (stalled := self.runner.stalled) != self._stalled:
             self._stalled = stalled
@@ -391,21 +391,21 @@ class SessionBridge(QObject):
         self._lost = lost
         if lost and not before:
             log.info(DEVICE_FAILED, ServoFault(self.runner.cause))
-        self._show()
+        self._show_view()
         if self.runner.finished and self._leaves:
-            QTimer.singleShot(0, self, self._leave)
+            QTimer.singleShot(0, self, self._leave_session)
         elif self.runner.finished and self.participant.isFullScreen():
             ended = self.parts.journal.progress.reached_end
             said = ended and isinstance(self.parts.session.schedule.steps[-1], PageStep)  # a study's last page
-            QTimer.singleShot(0 if said else END_SHOWN_MS, self.operator, self.operator.come_forward)
+            QTimer.singleShot(0 if said else END_SHOWN_MS, self.operator, self.operator.bring_forward)
 
-    def _show(self) -> None:
+    def _show_view(self) -> None:
         view = self.view()
         self.operator.show_view(view)
         if self.strip is not None:
             self.strip.show_view(view)
             if view.state == "trouble" and not self._called:
-                self.operator.come_forward()
+                self.operator.bring_forward()
             self._called = view.state == "trouble"
 
     def view(self) -> OperatorView:
@@ -433,22 +433,22 @@ class SessionBridge(QObject):
         return replace(view, may_reconnect=True, reconnects=self.reconnecting.busy, reconnection=self._reconnection)
 
     @guarded_session_slot
-    def _event(self, event: Event) -> None:
+    def _handle_page_event(self, event: Event) -> None:
         if isinstance(event, ForceStopped):
             self.parts.servo.stop_force()
-        self._post(event)
+        self._post_event(event)
 
     @guarded_session_slot
-    def _asked(self, what: str, details: tuple[Any, ...]) -> None:
+    def _handle_request(self, what: str, details: tuple[Any, ...]) -> None:
         """Carry out an operator's request; zero force comes before anything that may fail or wait for the disk."""
-        post = self._post
+        post = self._post_event
         match what:
             case "stop":
                 self._stop_force()
             case "resume":
                 post(ResumeRequested(self._now(), "operator"))
                 if self.strip is not None:
-                    self.participant.come_forward()
+                    self.participant.bring_forward()
             case "pause":
                 post(PauseRequested(self._now(), "operator"))
             case "repeat":
@@ -461,7 +461,7 @@ class SessionBridge(QObject):
                 status, reason = details
                 post(EndRequested(self._now(), status, reason))
             case "diagnose":
-                self._diagnose()
+                self._request_diagnosis()
             case "reconnect":
                 self._reconnect()
             case "failed":
@@ -469,21 +469,21 @@ class SessionBridge(QObject):
                 log.error("a part of the operator's window failed: %s", what, exc_info=error)
                 self.record_note(f"a part of the operator's window failed: {what}")
             case "page":
-                self.participant.come_forward()
+                self.participant.bring_forward()
             case "close":
-                self._close()
+                self._close_window()
 
     @guarded_session_slot
     def _stop_force(self) -> None:
         self.parts.servo.stop_force()
-        self._post(ForceStopped(self._now(), "operator"))
+        self._post_event(ForceStopped(self._now(), "operator"))
 
-    def _diagnose(self) -> None:
+    def _request_diagnosis(self) -> None:
         """Send zero force, pause, and have the device diagnosed."""
         self.parts.servo.stop_force()
         try:
             if not self.runner.finished:
-                self._post(ForceStopped(self._now(), "operator"))
+                self._post_event(ForceStopped(self._now(), "operator"))
         finally:
             self.diagnose_asked.emit()
 
@@ -493,47 +493,47 @@ class SessionBridge(QObject):
             if not self.reconnecting.busy:
                 self._reconnection = "Connecting the device …"
                 self.reconnecting.run(self.parts.reconnect)
-            self._show()
+            self._show_view()
 
     def record_note(self, text: str) -> None:
         """Write a note to the journal; after the session's end do nothing."""
         if not self.runner.finished:
-            self._post(Note(self._now(), "note", text))
+            self._post_event(Note(self._now(), "note", text))
 
-    def tell_of_device(self, line: str) -> None:
+    def show_device_line(self, line: str) -> None:
         if self.reconnecting.busy:
             self._reconnection = line
-            self._show()
+            self._show_view()
 
     @guarded_session_slot
-    def _reconnected(self, described: dict[str, Any]) -> None:
+    def _show_reconnected(self, described: dict[str, Any]) -> None:
         self._reconnection = ""
         if isinstance(self.failure, DeviceError | ServoFault | VideoError):
             self.trouble, self.failure = "", None
         log.info("the device was reconnected")
-        self._post(Reconnected(self._now(), described))
+        self._post_event(Reconnected(self._now(), described))
 
     @guarded_session_slot
-    def _not_reconnected(self, error: Exception) -> None:
+    def _show_reconnection_error(self, error: Exception) -> None:
         why = str(error) if isinstance(error, StudyError) else f"{type(error).__name__}: {error}"
         self._reconnection = f"Not connected: {why}."
-        log.warning("the device was not reconnected: %s", error, exc_info=_trace_of(error))
-        self._show()
+        log.warning("the device was not reconnected: %s", error, exc_info=_unexpected_error(error))
+        self._show_view()
 
     @guarded_session_slot
-    def _point(self, x_m: float, y_m: float, z_m: float) -> None:
+    def _move_hand(self, x_m: float, y_m: float, z_m: float) -> None:
         if self.parts.point_to is not None:
             self.parts.point_to(x_m, y_m, z_m)
 
     @guarded_session_slot
-    def _press(self, buttons: int) -> None:
+    def _press_buttons(self, buttons: int) -> None:
         if self.parts.press is not None:
             self.parts.press(buttons)
 
-    def _close(self) -> None:
+    def _close_window(self) -> None:
         """Close the operator's window after the session; before, send zero force and ask; leave if asked again."""
         if self.runner.finished:
-            self._leave()
+            self._leave_session()
             return
         if self.runner.ending:  # as soon as the recordings are on the disk
             self._leaves = True
@@ -541,12 +541,12 @@ class SessionBridge(QObject):
             return
         self.parts.servo.stop_force()
         if self.operator.question is not None:
-            self.leave_now()
+            self.leave_without_asking()
             return
         self.operator.ask_to_end()
-        self._post(ForceStopped(self._now(), "operator"))
+        self._post_event(ForceStopped(self._now(), "operator"))
 
-    def _leave(self) -> None:
+    def _leave_session(self) -> None:
         if self._gone:
             return
         self._gone = True
@@ -566,12 +566,12 @@ class SessionBridge(QObject):
             part.deleteLater()  # delete the objects in this thread, never in a collection of another one
 
 
-def _trace_of(error: BaseException) -> BaseException | None:
+def _unexpected_error(error: BaseException) -> BaseException | None:
     """Return the error if the log needs its traceback, None if its message explains it."""
     return None if isinstance(error, StudyError) else error
 
 
-def make_cockpit(chosen: NewSession, protocol: Protocol, rig: Rig, theme: Theme) -> OperatorWindow:
+def make_operator_window(chosen: NewSession, protocol: Protocol, rig: Rig, theme: Theme) -> OperatorWindow:
     """Return the operator's window, not yet shown."""
     described = descriptor_of(chosen.device)
     return OperatorWindow(
@@ -607,14 +607,14 @@ def make_participant_window(
         windowed=chosen.windowed,
         captures_pointer=descriptor_of(chosen.device).pointer,
         pilot=chosen.pilot,
-        on_card=in_step and has_card(),
+        on_card=in_step and has_graphics_card(),
         text_scale=text_scale,
         photodiode=photodiode,
         strip=Strip(played=chosen.played) if shares_screen else None,
     )
 
 
-def planned(chosen: NewSession, protocol: Protocol, store: SessionStore) -> tuple[Protocol, Schedule, Start]:
+def session_plan(chosen: NewSession, protocol: Protocol, store: SessionStore) -> tuple[Protocol, Schedule, Start]:
     """Return protocol and schedule of a session that is on the disk, and where it begins or resumes."""
     protocol = store.as_recorded(protocol)
     protocol = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
@@ -648,7 +648,7 @@ def connect_windows(
     protocol, schedule, start = plan
     hand = hand_of(device)
     parts = Parts(
-        session=_facts(chosen, protocol, schedule, rig),
+        session=_session_facts(chosen, protocol, schedule, rig),
         key=store.key.codes,
         secret=store.key.nonce,
         language=chosen.language,
@@ -658,12 +658,12 @@ def connect_windows(
         recorder=store.recorder,
         outlets=store.outlets,
         start=start,
-        reconnect=_reconnecting(rig, videos),
+        reconnect=_make_reconnect(rig, videos),
         videos=videos,
-        aim_m=_aim(hand, servo),
+        aim_m=_make_position_reader(hand, servo),
         point_to=getattr(device, "point_to", None) if described.pointer else None,
         press=getattr(device, "press", None) if described.pointer else None,
-        hand_for=_hands(hand, chosen, clock) if hand is not None and described.moves_by_itself else None,
+        hand_for=_make_hand_for_page(hand, chosen, clock) if hand is not None and described.moves_by_itself else None,
     )
     return SessionBridge(parts, participant, operator, refresh_hz=refresh_hz or 60.0)
 
@@ -682,7 +682,7 @@ def show_windows(
     """
     if not played:
         shown_on, operated_on = screens()
-        place(bridge.operator, operated_on, corner=shown_on is operated_on)
+        place_window(bridge.operator, operated_on, corner=shown_on is operated_on)
         bridge.operator.show()
         yield
     shown_on, operated_on = screens()
@@ -693,7 +693,7 @@ def show_windows(
         bridge.watch_screens()
 
 
-def _reconnecting(rig: Rig, videos: Videos | None) -> Callable[[], dict[str, Any]]:
+def _make_reconnect(rig: Rig, videos: Videos | None) -> Callable[[], dict[str, Any]]:
     """Return a function that reopens what failed: device and servo, or videos."""
 
     def reconnect() -> dict[str, Any]:
@@ -706,7 +706,7 @@ def _reconnecting(rig: Rig, videos: Videos | None) -> Callable[[], dict[str, Any
     return reconnect
 
 
-def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, rig: Rig) -> Session:
+def _session_facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, rig: Rig) -> Session:
     described = descriptor_of(chosen.device)
     return Session(
         protocol=protocol,
@@ -718,11 +718,14 @@ def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, rig: Rig)
         lateness_limit_s=protocol.limits.lateness_ms / 1000,
         device_name=described.title,
         device_icon=described.icon,
-        device_rows=(("Priority", str(rig.servo.describe()["priority"]).partition(" (")[0]), *_calibration(rig.device)),
+        device_rows=(
+            ("Priority", str(rig.servo.describe()["priority"]).partition(" (")[0]),
+            *_calibration_rows(rig.device),
+        ),
     )
 
 
-def _calibration(device: Device) -> tuple[tuple[str, str], ...]:
+def _calibration_rows(device: Device) -> tuple[tuple[str, str], ...]:
     """Return the rows about the calibration of a device, empty if it cannot be calibrated."""
     used = device.describe().get("calibration")
     if used is None:
@@ -730,7 +733,7 @@ def _calibration(device: Device) -> tuple[tuple[str, str], ...]:
     return (("Calibration", f"of {used['measured']}" if isinstance(used, dict) else "none"),)
 
 
-def _aim(hand: HandOrders | None, servo: Servo) -> Callable[[], Vector]:
+def _make_position_reader(hand: HandOrders | None, servo: Servo) -> Callable[[], Vector]:
     """Return a function that gives the hand's position, or a simulated hand's aim: its lag would reveal the liquid."""
     if hand is not None:
         return lambda: hand.aim_m
@@ -742,7 +745,9 @@ def _aim(hand: HandOrders | None, servo: Servo) -> Callable[[], Vector]:
     return position_m
 
 
-def _hands(hand: HandOrders, chosen: NewSession, clock: Callable[[], float]) -> Callable[[Page], Hand | None]:
+def _make_hand_for_page(
+    hand: HandOrders, chosen: NewSession, clock: Callable[[], float]
+) -> Callable[[Page], Hand | None]:
     """Return a function that makes the simulated hand of a page; on pages without a task the hand rests."""
     draw = stream(chosen.seed, f"run/{chosen.participant}/hand").random
 

@@ -20,17 +20,17 @@ from PySide6.QtCore import QEventLoop, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QScreen
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.app.failures import BY_SIGNAL_S, CrashTrace, ended_from_outside
-from study_app.app.timing import collecting_here, unfreeze_garbage
+from study_app.app.failures import BY_SIGNAL_S, CrashTrace, ending_on_signals
+from study_app.app.timing import collecting_in_this_thread, unfreeze_garbage
 from study_app.devices import DEFAULT_DEVICE
 from study_app.devices.registry import descriptor_of
 from study_app.devices.rig import Rig, open_rig, study_settings
 from study_app.discovery import explained
 from study_app.errors import SessionError, StoreError, StudyError
 from study_app.gui.application import application_here
-from study_app.gui.display.screens import choose_screens, place
+from study_app.gui.display.screens import choose_screens, place_window
 from study_app.gui.home.startup_window import OpeningWindow
-from study_app.gui.kit.devices import described, screen_number, settings_here, text_scale_on
+from study_app.gui.kit.devices import described_screens, screen_number, settings_here, text_scale_on
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.widgets.background import Background
 from study_app.protocol.load import load, parse
@@ -118,29 +118,29 @@ class LiveSession(QObject):
         self._windows: list[QWidget] = []  # until the bridge has them
         self.patience_s = OPENING_PATIENCE_S
         self._opening = Background(self)
-        self._opening.done.connect(self._begin)
-        self._said.connect(self._say, Qt.ConnectionType.QueuedConnection)
+        self._opening.done.connect(self._show_preflight_or_windows)
+        self._said.connect(self._report_progress, Qt.ConnectionType.QueuedConnection)
         self._compiled.connect(self._show_compiled, Qt.ConnectionType.QueuedConnection)
 
     def open(self) -> None:
         """Show the opening window and prepare device and servo; an error closes the session and emits ``over``."""
-        self._go_on(self._open)
+        self._run_step(self._show_note)
 
-    def _open(self) -> None:
+    def _show_note(self) -> None:
         if self._unread and self._progress is not None:
             self._progress(self._unread)
         self.note = OpeningWindow(f"Preparing {Path(self.chosen.source).stem}", self.chosen.who, theme=self.theme)
         self.note.cancelled.connect(self.cancel)
-        place(self.note, self.note.screen(), corner=False)
+        place_window(self.note, self.note.screen(), corner=False)
         self.note.show()
-        self._opening.run(self._make_ready)
+        self._opening.run(self._prepare_rig)
 
     @property
-    def began(self) -> bool:
+    def has_begun(self) -> bool:
         return self.bridge is not None
 
     @property
-    def opening(self) -> bool:
+    def is_opening(self) -> bool:
         """Whether device and servo are being prepared, even if the session was cancelled meanwhile."""
         return self._opening.busy
 
@@ -156,12 +156,12 @@ class LiveSession(QObject):
         if self._closed:
             return
         if self.bridge is not None:
-            self.bridge.leave_now()
+            self.bridge.leave_without_asking()
         else:
-            self._close()
+            self._close_everything()
 
-    def _make_ready(self) -> Ready | Exception:
-        """Compile, open, start and measure in a separate thread; return the parts for ``_begin``, or the exception."""
+    def _prepare_rig(self) -> Ready | Exception:
+        """Compile, open, start and measure in a separate thread; return the parts, or the exception."""
         rig: Rig | None = None
         outlets: Outlets | None = None
         videos: Videos | None = None
@@ -186,17 +186,17 @@ class LiveSession(QObject):
             return error
         return made
 
-    def _begin(self, made: object) -> None:
+    def _show_preflight_or_windows(self, made: object) -> None:
         """Show the pre-flight window, or claim the session on the disk and open its windows at once."""
         if isinstance(made, Ready):
             self.rig, self._outlets, self._videos = made.rig, made.outlets, made.videos
         if self._closed:
-            self._let_go()
+            self._close_rig()
             self.deleteLater()
             return
         if self._asks and isinstance(made, Ready):
             ready = made
-            self._go_on(lambda: self._ask(ready))
+            self._run_step(lambda: self._show_preflight(ready))
         else:
             self._open_windows(made)
 
@@ -204,14 +204,16 @@ class LiveSession(QObject):
         """Open the windows step by step; other events are handled between the steps."""
         if self._steps is None or not isinstance(made, Ready):
             self._steps = self.open_windows(made)
-            self._go_on(self._step)
+            self._run_step(self._run_next_step)
 
-    def _step(self) -> None:
+    def _run_next_step(self) -> None:
         """Run the next step, unless the session was closed meanwhile."""
         if not self._closed and self._steps is not None and next(self._steps, self) is None:
-            QTimer.singleShot(1, self, lambda: self._go_on(self._step))  # 0 ms may be the same iteration of the loop
+            QTimer.singleShot(
+                1, self, lambda: self._run_step(self._run_next_step)
+            )  # 0 ms may be the same iteration of the loop
 
-    def _go_on(self, step: Callable[[], None]) -> None:
+    def _run_step(self, step: Callable[[], None]) -> None:
         """Run a step towards the first page; an error closes the session in order."""
         try:
             step()
@@ -222,14 +224,14 @@ class LiveSession(QObject):
             else:
                 traceback.print_exc()
                 self.code = BUG
-            self._close()
+            self._close_everything()
 
-    def _ask(self, made: Ready) -> None:
+    def _show_preflight(self, made: Ready) -> None:
         """Show the results of the checks to the operator, who starts the session."""
         from study_app.app.session.preflight_controller import Preflight  # noqa: PLC0415 - pyqtgraph: only once it is needed
 
         study, who = self.chosen.read_protocol(), self.chosen.who
-        asked = Preflight(self.chosen, study, made, lambda: self.screens()[0], who, self.theme)
+        asked = Preflight(self.chosen, study, made, lambda: self.chosen_screens()[0], who, self.theme)
         asked.started.connect(self._open_windows)
         asked.failed.connect(self._open_windows)
         asked.cancelled.connect(self.cancel)
@@ -246,7 +248,7 @@ class LiveSession(QObject):
         chosen, rig = self.chosen, made.rig
         source = chosen.read_source()
         protocol = parse(source, chosen.source)
-        shown_on, operated_on = self.screens()
+        shown_on, operated_on = self.chosen_screens()
         shares_screen, rate_hz = shown_on is operated_on, shown_on.refreshRate()
         text_scale = text_scale_on(self.settings, shown_on)
         results = preflight_checks(made.facts_with(rate_hz, shown_on.devicePixelRatio()), protocol)
@@ -255,14 +257,14 @@ class LiveSession(QObject):
                 self._progress(str(check))
         if reason := refusal_reasons(results):
             raise SessionError(f"the session did not start: {reason}")
-        screens = described(self.settings, shown_on, operated_on)
+        screens = described_screens(self.settings, shown_on, operated_on)
         yield
-        operator = bridge.make_cockpit(chosen, protocol, rig, self.theme)
+        operator = bridge.make_operator_window(chosen, protocol, rig, self.theme)
         self._windows.append(operator)
         yield
         participant = bridge.make_participant_window(
             chosen,
-            self._seconds,
+            self._elapsed_s,
             shares_screen=shares_screen,
             text_scale=text_scale,
             photodiode=self.settings.photodiode,
@@ -276,32 +278,32 @@ class LiveSession(QObject):
                 keep_content(source)
         self._crash_trace = CrashTrace(store.folder.crash)
         store.append(journal_events.Preflight(checks=[check.entry for check in results]))
-        plan = bridge.planned(chosen, protocol, store)
+        plan = bridge.session_plan(chosen, protocol, store)
         self.bridge = bridge.connect_windows(
             chosen, plan, store, rig, operator, participant, refresh_hz=rate_hz, videos=made.videos
         )
         self._windows.clear()
-        self.bridge.done.connect(self._finished)
+        self.bridge.done.connect(self._finish_session)
         self.bridge.diagnose_asked.connect(self.diagnose)
         yield
         self.bridge.start()  # before the windows are shown: a session that has not begun accepts no requests
         yield
-        yield from bridge.show_windows(self.bridge, self.screens, played=chosen.played)
+        yield from bridge.show_windows(self.bridge, self.chosen_screens, played=chosen.played)
         self._close_note()
         self._close_preflight()
 
-    def _seconds(self) -> float:
+    def _elapsed_s(self) -> float:
         """Return the time since the session's origin [s]; 0 while it is not on the disk."""
         return 0.0 if self._store is None else self._store.clock.seconds()
 
-    def screens(self) -> tuple[QScreen, QScreen]:
+    def chosen_screens(self) -> tuple[QScreen, QScreen]:
         """Return the participant's and the operator's screens, as chosen or as set for this machine."""
         chosen = self.chosen.screen
         return choose_screens(chosen if chosen is not None else screen_number(self.settings))
 
     def diagnose(self) -> None:
         """Open the diagnosis of the device above the operator's window; the bridge has stopped the force."""
-        from study_app.gui.devices.diagnosis_dialog import diagnosis  # noqa: PLC0415 - the note comes before it
+        from study_app.gui.devices.diagnosis_dialog import open_diagnosis  # noqa: PLC0415 - the note comes before it
 
         assert self.bridge is not None  # noqa: S101 - it has just asked
         name = self.chosen.device
@@ -310,23 +312,23 @@ class LiveSession(QObject):
             self.bridge.operator.show_message(*NOT_EXAMINED)
             return
         held = not device.simulated
-        diagnosis(self.bridge.operator, self.bridge.operator.theme, name, self.settings, held=held).show()
+        open_diagnosis(self.bridge.operator, self.bridge.operator.theme, name, self.settings, held=held).show()
 
     def _show_compiled(self, share: float) -> None:
         if self.note is not None:
             self.note.show_compiled(share)
 
-    def _say(self, line: str) -> None:
+    def _report_progress(self, line: str) -> None:
         if self.settings.sound:
             QApplication.beep()
         if self._progress is not None:
             self._progress(line)
         if self.note is not None:
-            self.note.say(line)
+            self.note.show_line(line)
         elif self.bridge is not None:
-            self.bridge.tell_of_device(line)
+            self.bridge.show_device_line(line)
 
-    def _finished(self) -> None:
+    def _finish_session(self) -> None:
         """Close the session after its windows; keep the error that ended it for the caller."""
         assert self.bridge is not None  # noqa: S101 - it has just spoken
         self.theme = self.bridge.operator.theme
@@ -342,15 +344,15 @@ class LiveSession(QObject):
             self.error = StudyError(f"the session was stopped: {trouble}; all answers so far are on disk")
         elif trouble:
             self.code = BUG
-        self._close()
+        self._close_everything()
 
     def cancel(self) -> None:
         """Cancel the session if it is not on the disk yet; later it is ended in its windows."""
         if self._store is None:
             self.code = CANCELLED
-            self._close()
+            self._close_everything()
 
-    def _close(self) -> None:
+    def _close_everything(self) -> None:
         """Close everything, in the order of safety, and emit ``over`` once."""
         if self._closed:
             return
@@ -360,14 +362,14 @@ class LiveSession(QObject):
             unfreeze_garbage()  # a bridge does this when it leaves
         try:
             with ExitStack() as closing:
-                closing.callback(self._let_go)  # even where a window cannot be closed
+                closing.callback(self._close_rig)  # even where a window cannot be closed
                 closing.callback(self._close_preflight)
                 closing.callback(self._close_note)
                 for window in self._windows:
                     window.deleteLater()
                 self._steps = None
                 if self.bridge is not None:
-                    self.bridge.leave_now()  # if it failed before that: no window stays open without its session
+                    self.bridge.leave_without_asking()  # no window stays open without its session
         except StudyError as error:
             self.error = self.error or error  # the first error is the cause
         except Exception:  # noqa: BLE001 - printed; whoever waits for the end must be notified
@@ -388,7 +390,7 @@ class LiveSession(QObject):
         if asked is not None:
             asked.close()
 
-    def _let_go(self) -> None:
+    def _close_rig(self) -> None:
         rig, self.rig = self.rig, None
         bridge = self.bridge
         if bridge is not None and not bridge.reconnecting.wait(self.patience_s):  # it ends now that this is closed
@@ -533,7 +535,7 @@ def run_session(chosen: NewSession, progress: Callable[[str], object] | None) ->
     live = LiveSession(chosen, LIGHT, progress)
     loop = QEventLoop()
     live.over.connect(loop.quit)
-    with collecting_here(), ended_from_outside(live.end_by_signal):
+    with collecting_in_this_thread(), ending_on_signals(live.end_by_signal):
         QTimer.singleShot(0, live.open)
         loop.exec()
         live.wait(live.patience_s)

@@ -24,7 +24,7 @@ from study_app.app.session.live_session import BUG, LiveSession
 from study_app.designer import header as shown
 from study_app.designer.controller import DesignerController
 from study_app.designer.header import Notice, PlayDevices
-from study_app.designer.participant.playable import NotPlayableError, Playable, StepPosition, playable
+from study_app.designer.participant.playable import NotPlayableError, Playable, StepPosition, part_to_play
 from study_app.designer.problems import problem_rows
 from study_app.devices.registry import descriptor_of, title_of
 from study_app.errors import StoreError, StudyError
@@ -51,7 +51,7 @@ class PlayedSession(LiveSession):
     _shown = False
 
     @property
-    def began(self) -> bool:
+    def has_begun(self) -> bool:
         return self._shown
 
     def open_windows(self, made: object) -> Iterator[None]:
@@ -64,8 +64,8 @@ class PlayedSession(LiveSession):
         self.bridge.operator.asked.connect(lambda what, _details: self._stop_later() if what == "stop" else None)
         if self.bridge.strip is not None:
             self.bridge.strip.stop.pressed.connect(self._stop_later)
-        runner.on_change(self._follow)
-        self._follow(runner.state)
+        runner.on_change(self._follow_state)
+        self._follow_state(runner.state)
         if runner.state.phase is Phase.PAUSED and runner.state.held is None:
             runner.post(ResumeRequested(self.bridge.parts.clock(), "participant"))
 
@@ -88,7 +88,7 @@ class PlayedSession(LiveSession):
         except StudyError as error:  # it stays unfinished
             log.warning("the played session has no end: %s", error)
         finally:
-            bridge.leave_now()
+            bridge.leave_without_asking()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """End the session when the participant's window is closed."""
@@ -99,19 +99,19 @@ class PlayedSession(LiveSession):
         self._stop_later()
         return True
 
-    def _follow(self, state: SessionState) -> None:
+    def _follow_state(self, state: SessionState) -> None:
         if state.phase is Phase.TROUBLE:
             self._stop_later()
         elif state.over:
-            QTimer.singleShot(END_SHOWN_MS, self, self._leave)
+            QTimer.singleShot(END_SHOWN_MS, self, self._leave_session)
 
     def _stop_later(self) -> None:
         """Stop after the current event, which may be the window's own."""
         QTimer.singleShot(0, self, self.stop)
 
-    def _leave(self) -> None:
+    def _leave_session(self) -> None:
         if self.bridge is not None and not self._closed:
-            self.bridge.leave_now()
+            self.bridge.leave_without_asking()
 
 
 SIMULATED: Final = "scripted"
@@ -154,23 +154,23 @@ class Playing(QObject):
         super().__init__(editing)
         self.editing, self.place = editing, place
         self.where: Callable[[], StepPosition | None] = lambda: designer.preview.position
-        self.kept.connect(designer.runs.look)
+        self.kept.connect(designer.runs.read_in_background)
         self.device = SIMULATED
         self.pilot: _Pilot | None = None
         self._asked: Playable | None = None
         self._left: list[PlayedSession] = []
         self._preparing = Background(self)
-        self._preparing.done.connect(self._begin)
+        self._preparing.done.connect(self._start_pilot)
         header = place.header
         header.play.asked.connect(self.play)
         header.play.device_chosen.connect(self.choose_device)
-        header.strip.asked.connect(self._answer)
+        header.strip.asked.connect(self._handle_answer)
         place.left.connect(self.stop)
         place.entered.connect(self._show_devices)
-        editing.opened_other.connect(self._forget)
+        editing.opened_other.connect(self._discard_pilot)
 
     @property
-    def under_way(self) -> bool:
+    def is_under_way(self) -> bool:
         return self._preparing.busy or (self.pilot is not None and self.pilot.session is not None)
 
     # requests
@@ -183,52 +183,52 @@ class Playing(QObject):
         """Play from here, unless a part from here to the end is faulty; ask before a device is used."""
         self.place.flush()
         opened = self.editing.opened
-        if opened is None or self.under_way:
+        if opened is None or self.is_under_way:
             return
         study = opened.study
         try:
-            playable_part = playable(study, opened.selected, self.where())
+            playable_part = part_to_play(study, opened.selected, self.where())
         except NotPlayableError as refused:
             names = {str(problem): row.name for problem, row in zip(study.problems, problem_rows(study), strict=True)}
             named = (replace(problem, place=names.get(str(problem), problem.place)) for problem in refused.problems)
-            self._show(shown.refuses(tuple(map(str, named))))
+            self._show_notice(shown.refusal_notice(tuple(map(str, named))))
             return
         self._asked = playable_part
         if self.device == SIMULATED:
-            self._prepare()
+            self._prepare_pilot()
         else:
             has_force = descriptor_of(self.device).kind == "felt"
-            self._show(shown.asks_for_device(title_of(self.device), playable_part.words, has_force=has_force))
+            self._show_notice(shown.device_question(title_of(self.device), playable_part.words, has_force=has_force))
 
     def stop(self) -> None:
         """Stop the pilot: zero force first."""
         if self.pilot is not None and self.pilot.session is not None:
             self.pilot.session.stop()
         elif self._preparing.busy:
-            self.pilot = None  # `_begin` deletes its folder once nothing is written there
-            self._show(None)
+            self.pilot = None  # `_start_pilot` deletes its folder once nothing is written there
+            self._show_notice(None)
         elif self.pilot is not None and self.pilot.choices is None:  # a bug ended its preparation
-            self._delete()
-            self._show(None)
+            self._delete_data()
+            self._show_notice(None)
 
-    def _answer(self, action: str) -> None:
+    def _handle_answer(self, action: str) -> None:
         if action == "play":
-            self._prepare()
+            self._prepare_pilot()
         elif action == "stop":
             self.stop()
         elif action == "keep":
-            self._keep()
+            self._keep_data()
         else:
             if action == "problems":
                 self.place.problems.show()
-            self._delete()
-            self._show(None)
+            self._delete_data()
+            self._show_notice(None)
 
     # pilots
 
-    def _prepare(self) -> None:
+    def _prepare_pilot(self) -> None:
         """Simulate the steps before the first shown one, in the background."""
-        self._delete()
+        self._delete_data()
         part, self._asked = self._asked, None
         if part is None:
             return
@@ -238,42 +238,42 @@ class Playing(QObject):
             self.place.message.emit("The study cannot be played", f"No temporary folder can be made: {error.strerror}.")
             return
         pilot = self.pilot = _Pilot(part, self.device, folder)
-        self._preparing.run(lambda: _prepared(pilot))
-        self._show(shown.under_way(part.words, title_of(pilot.device)))
+        self._preparing.run(lambda: _prepare_session(pilot))
+        self._show_notice(shown.playing_notice(part.words, title_of(pilot.device)))
 
-    def _begin(self, made: tuple[_Pilot, NewSession | StudyError]) -> None:
+    def _start_pilot(self, made: tuple[_Pilot, NewSession | StudyError]) -> None:
         pilot, choices = made
         if pilot is not self.pilot:  # it was stopped meanwhile
-            _remove(pilot.folder)
-            self.place.header.play.show_playing(self.under_way)
+            _remove_folder(pilot.folder)
+            self.place.header.play.show_playing(self.is_under_way)
             return
         if isinstance(choices, StudyError):
-            self._delete()
-            self._show(None)
+            self._delete_data()
+            self._show_notice(None)
             self.place.message.emit("The study cannot be played", f"{choices}.")
             return
         pilot.choices = choices
         pilot.session = PlayedSession(choices, self.place.theme)
-        pilot.session.over.connect(self._end)
+        pilot.session.over.connect(self._finish_pilot)
         pilot.session.open()
 
-    def _end(self) -> None:
+    def _finish_pilot(self) -> None:
         pilot = self.pilot
         if pilot is None or pilot.session is None:
             return
         session, pilot.session = pilot.session, None
-        self._left = [earlier for earlier in (*self._left, session) if earlier.opening]
+        self._left = [earlier for earlier in (*self._left, session) if earlier.is_opening]
         if session.error is not None:
             self.place.message.emit("Playing was stopped", f"{session.error}.")
         elif session.code == BUG:
             self.place.message.emit("A bug in the program stopped the pilot", "The terminal shows the details.")
-        if session.began:
-            self._show(shown.ended(pilot.what.words, OUTCOMES.get(session.status or "", "stopped")))
+        if session.has_begun:
+            self._show_notice(shown.ended_notice(pilot.what.words, OUTCOMES.get(session.status or "", "stopped")))
         else:
-            self._delete()
-            self._show(None)
+            self._delete_data()
+            self._show_notice(None)
 
-    def _keep(self) -> None:
+    def _keep_data(self) -> None:
         pilot = self.pilot
         if pilot is None or pilot.choices is None or pilot.session is not None:
             return
@@ -285,8 +285,8 @@ class Playing(QObject):
             return
         with suppress(StoreError):  # only the tab Changes needs the copy
             keep_content(pilot.what.source)
-        self._delete()
-        self._show(shown.kept(to.name))
+        self._delete_data()
+        self._show_notice(shown.kept_notice(to.name))
         self.kept.emit(to)
 
     def end_by_signal(self, number: int) -> None:
@@ -301,30 +301,30 @@ class Playing(QObject):
             time.sleep(LOOK_S)
         for session in self._left:
             session.wait(patience.left_s)
-        self._delete()
+        self._delete_data()
 
-    def _forget(self) -> None:
+    def _discard_pilot(self) -> None:
         self.stop()
-        self._delete()
+        self._delete_data()
         self._asked = None
-        self._show(None)
+        self._show_notice(None)
 
-    def _delete(self) -> None:
+    def _delete_data(self) -> None:
         pilot, self.pilot = self.pilot, None
         if pilot is not None:
-            _remove(pilot.folder)
+            _remove_folder(pilot.folder)
 
     # display
 
-    def _show(self, state: Notice | None) -> None:
+    def _show_notice(self, state: Notice | None) -> None:
         self.place.header.strip.show_notice(state)
-        self.place.header.play.show_playing(self.under_way)
+        self.place.header.play.show_playing(self.is_under_way)
 
     def _show_devices(self) -> None:
         self.place.header.play.show_devices(PlayDevices(device_choices(), self.device))
 
 
-def _prepared(pilot: _Pilot) -> tuple[_Pilot, NewSession | StudyError]:
+def _prepare_session(pilot: _Pilot) -> tuple[_Pilot, NewSession | StudyError]:
     """Return the choices of a session that starts at the pilot's first step, or the error."""
     part, study = pilot.what, pilot.what.protocol.study
     file = pilot.folder / f"{study.name}.toml"
@@ -352,6 +352,6 @@ def _prepared(pilot: _Pilot) -> tuple[_Pilot, NewSession | StudyError]:
         return pilot, error
 
 
-def _remove(folder: Path) -> None:
+def _remove_folder(folder: Path) -> None:
     """Delete the data of a pilot."""
     shutil.rmtree(folder, ignore_errors=True)

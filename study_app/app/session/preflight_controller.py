@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QWidget
 from study_app.devices.registry import descriptor_of
 from study_app.errors import StudyError
 from study_app.evidence.appraisal import Costs, DeliveryQuestion, Errors, Question, start_appraisal_worker
-from study_app.gui.display.screens import place
+from study_app.gui.display.screens import place_window
 from study_app.gui.preflight.window import (
     ComputerWindow,
     PreflightView,
@@ -72,17 +72,17 @@ class Appraisal:
         self.velocity_errors: tuple[float, float] | None = None
         self._errors_n: list[float | None] = []
         self._shares: dict[str, float] = {}
-        self._ask()
+        self._request_next()
 
     @property
-    def over(self) -> bool:
+    def is_over(self) -> bool:
         return (not self._waiting and self._last is None) or not self.appraiser.works
 
-    def look(self) -> bool:
+    def read_answers(self) -> bool:
         """Read the available answers; return whether there were any."""
         news = False
         for number, answer in self.appraiser.answers():
-            if number != self._asked or self.over:
+            if number != self._asked or self.is_over:
                 continue
             if isinstance(answer, Costs):
                 self.tick_s = max(self.tick_s or 0.0, answer.tick_ns * 1e-9)
@@ -98,12 +98,12 @@ class Appraisal:
             liquid = self._waiting.pop(0).liquid
             if isinstance(answer, Errors) and answer.withheld is not None:
                 self._shares[liquid] = max(answer.withheld, self._shares.get(liquid, 0.0))
-            self._ask()
+            self._request_next()
             if not self._waiting:
-                self.error_n, self.withheld, news = _largest(self._errors_n), self._shares, True
+                self.error_n, self.withheld, news = _largest_error_n(self._errors_n), self._shares, True
         return news
 
-    def _ask(self) -> None:
+    def _request_next(self) -> None:
         if self._waiting:
             _, scene, stroke = self._waiting[0]
             self._asked = self.appraiser.order(Question(scene, stroke, self.dynamics))
@@ -137,27 +137,27 @@ class Preflight(QObject):
         super().__init__()
         self._chosen, self._protocol, self._ready, self._screen = chosen, protocol, ready, screen
         self._who = who
-        self._goes_on = _goes_on(chosen, protocol)
+        self._goes_on = _resumption_rows(chosen, protocol)
         self.measuring = Background(self)
-        self.measuring.done.connect(self._take)
+        self.measuring.done.connect(self._use_measurements)
         self.measuring.failed.connect(self.failed)
         self._ending = threading.Event()
         self.appraisal = _appraisal(protocol, ready.facts)
         self.window = PreflightWindow(
             protocol.limits.lateness_ms * 1e3, asks_masking=descriptor_of(chosen.device).kind == "felt", theme=theme
         )
-        self.window.start_asked.connect(self._start)
-        self.window.again_asked.connect(self._again)
+        self.window.start_asked.connect(self._accept)
+        self.window.again_asked.connect(self._measure_again)
         self.window.cancelled.connect(self.cancelled)
         self._appraised = False
         self._outlets_shown = ready.outlet_statuses
         self._timer = QTimer(self)
-        self._timer.timeout.connect(self._look)
+        self._timer.timeout.connect(self._watch_servo_and_screen)
         self._timer.start(LOOK_MS)
 
     def open(self) -> None:
-        self._show()
-        place(self.window, self.window.screen(), corner=False)
+        self._show_checks()
+        place_window(self.window, self.window.screen(), corner=False)
         self.window.show()
 
     def close(self) -> None:
@@ -181,7 +181,7 @@ class Preflight(QObject):
             velocity_errors=appraisal.velocity_errors,
         )
 
-    def _show(self) -> None:
+    def _show_checks(self) -> None:
         try:
             facts = self._facts
         except StudyError as error:  # the screen is gone
@@ -190,14 +190,14 @@ class Preflight(QObject):
             return
         self._outlets_shown = facts.outlets
         error_n, now = self.appraisal.error_n, datetime.now().astimezone()
-        asked_error = error_n is not None or not self.appraisal.over
+        asked_error = error_n is not None or not self.appraisal.is_over
         planned = planned_rows(self._protocol, now, error_n, asked_error=asked_error)
         results, rows = preflight_checks(facts, self._protocol), (*self._goes_on, *planned)
         self.window.show_view(
             PreflightView(self._protocol.study.name, self._who, facts, results, rows, busy=self.measuring.busy)
         )
 
-    def _look(self) -> None:
+    def _watch_servo_and_screen(self) -> None:
         """Check servo and screen, which may be unplugged, and read the appraiser's answers."""
         try:
             self._ready.rig.servo.check()
@@ -207,28 +207,28 @@ class Preflight(QObject):
             self.failed.emit(error)
             return
         if self._ready.outlet_statuses != self._outlets_shown:  # a recording program was connected
-            self._show()
+            self._show_checks()
         if self._appraised:
             return
-        self._appraised = self.appraisal.over
-        if self.appraisal.look() or self._appraised:
-            self._show()
+        self._appraised = self.appraisal.is_over
+        if self.appraisal.read_answers() or self._appraised:
+            self._show_checks()
 
-    def _again(self) -> None:
+    def _measure_again(self) -> None:
         """Measure again in a thread of its own: the measurement takes two seconds."""
         if not self.measuring.busy:
             ready, sleep = self._ready, self._ending.wait
             self.measuring.run(lambda: measure_rig(ready.rig, self._chosen, ready.videos, sleep=sleep))
-            self._show()
+            self._show_checks()
 
-    def _take(self, facts: Measurements) -> None:
+    def _use_measurements(self, facts: Measurements) -> None:
         self._ready = replace(self._ready, facts=facts)
         if _dynamics(facts, self._protocol) != self.appraisal.dynamics:  # the delay decides how much force is withheld
             self.appraisal.close()
             self.appraisal, self._appraised = _appraisal(self._protocol, facts), False
-        self._show()
+        self._show_checks()
 
-    def _start(self) -> None:
+    def _accept(self) -> None:
         facts = replace(self._ready.facts, tick_s=self.appraisal.tick_s)
         masking = None if self.window.masking is None else self.window.masking.answer()
         self.started.emit(replace(self._ready, facts=facts, masking=masking))
@@ -239,7 +239,7 @@ def _appraisal(protocol: Protocol, facts: Measurements) -> Appraisal:
     return Appraisal(study_scenes(protocol), _dynamics(facts, protocol), DeliveryQuestion(protocol, facts.delay_ticks))
 
 
-def _goes_on(chosen: NewSession, protocol: Protocol) -> tuple[tuple[str, str], ...]:
+def _resumption_rows(chosen: NewSession, protocol: Protocol) -> tuple[tuple[str, str], ...]:
     """Return the rows that say where a session resumes and what is kept; empty for a new one."""
     if chosen.resumes is None:
         return ()
@@ -248,7 +248,7 @@ def _goes_on(chosen: NewSession, protocol: Protocol) -> tuple[tuple[str, str], .
     return resumed_rows(own, begun_schedule(own, start_of(lines), read_key(chosen.results)), lines)
 
 
-def _largest(errors_n: list[float | None]) -> float | None:
+def _largest_error_n(errors_n: list[float | None]) -> float | None:
     """Return the largest error [N]; None if one is unknown, since it may be the largest."""
     known = [error for error in errors_n if error is not None]
     return max(known, default=None) if len(known) == len(errors_n) else None
@@ -290,8 +290,8 @@ class ComputerCheck(QObject):
         self._results, self._screen = results, Screen(screen.refreshRate(), screen.devicePixelRatio())
         self.window = ComputerWindow(parent, theme)
         self._background = Background(self)
-        self._background.done.connect(self._show)
-        self._background.failed.connect(self._tell)
+        self._background.done.connect(self._show_checks)
+        self._background.failed.connect(self._show_error)
         self._compiled.connect(self.window.show_compiled, Qt.ConnectionType.QueuedConnection)
         self.window.asked.connect(self.measure)
         self.window.finished.connect(self._close)
@@ -299,9 +299,9 @@ class ComputerCheck(QObject):
 
     def measure(self) -> None:
         self.window.show_measuring()
-        self._background.run(self._look)
+        self._background.run(self._run_checks)
 
-    def _look(self) -> tuple[Check, ...]:
+    def _run_checks(self) -> tuple[Check, ...]:
         from study_app.devices.registry import backends  # noqa: PLC0415 - the compiler: only in this thread
         from study_app.devices.rig import open_rig, study_settings  # noqa: PLC0415
         from study_app.haptics.kernels.compiled import CACHE, following_compilation  # noqa: PLC0415
@@ -332,14 +332,14 @@ class ComputerCheck(QObject):
             self.window.deleteLater()
             self.deleteLater()
 
-    def _tell(self, error: BaseException) -> None:
+    def _show_error(self, error: BaseException) -> None:
         if self._closed:
             self._close()
         else:
             bug = f"{type(error).__name__}: {error}; the terminal shows the details"
             self.window.show_sentence(f"{error if isinstance(error, StudyError) else bug}.")
 
-    def _show(self, results: tuple[Check, ...]) -> None:
+    def _show_checks(self, results: tuple[Check, ...]) -> None:
         if self._closed:
             self._close()
         else:

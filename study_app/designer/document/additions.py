@@ -10,17 +10,17 @@ from study_app.designer.document.fields import (
     LETTER,
     Row,
     check_id,
-    initial,
+    element_noun,
+    initial_value,
     label_of,
     node_at,
     refused_at,
     row_at,
     rows,
     sections_at,
-    singular,
     table_of,
     tags,
-    why_not,
+    violated_bound,
 )
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset
@@ -28,13 +28,13 @@ from study_app.designer.document.toml_text import Refused
 from study_app.ids import MAX_ID, free_id
 from study_app.number_text import MINUS, exact_text, number_of
 from study_app.protocol.checks.cross_references import TEXTS
-from study_app.protocol.checks.force_limits import paced
+from study_app.protocol.checks.force_limits import check_paced
 from study_app.protocol.source.document import Path, entries, has, names, value_at
-from study_app.protocol.source.problems import Fault, rule_of, shown
+from study_app.protocol.source.problems import Fault, rule_of, shown_value
 from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
 
 
-def switched(study: Study, path: Path, kind: str | None) -> tuple[Edit, ...]:
+def edits_to_switch(study: Study, path: Path, kind: str | None) -> tuple[Edit, ...]:
     """Return the edits that change the kind of a table; None stands for the kind without the key.
 
     Keys of both kinds keep their values, the others are removed; keys that the new kind needs get an initial one.
@@ -52,9 +52,9 @@ def switched(study: Study, path: Path, kind: str | None) -> tuple[Edit, ...]:
         edits.insert(0, Set((*path, key), kind))
     elif key in table:
         edits.insert(0, Unset((*path, key)))
-    after, _ = study.edited(*edits)
+    after, _ = study.with_edits(*edits)
     needed = [name for name in node.get("required", ()) if name not in {*table, key}]
-    return (*edits, *(Set((*path, name), initial(after.document, (*path, name))) for name in needed))
+    return (*edits, *(Set((*path, name), initial_value(after.document, (*path, name))) for name in needed))
 
 
 def with_language(study: Study, code: str) -> tuple[Edit, ...]:
@@ -77,7 +77,7 @@ def without_language(study: Study, code: str) -> tuple[Edit, ...]:
     return (*gone, Set(("study", "languages"), [other for other in codes if other != code]))
 
 
-def filled_in(study: Study, code: str) -> tuple[Edit, ...]:
+def edits_to_fill_in(study: Study, code: str) -> tuple[Edit, ...]:
     """Return the edits that copy the first language's texts to missing texts of a language."""
     first = languages_of(study.document)[0]
     edits: list[Edit] = []
@@ -95,7 +95,7 @@ def texts_of(study: Study) -> Iterator[tuple[Path, Any]]:
         yield from entries(study.document, pattern)
 
 
-def moved(study: Study, entry: Path, to: int) -> tuple[tuple[Edit, ...], Path]:
+def edits_to_move(study: Study, entry: Path, to: int) -> tuple[tuple[Edit, ...], Path]:
     """Return the edits that move an entry of a list before the entry ``to``, and its new path.
 
     ``to`` counts before the move; the length of the list stands for its end. Parts of the study are renumbered if they
@@ -104,14 +104,14 @@ def moved(study: Study, entry: Path, to: int) -> tuple[tuple[Edit, ...], Path]:
     place, index = entry[:-1], int(entry[-1])
     to -= index < to
     moves = () if index == to else (Move(entry, to),)
-    return (*moves, *_renumbered(study, place, moves)), (*place, to)
+    return (*moves, *_edits_to_renumber(study, place, moves)), (*place, to)
 
 
-def _renumbered(study: Study, place: Path, moves: Sequence[Edit]) -> tuple[Edit, ...]:
+def _edits_to_renumber(study: Study, place: Path, moves: Sequence[Edit]) -> tuple[Edit, ...]:
     """Return the edits that number the parts of the session 1, 2 … again."""
     if place != ("sequence",) or not moves or any(fault.path[2:] == ("part",) for fault in study.faults):
         return ()
-    after, _ = study.edited(*moves)
+    after, _ = study.with_edits(*moves)
     blocks: Any = after.document.get("blocks", {})
     edits: list[Edit] = []
     old = number = 0
@@ -129,24 +129,24 @@ def _renumbered(study: Study, place: Path, moves: Sequence[Edit]) -> tuple[Edit,
 LONGEST: Final = 40
 
 
-def short_of(text: str) -> str:
+def initial_short_text(text: str) -> str:
     """Return the initial short text of a question: the beginning of its text."""
     return " ".join(text.split())[:LONGEST].rstrip(" ?.!:")
 
 
-def followed(study: Study, path: Path, language: str, text: str) -> tuple[Edit, ...]:
+def short_text_edits(study: Study, path: Path, language: str, text: str) -> tuple[Edit, ...]:
     """Return the edit of a question's short text when its text is typed; none if it was edited separately."""
     place = (*path[:-1], "short")
     before, short = value_at(study.document, path), value_at(study.document, place)
     if path[-1] != "text" or isinstance(before, Mapping) != isinstance(short, Mapping):
         return ()
-    old, own = _in(before, language), _in(short, language)
-    if old is None or own is None or own != short_of(old):
+    old, own = _text_in(before, language), _text_in(short, language)
+    if old is None or own is None or own != initial_short_text(old):
         return ()
-    return (Set((*place, language) if isinstance(short, Mapping) else place, short_of(text)),)
+    return (Set((*place, language) if isinstance(short, Mapping) else place, initial_short_text(text)),)
 
 
-def _in(value: Any, language: str) -> str | None:
+def _text_in(value: Any, language: str) -> str | None:
     text = value.get(language) if isinstance(value, Mapping) else value
     return text if isinstance(text, str) else None
 
@@ -164,14 +164,14 @@ class Repair:
 
 def repairs(study: Study, fault: Fault) -> tuple[Repair, ...]:
     """Return the repairs of a fault, by its kind: after each of them it is gone."""
-    offered = (*_levels(study, fault), *_stated(study, fault), *_by_kind(study, fault))
-    return tuple(repair for repair in offered if removes(study, fault, repair))
+    offered = (*_level_repairs(study, fault), *_stated_repairs(study, fault), *_repairs_by_kind(study, fault))
+    return tuple(repair for repair in offered if removes_fault(study, fault, repair))
 
 
-def removes(study: Study, fault: Fault, repair: Repair) -> bool:
+def removes_fault(study: Study, fault: Fault, repair: Repair) -> bool:
     """Return whether a repair removes a fault and adds none."""
     try:
-        after, _ = study.edited(*repair.edits)
+        after, _ = study.with_edits(*repair.edits)
     except Refused:
         return False
     known = {(problem.path, problem.message) for problem in study.faults}
@@ -179,7 +179,7 @@ def removes(study: Study, fault: Fault, repair: Repair) -> bool:
     return (fault.path, fault.message) not in problems_after and len(problems_after) <= len(known)
 
 
-def _stated(study: Study, fault: Fault) -> Iterator[Repair]:
+def _stated_repairs(study: Study, fault: Fault) -> Iterator[Repair]:
     """Yield the value or key that the fault proposes; for a number with a wrong sign, the number without it."""
     if fault.use is None:
         return
@@ -190,26 +190,26 @@ def _stated(study: Study, fault: Fault) -> Iterator[Repair]:
         return
     if isinstance(now, int | float) and isinstance(value, int | float) and now < 0 < value and path == fault.path:
         value = -now
-    sentence = f"Use {shown(value)}"
+    sentence = f"Use {shown_value(value)}"
     if path != fault.path:
-        sentence = f"Move to {value:g} mm" if isinstance(path[-1], int) else f"Use {path[-1]} = {shown(value)}"
+        sentence = f"Move to {value:g} mm" if isinstance(path[-1], int) else f"Use {path[-1]} = {shown_value(value)}"
     yield Repair(sentence, (Set(path, value),))
 
 
-def _by_kind(study: Study, fault: Fault) -> Iterator[Repair]:
+def _repairs_by_kind(study: Study, fault: Fault) -> Iterator[Repair]:
     """Yield the repairs that follow from the kind of a fault."""
     path, value = fault.path, value_at(study.document, fault.path)
     languages = value_at(study.document, ("study", "languages"))
     sequence = value_at(study.document, ("sequence",))
     if fault.kind == "missing" and path:
         with suppress(Refused):
-            yield Repair("Add it", (Set(path, initial(study.document, path)),))
+            yield Repair("Add it", (Set(path, initial_value(study.document, path)),))
     elif fault.kind in {"surplus", "unknown key"}:
         yield Repair("Remove", (Unset(path),))
     elif fault.kind == "other language":
         yield Repair("Remove this text", (Unset(path),))
     elif fault.kind == "not a number" and isinstance(value, str) and (number := number_of(value)) is not None:
-        yield Repair(f"Use {shown(number)} as a number", (Set(path, number),))
+        yield Repair(f"Use {shown_value(number)} as a number", (Set(path, number),))
     elif fault.kind == "one language" and isinstance(value, str) and languages:
         yield Repair("Use this text in every language", (Set(path, dict.fromkeys(languages, value)),))
     elif fault.kind == "not in sequence" and isinstance(sequence, tuple):
@@ -220,7 +220,7 @@ def _by_kind(study: Study, fault: Fault) -> Iterator[Repair]:
         yield Repair(sentence, (Set((*path, lacking), value[first]),))
 
 
-def _levels(study: Study, fault: Fault) -> Iterator[Repair]:
+def _level_repairs(study: Study, fault: Fault) -> Iterator[Repair]:
     """Yield the highest level within the limit."""
     levels = value_at(study.document, fault.path)
     if fault.path[:1] != ("stimuli",) or fault.path[-1:] != ("levels",) or not isinstance(levels, tuple):
@@ -228,12 +228,12 @@ def _levels(study: Study, fault: Fault) -> Iterator[Repair]:
     if len(levels) == 2 and all(isinstance(level, int | float) for level in levels):
         highest = highest_level(study, fault, *levels)
         if highest is not None:
-            lowered = _lowered(study, str(fault.path[1]), highest)
+            lowered = _lowered_levels(study, str(fault.path[1]), highest)
             edits = (Set(("methods", name, "levels"), list(own)) for name, own in lowered.items())
-            yield Repair(f"Highest level {shown(highest)}", (Set((*fault.path, 1), highest), *edits))
+            yield Repair(f"Highest level {shown_value(highest)}", (Set((*fault.path, 1), highest), *edits))
 
 
-def _lowered(study: Study, stimulus: str, highest: float) -> dict[str, tuple[float, ...]]:
+def _lowered_levels(study: Study, stimulus: str, highest: float) -> dict[str, tuple[float, ...]]:
     """Return the listed levels of a stimulus' methods, capped at the highest one, if any exceeds it.
 
     A method of another stimulus, too, keeps its levels.
@@ -257,12 +257,12 @@ def highest_level(study: Study, fault: Fault, low: float, high: float) -> float 
 
     def passes(level: float) -> bool:
         stimulus = formed.stimuli[name].model_copy(update={"levels": (low, level)})
-        lowered = _lowered(study, name, level).items()
+        lowered = _lowered_levels(study, name, level).items()
         methods = {name: formed.methods[name].model_copy(update={"levels": own}) for name, own in lowered}
         changed = formed.model_copy(
             update={"stimuli": {**formed.stimuli, name: stimulus}, "methods": {**formed.methods, **methods}}
         )
-        return not any(problem.path == fault.path for problem in paced(changed))
+        return not any(problem.path == fault.path for problem in check_paced(changed))
 
     least, most = low, high
     for _ in range(_HALVINGS):
@@ -279,7 +279,7 @@ def highest_level(study: Study, fault: Fault, low: float, high: float) -> float 
 _ROUNDS: Final = 12
 
 
-def added(
+def edits_to_add(
     study: Study, section: Path, *, name: str = "", behind: str | int | None = None
 ) -> tuple[tuple[Edit, ...], Path]:
     """Return the edits that add an element to a section or list as one step, and its path.
@@ -297,15 +297,15 @@ def added(
         count = len(row.value or ())
         path = (*section, behind + 1 if isinstance(behind, int) and behind < count else count)
         entry = row_at(study.document, path)
-        made = initial(study.document, path) if entry is not None and entry.kind == "references" else value
+        made = initial_value(study.document, path) if entry is not None and entry.kind == "references" else value
         first = Insert(path, made) if row.value else Set(section, [made])
     else:
-        path = (*section, free_id(names(study.document, str(section[0])), name or singular(section[-1])))
+        path = (*section, free_id(names(study.document, str(section[0])), name or element_noun(section[-1])))
         first = Set(path, value, behind if isinstance(behind, str) else None)
     others: list[Edit] = []
     tried = {(fault.path, fault.message) for fault in study.faults}
     for _ in range(_ROUNDS):
-        after, _splices = study.edited(first, *others)
+        after, _splices = study.with_edits(first, *others)
         fault = next((problem for problem in after.faults if (problem.path, problem.message) not in tried), None)
         if fault is None:
             break
@@ -314,18 +314,18 @@ def added(
         if inner and value_at(after.document, fault.path) is None:
             asked = row_at(after.document, fault.path)
             if asked is not None and asked.kind == "reference" and asked.sections and not asked.choices:
-                named, made = added(after, asked.sections[:1])
+                named, made = edits_to_add(after, asked.sections[:1])
                 others += named
-                _put(value, inner, made[-1])
+                _set_nested(value, inner, made[-1])
             else:
-                _put(value, inner, initial(after.document, fault.path))
+                _set_nested(value, inner, initial_value(after.document, fault.path))
         elif inner and fault.permitted:
             for word in fault.permitted:
-                _put(value, inner, word)
-                if fault.path not in {problem.path for problem in study.edited(first, *others)[0].faults}:
+                _set_nested(value, inner, word)
+                if fault.path not in {problem.path for problem in study.with_edits(first, *others)[0].faults}:
                     break
         else:
-            others += _outside(after, fault)
+            others += _edits_outside(after, fault)
     return (first, *others), path
 
 
@@ -338,11 +338,13 @@ def additions_for(study: Study, fault: Fault) -> tuple[Repair, ...]:
     for section in sections_at(fault.path):
         with suppress(Refused):
             check_id(name)
-            repairs.append(Repair(f'Add {singular(section)} "{name}"', added(study, (section,), name=name)[0]))
-    return tuple(repair for repair in repairs if removes(study, fault, repair))
+            repairs.append(
+                Repair(f'Add {element_noun(section)} "{name}"', edits_to_add(study, (section,), name=name)[0])
+            )
+    return tuple(repair for repair in repairs if removes_fault(study, fault, repair))
 
 
-def duplicated(study: Study, path: Path, wanted: str = "") -> tuple[tuple[Edit, ...], Path]:
+def edits_to_duplicate(study: Study, path: Path, wanted: str = "") -> tuple[tuple[Edit, ...], Path]:
     """Return the edits that copy an element right after itself as one step, and the path of the copy.
 
     The copy has the name ``wanted``, or the next free one, the next free code letter, and a place in the session if it
@@ -363,30 +365,30 @@ def duplicated(study: Study, path: Path, wanted: str = "") -> tuple[tuple[Edit, 
     else:
         copy = (*path[:-1], wanted or free_id(names(study.document, str(path[0])), str(name)))
         edits = [Duplicate(path, str(copy[-1]))]
-    return (*edits, *fitted(study, study.edited(*edits)[0], copy)), copy
+    return (*edits, *edits_to_fit(study, study.with_edits(*edits)[0], copy)), copy
 
 
-def fitted(before: Study, after: Study, path: Path) -> tuple[Edit, ...]:
+def edits_to_fit(before: Study, after: Study, path: Path) -> tuple[Edit, ...]:
     """Return the additional edits that a copy needs: a free code letter and a place in the session."""
     edits: list[Edit] = []
     for row in rows(after.document, path):
         if row.value is not None and rule_of(LETTER) in row.bounds:
             letters = [letter for _, letter in entries(after.document, f"{path[0]}.*.{row.path[-1]}")]
-            edits += [Set(row.path, initial(after.document, row.path))] if letters.count(row.value) > 1 else []
-    after, _ = after.edited(*edits)
+            edits += [Set(row.path, initial_value(after.document, row.path))] if letters.count(row.value) > 1 else []
+    after, _ = after.with_edits(*edits)
     for fault in after.faults:
         if fault.path == path and fault not in before.faults:
-            edits += _outside(after, fault)
+            edits += _edits_outside(after, fault)
     return tuple(edits)
 
 
-def _outside(study: Study, fault: Fault) -> tuple[Edit, ...]:
+def _edits_outside(study: Study, fault: Fault) -> tuple[Edit, ...]:
     """Return the edits elsewhere that a new element needs, such as its place in the session."""
     offered = repairs(study, fault)
     return offered[0].edits if offered else ()
 
 
-def _put(value: dict[str, Any], path: Path, inner: Any) -> None:
+def _set_nested(value: dict[str, Any], path: Path, inner: Any) -> None:
     for step in path[:-1]:
         value = value.setdefault(str(step), {})
     value[str(path[-1])] = inner
@@ -407,10 +409,10 @@ def number_rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
     section = row_at(document, path[:1])
     if len(path) != 2 or path[0] == "pages" or section is None or section.kind != "tables":
         return ()
-    return tuple(_numbers(document, path, _DEEPEST)) if isinstance(value_at(document, path), Mapping) else ()
+    return tuple(_number_rows(document, path, _DEEPEST)) if isinstance(value_at(document, path), Mapping) else ()
 
 
-def _numbers(document: Mapping[str, Any], path: Path, deepest: int) -> Iterator[Row]:
+def _number_rows(document: Mapping[str, Any], path: Path, deepest: int) -> Iterator[Row]:
     refused = refused_at(document, path)
     below: list[Path] = []
     for row in rows(document, path):
@@ -420,7 +422,7 @@ def _numbers(document: Mapping[str, Any], path: Path, deepest: int) -> Iterator[
             known = isinstance(row.value, int | float) and not isinstance(row.value, bool)
             yield row if known else replace(row, value=None)
     for inner in below:
-        yield from _numbers(document, inner, deepest - 1)
+        yield from _number_rows(document, inner, deepest - 1)
 
 
 def number_row(document: Mapping[str, Any], path: Path, field: Path) -> Row:
@@ -435,7 +437,7 @@ def check_values(document: Mapping[str, Any], row: Row, values: Sequence[float])
     """Refuse values that copies of an element cannot have."""
     known = [row.value]
     for value in values:
-        if why := why_not(document, row, value):
+        if why := violated_bound(document, row, value):
             raise Refused(f"{exact_text(value)} is not permitted: {row.label} is {why}")
         if value in known:
             raise Refused(f"{exact_text(value)} is there twice, or is the value of the original")
@@ -444,17 +446,17 @@ def check_values(document: Mapping[str, Any], row: Row, values: Sequence[float])
         raise Refused(f"a series has 1 to {MOST} copies")
 
 
-def copy_with(study: Study, path: Path, row: Row, value: float) -> tuple[tuple[Edit, ...], Path]:
+def edits_to_copy_with(study: Study, path: Path, row: Row, value: float) -> tuple[tuple[Edit, ...], Path]:
     """Return the edits that copy an element with another number in its id and titles, and the path of the copy."""
-    word = _word(value)
-    stem = str(path[1]).removesuffix("" if row.value is None else f"_{_word(row.value)}")
+    word = _number_in_id(value)
+    stem = str(path[1]).removesuffix("" if row.value is None else f"_{_number_in_id(row.value)}")
     name = f"{stem[: MAX_ID - len(word) - 1]}_{word}"
-    edits, copy = duplicated(study, path, free_id(names(study.document, str(path[0])), name))
-    titles = (Set((*copy, *place), text) for place, text in titles_with(study.document, path, row, value))
+    edits, copy = edits_to_duplicate(study, path, free_id(names(study.document, str(path[0])), name))
+    titles = (Set((*copy, *place), text) for place, text in titles_of_copy(study.document, path, row, value))
     return (*edits, Set((*copy, *row.path[2:]), value), *titles), copy
 
 
-def titles_with(document: Mapping[str, Any], path: Path, row: Row, value: float) -> Iterator[tuple[Path, str]]:
+def titles_of_copy(document: Mapping[str, Any], path: Path, row: Row, value: float) -> Iterator[tuple[Path, str]]:
     """Yield the titles of a copy: the number at their end is replaced, or the new number is added."""
     number = re.compile(rf"(?:(?<!\w)[-{MINUS}])?\d+(?:[.,]\d+)?(?=\s*(?:{re.escape(row.unit)})?\s*$)")
     title = value_at(document, (*path, "title"))
@@ -466,6 +468,6 @@ def titles_with(document: Mapping[str, Any], path: Path, row: Row, value: float)
             yield ("title", *filter(None, [language])), new.rstrip()
 
 
-def _word(value: float) -> str:
+def _number_in_id(value: float) -> str:
     """Return a number as a part of an id: "0_5", "minus_60"."""
     return exact_text(value).replace("-", "minus_").replace(".", "_")[: MAX_ID // 2]

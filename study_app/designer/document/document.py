@@ -12,11 +12,11 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Final
 
-from study_app.designer.document.additions import filled_in, with_language, without_language
+from study_app.designer.document.additions import edits_to_fill_in, with_language, without_language
 from study_app.designer.document.elements import FIRST, first_element, study_title
-from study_app.designer.document.study import Study, read
+from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Edit, Set
-from study_app.designer.document.toml_text import Refused, Splices, reverted
+from study_app.designer.document.toml_text import Refused, Splices, revert_splices
 from study_app.designer.templates import FOLDER, templates
 from study_app.errors import StoreError
 from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
@@ -28,9 +28,9 @@ from study_app.protocol.source.files import (
     hashes_in,
     shipped,
     shipped_file,
-    unbundled,
+    unbundle,
     with_liquid_files,
-    without_mark,
+    without_byte_order_mark,
 )
 from study_app.protocol.source.problems import did_you_mean
 from study_app.protocol.wording.languages import languages_of
@@ -69,7 +69,7 @@ def template(name: str) -> Study:
     """
     if name not in templates():
         raise Refused(f'there is no template "{name}": {did_you_mean(name, templates())}')
-    return read((FOLDER / f"{name}.toml").read_bytes())
+    return read_study((FOLDER / f"{name}.toml").read_bytes())
 
 
 def copy_of(study: Study, name: str) -> Study:
@@ -79,16 +79,16 @@ def copy_of(study: Study, name: str) -> Study:
     """
     _check_name(name)
     named = Study(study.text.replace(_SELF, f"liquid-study check {name}"), study.folder)
-    return named.edited(Set(("study", "name"), name), Set(("study", "version"), FIRST_VERSION))[0]
+    return named.with_edits(Set(("study", "name"), name), Set(("study", "version"), FIRST_VERSION))[0]
 
 
-def answered(study: Study, answers: Answers) -> Study:
+def with_answers(study: Study, answers: Answers) -> Study:
     """Return a study with the answers given on the page of new studies.
 
     Raises Refused if an answer is not permitted.
     """
     for place, value in answers.values:
-        study, _ = study.edited(Set(place, value))
+        study, _ = study.with_edits(Set(place, value))
         fault = next((problem for problem in study.faults if problem.path[: len(place)] == place), None)
         if fault is not None:
             raise Refused(f"{fault.message}{f' ({fault.hint})' if fault.hint else ''}")
@@ -96,20 +96,20 @@ def answered(study: Study, answers: Answers) -> Study:
         head = study.document["study"]
         by_language = isinstance(head, Mapping) and isinstance(head.get("title"), Mapping)
         place = ("study", "title", languages_of(study.document)[0]) if by_language else ("study", "title")
-        study, _ = study.edited(Set(place, answers.title))
+        study, _ = study.with_edits(Set(place, answers.title))
     codes = languages_of(study.document)
     for code in answers.languages:
         if code not in codes:
-            study, _ = study.edited(*with_language(study, code))
+            study, _ = study.with_edits(*with_language(study, code))
     if answers.languages and set(codes).isdisjoint(answers.languages):  # no text would be left
-        study, _ = study.edited(*filled_in(study, answers.languages[0]))
+        study, _ = study.with_edits(*edits_to_fill_in(study, answers.languages[0]))
     for code in codes:
         if answers.languages and code not in answers.languages:
-            study, _ = study.edited(*without_language(study, code))
+            study, _ = study.with_edits(*without_language(study, code))
     return study
 
 
-def check_free(name: str) -> Path:
+def check_free_name(name: str) -> Path:
     """Return the file of a new study in the workspace's protocols.
 
     Raises Refused if the name is not permitted, or taken.
@@ -117,7 +117,7 @@ def check_free(name: str) -> Path:
     _check_name(name)
     file = workspace().protocols / f"{name}.toml"
     if file.exists():
-        raise _refused(f"{file} is already there", name)
+        raise _refusal(f"{file} is already there", name)
     return file
 
 
@@ -126,7 +126,7 @@ def write_new(study: Study, name: str) -> Path:
 
     Raises Refused if the name is not permitted, or taken; StoreError if it cannot be written.
     """
-    file = check_free(name)
+    file = check_free_name(name)
     save_study(file, copy_of(study, name).text, "")
     return file
 
@@ -134,9 +134,9 @@ def write_new(study: Study, name: str) -> Path:
 def _check_name(name: str) -> None:
     if not _NAME.fullmatch(name):
         rule = f"write at most {MAX_SHORT_NAME} small letters and digits, a letter first"
-        raise _refused(f'"{name}" is not a short name: {rule}', name)
+        raise _refusal(f'"{name}" is not a short name: {rule}', name)
     if name in shipped():
-        raise _refused(f'"{name}" is a study that ships with the program', name)
+        raise _refusal(f'"{name}" is a study that ships with the program', name)
 
 
 def taken_names() -> set[str]:
@@ -145,7 +145,7 @@ def taken_names() -> set[str]:
     return {*shipped(), *(file.stem for file in (*folder.glob("*.toml"), *unsaved_files(folder)))}
 
 
-def _refused(why: str, name: str) -> Refused:
+def _refusal(why: str, name: str) -> Refused:
     free = free_short_name(taken_names(), short_name_of(name) or "study")
     return Refused(f'{why}; "{free}" is free')
 
@@ -196,9 +196,9 @@ class Document:
 
         A step with the ``key`` of the last step, made within `JOIN_S`, is joined to it. Refused edits change nothing.
         """
-        study, splices = (self.study, ()) if text is None else self.study.typed(text)
+        study, splices = (self.study, ()) if text is None else self.study.with_text(text)
         if edits or text is None:
-            study, more = study.edited(*edits)
+            study, more = study.with_edits(*edits)
             splices = (*splices, *more)
         before, selected = self.selected, self.selected if select is None else select
         self.selected = selected
@@ -211,24 +211,24 @@ class Document:
         self.study, self.undone, self.last = study, [], (key, time.monotonic())
         self.done = [*self.done, DoneStep(name, splices, before, selected)][-MOST_STEPS:]
 
-    def rest(self) -> None:
+    def end_step(self) -> None:
         """Close the current undo step: the next edit begins a new one."""
         self.last = (None, 0.0)
 
     def undo(self) -> None:
         if self.done:
             step = self.done.pop()
-            self.study = self.study.spliced(tuple(reverted(splices) for splices in reversed(step.splices)))
+            self.study = self.study.with_splices(tuple(revert_splices(splices) for splices in reversed(step.splices)))
             self.selected = step.before
             self.undone.append(step)
-            self.rest()
+            self.end_step()
 
     def redo(self) -> None:
         if self.undone:
             step = self.undone.pop()
-            self.study, self.selected = self.study.spliced(step.splices), step.after
+            self.study, self.selected = self.study.with_splices(step.splices), step.after
             self.done.append(step)
-            self.rest()
+            self.end_step()
 
     # what it is called
 
@@ -258,10 +258,10 @@ class Document:
         if self.edited or not self.base:
             self.keeper.note_edit(self.study.text, self.selected, now_s)
         else:
-            self._settle()
+            self._forget_draft()
 
-    def _settle(self) -> None:
-        """Discard the draft: the text equals the file's."""
+    def _forget_draft(self) -> None:
+        """Discard the draft: the text equals the file."""
         self.keeper.note_saved(self.base)
         self.kept = None
 
@@ -275,25 +275,25 @@ class Document:
         """Restore the file's text as one step and discard the draft."""
         self.edit("Discard the draft", text=self.saved)
         self.draft = None
-        self._settle()
+        self._forget_draft()
 
-    def give_up(self) -> None:
+    def discard(self) -> None:
         self.keeper.note_saved("")
         self.keeper.write()
 
     def changed_outside(self) -> bool:
-        return content_hash(_content(self.file)) != self.base if self.file.exists() else bool(self.base)
+        return content_hash(_file_content(self.file)) != self.base if self.file.exists() else bool(self.base)
 
-    def take_outside(self) -> None:
-        content = _content(self.file)
-        self.saved = read(content, self.file.parent).text
+    def take_file_content(self) -> None:
+        content = _file_content(self.file)
+        self.saved = read_study(content, self.file.parent).text
         self._rebase(content_hash(content))
         self.edit("Take the file's content", text=self.saved)
-        self._settle()
+        self._forget_draft()
 
-    def keep_mine(self, now_s: float) -> None:
-        content = _content(self.file) if self.file.exists() else b""
-        self.saved = without_mark(content).decode("utf-8", "replace")
+    def keep_edits(self, now_s: float) -> None:
+        content = _file_content(self.file) if self.file.exists() else b""
+        self.saved = without_byte_order_mark(content).decode("utf-8", "replace")
         self._rebase(content_hash(content) if self.file.exists() else "")
         self.note_edit(now_s)
 
@@ -346,20 +346,20 @@ class Document:
                 f"version {self.version} was run by {counted(others, 'session')} with another content: "
                 f"save it as version {next_version(self.version)}"
             )
-        self._bring_files(source)
+        self._write_named_files(source)
         keep_content(source)
         self.base = save_study(self.file, self.study.text, self.base)
         self.saved, self.draft = self.study.text, None
-        self._settle()
+        self._forget_draft()
 
-    def _bring_files(self, source: bytes) -> None:
+    def _write_named_files(self, source: bytes) -> None:
         """Copy the files that the study names into its folder if it comes from another one."""
         folder = self.file.resolve().parent
         if self.study.folder.resolve() == folder:
             return
-        for name, text in unbundled(source)[1].items():
+        for name, text in unbundle(source)[1].items():
             path = folder / name
-            if path.exists() and _content(path) != text.encode():
+            if path.exists() and _file_content(path) != text.encode():
                 raise Refused(f"{path} exists and holds another liquid: rename one of the two files")
             write_whole(path, text.encode())
         for name, digest in hashes_in(source).items():
@@ -373,9 +373,9 @@ class Document:
                 raise Refused(f"{folder / name} exists and holds another video: rename one of the two files")
         self.study = replace(self.study, folder=folder)
 
-    def saved_as(self, name: str) -> Document:
+    def copy_as(self, name: str) -> Document:
         """Return the edited study under another name, as one step; this one returns to its file."""
-        made = Document(self.study, self.selected, check_free(name))
+        made = Document(self.study, self.selected, check_free_name(name))
         made.done = [*self.done]
         made.edit(f"Save as {name}", text=copy_of(self.study, name).text)
         made.note_edit(0.0)
@@ -386,8 +386,8 @@ class Document:
 
 def open_file(file: Path, results: Path) -> Document:
     """Open a study's file with its unsaved draft."""
-    content = _content(file)
-    study = read(content, file.parent)
+    content = _file_content(file)
+    study = read_study(content, file.parent)
     opened = Document(study, first_element(study.document), file, content_hash(content))
     opened.read_only = opened.why_read_only(results)
     if not opened.read_only:
@@ -397,7 +397,7 @@ def open_file(file: Path, results: Path) -> Document:
 
 def open_new(study: Study, name: str) -> Document:
     """Open a copy of a study under another name; nothing is written before it is saved."""
-    file, made = check_free(name), copy_of(study, name)
+    file, made = check_free_name(name), copy_of(study, name)
     return Document(made, first_element(made.document), file)
 
 
@@ -408,7 +408,7 @@ def open_unsaved(file: Path, draft: Draft) -> Document:
     return opened
 
 
-def _content(file: Path) -> bytes:
+def _file_content(file: Path) -> bytes:
     try:
         return file.read_bytes()
     except OSError as error:

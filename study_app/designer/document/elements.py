@@ -10,17 +10,17 @@ from study_app.designer.document.fields import (
     ITEMS,
     Row,
     counted_elements,
+    element_noun,
     label_of,
     named_at,
     refused_at,
     row_at,
     rows,
-    singular,
     uses,
 )
 from study_app.designer.document.study import Study
 from study_app.number_text import counted, exact_duration
-from study_app.protocol.formats import is_second
+from study_app.protocol.formats import is_format_2
 from study_app.protocol.groups import sequences_in
 from study_app.protocol.source.document import Path, entries, has, value_at
 from study_app.protocol.wording.languages import languages_of
@@ -67,7 +67,7 @@ def outline(study: Study) -> Outline:
         for path, depth in ((section, 0), *((path, 1) for path, _ in entries(study.document, f"{section[0]}.*")))
     )
     order = [path for path in (SEQUENCE, ("sequences",)) if value_at(study.document, path)]
-    session = (*(element(study, path) for path in order), *_session(study))
+    session = (*(element(study, path) for path in order), *_session_elements(study))
     return Outline(session=session, parts=tuple(parts), study=tuple(element(study, path) for path in tables))
 
 
@@ -87,7 +87,7 @@ def title_of(document: Mapping[str, Any], path: Path) -> str:
     value = value_at(document, path)
     if not isinstance(value, Mapping) or len(path) == 1:
         return label_of(path[-1])
-    if called := _called(document, value):
+    if called := _title_text(document, value):
         return called
     if isinstance(path[-1], int) and "id" not in value:
         texts = [text for held in value.values() for text in (held if isinstance(held, tuple | list) else (held,))]
@@ -98,26 +98,26 @@ def title_of(document: Mapping[str, Any], path: Path) -> str:
 def study_title(document: Mapping[str, Any]) -> str:
     """Return the title of a study in its first language; "" where it has none."""
     head = document.get("study")
-    return _called(document, head) if isinstance(head, Mapping) else ""
+    return _title_text(document, head) if isinstance(head, Mapping) else ""
 
 
-def _called(document: Mapping[str, Any], value: Mapping[str, Any]) -> str:
+def _title_text(document: Mapping[str, Any], value: Mapping[str, Any]) -> str:
     text = next((value[key] for key in TITLES if key in value), None)
     if isinstance(text, Mapping):
         text = text.get(languages_of(document)[0]) or next(iter(text.values()), None)
     return text if isinstance(text, str) and text.strip() else ""
 
 
-def found(document: Mapping[str, Any], path: Path, sought: str, *, named: bool = False) -> bool:
+def has_text(document: Mapping[str, Any], path: Path, sought: str, *, named: bool = False) -> bool:
     """Return whether title, id or any text of an element, in any language, contains the text.
 
     ``named`` leaves the texts out, but the title.
     """
-    texts = () if named else _texts(value_at(document, path))
+    texts = () if named else _all_texts(value_at(document, path))
     return any(sought.casefold() in text.casefold() for text in (str(path[-1]), title_of(document, path), *texts))
 
 
-def _session(study: Study) -> Iterator[Element]:
+def _session_elements(study: Study) -> Iterator[Element]:
     """Yield the steps of every sequence, blocks with what they refer to, questionnaires with their items."""
     document = study.document
     steps: list[Path] = [(*place, index) for place, listed in sequences_in(document) for index in range(len(listed))]
@@ -142,18 +142,20 @@ def rows_of_blocks(document: Mapping[str, Any]) -> tuple[Row, ...]:
     blocks = [block for _, block in entries(document, "blocks.*") if isinstance(block, Mapping)]
     several = sum(block.get("phase", "main") == "main" for block in blocks) > 1
     places = [("study", "block_order")] * several + [("analysis", "contrasts")]
-    return tuple(row for place in places if (row := row_at(document, place)) is not None) if is_second(document) else ()
+    return (
+        tuple(row for place in places if (row := row_at(document, place)) is not None) if is_format_2(document) else ()
+    )
 
 
-def _texts(value: Any) -> Iterator[str]:
+def _all_texts(value: Any) -> Iterator[str]:
     if isinstance(value, str):
         yield value
     elif isinstance(value, Mapping):
         for inner in value.values():
-            yield from _texts(inner)
+            yield from _all_texts(inner)
     elif isinstance(value, tuple):
         for inner in value:
-            yield from _texts(inner)
+            yield from _all_texts(inner)
 
 
 def element_of(study: Study, path: Path) -> Path:
@@ -199,8 +201,8 @@ USED: Final = frozenset({"liquids", "conditions", "tasks", "questionnaires", "sc
 def kind_of(path: Path) -> str:
     """Return the kind of an element, such as "Block"; "" for a table that is the only one of its kind."""
     if isinstance(path[-1], int):
-        return label_of(singular(path[-2]))
-    return label_of(singular(path[0])) if len(path) > 1 else ""
+        return label_of(element_noun(path[-2]))
+    return label_of(element_noun(path[0])) if len(path) > 1 else ""
 
 
 def kind_and_title(document: Mapping[str, Any], path: Path) -> str:
@@ -215,7 +217,7 @@ def place_words(path: Path, line: int | None) -> str:
     return " · ".join(filter(None, (place, "" if line is None else f"line {line}")))
 
 
-def brief(document: Mapping[str, Any], path: Path) -> str:
+def short_note(document: Mapping[str, Any], path: Path) -> str:
     """Return the duration of a task or the number of questions of a questionnaire; "" for other elements."""
     value = value_at(document, path)
     if not isinstance(value, Mapping) or len(path) != 2:
@@ -231,7 +233,7 @@ def brief(document: Mapping[str, Any], path: Path) -> str:
     return f"{numbers['count']:g} targets" if "count" in numbers else ""
 
 
-def used_by(document: Mapping[str, Any], path: Path) -> str:
+def usage_text(document: Mapping[str, Any], path: Path) -> str:
     """Return how many elements use an element: "used by 3 conditions", "not used".
 
     It is "" of steps and settings.
@@ -266,7 +268,7 @@ class FoundField:
     rank: int = LABEL
 
 
-def words_sought(text: str) -> list[str]:
+def search_words(text: str) -> list[str]:
     """Return the search words, each without the "s" of a plural."""
     return [part.removesuffix("s") if len(part) > SHORTEST else part for part in text.casefold().split()]
 
@@ -276,10 +278,10 @@ def found_fields(study: Study, text: str) -> tuple[FoundField, ...]:
 
     Choices that are not chosen count where no label and nothing that is chosen has the words; sentences count last.
     """
-    parts = words_sought(text)
+    parts = search_words(text)
     if not parts or len(text.strip()) < SHORTEST:
         return ()
-    fields = [match for field in _fields(study) for match in _found_in(field, parts)]
+    fields = [match for field in _searchable_fields(study) for match in _matches_in_field(field, parts)]
     best = min((match.rank for match in fields), default=0)
     return tuple(sorted((match for match in fields if match.rank <= max(best, CHOSEN)), key=lambda match: match.rank))
 
@@ -293,7 +295,7 @@ def found_in_elements(study: Study, text: str) -> Mapping[Path, FoundField]:
 
 
 @lru_cache(maxsize=2)
-def _fields(study: Study) -> tuple[tuple[Path, Row, str], ...]:
+def _searchable_fields(study: Study) -> tuple[tuple[Path, Row, str], ...]:
     shown = outline(study)
     parts = [element.path for element in (*shown.session, *shown.parts) if len(element.path) > 1]
     elements = dict.fromkeys((*parts, *(element.path for element in shown.study)))
@@ -303,12 +305,12 @@ def _fields(study: Study) -> tuple[tuple[Path, Row, str], ...]:
     of_blocks = () if whose is None else rows_of_blocks(study.document)  # not again elsewhere
     fields: dict[Path, tuple[Path, Row, str]] = {row.path: (whose or FIRST, row, row.label) for row in of_blocks}
     for element in elements:
-        for row, label in _of_table(study, element, ""):
+        for row, label in _fields_of_table(study, element, ""):
             fields.setdefault(row.path, (element, row, label))
     return tuple(fields.values())
 
 
-def _of_table(study: Study, path: Path, above: str, depth: int = 0) -> Iterator[tuple[Row, str]]:
+def _fields_of_table(study: Study, path: Path, above: str, depth: int = 0) -> Iterator[tuple[Row, str]]:
     refused = refused_at(study.document, path)
     for row in rows(study.document, path):
         if row.value is None and row.path[-1] in refused:
@@ -316,32 +318,32 @@ def _of_table(study: Study, path: Path, above: str, depth: int = 0) -> Iterator[
         label = f"{above}{row.label}"
         yield row, label
         if row.kind == "table" and isinstance(row.value, Mapping) and depth < _DEEPEST:
-            yield from _of_table(study, row.path, f"{label}, ", depth + 1)
+            yield from _fields_of_table(study, row.path, f"{label}, ", depth + 1)
 
 
-def _found_in(field: tuple[Path, Row, str], parts: list[str]) -> Iterator[FoundField]:
+def _matches_in_field(field: tuple[Path, Row, str], parts: list[str]) -> Iterator[FoundField]:
     """Yield the field if its label has the words, else once for each choice that has them."""
     element, row, label = field
-    if _has(label, parts):
+    if _has_words(label, parts):
         yield FoundField(element, row.path, label)
         return
     for choice in row.choices if row.kind in {"choice", "choices", "kind"} else ():
         named = label_of(choice.value or "")
         whole = f"{label} {named} {choice.sentence}"
-        if choice.value and _has(whole, parts):
+        if choice.value and _has_words(whole, parts):
             current = row.default if row.value is None else row.value
             of_name = CHOSEN if choice.value == current else OTHER
-            rank = of_name if any(_has(named, [part]) for part in parts) else SENTENCE
+            rank = of_name if any(_has_words(named, [part]) for part in parts) else SENTENCE
             yield FoundField(element, row.path, label, rank)
 
 
-def _has(text: str, parts: list[str]) -> bool:
+def _has_words(text: str, parts: list[str]) -> bool:
     """Return whether each part begins a word of a text."""
     spaced = " " + " ".join(text.casefold().replace("-", " ").replace(",", " ").replace("(", " ").split())
     return all(f" {part}" in spaced for part in parts)
 
 
-def there(document: Mapping[str, Any], path: Path) -> Path:
+def existing_path(document: Mapping[str, Any], path: Path) -> Path:
     """Return the longest existing part of a path; the study's own table if there is none."""
     value: Any = document
     known = path[:1] if path and row_at(document, path[:1]) is not None else FIRST

@@ -18,7 +18,7 @@ from study_app.protocol.checks.cross_references import CHOICES, ITEM_REFERENCES
 from study_app.protocol.json_schema import schema
 from study_app.protocol.questions import POINTS
 from study_app.protocol.source.document import Path, entries, has, names, value_at
-from study_app.protocol.source.problems import rule_of, shown
+from study_app.protocol.source.problems import rule_of, shown_value
 from study_app.protocol.table import ALTERNATIVES, NOT_WITH, SECTIONS
 from study_app.protocol.wording.languages import languages_of
 
@@ -34,12 +34,14 @@ def named_at(document: Document, place: Path) -> Path | None:
     if not isinstance(name, str):
         return None
     for pattern in CHOICES:
-        if _matches(place, pattern):
+        if _matches_pattern(place, pattern):
             for section in _sections(document, pattern):
                 if has(document.get(section), name):
                     return section, name
-    if any(_matches(place, pattern) for pattern in ITEM_REFERENCES):
-        return next((path for path, item in _items(document) if item["id"] == name and _in_reach(place, path)), None)
+    if any(_matches_pattern(place, pattern) for pattern in ITEM_REFERENCES):
+        return next(
+            (path for path, item in _items(document) if item["id"] == name and _can_name_item(place, path)), None
+        )
     return None
 
 
@@ -51,26 +53,28 @@ def references_to(document: Document, thing: Path) -> tuple[Path, ...]:
 def choices_at(document: Document, place: Path) -> tuple[str, ...] | None:
     """Return the permitted names of a text at ``place``; None if it is not a reference."""
     for pattern in CHOICES:
-        if _matches(place, pattern):
+        if _matches_pattern(place, pattern):
             return tuple(name for section in _sections(document, pattern) for name in names(document, section))
-    if any(_matches(place, pattern) for pattern in ITEM_REFERENCES):
-        items = (item for path, item in _items(document) if _in_reach(place, path))
+    if any(_matches_pattern(place, pattern) for pattern in ITEM_REFERENCES):
+        items = (item for path, item in _items(document) if _can_name_item(place, path))
         return tuple(dict.fromkeys(str(item["id"]) for item in items))
     return None
 
 
 def sections_at(place: Path) -> tuple[str, ...]:
     """Return the sections whose tables a text at ``place`` may refer to; empty if it refers to none."""
-    return next((sections for pattern, sections in CHOICES.items() if _matches(place, pattern)), ())
+    return next((sections for pattern, sections in CHOICES.items() if _matches_pattern(place, pattern)), ())
 
 
-def renamed(document: Document, thing: Path, name: str, recorded: frozenset[str] = frozenset()) -> tuple[Edit, ...]:
+def edits_to_rename(
+    document: Document, thing: Path, name: str, recorded: frozenset[str] = frozenset()
+) -> tuple[Edit, ...]:
     """Return the edits that rename a table or item and all references to it.
 
     Where the name is refused, a free one is proposed that is not one of those with ``recorded`` answers.
     """
     item = _item_id(document, thing)
-    taken = taken_beside(document, thing)
+    taken = sibling_names(document, thing)
     title = value_at(document, (*thing, "text" if item is not None else "title"))
     text = next(iter(title.values()), "") if isinstance(title, Mapping) else title
     own = str(item or thing[-1])
@@ -97,11 +101,11 @@ def suggested_id(document: Document, thing: Path, recorded: frozenset[str] = fro
         text = text.get(languages_of(document)[0])
     wanted = id_of(text, MAX_FROM_TEXT) if isinstance(text, str) else ""
     own = id_at(document, thing)
-    free = free_id(taken_beside(document, thing) | (recorded - {own}), wanted) if wanted else ""
+    free = free_id(sibling_names(document, thing) | (recorded - {own}), wanted) if wanted else ""
     return "" if free == own else free
 
 
-def taken_beside(document: Document, thing: Path) -> set[str]:
+def sibling_names(document: Document, thing: Path) -> set[str]:
     """Return the names that other tables or items already have."""
     if _item_id(document, thing) is None:
         node = value_at(document, thing[:-1])
@@ -109,7 +113,7 @@ def taken_beside(document: Document, thing: Path) -> set[str]:
     return {str(other["id"]) for path, other in _items(document) if (thing[:2] == path[:2]) and path != thing}
 
 
-def replaced(document: Document, thing: Path, other: str) -> tuple[Edit, ...]:
+def edits_to_replace(document: Document, thing: Path, other: str) -> tuple[Edit, ...]:
     """Return the edits that delete an element and redirect its references to another one."""
     return (*(Set(place, other) for place in references_to(document, thing)), Unset(thing))
 
@@ -120,27 +124,27 @@ def with_references(document: Document, thing: Path, needs: Callable[[Path], boo
     A table whose key ``needs`` says that it cannot be without goes too, and so does one whose list would be empty.
     """
     named: dict[Path, list[Path]] = {}
-    for place, target in _uses_in_turn(document):
+    for place, target in _uses_without_conditions(document):
         named.setdefault(place, []).append(target)
     gone = [thing]
     for inner in gone:  # grows while it is read
         for place, targets in named.items():
-            touched = any(_within(target, inner) for target in targets)
-            if not touched or _covered(place, gone) or not all(_covered(target, gone) for target in targets):
+            touched = any(_is_within(target, inner) for target in targets)
+            if not touched or _is_covered(place, gone) or not all(_is_covered(target, gone) for target in targets):
                 continue
             array = place[:-1]
             if not isinstance(place[-1], int):
                 gone.append(place if value_at(document, place) is not None and not needs(place) else place[:2])
                 continue
             gone.append(place)
-            empty = all(_covered((*array, at), gone) for at in range(len(value_at(document, array))))
+            empty = all(_is_covered((*array, at), gone) for at in range(len(value_at(document, array))))
             if empty and len(array) > 2:
                 gone.append(array[:2] if needs(array) else array)
-    outermost = [path for path in gone[1:] if not _covered(path, (other for other in gone if other != path))]
+    outermost = [path for path in gone[1:] if not _is_covered(path, (other for other in gone if other != path))]
     return (*outermost[::-1], thing)
 
 
-def deletions(paths: Iterable[Path]) -> tuple[Edit, ...]:
+def edits_to_delete(paths: Iterable[Path]) -> tuple[Edit, ...]:
     """Return the edits that remove these paths: later entries of an array first, nothing twice."""
     every = set(paths)
     outer = [path for path in every if not any(path[:length] in every for length in range(1, len(path)))]
@@ -163,12 +167,12 @@ def check_id(name: str, free: str = "") -> None:
         raise Refused(f'"{name}" is not an id: write {rule}{proposed}')
 
 
-def _within(path: Path, outer: Path) -> bool:
+def _is_within(path: Path, outer: Path) -> bool:
     return path[: len(outer)] == outer
 
 
-def _covered(path: Path, outer: Iterable[Path]) -> bool:
-    return any(_within(path, outer_path) for outer_path in outer)
+def _is_covered(path: Path, outer: Iterable[Path]) -> bool:
+    return any(_is_within(path, outer_path) for outer_path in outer)
 
 
 def named_places(document: Document) -> Iterator[tuple[Path, Path]]:
@@ -182,7 +186,7 @@ def named_places(document: Document) -> Iterator[tuple[Path, Path]]:
     for pattern in ITEM_REFERENCES:
         for place, name in entries(document, pattern):
             for path, item in items:
-                if item["id"] == name and _in_reach(place, path):
+                if item["id"] == name and _can_name_item(place, path):
                     yield place, path
 
 
@@ -191,27 +195,27 @@ def uses(document: Document) -> Iterator[tuple[Path, Path]]:
     yield from named_places(document)
     for section, key in _MAY_LEAVE_OUT:
         (of,) = _sections(document, f"{section}.*.{key}")
-        yield from _left_out(document, section, key, of)
+        yield from _implied_uses(document, section, key, of)
 
 
-def left_without(document: Document, things: Iterable[Path]) -> tuple[Path, ...]:
+def orphaned_keys(document: Document, things: Iterable[Path]) -> tuple[Path, ...]:
     """Return the omitted keys that mean nothing once all of these tables are deleted."""
     gone = set(things)
     meant: dict[Path, set[Path]] = {}
-    for place, named in _uses_in_turn(document):
+    for place, named in _uses_without_conditions(document):
         if value_at(document, place) is None:
             meant.setdefault(place, set()).add(named)
     return tuple(place for place, named in meant.items() if named <= gone)
 
 
-def _uses_in_turn(document: Document) -> Iterator[tuple[Path, Path]]:
+def _uses_without_conditions(document: Document) -> Iterator[tuple[Path, Path]]:
     """Yield what `uses` yields, and the meaning of omitted keys once the study has no conditions."""
     yield from uses(document)
     if "conditions" in document:
-        yield from _left_out(document, "stimuli", "condition", "liquids")
+        yield from _implied_uses(document, "stimuli", "condition", "liquids")
 
 
-def _left_out(document: Document, section: str, key: str, of: str) -> Iterator[tuple[Path, Path]]:
+def _implied_uses(document: Document, section: str, key: str, of: str) -> Iterator[tuple[Path, Path]]:
     if len(only := names(document, of)) == 1:
         tables = entries(document, f"{section}.*")
         yield from (((*path, key), (of, only[0])) for path, table in tables if not has(table, key))
@@ -233,12 +237,12 @@ def _item_id(document: Document, thing: Path) -> str | None:
     return next((item["id"] for path, item in _items(document) if path == thing), None)
 
 
-def _in_reach(place: Path, item: Path) -> bool:
+def _can_name_item(place: Path, item: Path) -> bool:
     """Return whether a text may refer to an item: within a questionnaire only to its own items."""
     return place[0] != item[0] or place[1] == item[1]
 
 
-def _matches(place: Path, pattern: str) -> bool:
+def _matches_pattern(place: Path, pattern: str) -> bool:
     steps = pattern.split(".")
     return len(steps) == len(place) and all(step in {"*", str(key)} for step, key in zip(steps, place, strict=True))
 
@@ -274,8 +278,8 @@ def tags(nodes: tuple[Node, ...]) -> tuple[str, dict[str | None, Node]]:
     if len(tables) < 2:
         return "", {}
     keys = {**tables[0]["properties"], **tables[1]["properties"]}
-    key = next((key for key in keys if _tells_apart(key, tables)), "")
-    return key, {value: node for node in tables for value in _values(node, key) or (None,)} if key else {}
+    key = next((key for key in keys if _distinguishes(key, tables)), "")
+    return key, {value: node for node in tables for value in _fixed_values(node, key) or (None,)} if key else {}
 
 
 def alternatives(node: Node) -> Iterator[Node]:
@@ -283,15 +287,15 @@ def alternatives(node: Node) -> Iterator[Node]:
     around = {key: value for key, value in node.items() if key not in {"$ref", "anyOf", "oneOf", "discriminator"}}
     if "$ref" in node:
         definition = schema()["$defs"][node["$ref"].rsplit("/", 1)[-1]]
-        yield from (_joined(around, alternative) for alternative in alternatives(definition))
+        yield from (_with_union_keys(around, alternative) for alternative in alternatives(definition))
     elif branches := node.get("anyOf") or node.get("oneOf"):
         for branch in branches:
-            yield from (_joined(around, alternative) for alternative in alternatives(branch))
+            yield from (_with_union_keys(around, alternative) for alternative in alternatives(branch))
     elif node.get("type") != "null":
         yield node
 
 
-def _joined(around: Node, node: Node) -> Node:
+def _with_union_keys(around: Node, node: Node) -> Node:
     """Return a node with the keys of the union around it; `OWN` keeps the node's own description."""
     own = {OWN: node["description"]} if "description" in node and OWN not in node else {}
     return {**node, **own, **around}
@@ -308,14 +312,14 @@ def _is_of(node: Node, tables: list[Node], value: Mapping[str, Any]) -> bool:
     return (chosen is None or isinstance(chosen, str)) and named.get(chosen) is node
 
 
-def _tells_apart(key: str, tables: list[Node]) -> bool:
+def _distinguishes(key: str, tables: list[Node]) -> bool:
     """Return whether the key has another fixed value in each table; one table may lack it."""
-    values = [_values(node, key) for node in tables]
+    values = [_fixed_values(node, key) for node in tables]
     every = [value for some in values for value in some]
     return sum(map(bool, values)) >= len(tables) - 1 and len(every) == len(set(every))
 
 
-def _values(node: Node, key: str) -> tuple[str, ...]:
+def _fixed_values(node: Node, key: str) -> tuple[str, ...]:
     part = node["properties"].get(key, {})
     return (part["const"],) if "const" in part else tuple(part.get("enum", ()))
 
@@ -484,13 +488,13 @@ def row_at(document: Mapping[str, Any], path: Path) -> Row | None:
     nodes = node_at(document, path)
     if not nodes:
         return None if value is None else Row(path=path, kind="unknown", label=label_of(path[-1]), value=value)
-    row = _row(document, path, nodes, value, required=path[-1] in around.get("required", ()))
+    row = _make_row(document, path, nodes, value, required=path[-1] in around.get("required", ()))
     pairs = [pair for pair in around.get(ALTERNATIVES, ()) if path[-1] in pair]
     instead = next((key for pair in pairs for key in pair if key != path[-1]), "")
     return replace(row, instead=instead, model=around.get("title", ""))
 
 
-def _row(document: Mapping[str, Any], path: Path, nodes: tuple[Node, ...], value: Any, *, required: bool) -> Row:
+def _make_row(document: Mapping[str, Any], path: Path, nodes: tuple[Node, ...], value: Any, *, required: bool) -> Row:
     first = nodes[0]
     common: dict[str, Any] = {
         "label": label_of(path[-1]),
@@ -503,19 +507,24 @@ def _row(document: Mapping[str, Any], path: Path, nodes: tuple[Node, ...], value
     if is_localised(nodes):
         return Row(path=path, kind="paragraphs" if first.get("lines") == "several" else "localised", **common)
     if len(nodes) > 1 and not tags(nodes)[0]:
-        either = tuple(_row(document, path, (node,), value, required=required) for node in nodes)
+        either = tuple(_make_row(document, path, (node,), value, required=required) for node in nodes)
         return Row(path=path, kind="either", **common, either=either)
     named = (*path, 0) if first.get("type") == "array" else path
     references = choices_at(document, named)
     kind = _kind(first, isinstance(references, tuple))
     choices = first.get("items", first) if kind == "choices" else first
-    names = references if kind in {"reference", "references"} and references is not None else _enum(choices)
-    sentences = _sentences(first.get("description", ""))
+    names = references if kind in {"reference", "references"} and references is not None else _permitted_values(choices)
+    sentences = _value_sentences(first.get("description", ""))
     options = tuple(Choice(name, sentences.get(name, "")) for name in names)
     limits = _numbers_in(first) if kind in {"vector", "numbers", "points"} else first
     common["sections"] = sections_at(named) if kind in {"reference", "references"} else ()
     return Row(
-        path=path, kind=kind, **common, choices=options, bounds=_bounds(first, limits), reason=limits.get(REASON, "")
+        path=path,
+        kind=kind,
+        **common,
+        choices=options,
+        bounds=_bound_texts(first, limits),
+        reason=limits.get(REASON, ""),
     )
 
 
@@ -535,13 +544,13 @@ def _kind(node: Node, references: bool) -> Kind:
     if kind == "object":
         return "table" if "properties" in node else "tables"
     if kind == "string":
-        return "reference" if references else "choice" if _enum(node) else "text"
+        return "reference" if references else "choice" if _permitted_values(node) else "text"
     if "enum" in node or "const" in node:
         return "choice"
     return "switch" if kind == "boolean" else "whole number" if kind == "integer" else "number"
 
 
-def _enum(node: Node) -> tuple[Any, ...]:
+def _permitted_values(node: Node) -> tuple[Any, ...]:
     return (node["const"],) if "const" in node else tuple(node.get("enum", ()))
 
 
@@ -558,20 +567,20 @@ def _numbers_in(node: Node) -> Node:
     return node
 
 
-def _bounds(node: Node, numbers: Node) -> tuple[str, ...]:
-    phrases = [phrase.format(shown(numbers[key])) for key, phrase in _OF_NUMBERS.items() if key in numbers]
+def _bound_texts(node: Node, numbers: Node) -> tuple[str, ...]:
+    phrases = [phrase.format(shown_value(numbers[key])) for key, phrase in _OF_NUMBERS.items() if key in numbers]
     if "prefixItems" not in node:
         phrases += [phrase.format(node[key]) for key, phrase in _OF_LENGTHS.items() if key in node]
     return (*phrases, rule_of(node["pattern"])) if "pattern" in node else tuple(phrases)
 
 
-def why_not(document: Mapping[str, Any], row: Row, number: float) -> str:
+def violated_bound(document: Mapping[str, Any], row: Row, number: float) -> str:
     """Return the bound that a number violates, such as "at most 8"; "" if it is permitted."""
     node = node_at(document, row.path)[0]
     if row.kind == "whole number" and not isinstance(number, int):
         return "a whole number"
     broken = (key for key, holds in _HOLDS.items() if key in node and not holds(number, node[key]))
-    return next((_OF_NUMBERS[key].format(shown(node[key])) for key in broken), "")
+    return next((_OF_NUMBERS[key].format(shown_value(node[key])) for key in broken), "")
 
 
 def label_of(step: str | int) -> str:
@@ -580,21 +589,21 @@ def label_of(step: str | int) -> str:
         return str(step + 1)
     if step in LABELS:
         return LABELS[step]
-    unit = _suffix(step)
+    unit = _unit_suffix(step)
     plain = step.removesuffix(f"_{unit}") if unit else step
     return plain.replace("_", " ").strip().capitalize()
 
 
 def unit_of(key: str) -> str:
     """Return the unit at the end of a key, "" if it has none."""
-    return UNITS.get(_suffix(key), "")
+    return UNITS.get(_unit_suffix(key), "")
 
 
-def _suffix(key: str) -> str:
+def _unit_suffix(key: str) -> str:
     return max((suffix for suffix in UNITS if key.endswith(f"_{suffix}")), key=len, default="")
 
 
-def _sentences(description: str) -> dict[str, str]:
+def _value_sentences(description: str) -> dict[str, str]:
     """Return the sentence about each value in a description such as "fixed: as written; shuffled: anew each trial"."""
     return {value: match[2].strip() for match in _SENTENCES.finditer(description) for value in match[1].split(", ")}
 
@@ -606,22 +615,22 @@ _PLURAL: Final = {"items": "questions"}
 LETTER: Final = "^[A-Z]$"
 
 
-def singular(section: str | int) -> str:
+def element_noun(section: str | int) -> str:
     """Return the name of an element of a section: "liquid" of ``liquids``."""
     return SINGULAR.get(str(section), str(section).removesuffix("s"))
 
 
 def counted_elements(number: int, section: str | int) -> str:
     """Return "1 stimulus", "2 stimuli" of ``stimuli``."""
-    return counted(number, singular(section), _PLURAL.get(str(section), str(section)))
+    return counted(number, element_noun(section), _PLURAL.get(str(section), str(section)))
 
 
 def new_text(section: str | int) -> str:
     """Return the initial text of an element of a list: "New question" of ``items``."""
-    return f"New {singular(section)}"
+    return f"New {element_noun(section)}"
 
 
-def initial(document: Mapping[str, Any], path: Path) -> Any:
+def initial_value(document: Mapping[str, Any], path: Path) -> Any:
     """Return a valid value for a key that is not in the study."""
     row = row_at(document, path)
     if row is None or row.kind == "unknown":
@@ -630,13 +639,13 @@ def initial(document: Mapping[str, Any], path: Path) -> Any:
         return row.default
     nodes = node_at(document, path)
     node = table_of(nodes, None) or nodes[0]
-    return _initial(document, row.either[0] if row.kind == "either" else row, node)
+    return _initial_of_kind(document, row.either[0] if row.kind == "either" else row, node)
 
 
-def _initial(document: Mapping[str, Any], row: Row, node: Node) -> Any:
+def _initial_of_kind(document: Mapping[str, Any], row: Row, node: Node) -> Any:
     path, kind = row.path, row.kind
     if kind in {"localised", "paragraphs", "text"}:
-        return _text(document, path, node, localised=kind != "text")
+        return _initial_text(document, path, node, localised=kind != "text")
     if kind in {"choice", "kind", "reference"}:
         return next((choice.value for choice in row.choices if choice.value is not None), "")
     if kind in {"references", "choices"}:
@@ -645,10 +654,10 @@ def _initial(document: Mapping[str, Any], row: Row, node: Node) -> Any:
     if kind == "switch":
         return False
     if kind in {"number", "whole number"}:
-        return _number(node, 1)
+        return _initial_number(node, 1)
     if kind in {"vector", "numbers"}:
         parts = node.get("prefixItems") or [node["items"]] * node.get("minItems", 1)
-        return [_number(part, place) for place, part in enumerate(parts, start=1)]
+        return [_initial_number(part, place) for place, part in enumerate(parts, start=1)]
     if kind == "points":
         size = len(node["items"]["prefixItems"])
         return [[x] + [0] * (size - 1) for x in (-20, 20)][: max(2, node.get("minItems", 2))]
@@ -658,31 +667,31 @@ def _initial(document: Mapping[str, Any], row: Row, node: Node) -> Any:
     if kind == "tables" and isinstance(entry, Mapping) and entry.get("type") == "array":
         points = [f"Point {number}" for number in range(1, POINTS + 1)]
         return dict.fromkeys(languages_of(document), points)
-    return _tables(document, path, node) if kind == "list" else {}
+    return _initial_tables(document, path, node) if kind == "list" else {}
 
 
-def _tables(document: Mapping[str, Any], path: Path, node: Node) -> list[Any]:
+def _initial_tables(document: Mapping[str, Any], path: Path, node: Node) -> list[Any]:
     """Return the minimum number of tables of a list, each with its required keys, or of lists for sequences."""
     tables: list[Any] = []
     for number in range(max(1, node.get("minItems", 1))):
         place = (*path, number)
         if node["items"].get("type") == "array":
-            tables.append(initial(document, place))
+            tables.append(initial_value(document, place))
             continue
         table = table_of(node_at(document, place), {})
         required = () if table is None else table.get("required", ())
-        name = f"{singular(path[-1])}_{number + 1}"
+        name = f"{element_noun(path[-1])}_{number + 1}"
         text = _in_languages(document, label_of(name))
-        tables.append({key: name if key == "id" else text if key == "text" else initial(document, (*place, key))
+        tables.append({key: name if key == "id" else text if key == "text" else initial_value(document, (*place, key))
                       for key in required})  # fmt: skip
     return tables
 
 
-def _text(document: Mapping[str, Any], path: Path, node: Node, *, localised: bool) -> Any:
+def _initial_text(document: Mapping[str, Any], path: Path, node: Node, *, localised: bool) -> Any:
     around = value_at(document, path[:-1])
     if path[-1] == "id":
         taken = (str(name) for _, name in entries(document, ".".join((*map(str, path[:2]), "*", "*", "id"))))
-        return free_id(taken, singular(path[-3]))
+        return free_id(taken, element_noun(path[-3]))
     if node.get("pattern") == LETTER:
         used = {letter for _, letter in entries(document, f"{path[0]}.*.{path[-1]}")}
         return next((letter for letter in string.ascii_uppercase if letter not in used), "Z")
@@ -696,7 +705,7 @@ def _in_languages(document: Mapping[str, Any], text: str) -> Any:
     return dict.fromkeys(languages, text) if len(languages) > 1 else text
 
 
-def _number(node: Node, otherwise: float) -> float:
+def _initial_number(node: Node, otherwise: float) -> float:
     wanted = next(iter(node.get("examples", ())), otherwise)
     least, most = node.get("minimum", node.get("exclusiveMinimum", wanted)), node.get("maximum", wanted)
     number = min(max(wanted, least), most)

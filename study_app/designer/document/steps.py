@@ -7,40 +7,40 @@ from dataclasses import KW_ONLY, dataclass, fields, is_dataclass, replace
 from typing import Any, Literal, TypeAlias
 
 from study_app.designer.document.additions import (
-    added,
     check_values,
-    copy_with,
-    duplicated,
-    filled_in,
-    followed,
-    moved,
+    edits_to_add,
+    edits_to_copy_with,
+    edits_to_duplicate,
+    edits_to_fill_in,
+    edits_to_move,
+    edits_to_switch,
     number_row,
-    switched,
+    short_text_edits,
     with_language,
     without_language,
 )
 from study_app.designer.document.elements import step_of, title_of
 from study_app.designer.document.fields import (
     counted_elements,
-    deletions,
-    initial,
+    edits_to_delete,
+    edits_to_rename,
+    edits_to_replace,
+    element_noun,
+    initial_value,
     label_of,
     named_at,
     references_to,
-    renamed,
-    replaced,
     row_at,
     rows,
-    singular,
     with_references,
 )
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_edits import Edit, Insert, Move, Set, Unset
-from study_app.designer.document.toml_text import Refused, retyped
+from study_app.designer.document.toml_text import Refused, with_own_line_ends
 from study_app.ids import free_id
 from study_app.number_text import counted
-from study_app.protocol.formats import is_second
-from study_app.protocol.questionnaires import written_out
+from study_app.protocol.formats import is_format_2
+from study_app.protocol.questionnaires import instrument_tables
 from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.wording.languages import language_name, languages_of
 
@@ -111,7 +111,7 @@ class SetText(Request):
         else:
             before = {languages[0]: value} if isinstance(value, str) else {}
             edit = Set(self.path, {**before, self.language: self.text})
-        edits = (edit, *followed(at.study, self.path, self.language, self.text))
+        edits = (edit, *short_text_edits(at.study, self.path, self.language, self.text))
         return Step(f"Type {label_of(self.path[-1])}", edits, continues=(self.path, self.language))
 
 
@@ -157,9 +157,9 @@ class AddEntry(Request):
             if row is None:
                 raise Refused("nothing can be added here")
             if row.kind == "list":
-                return Step(f"Add {singular(self.path[-1])}", added(at.study, self.path)[0])
-            first = initial({}, self.path) if not entries else entries[-1]
-            value = _listed(first[0] if not entries and isinstance(first, list | tuple) else first)
+                return Step(f"Add {element_noun(self.path[-1])}", edits_to_add(at.study, self.path)[0])
+            first = initial_value({}, self.path) if not entries else entries[-1]
+            value = _as_written(first[0] if not entries and isinstance(first, list | tuple) else first)
         edit: Edit = Insert((*self.path, len(entries)), value) if entries else Set(self.path, [value])
         return Step(f"Add to {label_of(self.path[-1])}", (edit,))
 
@@ -173,7 +173,7 @@ class SwitchKind(Request):
 
     def step(self, at: Situation) -> Step:
         title = f"Switch to {label_of(self.kind or 'nothing').lower()}"
-        return Step(title, switched(at.study, self.path, self.kind))
+        return Step(title, edits_to_switch(at.study, self.path, self.kind))
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +186,7 @@ class SwitchKey(Request):
     def step(self, at: Situation) -> Step:
         place = (*self.path[:-1], self.to)
         gone = () if value_at(at.study.document, self.path) is None else (Unset(self.path),)
-        value = _first_value(at.study.edited(*gone)[0], place)
+        value = _first_value(at.study.with_edits(*gone)[0], place)
         if value in ("", []):
             raise Refused(f"there is nothing that {label_of(self.to)} can name: add it first")
         return Step(f"Give {label_of(self.to)}", (*gone, Set(place, value)))
@@ -202,8 +202,10 @@ class AddElement(Request):
         section, selected = self.section, at.selected
         inside = selected[: len(section)] == section and len(selected) > len(section)
         behind = selected[len(section)] if inside else None
-        edits, path = added(at.study, section, behind=behind)
-        return Step(f"Add {singular(section[-1])}", _beside(at.study, edits, selected, path), path, fresh="new")
+        edits, path = edits_to_add(at.study, section, behind=behind)
+        return Step(
+            f"Add {element_noun(section[-1])}", _edits_beside(at.study, edits, selected, path), path, fresh="new"
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,15 +217,15 @@ class AddNamed(Request):
 
     def step(self, at: Situation) -> Step:
         row = row_at(at.study.document, self.path)
-        edits, path = added(at.study, (self.section,))
+        edits, path = edits_to_add(at.study, (self.section,))
         if row is not None and row.kind == "references":
-            listed = value_at(at.study.edited(*edits)[0].document, self.path) or ()
+            listed = value_at(at.study.with_edits(*edits)[0].document, self.path) or ()
             if path[1] not in listed:
                 end = (*self.path, len(listed))
                 edits = (*edits, Insert(end, path[1]) if listed else Set(self.path, [path[1]]))
         else:
             edits = (*edits, Set(self.path, path[1]))
-        return Step(f"Add {singular(self.section)}", edits, path, fresh="new")
+        return Step(f"Add {element_noun(self.section)}", edits, path, fresh="new")
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,7 +235,7 @@ class AddInstrument(Request):
     name: str
 
     def step(self, at: Situation) -> Step:
-        table, scales = written_out(self.name, languages_of(at.study.document))
+        table, scales = instrument_tables(self.name, languages_of(at.study.document))
         taken, scale_names = names(at.study.document, "questionnaires"), names(at.study.document, "scales")
         path = ("questionnaires", free_id(taken, self.name.replace("-", "_")))
         edits = (Set(("scales", name), scale) for name, scale in scales.items() if name not in scale_names)
@@ -249,7 +251,9 @@ class ChangeLanguage(Request):
 
     def step(self, at: Situation) -> Step:
         verb = {"add": "Add", "copy": "Fill in", "remove": "Remove"}[self.how]
-        edits = {"add": with_language, "copy": filled_in, "remove": without_language}[self.how](at.study, self.language)
+        edits = {"add": with_language, "copy": edits_to_fill_in, "remove": without_language}[self.how](
+            at.study, self.language
+        )
         return Step(f"{verb} {language_name(self.language)}", edits)
 
 
@@ -266,11 +270,11 @@ class DuplicateElement(Request):
     def step(self, at: Situation) -> Step:
         path, value = self.path, value_at(at.study.document, self.path)
         if isinstance(value, Mapping) or not isinstance(path[-1], int):
-            edits, copy = duplicated(at.study, path)
+            edits, copy = edits_to_duplicate(at.study, path)
         else:
             copy = (*path[:-1], path[-1] + 1)
             edits = (Insert(copy, list(value) if isinstance(value, tuple) else value),)
-        title, edits = f"Duplicate {title_of(at.study.document, path)}", _beside(at.study, edits, path, copy)
+        title, edits = f"Duplicate {title_of(at.study.document, path)}", _edits_beside(at.study, edits, path, copy)
         return Step(title, edits) if self.stays else Step(title, edits, copy, fresh="copy")
 
 
@@ -292,14 +296,14 @@ class MakeSeries(Request):
         paths, now = [self.path], study
         for value in self.values:
             row = number_row(now.document, paths[-1], (*paths[-1], *self.field[2:]))
-            made, copy = copy_with(now, paths[-1], row, value)
-            made = _beside(now, made, paths[-1], copy)
-            now, _ = now.edited(*made)
+            made, copy = edits_to_copy_with(now, paths[-1], row, value)
+            made = _edits_beside(now, made, paths[-1], copy)
+            now, _ = now.with_edits(*made)
             for place in references_to(now.document, paths[-1]):
                 if place[0] != "blocks" or not isinstance(place[-1], int):
                     continue
                 listing = Insert((*place[:-1], place[-1] + 1), copy[1])
-                listed, _ = now.edited(listing)
+                listed, _ = now.with_edits(listing)
                 if len(listed.faults) <= len(now.faults):
                     now, made = listed, (*made, listing)
             edits = (*edits, *made)
@@ -324,7 +328,7 @@ class MoveElement(Request):
         to = index_of(entry) + (by if by < 0 else 1 + by)
         if not 0 <= to <= len(value_at(document, entry[:-1])):
             raise Refused(f"{title} is the {'first' if by < 0 else 'last'} already")
-        return _moved(at.study, self.path, entry, to, f"Move {title} {'up' if by < 0 else 'down'}")
+        return _move_step(at.study, self.path, entry, to, f"Move {title} {'up' if by < 0 else 'down'}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -340,7 +344,7 @@ class MoveTo(Request):
 
     def step(self, at: Situation) -> Step:
         thing = named_at(at.study.document, self.entry) or self.entry
-        step = _moved(at.study, thing, self.entry, self.to, f"Move {title_of(at.study.document, thing)}")
+        step = _move_step(at.study, thing, self.entry, self.to, f"Move {title_of(at.study.document, thing)}")
         return replace(step, select=None) if self.stays else step
 
 
@@ -352,7 +356,7 @@ class AddToSession(Request):
     places: tuple[Path, ...]
 
     def step(self, at: Situation) -> Step:
-        if not is_second(at.study.document):
+        if not is_format_2(at.study.document):
             raise Refused("a questionnaire on its own belongs to format 2: write format = 2 in the tab File")
         title, places = title_of(at.study.document, self.path), sorted(self.places, key=index_of, reverse=True)
         said = f"{title}, now step {index_of(places[-1]) + 1}"
@@ -371,7 +375,7 @@ class DeleteElement(Request):
         path, document = self.path, at.study.document
         title = f"Delete {title_of(document, path)}"
         if self.how == "other":
-            return Step(title, replaced(document, path, self.other), (*path[:-1], self.other))
+            return Step(title, edits_to_replace(document, path, self.other), (*path[:-1], self.other))
         if isinstance(path[-1], int):
             select: Path = path[:2]
         else:
@@ -380,7 +384,7 @@ class DeleteElement(Request):
         gone = (path,) if self.how == "gaps" else with_references(document, path, at.study.needs)
         if any(select[: len(path)] == path for path in gone):
             select = ("study",)
-        return Step(title, deletions(gone), select)
+        return Step(title, edits_to_delete(gone), select)
 
 
 @dataclass(frozen=True, slots=True)
@@ -391,7 +395,7 @@ class RenameElement(Request):
     name: str
 
     def step(self, at: Situation) -> Step:
-        edits = renamed(at.study.document, self.path, self.name, at.recorded(self.path))
+        edits = edits_to_rename(at.study.document, self.path, self.name, at.recorded(self.path))
         after = self.path if isinstance(self.path[-1], int) else (*self.path[:-1], self.name)
         followed = len(references_to(at.study.document, self.path))
         said = f"{counted(followed, 'place')} updated" if followed else ""
@@ -405,7 +409,7 @@ class RetypeFile(Request):
     text: str
 
     def step(self, at: Situation) -> Step:
-        return Step("Edit the file", (), continues="file", text=retyped(at.study.text, self.text))
+        return Step("Edit the file", (), continues="file", text=with_own_line_ends(at.study.text, self.text))
 
 
 @dataclass(frozen=True, slots=True)
@@ -420,7 +424,7 @@ class Several(Request):
         study = at.study
         for request in self.requests:
             step = request.step(replace(at, study=study))
-            study, _ = study.edited(*step.edits)
+            study, _ = study.with_edits(*step.edits)
             edits += step.edits
         return Step(self.words, edits)
 
@@ -459,9 +463,9 @@ def with_path(asked: Any, before: Path, after: Path) -> Any:
     return asked
 
 
-def _beside(study: Study, edits: tuple[Edit, ...], original: Path, copy: Path) -> tuple[Edit, ...]:
+def _edits_beside(study: Study, edits: tuple[Edit, ...], original: Path, copy: Path) -> tuple[Edit, ...]:
     """Return the edits that add an element, with its session step right after the original's."""
-    after, _ = study.edited(*edits)
+    after, _ = study.with_edits(*edits)
     first, step = step_of(after.document, original), step_of(after.document, copy)
     if first is None or step is None or step == copy or step[:-1] != first[:-1]:
         return edits
@@ -469,8 +473,8 @@ def _beside(study: Study, edits: tuple[Edit, ...], original: Path, copy: Path) -
     return edits if index_of(step) == to else (*edits, Move(step, to))
 
 
-def _moved(study: Study, thing: Path, entry: Path, to: int, title: str) -> Step:
-    edits, after = moved(study, entry, to)
+def _move_step(study: Study, thing: Path, entry: Path, to: int, title: str) -> Step:
+    edits, after = edits_to_move(study, entry, to)
     count = len(value_at(study.document, entry[:-1]))
     said = f"{title_of(study.document, thing)}, now {index_of(after) + 1} of {count}"
     return Step(title, edits, after if thing == entry else thing, said=said)
@@ -486,16 +490,16 @@ def index_of(path: Path) -> int:
 
 def _first_value(study: Study, path: Path) -> Any:
     """Return the default of a key, or an initial value; for a table with its required keys."""
-    value = _listed(initial(study.document, path))
+    value = _as_written(initial_value(study.document, path))
     if value != {}:
         return value
-    after, _ = study.edited(Set(path, {}))
+    after, _ = study.with_edits(Set(path, {}))
     needed = (row for row in rows(after.document, path) if row.required)
-    return {str(row.path[-1]): _listed(initial(after.document, row.path)) for row in needed}
+    return {str(row.path[-1]): _as_written(initial_value(after.document, row.path)) for row in needed}
 
 
-def _listed(value: Any) -> Any:
+def _as_written(value: Any) -> Any:
     """Return a value as TOML writes it: lists instead of tuples, and no omitted keys."""
     if isinstance(value, Mapping):
-        return {key: _listed(part) for key, part in value.items() if part is not None}
-    return [_listed(part) for part in value] if isinstance(value, list | tuple) else value
+        return {key: _as_written(part) for key, part in value.items() if part is not None}
+    return [_as_written(part) for part in value] if isinstance(value, list | tuple) else value

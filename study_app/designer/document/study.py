@@ -8,13 +8,13 @@ from functools import cached_property
 from pathlib import Path as File
 from typing import Any, Final
 
-from study_app.designer.document.toml_edits import Edit, Unset, apply, check_encodable
-from study_app.designer.document.toml_text import Refused, Splice, Splices, applied, common_ends
+from study_app.designer.document.toml_edits import Edit, Unset, apply_edit, check_encodable
+from study_app.designer.document.toml_text import Refused, Splice, Splices, apply_splices, common_ends
 from study_app.errors import Problem, ProtocolError
-from study_app.protocol.load import examined, located, read_document
+from study_app.protocol.load import located_problems, read_document, validate_document
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import Path, Places
-from study_app.protocol.source.files import TABLE, is_utf16, with_liquid_files, without_mark
+from study_app.protocol.source.files import TABLE, is_utf16, with_liquid_files, without_byte_order_mark
 from study_app.protocol.source.problems import Fault
 
 _NOT_TOML: Final = "the file cannot be read: correct its text first"
@@ -42,11 +42,11 @@ class Study:
             return None, Places(""), error.problems
 
     @cached_property
-    def _examined(self) -> tuple[Protocol | None, tuple[Fault, ...]]:
+    def _validated(self) -> tuple[Protocol | None, tuple[Fault, ...]]:
         document, _, broken = self._read
         if document is None:
             return None, tuple(Fault((), problem.message, problem.hint) for problem in broken)
-        protocol, faults = examined(document)
+        protocol, faults = validate_document(document)
         return protocol, tuple(faults)
 
     @cached_property
@@ -65,17 +65,17 @@ class Study:
     @property
     def formed(self) -> Protocol | None:
         """The protocol, even if it has forces beyond a limit; None if there are other faults."""
-        return self._examined[0]
+        return self._validated[0]
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        return self._examined[1]
+        return self._validated[1]
 
     @cached_property
     def problems(self) -> tuple[Problem, ...]:
         """The faults, as ``check`` prints them."""
         _, places, broken = self._read
-        return broken or located(self.faults, places)
+        return broken or located_problems(self.faults, places)
 
     @property
     def is_toml(self) -> bool:
@@ -83,49 +83,49 @@ class Study:
         return self._read[0] is not None
 
     @property
-    def unreadable(self) -> bool:
+    def is_unreadable(self) -> bool:
         """Whether the text cannot be read as TOML and no earlier text could."""
         return not self.is_toml and not self.before
 
     def needs(self, place: Path) -> bool:
         """Return whether a table of a section would be incomplete without one of its keys."""
-        after, _ = self.edited(Unset(place))
+        after, _ = self.with_edits(Unset(place))
         table = place[:2]
         without = {fault for fault in after.faults if fault.path[: len(table)] == table}
         return not without <= set(self.faults)
 
-    def edited(self, *edits: Edit) -> tuple[Study, tuple[Splices, ...]]:
+    def with_edits(self, *edits: Edit) -> tuple[Study, tuple[Splices, ...]]:
         if not self.is_toml:
             raise Refused(_NOT_TOML)
         text, steps = self.text, list[Splices]()
         for edit in edits:
-            text, splices = apply(text, edit)
+            text, splices = apply_edit(text, edit)
             steps += splices
-        return self._with(text), tuple(steps)
+        return self._of_text(text), tuple(steps)
 
-    def typed(self, text: str) -> tuple[Study, tuple[Splices, ...]]:
+    def with_text(self, text: str) -> tuple[Study, tuple[Splices, ...]]:
         check_encodable(text)
         old = self.text
         first, last = common_ends(old, text)
         splice = Splice(first, old[first : len(old) - last], text[first : len(text) - last])
-        return (self, ()) if old == text else (self._with(text), ((splice,),))
+        return (self, ()) if old == text else (self._of_text(text), ((splice,),))
 
-    def spliced(self, steps: tuple[Splices, ...]) -> Study:
+    def with_splices(self, steps: tuple[Splices, ...]) -> Study:
         text = self.text
         for step in steps:
-            text = applied(text, step)
-        return self._with(text)
+            text = apply_splices(text, step)
+        return self._of_text(text)
 
-    def _with(self, text: str) -> Study:
+    def _of_text(self, text: str) -> Study:
         return Study(text, self.folder, self.document)
 
 
-def read(source: bytes, folder: File = File()) -> Study:
+def read_study(source: bytes, folder: File = File()) -> Study:
     """Return the study in a file's bytes, without a byte order mark."""
     if is_utf16(source):
         raise Refused("this is UTF-16 text: save the file as UTF-8")
     try:
-        return Study(without_mark(source).decode("utf-8"), folder)
+        return Study(without_byte_order_mark(source).decode("utf-8"), folder)
     except UnicodeDecodeError as error:
         line = source.count(b"\n", 0, error.start) + 1
         raise Refused(f"line {line} is not UTF-8 text: save the file as UTF-8") from error

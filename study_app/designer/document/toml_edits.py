@@ -17,13 +17,13 @@ from study_app.designer.document.toml_text import (
     Slot,
     Spans,
     Splices,
-    applied,
+    apply_splices,
     common_ends,
-    inline,
+    inline_value,
     key_text,
     spans_of,
-    tables,
-    written,
+    table_text,
+    toml_value,
 )
 from study_app.protocol.source.document import Node, Path
 
@@ -42,12 +42,12 @@ def replace_value(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
     indent = re.match(r"[ \t]*", text[line:]).group()  # type: ignore[union-attr]
     column = node.value - line
     lines = node.kind == "key"
-    if lines and isinstance(value, Mapping) and value and column + len(inline(value)) > WIDTH:
+    if lines and isinstance(value, Mapping) and value and column + len(inline_value(value)) > WIDTH:
         key = text[node.parts[0][0] : node.parts[-1][1]]
-        rows = (f"{key}.{key_text(name)} = {written(part, newline=spans.newline)}" for name, part in value.items())
+        rows = (f"{key}.{key_text(name)} = {toml_value(part, newline=spans.newline)}" for name, part in value.items())
         edit.replace(node.start, node.end, f"{spans.newline}{indent}".join(rows))
         return
-    after = inline(value) if node.kind == "pair" else written(value, like, spans.newline, indent, column)
+    after = inline_value(value) if node.kind == "pair" else toml_value(value, like, spans.newline, indent, column)
     edit.replace(node.value, node.end, after)
     padding = _PADDING.match(text, node.end)
     if padding and "\n" not in like + after:
@@ -69,7 +69,7 @@ def add_key(spans: Spans, edit: Editor, path: Path, value: Any, after: str | Non
     elif _with_header(spans, path, value):
         _add_table(spans, edit, path, value, after)
     elif parent and owner is None:
-        body = tables(parent, {path[-1]: value}, spans.newline)  # type: ignore[dict-item]
+        body = table_text(parent, {path[-1]: value}, spans.newline)  # type: ignore[dict-item]
         edit.insert(pieces[0].start, body + spans.newline)
     else:
         _add_line(spans, edit, owner, path, value, after)
@@ -82,7 +82,7 @@ def _with_header(spans: Spans, path: Path, value: Any) -> bool:
             return False
     elif not isinstance(value, Mapping):
         return False
-    fits = len(key_text(str(path[-1]))) + 3 + len(inline(value)) <= WIDTH
+    fits = len(key_text(str(path[-1]))) + 3 + len(inline_value(value)) <= WIDTH
     within = len(path) - 1
     neighbours = any(len(node.path) > within and node.path[:within] == path[:-1] for node in spans.headers())
     return not fits or len(path) == 1 or (neighbours and isinstance(value, Mapping))
@@ -91,13 +91,13 @@ def _with_header(spans: Spans, path: Path, value: Any) -> bool:
 def _add_table(spans: Spans, edit: Editor, path: Path, value: Any, after: str | None) -> None:
     entry = isinstance(value, list | tuple)
     rows = value if entry else [value]
-    body = spans.newline.join(tables(path, row, spans.newline, entry=entry) for row in rows)
-    pieces = _headed(spans, (*path[:-1], after)) if after is not None else []
-    pieces = pieces or (_headed(spans, path[:-1]) if len(path) > 1 else [])
+    body = spans.newline.join(table_text(path, row, spans.newline, entry=entry) for row in rows)
+    pieces = _header_pieces(spans, (*path[:-1], after)) if after is not None else []
+    pieces = pieces or (_header_pieces(spans, path[:-1]) if len(path) > 1 else [])
     insert_block(spans, edit, pieces[-1].end if pieces else len(spans.text), body)
 
 
-def _headed(spans: Spans, path: Path) -> list[Piece]:
+def _header_pieces(spans: Spans, path: Path) -> list[Piece]:
     return [piece for piece in spans.pieces(path) if piece.node.kind in {"table", "array table"}]
 
 
@@ -130,12 +130,12 @@ def _add_line(spans: Spans, edit: Editor, owner: Node | None, path: Path, value:
     if last is None:
         first = next(spans.headers(), None)
         at = len(spans.text) if first is None else spans.owned_start(first)
-        line = f"{key}{written(value, newline=spans.newline, column=len(key))}{spans.newline}"
+        line = f"{key}{toml_value(value, newline=spans.newline, column=len(key))}{spans.newline}"
         insert_lines(spans, edit, at, line if first is None else line + spans.newline)
         return
     line_start = spans.text.rfind("\n", 0, last.start) + 1
     indent = spans.text[line_start : last.start]
-    line = f"{indent}{key}{written(value, '', spans.newline, indent, len(indent + key))}{spans.newline}"
+    line = f"{indent}{key}{toml_value(value, '', spans.newline, indent, len(indent + key))}{spans.newline}"
     insert_lines(spans, edit, spans.line_end(last), line)
 
 
@@ -143,7 +143,7 @@ def _add_pair(spans: Spans, edit: Editor, owner: Node, path: Path, value: Any) -
     inner = [piece for piece in spans.pieces(path[:-1])[:1] if piece.node is owner]
     if not inner or spans.text[owner.value] != "{":
         raise Refused("a value that is not a table has no keys")
-    pair = f"{key_text(str(path[-1]))} = {inline(value)}"
+    pair = f"{key_text(str(path[-1]))} = {inline_value(value)}"
     pairs = [node for node in spans.nodes if node.kind == "pair" and owner.value < node.start < owner.end]
     top = [node for node in pairs if len(node.path) - len(node.parts) == len(path) - 1]
     if top:
@@ -158,11 +158,11 @@ def _add_dotted(spans: Spans, edit: Editor, piece: Piece, path: Path, value: Any
     parts = node.parts[: len(path) - 1 - (len(node.path) - len(node.parts))]
     key = f"{text[parts[0][0] : parts[-1][1]]}.{key_text(str(path[-1]))} = "
     if node.kind == "pair":
-        edit.insert(node.end, f", {key}{inline(value)}")
+        edit.insert(node.end, f", {key}{inline_value(value)}")
         return
     indent = text[text.rfind("\n", 0, node.start) + 1 : node.start]
     like = text[node.value : node.end]
-    value_text = written(value, like, spans.newline, indent, len(indent + key))
+    value_text = toml_value(value, like, spans.newline, indent, len(indent + key))
     insert_lines(spans, edit, piece.end, f"{indent}{key}{value_text}{spans.newline}")
 
 
@@ -172,10 +172,10 @@ def remove_key(spans: Spans, edit: Editor, path: Path) -> None:
         if piece.node.kind == "pair":
             _remove_pair(spans, edit, piece)
         else:
-            edit.delete(blank_before(spans.text, piece), piece.end)
+            edit.delete(blank_start(spans.text, piece), piece.end)
 
 
-def blank_before(text: str, piece: Piece) -> int:
+def blank_start(text: str, piece: Piece) -> int:
     """Return the start of a deletion: before the blank lines above, if a blank line or the end follows."""
     start = piece.start
     if not _BLANK_LINE.match(text, piece.end):
@@ -197,7 +197,7 @@ def _remove_pair(spans: Spans, edit: Editor, piece: Piece) -> None:
 def copy_table(spans: Spans, edit: Editor, path: Path, name: str) -> None:
     """Copy a key or table with its comments under another name, right after it."""
     pieces = spans.pieces(path)
-    copies = [_renamed(spans, piece, len(path) - 1, name) for piece in pieces]
+    copies = [_renamed_text(spans, piece, len(path) - 1, name) for piece in pieces]
     last = pieces[-1]
     if last.node.kind == "pair":
         edit.insert(last.end, "".join(f", {text}" for text in copies))
@@ -207,7 +207,7 @@ def copy_table(spans: Spans, edit: Editor, path: Path, name: str) -> None:
         insert_block(spans, edit, last.end, spans.newline.join(copies))
 
 
-def _renamed(spans: Spans, piece: Piece, depth: int, name: str) -> str:
+def _renamed_text(spans: Spans, piece: Piece, depth: int, name: str) -> str:
     """Return the text of a piece with another name for the step at ``depth`` of its paths, whole lines."""
     editor = Editor(spans.text)
     for start, end in _key_parts(spans, piece.node.path[: depth + 1]):
@@ -237,7 +237,7 @@ _TO_COMMA: Final = re.compile(r"(?:[ \t\r\n]|#[^\n]*+)*+,")
 _LINE_REST: Final = re.compile(r"[ \t]*(\r?\n)")
 
 
-def _entry(path: Path) -> tuple[Path, int]:
+def _array_and_index(path: Path) -> tuple[Path, int]:
     index = path[-1]
     if not isinstance(index, int):
         raise Refused("an entry of an array has a number")
@@ -246,34 +246,35 @@ def _entry(path: Path) -> tuple[Path, int]:
 
 def insert_entry(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
     """Insert an entry at the index that ends ``path``, into an array that is in the text."""
-    array, index = _entry(path)
+    array, index = _array_and_index(path)
     node = spans.node(array)
     if node is None:
         _insert_table(spans, edit, path, value)
         return
     slots = spans.slots(array)
     if not slots:
-        edit.insert(node.end - 1, inline(value))
+        edit.insert(node.end - 1, inline_value(value))
     elif index < len(slots):
         slot = slots[index]
         own = slot.own_line
         edit.insert(
-            slot.start, f"{_indent(spans, slot)}{inline(value)},{spans.newline}" if own else f"{inline(value)}, "
+            slot.start,
+            f"{_indent(spans, slot)}{inline_value(value)},{spans.newline}" if own else f"{inline_value(value)}, ",
         )
     elif slots[-1].own_line:
-        _append(spans, edit, slots[-1], inline(value))
-    elif _fits(spans, node.start, node.end, value):
-        edit.insert(slots[-1].end, f", {inline(value)}")
+        _append_lines(spans, edit, slots[-1], inline_value(value))
+    elif _fits_line(spans, node.start, node.end, value):
+        edit.insert(slots[-1].end, f", {inline_value(value)}")
     else:
-        _spread(spans, edit, array, slots, inline(value))
+        _spread_array(spans, edit, array, slots, inline_value(value))
 
 
-def _fits(spans: Spans, start: int, end: int, value: Any) -> bool:
+def _fits_line(spans: Spans, start: int, end: int, value: Any) -> bool:
     line = spans.text.rfind("\n", 0, start) + 1
-    return "\n" in spans.text[start:end] or end - line + len(inline(value)) + 2 <= WIDTH
+    return "\n" in spans.text[start:end] or end - line + len(inline_value(value)) + 2 <= WIDTH
 
 
-def _spread(spans: Spans, edit: Editor, array: Path, slots: list[Slot], value: str) -> None:
+def _spread_array(spans: Spans, edit: Editor, array: Path, slots: list[Slot], value: str) -> None:
     """Write an array that becomes too long for its line with a line for each entry."""
     node = spans.node(array)
     if node is None:
@@ -289,7 +290,7 @@ def _indent(spans: Spans, slot: Slot) -> str:
     return re.match(r"[ \t]*", spans.text[spans.text.rfind("\n", 0, slot.entry) + 1 :]).group()  # type: ignore[union-attr]
 
 
-def _append(spans: Spans, edit: Editor, last: Slot, body: str, tail: str = "") -> None:
+def _append_lines(spans: Spans, edit: Editor, last: Slot, body: str, tail: str = "") -> None:
     """Add lines after the line on which an entry ends, keeping its comment; add a missing comma."""
     newline = spans.newline
     comma = _TO_COMMA.match(spans.text, last.end)
@@ -301,10 +302,10 @@ def _append(spans: Spans, edit: Editor, last: Slot, body: str, tail: str = "") -
 
 
 def _insert_table(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
-    array, index = _entry(path)
+    array, index = _array_and_index(path)
     if not isinstance(value, Mapping):
         raise Refused("an entry of an array of tables is a table")
-    body = tables(path, value, spans.newline, entry=True)
+    body = table_text(path, value, spans.newline, entry=True)
     if following := spans.pieces((*array, index)):
         edit.insert(following[0].start, body + spans.newline)
     else:
@@ -313,10 +314,10 @@ def _insert_table(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
 
 def remove_entry(spans: Spans, edit: Editor, path: Path) -> None:
     """Remove an entry with its comments."""
-    array, index = _entry(path)
+    array, index = _array_and_index(path)
     if spans.node(array) is None:
         for piece in spans.pieces(path):
-            edit.delete(blank_before(spans.text, piece), piece.end)
+            edit.delete(blank_start(spans.text, piece), piece.end)
         return
     text, slots = spans.text, spans.slots(array)
     slot, last = slots[index], index == len(slots) - 1
@@ -337,7 +338,7 @@ def remove_entry(spans: Spans, edit: Editor, path: Path) -> None:
 
 def copy_entry(spans: Spans, edit: Editor, path: Path) -> None:
     """Copy an entry with its comments, right after it."""
-    array, index = _entry(path)
+    array, index = _array_and_index(path)
     text, newline = spans.text, spans.newline
     if spans.node(array) is None:
         pieces = spans.pieces(path)
@@ -352,7 +353,7 @@ def copy_entry(spans: Spans, edit: Editor, path: Path) -> None:
     elif slot.own_line and index < len(slots) - 1:
         edit.insert(slots[index + 1].start, f"{text[slot.start : slot.end]},{tail}{newline}")
     else:  # the comment behind it ends the line
-        _append(spans, edit, slot, text[slot.start : slot.end].lstrip(" \t"), tail)
+        _append_lines(spans, edit, slot, text[slot.start : slot.end].lstrip(" \t"), tail)
 
 
 def _lines(text: str, piece: Piece, newline: str) -> str:
@@ -362,7 +363,7 @@ def _lines(text: str, piece: Piece, newline: str) -> str:
 
 def move_entry(spans: Spans, edit: Editor, path: Path, to: int) -> None:
     """Move an entry with its comments to another index; the others close up."""
-    array, index = _entry(path)
+    array, index = _array_and_index(path)
     order = list(range(max(index, to) + 1))
     order.insert(to, order.pop(index))
     if spans.node(array) is None:
@@ -397,7 +398,7 @@ def _move_table(spans: Spans, edit: Editor, array: Path, order: list[int]) -> No
             body = body.removesuffix(spans.newline)
         edit.replace(first.start, first.end, body)
         for piece in others:
-            edit.delete(blank_before(text, piece), piece.end)
+            edit.delete(blank_start(text, piece), piece.end)
 
 
 Document: TypeAlias = dict[str, Any]
@@ -459,88 +460,90 @@ class WriterError(AssertionError):
     """The text that an edit produced does not mean what the edit meant: a bug of the writer."""
 
 
-def apply(text: str, edit: Edit) -> tuple[str, tuple[Splices, ...]]:
+def apply_edit(text: str, edit: Edit) -> tuple[str, tuple[Splices, ...]]:
     """Return the text after an edit, and the splices of its steps, each of the text before it."""
-    document = _read(text)
-    meant = meaning(document, edit)
+    document = _parse(text)
+    meant = meant_document(document, edit)
     steps: list[Splices] = []
-    parts = list(_parts(document, edit))
+    parts = list(_single_edits(document, edit))
     while parts:
         part = parts.pop(0)
         spans, editor = spans_of(text), Editor(text)
-        if isinstance(part, Set) and _written_apart(spans, part.path):
+        if isinstance(part, Set) and _is_written_apart(spans, part.path):
             parts = [Unset(part.path), part, *parts]
             continue
-        _write(spans, editor, part)
+        _write_edit(spans, editor, part)
         if editor.splices:
             steps.append(editor.splices)
-            text = applied(text, editor.splices)
+            text = apply_splices(text, editor.splices)
     try:
-        edited = _read(text)
+        edited = _parse(text)
     except tomllib.TOMLDecodeError as error:
         raise WriterError(f"{edit} made a text that is not TOML: {error}") from error
-    if not same(edited, meant) and not same(_pruned(copy.deepcopy(edited), edit.path), _pruned(meant, edit.path)):
+    if not is_same_value(edited, meant) and not is_same_value(
+        _pruned(copy.deepcopy(edited), edit.path), _pruned(meant, edit.path)
+    ):
         raise WriterError(f"{edit} made another document than the one meant")
     return text, tuple(steps)
 
 
 @lru_cache(maxsize=4)
-def _read(text: str) -> Document:
+def _parse(text: str) -> Document:
     """Return the document of a text; it must not be changed."""
     return tomllib.loads(text)
 
 
-def meaning(document: Mapping[str, Any], edit: Edit) -> Document:
+def meant_document(document: Mapping[str, Any], edit: Edit) -> Document:
     """Return the document after an edit; unchanged parts are shared with the document before."""
     meant: Document = dict(document)
     *parent, last = edit.path
     if isinstance(edit, Set):
         _check_value(edit.value)
-        node = _own(meant, parent, makes=True)
+        node = _own_value(meant, parent, makes=True)
         if isinstance(node, list) or isinstance(last, int):
-            _at(node, last)
+            _value_at(node, last)
         elif not isinstance(node, dict):
-            raise Refused(f"{_words(tuple(parent))} is not a table: it has no key {last}")
+            raise Refused(f"{_path_text(tuple(parent))} is not a table: it has no key {last}")
         node[last] = copy.deepcopy(edit.value)
         return meant
-    node = _own(meant, parent)
+    node = _own_value(meant, parent)
     if isinstance(edit, Insert):
         _check_value(edit.value)
         if not isinstance(node, list) or not isinstance(last, int) or not 0 <= last <= len(node):
-            raise Refused(f"{_words(tuple(parent))} has no place {last} for a new entry")
+            raise Refused(f"{_path_text(tuple(parent))} has no place {last} for a new entry")
         node.insert(last, copy.deepcopy(edit.value))
         return meant
-    value = _at(node, last)
+    value = _value_at(node, last)
     if isinstance(edit, Unset):
         del node[last]
     elif isinstance(edit, Duplicate):
         _duplicate(node, last, value, edit.name)
     elif isinstance(edit, Move):
         if not isinstance(node, list) or not isinstance(last, int) or not 0 <= edit.to < len(node):
-            raise Refused(f"{_words(edit.path)} cannot move to place {edit.to + 1}")
+            raise Refused(f"{_path_text(edit.path)} cannot move to place {edit.to + 1}")
         node.insert(edit.to, node.pop(last))
     else:
         _rename(meant, node, edit)
     return meant
 
 
-def _own(document: Document, path: Iterable[str | int], *, makes: bool = False) -> Any:
+def _own_value(document: Document, path: Iterable[str | int], *, makes: bool = False) -> Any:
     """Return the document's own value at a path: tables and arrays on the way are copied, the rest is shared."""
     node: Any = document
     for step in path:
         absent = isinstance(node, dict) and isinstance(step, str) and step not in node
-        inner = {} if makes and absent else _at(node, step)
+        inner = {} if makes and absent else _value_at(node, step)
         node[step] = dict(inner) if isinstance(inner, dict) else list(inner) if _is_array(inner) else inner
         node = node[step]
     return node
 
 
-def same(first: Any, other: Any) -> bool:
+def is_same_value(first: Any, other: Any) -> bool:
     """Return whether two values are the same in TOML: 1, 1.0 and true differ."""
     if isinstance(first, dict) and isinstance(other, dict):
-        return first.keys() == other.keys() and all(same(first[key], other[key]) for key in first)
+        return first.keys() == other.keys() and all(is_same_value(first[key], other[key]) for key in first)
     if isinstance(first, list | tuple) and isinstance(other, list | tuple):
-        return len(first) == len(other) and all(same(*pair) for pair in zip(first, other, strict=True))
+        return len(first) == len(other) and all(is_same_value(*pair) for pair in zip(first, other, strict=True))
     return type(first) is type(other) and (first == other or (first != first and other != other))  # noqa: PLR0124 - NaN
 
 
@@ -557,8 +560,8 @@ def _rename(document: Document, node: Any, edit: Rename) -> None:
         raise Refused("entries of an array have no name")
     _check_free(node, edit.name)
     for *parent, last in edit.references:
-        _own(document, parent)[last] = edit.name
-    node = _own(document, edit.path[:-1])
+        _own_value(document, parent)[last] = edit.name
+    node = _own_value(document, edit.path[:-1])
     node[edit.name] = node.pop(edit.path[-1])
 
 
@@ -587,13 +590,13 @@ def check_encodable(text: str) -> None:
         raise Refused("the text holds half a character, which UTF-8 cannot write: type it again")
 
 
-def _at(node: Any, step: str | int) -> Any:
-    if not _has(node, step):
+def _value_at(node: Any, step: str | int) -> Any:
+    if not _has_step(node, step):
         raise Refused(f"there is no {step + 1 if isinstance(step, int) else step} in the study any more")
     return node[step]
 
 
-def _has(node: Any, step: str | int) -> bool:
+def _has_step(node: Any, step: str | int) -> bool:
     if _is_array(node):
         return isinstance(step, int) and 0 <= step < len(node)
     return isinstance(node, dict) and step in node
@@ -603,11 +606,11 @@ def _is_array(node: Any) -> bool:
     return isinstance(node, list | tuple)
 
 
-def _words(path: Path) -> str:
+def _path_text(path: Path) -> str:
     return ".".join(str(step + 1) if isinstance(step, int) else step for step in path) or "the file"
 
 
-def _parts(document: Document, edit: Edit) -> Iterator[Edit]:
+def _single_edits(document: Document, edit: Edit) -> Iterator[Edit]:
     """Yield edits that each change one place of the text."""
     if not isinstance(edit, Set):
         yield edit
@@ -621,16 +624,16 @@ def _parts(document: Document, edit: Edit) -> Iterator[Edit]:
             yield Set(edit.path[: depth + 1], value, edit.after if depth == len(edit.path) - 1 else None)
             return
         node = node[step]
-    yield from _changes(edit.path, node, edit.value)
+    yield from _edits_between(edit.path, node, edit.value)
 
 
-def _changes(path: Path, old: Any, new: Any) -> Iterator[Edit]:
+def _edits_between(path: Path, old: Any, new: Any) -> Iterator[Edit]:
     """Yield the fewest edits that turn one value into another; unchanged parts keep place and comments."""
-    if same(old, new):
+    if is_same_value(old, new):
         return
     if isinstance(old, dict) and isinstance(new, Mapping) and new:
         for key in [key for key in new if key in old]:
-            yield from _changes((*path, key), old[key], new[key])
+            yield from _edits_between((*path, key), old[key], new[key])
         previous = None
         for key in new:
             if key not in old:
@@ -638,23 +641,23 @@ def _changes(path: Path, old: Any, new: Any) -> Iterator[Edit]:
             previous = key
         yield from (Unset((*path, key)) for key in old if key not in new)
     elif isinstance(old, list) and isinstance(new, list | tuple) and old and new:
-        yield from _list_changes(path, old, list(new))
+        yield from _edits_between_lists(path, old, list(new))
     else:
         yield Set(path, new)
 
 
-def _list_changes(path: Path, old: list[Any], new: list[Any]) -> Iterator[Edit]:
+def _edits_between_lists(path: Path, old: list[Any], new: list[Any]) -> Iterator[Edit]:
     shortest = min(len(old), len(new))
-    first, last = common_ends(old, new, same)
+    first, last = common_ends(old, new, is_same_value)
     for index in range(first, shortest - last):
-        yield from _changes((*path, index), old[index], new[index])
+        yield from _edits_between((*path, index), old[index], new[index])
     for index in range(shortest - last, len(new) - last):
         yield Insert((*path, index), new[index])
     for index in reversed(range(shortest - last, len(old) - last)):
         yield Unset((*path, index))
 
 
-def _write(spans: Spans, editor: Editor, edit: Edit) -> None:
+def _write_edit(spans: Spans, editor: Editor, edit: Edit) -> None:
     path = edit.path
     if isinstance(edit, Insert):
         insert_entry(spans, editor, path, edit.value)
@@ -665,7 +668,7 @@ def _write(spans: Spans, editor: Editor, edit: Edit) -> None:
             editor.replace(start, end, key_text(edit.name))
         for reference in edit.references:
             if (node := spans.node(reference)) is not None:
-                editor.replace(node.value, node.end, written(edit.name, spans.text[node.value : node.end]))
+                editor.replace(node.value, node.end, toml_value(edit.name, spans.text[node.value : node.end]))
     elif isinstance(edit, Duplicate):
         if isinstance(path[-1], int):
             copy_entry(spans, editor, path)
@@ -679,12 +682,12 @@ def _write(spans: Spans, editor: Editor, edit: Edit) -> None:
         replace_value(spans, editor, path, edit.value)
 
 
-def _written_apart(spans: Spans, path: Path) -> bool:
+def _is_written_apart(spans: Spans, path: Path) -> bool:
     """Return whether a value is written with headers or dotted keys, so that it cannot be replaced in place."""
     node = spans.node(path)
     apart = node.kind in {"table", "array table"} if node is not None else bool(spans.pieces(path))
     if apart and isinstance(path[-1], int):
-        raise Refused(f"{_words(path)} is a table with a header: it cannot become a value")
+        raise Refused(f"{_path_text(path)} is a table with a header: it cannot become a value")
     return apart
 
 
@@ -693,7 +696,7 @@ def _pruned(document: Document, path: Path) -> Document:
     for length in range(len(path), 0, -1):
         node: Any = document
         for step in path[: length - 1]:
-            node = node[step] if _has(node, step) else None
+            node = node[step] if _has_step(node, step) else None
         if isinstance(node, dict) and node.get(path[length - 1]) in ({}, []):
             del node[path[length - 1]]
     return document

@@ -13,7 +13,7 @@ import tomlkit
 import tomlkit.items
 
 from study_app.errors import StudyError
-from study_app.protocol.source.document import Node, Path, scan
+from study_app.protocol.source.document import Node, Path, scan_nodes
 
 
 class Refused(StudyError):
@@ -76,7 +76,7 @@ def common_ends(
     return first, last
 
 
-def applied(text: str, splices: Iterable[Splice]) -> str:
+def apply_splices(text: str, splices: Iterable[Splice]) -> str:
     """Return a text with splices applied."""
     parts: list[str] = []
     end = 0
@@ -88,7 +88,7 @@ def applied(text: str, splices: Iterable[Splice]) -> str:
     return "".join((*parts, text[end:]))
 
 
-def reverted(splices: Splices) -> Splices:
+def revert_splices(splices: Splices) -> Splices:
     """Return the splices that undo these in the resulting text."""
     shift, undoing = 0, list[Splice]()
     for at, before, after in splices:
@@ -101,20 +101,20 @@ _ENDS: Final = re.compile("\r\n|\r|\u2029")
 """What an editor takes as the end of a line beyond line feeds."""
 
 
-def shown(text: str) -> str:
+def with_line_feeds(text: str) -> str:
     """Return a text with line feeds only."""
     return _ENDS.sub("\n", text)
 
 
-def retyped(text: str, typed: str) -> str:
+def with_own_line_ends(text: str, typed: str) -> str:
     """Return the typed text with the line ends of the original text."""
-    old, newline = shown(text), "\r\n" if "\r\n" in text else "\n"
+    old, newline = with_line_feeds(text), "\r\n" if "\r\n" in text else "\n"
     first, last = common_ends(old, typed)
-    begin, end = _original(text, first), _original(text, len(old) - last)
+    begin, end = _original_position(text, first), _original_position(text, len(old) - last)
     return text[:begin] + typed[first : len(typed) - last].replace("\n", newline) + text[end:]
 
 
-def _original(text: str, place: int) -> int:
+def _original_position(text: str, place: int) -> int:
     """Return the position in the file's text of a position in the shown text."""
     for match in _ENDS.finditer(text):
         if match.start() >= place:
@@ -164,7 +164,7 @@ class Spans:
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self.nodes = scan(text)
+        self.nodes = scan_nodes(text)
         self.newline = "\r\n" if "\r\n" in text else "\n"
         self._by_path = {node.path: node for node in self.nodes}
         self._lines = [node for node in self.nodes if node.kind in {"table", "array table", "key"}]
@@ -279,35 +279,35 @@ def key_text(key: str) -> str:
     return key if _BARE.fullmatch(key) else str(tomlkit.key(key).as_string())
 
 
-def written(value: Any, like: str = "", newline: str = "\n", indent: str = "", column: int = 0) -> str:
+def toml_value(value: Any, like: str = "", newline: str = "\n", indent: str = "", column: int = 0) -> str:
     """Return a value, as ``tomllib`` reads it, as TOML.
 
     ``like`` is the text that it replaces, or of a neighbour: its quotes and its lines are kept where possible;
     ``indent`` and ``column`` are what precedes the value on its line.
     """
     if isinstance(value, str):
-        return _string(value, like, newline)
+        return _toml_string(value, like, newline)
     if isinstance(value, list | tuple) and value:
-        line = inline(value)
+        line = inline_value(value)
         if "\n" not in like and column + len(line) <= WIDTH:
             return line
-        inner = indent + (INDENT if not like else _indent_in(like, indent))
-        rows = "".join(f"{inner}{inline(entry)},{newline}" for entry in value)
+        inner = indent + (INDENT if not like else _array_indent(like, indent))
+        rows = "".join(f"{inner}{inline_value(entry)},{newline}" for entry in value)
         return f"[{newline}{rows}{indent}]"
-    return inline(value)
+    return inline_value(value)
 
 
-def inline(value: Any) -> str:
+def inline_value(value: Any) -> str:
     """Return a value as TOML without a line break."""
     if isinstance(value, Mapping):
-        pairs = ", ".join(f"{key_text(key)} = {inline(entry)}" for key, entry in value.items())
+        pairs = ", ".join(f"{key_text(key)} = {inline_value(entry)}" for key, entry in value.items())
         return f"{{ {pairs} }}" if pairs else "{}"
     if isinstance(value, list | tuple):
-        return f"[{', '.join(map(inline, value))}]"
+        return f"[{', '.join(map(inline_value, value))}]"
     return str(tomlkit.item(value).as_string())
 
 
-def tables(path: tuple[str | int, ...], value: Mapping[str, Any], newline: str, *, entry: bool = False) -> str:
+def table_text(path: tuple[str | int, ...], value: Mapping[str, Any], newline: str, *, entry: bool = False) -> str:
     """Return a table with its header; inner tables that fill more than a line get headers of their own.
 
     ``entry`` says that it is an entry of an array of tables.
@@ -316,27 +316,27 @@ def tables(path: tuple[str | int, ...], value: Mapping[str, Any], newline: str, 
     lines, inner = [f"[[{name}]]" if entry else f"[{name}]"], list[str]()
     for key, part in value.items():
         column = len(key_text(key)) + 3
-        fits = column + len(inline(part)) <= WIDTH
+        fits = column + len(inline_value(part)) <= WIDTH
         if isinstance(part, Mapping) and part and not fits:
-            inner.append(tables((*path, key), part, newline))
+            inner.append(table_text((*path, key), part, newline))
         elif isinstance(part, list | tuple) and part and not fits and all(isinstance(row, Mapping) for row in part):
-            inner += [tables((*path, key), row, newline, entry=True) for row in part]
+            inner += [table_text((*path, key), row, newline, entry=True) for row in part]
         else:
-            lines.append(f"{key_text(key)} = {written(part, newline=newline, column=column)}")
+            lines.append(f"{key_text(key)} = {toml_value(part, newline=newline, column=column)}")
     return newline.join(["".join(f"{line}{newline}" for line in lines), *inner])
 
 
-def _string(value: str, like: str, newline: str) -> str:
+def _toml_string(value: str, like: str, newline: str) -> str:
     if "\n" in value and "\r" not in value:
         # tomlkit adds a line break before a text that begins with one; the leading sign prevents it.
         body = tomlkit.string(f"-{value}", multiline=True).as_string()[4:-3]
         return f'"""{newline}{body.replace(chr(10), newline)}"""'
     if like.startswith("'") and _LITERAL.fullmatch(value):
         return f"'{value}'"
-    return inline(value)
+    return inline_value(value)
 
 
-def _indent_in(array: str, indent: str) -> str:
+def _array_indent(array: str, indent: str) -> str:
     """Return the indent of an array's entries."""
     match = re.search(r"\n([ \t]*)[^\s#\]]", array)
     return match.group(1).removeprefix(indent) if match else INDENT

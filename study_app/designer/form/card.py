@@ -26,8 +26,8 @@ from study_app.designer.form.fields import (
     TypedText,
     UnknownField,
     add_button,
+    is_stacked,
     removes_key,
-    stacked,
 )
 from study_app.designer.form.lists import CONDITIONS, EntriesField, EntryList, LanguageListField, LinesField
 from study_app.designer.form.rows import STUDY_LANGUAGES, Form, FormRow, Section, added_row, values_of
@@ -46,10 +46,10 @@ from study_app.designer.form.special import (
 )
 from study_app.designer.parts import FIELD_PX, Segments, cut_text, small_button
 from study_app.designer.problems import ProblemRow, RepairButton
-from study_app.gui.kit.commands import tip, with_key
+from study_app.gui.kit.commands import command_tip, with_key
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
-from study_app.gui.theme.themed import Themed, name_bars, remove_widget
+from study_app.gui.theme.themed import Themed, name_scroll_bars, remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, insert_layout, vbox
 from study_app.gui.widgets.boxes import grid as grid_of
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Icon, Rule, fill_rounded, scrolled, smooth_painter
@@ -73,9 +73,9 @@ class EitherField(Field):
         super().__init__(row)
         self.box.setDirection(QBoxLayout.Direction.TopToBottom)
         self.kinds = Segments(f"{row.label}, kind")
-        self.kinds.chosen.connect(self._switch)
+        self.kinds.chosen.connect(self._switch_kind)
         self.box.addWidget(self.kinds, 0, Qt.AlignmentFlag.AlignLeft)
-        self.inner = field(self._chosen(row))
+        self.inner = field_for(self._chosen_row(row))
         self.inner.asked.connect(self.asked)
         self.inner.came.connect(self.came)
         self.box.addWidget(self.inner)
@@ -83,17 +83,17 @@ class EitherField(Field):
         self.show_value()
 
     def show_row(self, row: FormRow) -> None:
-        self.inner.show_row(self._chosen(row))
+        self.inner.show_row(self._chosen_row(row))
         super().show_row(row)
 
     def show_value(self) -> None:
         values = [(at, KINDS.get(kind.kind, kind.kind)) for at, kind in enumerate(self.row.either)]
         self.kinds.show_values(values, self.row.number)
 
-    def _chosen(self, row: FormRow) -> FormRow:
+    def _chosen_row(self, row: FormRow) -> FormRow:
         return replace(row, **values_of(row.either[row.number or 0]))
 
-    def _switch(self, at: int) -> None:
+    def _switch_kind(self, at: int) -> None:
         """Request a value of another kind, converted from the present one as far as possible."""
         if at == self.row.number:
             return
@@ -111,7 +111,7 @@ class EitherField(Field):
             self.set_value(str(first))
 
 
-def field(row: FormRow) -> Field:
+def field_for(row: FormRow) -> Field:
     """Return the editor of a row."""
     kind = row.kind
     if kind in {"localised", "paragraphs"}:
@@ -170,7 +170,7 @@ class RowWidget(Themed, QWidget):
         self.refusal = ""
         special, wide = special_editor_of(row), is_wide(row)
         bare = special is not None and not special.labelled
-        self.field = field(row) if special is None or special.make is None else special.make(row)
+        self.field = field_for(row) if special is None or special.make is None else special.make(row)
         if special is not None and special.adds is not None:
             self.field.add_extra(special.adds(self.field))
         self.keys = Segments("Which of the two is given") if row.keys else None
@@ -183,7 +183,7 @@ class RowWidget(Themed, QWidget):
         removes = f"Remove {row.label} from the file"
         self.remove = IconButton("cross", removes, with_key(removes, "remove"), size=FIELD_PX, role="plain")
         self.remove.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # no Tab stop at each field
-        self.remove.clicked.connect(self._remove)
+        self.remove.clicked.connect(self._ask_to_remove)
         room = self.remove.sizePolicy()
         room.setRetainSizeWhenHidden(True)
         self.remove.setSizePolicy(room)
@@ -194,13 +194,13 @@ class RowWidget(Themed, QWidget):
         else:
             across.addWidget(self.words, int(wide), top)
             across.addWidget(label(self.field.caption, "small", "text2") if wide else self.field, int(not wide))
-        if not bare or row.removable:
+        if not bare or row.is_removable:
             across.addWidget(self.remove, 0, top)
         self.repairs: list[RepairButton] = []
         self._offered: dict[ProblemRow, tuple[str, ...]] = {}
         self._buttons = vbox(spacing=6, margins=(LABEL_PX + 32, 0, 0, 0))
         column = vbox(spacing=4, margins=0, parent=self)
-        heads = wide and len(row.languages) > 1 and not stacked(row)
+        heads = wide and len(row.languages) > 1 and not is_stacked(row)
         labelled = not bare and not (heads and row.required)
         if labelled or bare:
             add_layout(column, across)
@@ -209,7 +209,7 @@ class RowWidget(Themed, QWidget):
             self.words.hide()
         if self.keys is not None:
             self.keys.show_values(row.keys, row.path[-1])
-            self.keys.chosen.connect(self._switch)
+            self.keys.chosen.connect(self._switch_key)
             above = hbox((self.keys, 0, Qt.AlignmentFlag.AlignLeft), margins=(0 if wide else LABEL_PX + 8, 0, 0, 0))
             insert_layout(column, 0, above)
         if heads:
@@ -228,10 +228,10 @@ class RowWidget(Themed, QWidget):
         assert isinstance(column, QVBoxLayout)  # noqa: S101 - made so
         made.hide()
         column.insertWidget(column.count() - 1, made)
-        name_bars(made)
+        name_scroll_bars(made)
         return made
 
-    def _remove(self) -> None:
+    def _ask_to_remove(self) -> None:
         """Ask to remove the key; typed text is handed on first, otherwise it would restore the key."""
         for part in self.field.findChildren(QWidget):
             if isinstance(part, TypedLine | TypedText):
@@ -239,12 +239,12 @@ class RowWidget(Themed, QWidget):
         self.field.asked.emit(RemoveKey(self.row.path))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if removes_key(event) and self.row.removable and self.remove.isEnabled():
-            self._remove()
+        if removes_key(event) and self.row.is_removable and self.remove.isEnabled():
+            self._ask_to_remove()
         else:
             super().keyPressEvent(event)
 
-    def _switch(self, key: object) -> None:
+    def _switch_key(self, key: object) -> None:
         if key != self.row.path[-1]:
             self.field.asked.emit(SwitchKey(self.row.path, str(key)))
 
@@ -253,7 +253,7 @@ class RowWidget(Themed, QWidget):
             self.refusal = ""
             self.row = row
             self.field.show_row(row)
-        self.say()
+        self.show_messages()
 
     def begin(self, row: FormRow) -> None:
         """Show a row of another element: nothing typed, refused or selected remains."""
@@ -268,10 +268,10 @@ class RowWidget(Themed, QWidget):
         self.field.show_row(row)
         for part in typed:
             part.begin_value()
-        self.say()
+        self.show_messages()
 
-    def say(self) -> None:
-        self.remove.setVisible(self.row.removable and self.remove.parent() is not None)
+    def show_messages(self) -> None:
+        self.remove.setVisible(self.row.is_removable and self.remove.parent() is not None)
         refused = [field.refusal for field in (self.field, *self.field.findChildren(Field)) if field.refusal]
         corrections = [sentence for sentence in (self.refusal, *refused, *self.row.faults) if sentence]
         times = Counter(corrections)
@@ -282,7 +282,7 @@ class RowWidget(Themed, QWidget):
         row = self.row
         sentences = filter(None, (row.help, row.permitted, *corrections))
         self.field.setAccessibleDescription(" ".join(f"{sentence.rstrip('.')}." for sentence in sentences))
-        some_missing = isinstance(self.field, LanguagesField) and self.field.some_missing
+        some_missing = isinstance(self.field, LanguagesField) and self.field.has_missing_texts
         for part in self.field.findChildren(QWidget):
             if not isinstance(part, TypedLine | TypedText):
                 continue
@@ -310,8 +310,8 @@ class RowWidget(Themed, QWidget):
         for problem, word in [(problem, word) for problem, word in asked if times[word] == 1][:MOST_REPAIRS]:
             made = RepairButton(problem, word)
             made.clicked.connect(lambda _on=False, row=problem, word=word: self.repair_asked.emit(row, word))
-            made.typed.connect(self._type)
-            name_bars(made)
+            made.typed.connect(self._type_letter)
+            name_scroll_bars(made)
             self._buttons.addWidget(made, 0, Qt.AlignmentFlag.AlignRight)
             made.show()  # at once: Tab skips widgets that a layout has not shown yet
             self.repairs.append(made)
@@ -322,7 +322,7 @@ class RowWidget(Themed, QWidget):
         for button in before:
             remove_widget(button)
 
-    def _type(self, event: QKeyEvent) -> None:
+    def _type_letter(self, event: QKeyEvent) -> None:
         """Type a letter into the field."""
         self.field.take_keyboard()
         line = self.window().focusWidget()
@@ -353,7 +353,7 @@ def is_wide(row: FormRow) -> bool:
     return row.kind == "paragraphs" if special is None else special.wide
 
 
-def structure_of(row: FormRow) -> object:
+def editor_structure(row: FormRow) -> object:
     """Return the part of a row's state that, when it changes, requires a new editor."""
     special, own = special_editor_of(row), row
     inner = own.either[row.number or 0].kind if own.either else ""
@@ -428,7 +428,7 @@ class FormHead(QWidget):
         self.up = IconButton("arrow_up", "Move up", size=34)
         self.down = IconButton("arrow_down", "Move down", size=34)
         self.copy = IconButton("copy", "Duplicate", size=34)
-        self.delete = IconButton("trash", "Delete", f"{tip('delete')} in the outline", size=34, role="danger")
+        self.delete = IconButton("trash", "Delete", f"{command_tip('delete')} in the outline", size=34, role="danger")
         titles = vbox(self.title, self.kind, spacing=0)
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
@@ -508,7 +508,7 @@ class FormHead(QWidget):
         path, why = self._lock
         locked = bool(why) and self.form is not None and self.form.path == path
         self.id.setReadOnly(self._read_only or locked)
-        self.id.setToolTip(why if locked else tip("rename"))
+        self.id.setToolTip(why if locked else command_tip("rename"))
         self.unlock.setVisible(locked and not self._read_only)
         self.unlock.setToolTip(why)
         self.unlock.setAccessibleDescription(why)
@@ -595,7 +595,7 @@ class FormCard(Card):
         self._focused: RowWidget | None = None
         self._renames = False
         self.head = FormHead()
-        self.head.asked.connect(self._ask)
+        self.head.asked.connect(self._request)
         self.own = label("", "label", "bad", wraps=True)
         self.above, self.panel, self.below = QuestionRows(), Panel(), QuestionRows()
         for questions in (self.above, self.below):
@@ -611,7 +611,7 @@ class FormCard(Card):
         super().resizeEvent(event)
         self.foot.setVisible(self.height() >= FOOT_FROM)
 
-    def _ask(self, asked: object) -> None:
+    def _request(self, asked: object) -> None:
         """Request a step; after a rename the form stays at its element."""
         before, self._renames = self._renames, isinstance(asked, RenameElement | LeaveText)
         self.asked.emit(asked)
@@ -628,7 +628,7 @@ class FormCard(Card):
             if self.form is not before:  # a later form with the typed text is already shown
                 return
         if read_only != self.read_only:
-            self._drop(self._parts)
+            self._remove_parts(self._parts)
             self._parts = {}
         self.form, self.read_only = form, read_only
         self.head.show_form(form, read_only=read_only)
@@ -639,7 +639,7 @@ class FormCard(Card):
             self.area.verticalScrollBar().setValue(0)
             keyboard = self.window().focusWidget()
             if keyboard is not None and self.inside.isAncestorOf(keyboard):
-                self._reveal(keyboard)
+                self._scroll_to(keyboard)
         self.show_repairs(self._known)
         self.show_help()
 
@@ -654,7 +654,7 @@ class FormCard(Card):
         keyboard = self.window().focusWidget()
         inside_form = keyboard is not None and self.inside.isAncestorOf(keyboard)
         old, self._parts, self.rows, self.adds = self._parts, {}, [], {}
-        for key, make, row in self._wanted(form):
+        for key, make, row in self._form_parts(form):
             kept = old.pop(key, None)
             part = self._parts[key] = kept or make()
             if isinstance(part, RowWidget) and row is not None:
@@ -668,11 +668,11 @@ class FormCard(Card):
         gone = next((part for part in old.values() if inside_form and part.isAncestorOf(keyboard)), None)
         if gone is not None and keyboard is not None:
             keyboard.clearFocus()  # else Qt moves the keyboard focus
-        self._drop(old)
+        self._remove_parts(old)
         for place, part in enumerate(self._parts.values()):
             if self.sections.indexOf(part) != place:
                 self.sections.insertWidget(place, part)
-                name_bars(part)
+                name_scroll_bars(part)
                 part.show()  # at once: a layout shows it later, and a hidden widget takes no focus
         if gone is not None:
             self._refocus(form, before, gone)
@@ -685,15 +685,15 @@ class FormCard(Card):
             path = (*form.path, *path[len(before.path) :]) if path[: len(before.path)] == before.path else path
         elif before is not None:
             path = added_row(form, before)
-        if path is None or not self.focus(path):
+        if path is None or not self.focus_row(path):
             self.focus_first()
 
     @staticmethod
-    def _drop(parts: Mapping[object, QWidget]) -> None:
+    def _remove_parts(parts: Mapping[object, QWidget]) -> None:
         for part in parts.values():
             remove_widget(part)
 
-    def _wanted(self, form: Form) -> Iterator[tuple[object, Callable[[], QWidget], FormRow | None]]:
+    def _form_parts(self, form: Form) -> Iterator[tuple[object, Callable[[], QWidget], FormRow | None]]:
         """Yield the parts of a form from top to bottom: identity, factory and row."""
         for number, section in enumerate(form.sections):
             at = form.path[:1], section.title, section.path[len(form.path) :]
@@ -701,13 +701,13 @@ class FormCard(Card):
                 yield ("rule", at), Rule, None
             if section.title:
                 removable = section.path != form.path and not self.read_only
-                yield ("title", at), partial(self._heading, section, removable=removable), None
+                yield ("title", at), partial(self._section_heading, section, removable=removable), None
             if section.faults:
                 sentences = "\n".join(section.faults)
                 yield ("faults", at, sentences), partial(label, sentences, "label", "bad", wraps=True), None
             heads: tuple[tuple[str, str], ...] = ()
             for row in section.rows:
-                beside = () if stacked(row) or is_wide(row) else row.languages
+                beside = () if is_stacked(row) or is_wide(row) else row.languages
                 if len(beside) > 1 and beside != heads:
                     names = tuple(language for _, language in beside)
                     yield (
@@ -717,35 +717,35 @@ class FormCard(Card):
                     )
                 heads = beside
                 inner = row.path[len(form.path) :] if row.path[: len(form.path)] == form.path else row.path
-                yield (at, inner, structure_of(row)), partial(self._row, row), row
+                yield (at, inner, editor_structure(row)), partial(self._make_row, row), row
             if section.absent and not self.read_only:
                 added = tuple((row.path[len(form.path) :], row.label, row.help) for row in section.absent)
-                yield ("adds", at, added), partial(AddKeys, added, self._add), None
+                yield ("adds", at, added), partial(AddKeys, added, self._add_key), None
 
-    def _add(self, inner: Path) -> None:
-        self.asked.emit(AddKey(self._now(inner)))
+    def _add_key(self, inner: Path) -> None:
+        self.asked.emit(AddKey(self._path_in_form(inner)))
 
-    def _now(self, inner: Path) -> Path:
+    def _path_in_form(self, inner: Path) -> Path:
         """Return the path of a part of the shown element."""
         return inner if self.form is None else (*self.form.path, *inner)
 
-    def _heading(self, section: Section, *, removable: bool) -> QWidget:
+    def _section_heading(self, section: Section, *, removable: bool) -> QWidget:
         made, inner = QWidget(), () if self.form is None else section.path[len(self.form.path) :]
         heading = hbox(label(section.title, "strong"), STRETCH, margins=0, parent=made)
         if section.path != (() if self.form is None else self.form.path):
             away = IconButton("cross", f"Remove {section.title} from the file", size=FIELD_PX, role="plain")
-            away.clicked.connect(lambda: self.asked.emit(RemoveKey(self._now(inner))))
+            away.clicked.connect(lambda: self.asked.emit(RemoveKey(self._path_in_form(inner))))
             away.setEnabled(removable)
             heading.addWidget(away)
         return made
 
-    def _row(self, row: FormRow) -> RowWidget:
+    def _make_row(self, row: FormRow) -> RowWidget:
         made = RowWidget(row)
-        made.field.asked.connect(self._ask)
+        made.field.asked.connect(self._request)
         made.repair_asked.connect(self.repair_asked)
         if isinstance(made.field, EntryList) and self.read_only:
-            made.field.freeze()
-        made.field.came.connect(lambda: self._come(made))
+            made.field.make_read_only()
+        made.field.came.connect(lambda: self._show_focused_row(made))
         made.field.setEnabled(not self.read_only or row.kind in {"list", "tables", "references", "reference"})
         for part in (made.remove, made.keys):
             if part is not None:
@@ -758,7 +758,7 @@ class FormCard(Card):
             if isinstance(part, TypedLine | TypedText):
                 part.flush()
 
-    def _reveal(self, row: QWidget) -> None:
+    def _scroll_to(self, row: QWidget) -> None:
         """Scroll to a row, or to the focused part of a high row; new rows are laid out first."""
         QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)
         self.area.ensureWidgetVisible(row, 0, 40)
@@ -770,7 +770,7 @@ class FormCard(Card):
         around = [row for row in self.rows if path[: len(row.row.path)] == row.row.path]
         return max(around, key=lambda row: len(row.row.path), default=None)
 
-    def focus(self, path: Path) -> bool:
+    def focus_row(self, path: Path) -> bool:
         """Focus the row of a place and scroll to it; return whether there is one.
 
         A key that the file does not have has a button that adds it instead.
@@ -782,13 +782,13 @@ class FormCard(Card):
                 self.area.ensureWidgetVisible(button)
             return button is not None
         row.field.take_keyboard()
-        self._come(row)
-        self._reveal(row)
+        self._show_focused_row(row)
+        self._scroll_to(row)
         return True
 
     def focus_first(self) -> None:
         if self.rows:
-            self.focus(self.rows[0].row.path)
+            self.focus_row(self.rows[0].row.path)
 
     def focus_first_text(self, *, filled: bool) -> None:
         """Focus the first text and select it; an empty one comes first unless all are filled in.
@@ -806,14 +806,14 @@ class FormCard(Card):
         field.setFocus(Qt.FocusReason.OtherFocusReason)
         field.selectAll()
         row = next(row for row in self.rows if row.isAncestorOf(field))
-        self._come(row)
-        self._reveal(row)
+        self._show_focused_row(row)
+        self._scroll_to(row)
 
     def refuse(self, path: Path, sentence: str) -> None:
         """Show at the field of a place why it was not changed."""
         if (row := self._row_of(path)) is not None:
             row.refusal = sentence
-            row.say()
+            row.show_messages()
         else:
             self.own.setText(sentence)
             self.own.setVisible(True)
@@ -826,9 +826,9 @@ class FormCard(Card):
     def repairs_of(self, problem: ProblemRow) -> list[RepairButton]:
         return [button for row in self.rows for button in row.repairs if button.problem == problem]
 
-    def _come(self, row: RowWidget) -> None:
+    def _show_focused_row(self, row: RowWidget) -> None:
         self._focused = row if row in self.rows else self._focused  # its own step may have replaced the row
-        row.say()
+        row.show_messages()
         self.show_help()
 
     def show_help(self) -> None:

@@ -156,7 +156,7 @@ class AxisView(Extra, Themed, QWidget):
     def _x(self, level: float) -> float:
         assert self.axis is not None  # noqa: S101 - it is painted
         span = Range(self.axis.least, self.axis.most, logarithmic=self.axis.logarithmic)
-        return MARGIN + span.share(level) * (self.width() - 2 * MARGIN)
+        return MARGIN + span.fraction_of_range(level) * (self.width() - 2 * MARGIN)
 
     def sizeHint(self) -> QSize:
         return QSize(260, HEIGHT)
@@ -185,7 +185,7 @@ class AxisView(Extra, Themed, QWidget):
         for x in (low, high):
             painter.drawEllipse(QPointF(x, TRACK_Y), 7, 7)
         painter.setFont(font("small", tabular=True))
-        self._limits(painter, axis, track)
+        self._paint_limits(painter, axis, track)
         painter.setPen(QColor(t.text3))
         for level, label in axis.ticks:
             x = self._x(level)
@@ -197,7 +197,7 @@ class AxisView(Extra, Themed, QWidget):
         painter.drawText(below, Qt.AlignmentFlag.AlignLeft, axis.standard)
         painter.drawText(below, Qt.AlignmentFlag.AlignRight, axis.caption)
 
-    def _limits(self, painter: QPainter, axis: LevelAxis, track: QRectF) -> None:
+    def _paint_limits(self, painter: QPainter, axis: LevelAxis, track: QRectF) -> None:
         """Paint where the limits begin, the name of the higher one above that of the lower one."""
         limits = [(limit, limit_colour(self.theme, name)) for name, limit in axis.limits.items()]
         for row, (limit, ink) in enumerate(sorted(limits, key=lambda pair: pair[0].level)):
@@ -274,7 +274,7 @@ def trial_strip(study: Study, row: Row) -> TrialStrip | None:
             phases.append(Phase("pause", label_of("pause_s"), "", design.pause_s, of_design("pause_s")))
         ordinal = ORDINALS[number] if design.intervals > 1 else ""
         phases.append(
-            Phase("interval", "Interval", ordinal, task.expected_s, ("tasks", block.task, _length(task)), free)
+            Phase("interval", "Interval", ordinal, task.expected_s, ("tasks", block.task, _duration_key(task)), free)
         )
     method = method_of(protocol, block) if block.stimulus is not None else None
     if isinstance(method, Adjustment):
@@ -289,7 +289,7 @@ def trial_strip(study: Study, row: Row) -> TrialStrip | None:
     return TrialStrip(tuple(phases), sum(phase.duration_s for phase in phases))
 
 
-def _length(task: AnyTask) -> str:
+def _duration_key(task: AnyTask) -> str:
     """Return the key that holds the duration of a task."""
     return next((key for key in ("count", "duration_s", "cycles", "max_s") if getattr(task, key, None)), "kind")
 
@@ -325,7 +325,7 @@ class PhaseButton(Themed, QAbstractButton):
         painter.drawRoundedRect(picture, 6, 6)
         middle = picture.center()
         if phase.kind == "interval":
-            self._interval(painter, phase, picture)
+            self._paint_interval(painter, phase, picture)
         elif phase.kind == "question":
             draw_icon(painter, "list", QRectF(middle.x() - 9, middle.y() - 9, 18, 18), t.accent, 2.0)
         elif phase.kind == "feedback":
@@ -337,7 +337,7 @@ class PhaseButton(Themed, QAbstractButton):
             shown = metrics.elidedText(text, Qt.TextElideMode.ElideRight, self.width())
             painter.drawText(QPointF(0, picture.bottom() + below), shown)
 
-    def _interval(self, painter: QPainter, phase: Phase, picture: QRectF) -> None:
+    def _paint_interval(self, painter: QPainter, phase: Phase, picture: QRectF) -> None:
         t, way = self.theme, QPainterPath()
         middle = picture.center().y() - 5
         step = picture.width() / 4
@@ -379,30 +379,32 @@ class StripView(Extra, Themed, QWidget):
         self.setAccessibleDescription(strip.sentence)
         while len(self.phases) < len(strip.phases):
             made = PhaseButton(self)
-            made.clicked.connect(lambda _checked=False, made=made: self._open(made))
+            made.clicked.connect(lambda _checked=False, made=made: self._open_phase(made))
             self.phases.append(made)
         for at, button in enumerate(self.phases):
             button.setVisible(at < len(strip.phases))
             if at < len(strip.phases):
                 button.show_phase(strip.phases[at])
-        self._place()
+        self._place_phases()
         self.update()
 
-    def _open(self, pressed: PhaseButton) -> None:
+    def _open_phase(self, pressed: PhaseButton) -> None:
         if pressed.phase is not None and pressed.phase.field:
             self.opened.emit(pressed.phase.field)
 
-    def _place(self) -> None:
+    def _place_phases(self) -> None:
         if self.strip is None:
             return
         phases, x = self.strip.phases, 0.0
-        for button, width in zip(self.phases, _widths(phases, self.width() - GAP * (len(phases) - 1)), strict=False):
+        for button, width in zip(
+            self.phases, _phase_widths(phases, self.width() - GAP * (len(phases) - 1)), strict=False
+        ):
             button.setGeometry(round(x), 18, round(width), HEIGHT - 18)
             x += width + GAP
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._place()
+        self._place_phases()
 
     def sizeHint(self) -> QSize:
         return QSize(260, HEIGHT)
@@ -418,7 +420,7 @@ class StripView(Extra, Themed, QWidget):
         painter.drawText(head, Qt.AlignmentFlag.AlignRight, self.strip.duration)
 
 
-def _widths(phases: tuple[Phase, ...], whole: float) -> list[float]:
+def _phase_widths(phases: tuple[Phase, ...], whole: float) -> list[float]:
     """Return the widths of the phases: wide enough for their texts, and longer phases are wider."""
     metrics = QFontMetrics(font("small"))
     least_widths = [max(map(metrics.horizontalAdvance, (phase.name, phase.duration))) + GAP for phase in phases]
@@ -427,10 +429,10 @@ def _widths(phases: tuple[Phase, ...], whole: float) -> list[float]:
     return [share * least + rest * phase.duration_s / total for least, phase in zip(least_widths, phases, strict=True)]
 
 
-def _strip_below(field: Field) -> StripView:
+def _trial_strip_below(field: Field) -> StripView:
     made = StripView()
     made.opened.connect(lambda path: field.asked.emit(GoTo(path[:2], path)))
     return made
 
 
-TRIAL: Final = SpecialEditor((("Block", "design"),), adds=_strip_below, wide=True, facts=trial_strip)
+TRIAL: Final = SpecialEditor((("Block", "design"),), adds=_trial_strip_below, wide=True, facts=trial_strip)

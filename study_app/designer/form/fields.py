@@ -19,8 +19,8 @@ from PySide6.QtWidgets import QApplication, QBoxLayout, QLabel, QLineEdit, QPlai
 from study_app.designer.document.fields import Row
 from study_app.designer.document.steps import AddNamed, Do, LeaveText, RemoveKey, SetText, SetValue, SwitchKind
 from study_app.designer.document.study import Study
-from study_app.designer.form.rows import STATEMENT, FormRow, choice_words, is_right_to_left, new_words
-from study_app.designer.parts import FIELD_PX, Segments, cut_text, dense, small_button
+from study_app.designer.form.rows import STATEMENT, FormRow, choice_label, is_right_to_left, new_element_label
+from study_app.designer.parts import FIELD_PX, Segments, cut_text, make_dense, small_button
 from study_app.gui.kit.commands import keys_of, with_key
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
@@ -70,7 +70,7 @@ class _Typed(_Base):
         self._rest.setSingleShot(True)
         self._rest.timeout.connect(self._flush_after_click)
 
-    def note(self) -> None:
+    def note_typing(self) -> None:
         self.pending = True
         if self.rests and not self._rest.isActive():
             self._rest.start(HAND_ON_MS)
@@ -99,14 +99,14 @@ class _Typed(_Base):
     def words(self) -> str:
         raise NotImplementedError
 
-    def nothing_to_delete(self) -> bool:
+    def has_nothing_to_delete(self) -> bool:
         """Return whether all text is selected, or none with the caret at the end, and other languages are empty.
 
         No key removes a text that is not.
         """
-        return self.at_end() and not any(field.words() for field in self.beside if field is not self)
+        return self.is_at_end() and not any(field.words() for field in self.beside if field is not self)
 
-    def at_end(self) -> bool:
+    def is_at_end(self) -> bool:
         """Return whether the caret is at the end of a text of which nothing or all is selected."""
         raise NotImplementedError
 
@@ -147,7 +147,7 @@ class _Typed(_Base):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:
             self.restore()
-        elif removes_key(event) and self.nothing_to_delete():
+        elif removes_key(event) and self.has_nothing_to_delete():
             event.ignore()  # its row removes the key
         else:
             super().keyPressEvent(event)
@@ -178,8 +178,8 @@ class TypedLine(_Typed, QLineEdit):
     def __init__(self, name: str) -> None:
         super().__init__()
         self.begin()
-        dense(self, name)
-        self.textEdited.connect(lambda _text: self.note())
+        make_dense(self, name)
+        self.textEdited.connect(lambda _text: self.note_typing())
         self.returnPressed.connect(self.accept)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -193,7 +193,7 @@ class TypedLine(_Typed, QLineEdit):
     def words(self) -> str:
         return self.text()
 
-    def at_end(self) -> bool:
+    def is_at_end(self) -> bool:
         last = len(self.text().encode("utf-16-le", "surrogatepass")) // 2  # in UTF-16 units, as Qt counts
         return self.selectedText() == self.text() or (not self.hasSelectedText() and self.cursorPosition() == last)
 
@@ -227,12 +227,12 @@ class TypedText(_Typed, QPlainTextEdit):
         if self.words() != self._known:
             self._known = self.words()
             if not self._showing:
-                self.note()
+                self.note_typing()
 
     def words(self) -> str:
         return self.document().toRawText().replace("\u2029", "\n")
 
-    def at_end(self) -> bool:
+    def is_at_end(self) -> bool:
         cursor = self.textCursor()
         return cursor.position() == self.document().characterCount() - 1 and cursor.anchor() in {0, cursor.position()}
 
@@ -366,7 +366,7 @@ class Field(Themed, QWidget):
         default = self.row.default
         if default in (None, "", [], {}):
             return ""
-        return f"{written(default)} (default)"
+        return f"{typed_value(default)} (default)"
 
 
 class LineField(Field):
@@ -384,14 +384,14 @@ class LineField(Field):
         if row.kind in {"number", "whole number"}:
             permitted = cut_text(row.range, "small", "text2", right=True)
             self.box.addWidget(permitted, 1)
-        self.line.typed.connect(self._take)
+        self.line.typed.connect(self._take_text)
         self.line.came.connect(self.came)
         if row.kind in {"number", "whole number"}:
-            self.line.stepped.connect(self._step)
+            self.line.stepped.connect(self._count)
         self.setFocusProxy(self.line)
         self.show_value()
 
-    def _step(self, by: int) -> None:
+    def _count(self, by: int) -> None:
         """Count up or down in the last shown digit."""
         shown = self.line.text().strip() or str(self.row.default or 0)
         number = number_of(shown)
@@ -400,15 +400,15 @@ class LineField(Field):
         digits = len(shown.replace(",", ".").partition(".")[2]) if isinstance(number, float) else 0
         value = round(number + by * 10.0**-digits, digits)
         self.line.setText(f"{value:.{digits}f}")
-        self._take(self.line.text())
+        self._take_text(self.line.text())
 
     def show_value(self) -> None:
         value = self.row.value
         self.line.setPlaceholderText(self.placeholder())
         if not self.refusal:
-            self.line.show_text("" if value is None else written(value))
+            self.line.show_text("" if value is None else typed_value(value))
 
-    def _take(self, text: str) -> None:
+    def _take_text(self, text: str) -> None:
         row, before = self.row, self.refusal
         self.refusal = ""
         value: Any = text
@@ -418,12 +418,12 @@ class LineField(Field):
             value = number_of(text)
             if value is None or (row.kind == "whole number" and isinstance(value, float)):
                 why = unclear_number(text) if value is None else f"“{text}” is not a whole number"
-                self.refusal = f"{why}. {kept(row.value)}"
+                self.refusal = f"{why}. {kept_value_sentence(row.value)}"
         elif row.kind in {"numbers", "vector"}:
             try:
                 value = [number for _, number in typed_numbers(text)]
             except ValueError as unclear:
-                self.refusal = f"{unclear}. {kept(row.value)}"
+                self.refusal = f"{unclear}. {kept_value_sentence(row.value)}"
         self.line.show_refused(bool(self.refusal))
         if self.refusal or before:
             self.came.emit()  # the form shows or removes its faults
@@ -461,14 +461,14 @@ class ChoiceField(Field):
         few = 1 < len(labels) <= MOST_SEGMENTS and sum(len(text) + 3 for text in labels) <= SEGMENT_LETTERS
         few = few and row.kind != "reference"
         self.segments = Segments(row.label) if few or row.kind == "kind" else None
-        self.list = None if few else dense(Choice(), row.label)
+        self.list = None if few else make_dense(Choice(), row.label)
         if self.segments is not None:
-            self.segments.chosen.connect(self._choose)
+            self.segments.chosen.connect(self._choose_value)
             self.box.addWidget(self.segments)
         if self.list is not None:
             self.list.setMinimumContentsLength(8 if row.facts else 12)
             self.list.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
-            self.list.activated.connect(self._pick)
+            self.list.activated.connect(self._choose_at)
             self.box.addWidget(self.list, 1)
         if self.segments is not None:
             self.box.addStretch()
@@ -494,7 +494,7 @@ class ChoiceField(Field):
             values = [(name, f"{name} ({note})" if note else name) for name, note in row.notes]
         if shown is not None and shown not in [value for value, _ in values]:
             values.append((shown, str(shown)))
-        values += [(section, new_words(section)) for section in row.sections]
+        values += [(section, new_element_label(section)) for section in row.sections]
         if [text for _, text in values] != [self.list.itemText(at) for at in range(self.list.count())]:
             self.list.clear()
             self.list.addItems([text for _, text in values])
@@ -510,7 +510,7 @@ class ChoiceField(Field):
         """Return the label of a choice; a statement has no kind in the file."""
         if choice.value is None and self.row.kind == "kind" and "items" in self.row.path:
             return STATEMENT.capitalize()
-        return choice_words(choice, default)
+        return choice_label(choice, default)
 
     def _make_room(self) -> None:
         if self.segments is not None and self.list is not None:
@@ -531,17 +531,17 @@ class ChoiceField(Field):
         super().resizeEvent(event)
         self._make_room()
 
-    def _pick(self, at: int) -> None:
+    def _choose_at(self, at: int) -> None:
         """Choose a value; the last entries add an element and refer to it."""
         sections = self.row.sections
         new = at - (len(self._values) - len(sections))
         if new < 0:
-            self._choose(self._values[at])
+            self._choose_value(self._values[at])
             return
         self.show_value()
         self.asked.emit(AddNamed(self.row.path, sections[new]))
 
-    def _choose(self, value: Any) -> None:
+    def _choose_value(self, value: Any) -> None:
         row = self.row
         if row.kind == "kind" and value != row.value:
             self.asked.emit(SwitchKind(row.path[:-1], value))
@@ -559,11 +559,11 @@ class ChecksField(Field):
         self.box.setSpacing(0)
         self.checks: dict[str, Check] = {}
         for choice in row.choices:
-            made = Check(choice_words(choice, None))
+            made = Check(choice_label(choice, None))
             made.setFont(font("label", weight=400))
             made.setAccessibleName(f"{row.label}, {made.text()}")
             made.setToolTip(plain_tip(choice.sentence))
-            made.clicked.connect(self._take)
+            made.clicked.connect(self._take_checked)
             self.checks[str(choice.value)] = made
             self.box.addWidget(made)
         if self.checks:
@@ -576,7 +576,7 @@ class ChecksField(Field):
         for value, check in self.checks.items():
             check.setChecked(value in chosen)
 
-    def _take(self) -> None:
+    def _take_checked(self) -> None:
         row = self.row
         chosen = [value for value in row.value or () if value in self.checks and self.checks[value].isChecked()]
         chosen += [value for value, check in self.checks.items() if check.isChecked() and value not in chosen]
@@ -593,7 +593,7 @@ class UnknownField(Field):
         self.show_value()
 
     def show_value(self) -> None:
-        self.value.show_text(written(self.row.value))
+        self.value.show_text(typed_value(self.row.value))
 
 
 def add_button(name: str, accessible_name: str = "") -> ActionButton:
@@ -603,19 +603,19 @@ def add_button(name: str, accessible_name: str = "") -> ActionButton:
     return made
 
 
-def kept(value: Any) -> str:
+def kept_value_sentence(value: Any) -> str:
     """Return the sentence about the value that a study keeps while the typed one is refused."""
     if value is None:
         return "The study does not use it; Esc clears the field."
-    return f"The study keeps {written(value)}; Esc restores it."
+    return f"The study keeps {typed_value(value)}; Esc restores it."
 
 
-def written(value: Any) -> str:
+def typed_value(value: Any) -> str:
     """Return a value as it is typed: numbers of a list separated by spaces."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, tuple | list):
-        return "  ".join(written(part) for part in value)
+        return "  ".join(typed_value(part) for part in value)
     return str(value)
 
 
@@ -624,7 +624,7 @@ class LanguagesField(Field):
 
     def __init__(self, row: FormRow, typed_in: type[TypedLine | TypedText] = TypedLine) -> None:
         super().__init__(row)
-        several, down = row.kind == "paragraphs", stacked(row)
+        several, down = row.kind == "paragraphs", is_stacked(row)
         if down:
             self.box.setDirection(QBoxLayout.Direction.TopToBottom)
         self.lines: dict[str, TypedLine | TypedText] = {}
@@ -658,7 +658,7 @@ class LanguagesField(Field):
         return made
 
     @property
-    def some_missing(self) -> bool:
+    def has_missing_texts(self) -> bool:
         written = [bool(line.words().strip()) for line in self.lines.values()]
         return any(written) and not all(written)
 
@@ -679,7 +679,7 @@ class LanguagesField(Field):
         first.setFocus(Qt.FocusReason.OtherFocusReason)
 
 
-def stacked(row: FormRow) -> bool:
+def is_stacked(row: FormRow) -> bool:
     """Return whether the texts of several languages are stacked, each with its language."""
     return len(row.languages) > 2 or row.kind == "paragraphs"
 

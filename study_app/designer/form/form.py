@@ -8,13 +8,13 @@ from study_app.designer.document.additions import number_rows
 from study_app.designer.document.elements import (
     FIRST,
     SEQUENCE,
-    brief,
     kind_of,
     place_words,
     position_of,
     rows_of_blocks,
+    short_note,
     title_of,
-    used_by,
+    usage_text,
 )
 from study_app.designer.document.fields import Choice, Row, label_of, named_at, refused_at, row_at, rows, sections_of
 from study_app.designer.document.steps import AddToSession, Request, SetValue, index_of
@@ -33,7 +33,7 @@ from study_app.designer.form.rows import (
 from study_app.designer.measures.study_facts import copied_texts, texts_by_language
 from study_app.designer.outline import icon_of
 from study_app.number_text import capitalised
-from study_app.protocol.formats import is_second
+from study_app.protocol.formats import is_format_2
 from study_app.protocol.groups import ASSIGNMENT, sequences_in
 from study_app.protocol.source.document import Path, Places, names, places_of, value_at
 from study_app.protocol.warnings.untranslated import untranslated_at
@@ -48,9 +48,9 @@ WITH_LIQUIDS = ("liquids", "conditions", "blocks")
 """Sections whose elements the lab opens."""
 
 
-def form(study: Study, path: Path) -> Form:
+def form_of(study: Study, path: Path) -> Form:
     """Return the form of the element at ``path``."""
-    if study.unreadable:
+    if study.is_unreadable:
         lines = [f"Line {problem.line}: " if problem.line else "" for problem in study.problems]
         said = [_sentence(problem.message, problem.hint) for problem in study.problems]
         why = tuple(map("".join, zip(lines, said, strict=True)))
@@ -97,12 +97,12 @@ def form(study: Study, path: Path) -> Form:
         around=tuple((path[:length], title_of(document, path[:length])) for length in (1, 2, 4) if length <= len(path)),
         feel=f"Feel {title}" if len(path) == 2 and path[0] in WITH_LIQUIDS else "",
         series=bool(number_rows(document, path)),
-        used=used_by(document, path),
-        asks=tuple(asking(document, path)),
+        used=usage_text(document, path),
+        asks=tuple(session_requests(document, path)),
     )
 
 
-def asking(document: Mapping[str, Any], path: Path) -> Iterator[tuple[str, Request]]:
+def session_requests(document: Mapping[str, Any], path: Path) -> Iterator[tuple[str, Request]]:
     """Yield the ways to add a questionnaire to the session, each with its request."""
     if len(path) != 2 or path[0] != "questionnaires":
         return
@@ -110,11 +110,11 @@ def asking(document: Mapping[str, Any], path: Path) -> Iterator[tuple[str, Reque
     blocks = [step for step in steps if step[1] in names(document, "blocks")]
     main = [step for step in blocks if value_at(document, ("blocks", step[1], "phase")) in (None, "main")]
     asked_after = {place for place, step in steps if step == path[1]}
-    asked_after |= set(_after(asked_after))  # it cannot be asked twice in a row
+    asked_after |= set(_places_after(asked_after))  # it cannot be asked twice in a row
 
     def as_step(sentence: str, places: Iterable[Path]) -> Iterator[tuple[str, Request]]:
         new = tuple(place for place in places if place not in asked_after)
-        if new and is_second(document):
+        if new and is_format_2(document):
             yield sentence, AddToSession(path, new)
 
     firsts = {place[:-1]: place for place, _ in reversed(blocks)}
@@ -125,16 +125,20 @@ def asking(document: Mapping[str, Any], path: Path) -> Iterator[tuple[str, Reque
             instead = "" if other is None else f", instead of {title_of(document, (path[0], str(other)))}"
             asked = SetValue(("blocks", name, "questionnaire"), path[1])
             yield f"After each trial of {title}\tabout that trial{instead}", asked
-    ends = {name: _after(place for place, step in main if step == name) for name in dict.fromkeys(s for _, s in main)}
+    ends = {
+        name: _places_after(place for place, step in main if step == name) for name in dict.fromkeys(s for _, s in main)
+    }
     for name, after in ends.items():
         yield from as_step(f"After {title_of(document, ('blocks', name))}\tonce, about the block", after)
     if len(ends) > 1:
-        yield from as_step(f"After each block\t{len(ends)} times, compared", _after(place for place, _ in main))
-    lasts = {place[:-1]: place if step in names(document, "pages") else _after([place])[0] for place, step in steps}
+        yield from as_step(f"After each block\t{len(ends)} times, compared", _places_after(place for place, _ in main))
+    lasts = {
+        place[:-1]: place if step in names(document, "pages") else _places_after([place])[0] for place, step in steps
+    }
     yield from as_step("At the end\tonce, about the session", lasts.values())
 
 
-def _after(places: Iterable[Path]) -> tuple[Path, ...]:
+def _places_after(places: Iterable[Path]) -> tuple[Path, ...]:
     return tuple((*place[:-1], index_of(place) + 1) for place in places)
 
 
@@ -165,7 +169,7 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
                 for key in row.value
                 if (inner := row_at(study.document, (*row.path, key))) is not None
             ]
-        elif row.instead and not _given(other[row.instead]) and (_given(row) or faulty):
+        elif row.instead and not _is_given(other[row.instead]) and (_is_given(row) or faulty):
             both = tuple(
                 (str(key), alternative.label)
                 for key, alternative in other.items()
@@ -173,7 +177,7 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
             )
             shown.append(replace(_form_row(study, row, places), keys=both))
         elif (row.value is None and not faulty and row.path[-1] in refused) or (
-            row.instead and _given(other[row.instead]) and not _given(row)
+            row.instead and _is_given(other[row.instead]) and not _is_given(row)
         ):
             continue
         elif (
@@ -207,7 +211,7 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
         yield from _sections(study, table, places, depth + 1)
 
 
-def _given(row: Row) -> bool:
+def _is_given(row: Row) -> bool:
     return row.value not in (None, ())
 
 
@@ -219,7 +223,7 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
     codes, is_text = languages_of(document), row.kind in {"localised", "paragraphs"}
     number = None
     if row.kind == "either":
-        number = next((index for index, alternative in enumerate(row.either) if _fits(alternative, row.value)), 0)
+        number = next((index for index, alternative in enumerate(row.either) if _fits_kind(alternative, row.value)), 0)
     return FormRow(
         **values_of(row),
         place=place_words(path, places.line(path)),
@@ -237,7 +241,7 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
 def _notes(document: Mapping[str, Any], row: Row) -> Iterator[tuple[str, str]]:
     if row.kind == "reference":
         for choice in row.choices:
-            facts = (brief(document, (section, str(choice.value))) for section in row.sections)
+            facts = (short_note(document, (section, str(choice.value))) for section in row.sections)
             yield str(choice.value), next(filter(None, facts), "")
 
 
@@ -264,7 +268,7 @@ def _entries(study: Study, row: Row) -> Iterator[Entry]:
                 yield Entry(path, title_of(study.document, path), str(note), faults, path)
 
 
-def _fits(row: Row, value: Any) -> bool:
+def _fits_kind(row: Row, value: Any) -> bool:
     """Return whether a value has the kind that a row edits."""
     if row.kind in {"number", "whole number"}:
         return isinstance(value, int | float) and not isinstance(value, bool)

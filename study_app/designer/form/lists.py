@@ -23,13 +23,13 @@ from study_app.designer.document.steps import (
     SetValue,
 )
 from study_app.designer.document.study import Study
-from study_app.designer.form.fields import Field, SpecialEditor, TypedLine, add_button, kept, written
-from study_app.designer.form.rows import FormRow, new_words
+from study_app.designer.form.fields import Field, SpecialEditor, TypedLine, add_button, kept_value_sentence, typed_value
+from study_app.designer.form.rows import FormRow, new_element_label
 from study_app.designer.measures.cards import UNKNOWN
 from study_app.designer.measures.study_facts import valid_part
-from study_app.designer.parts import FIELD_PX, cut_text, dense
+from study_app.designer.parts import FIELD_PX, cut_text, make_dense
 from study_app.gui.kit.commands import with_key
-from study_app.gui.theme.themed import name_bars
+from study_app.gui.theme.themed import name_scroll_bars
 from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import Elided, figures
@@ -50,7 +50,7 @@ class ConditionLine:
     clipped: bool = False  # whether a limit clips the force
 
 
-def _line(study: Study, name: Any) -> ConditionLine:
+def _condition_line(study: Study, name: Any) -> ConditionLine:
     document = study.document
     conditions, liquids = document.get("conditions", {}), document.get("liquids", {})
     table = conditions.get(name) if isinstance(conditions, Mapping) and isinstance(name, str) else None
@@ -92,16 +92,16 @@ class Rows(QListWidget):
         self.setFrameShape(QFrame.Shape.NoFrame)
 
     def event(self, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and self._own(event):
+        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and self._action_for(event):
             event.accept()
             return True
         return super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        own = self._own(event)
+        own = self._action_for(event)
         own() if own else super().keyPressEvent(event)
 
-    def _own(self, event: QKeyEvent) -> Callable[[], object] | None:
+    def _action_for(self, event: QKeyEvent) -> Callable[[], object] | None:
         modifiers = event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
         return self.keys.get(QKeySequence(event.key() | modifiers.value).toString())
 
@@ -157,27 +157,27 @@ class EntryList(Field):
         self.list = Rows()
         self.list.setAccessibleName(row.label)
         self.list.dropped.connect(lambda to: self.move_entry(self.chosen, to))
-        self.list.itemDoubleClicked.connect(lambda item: self.open(self.list.row(item)))
+        self.list.itemDoubleClicked.connect(lambda item: self.open_entry(self.list.row(item)))
         self.list.keys = {"Return": self._open_current, "Enter": self._open_current}
         if self.ordered:
             self.list.setDragDropMode(QAbstractItemView.DragDropMode.InternalMove)
             self.list.keys |= {"Alt+Up": lambda: self.move_entry(self.chosen, self.chosen - 1),
                                "Alt+Down": lambda: self.move_entry(self.chosen, self.chosen + 2),
-                               "Del": lambda: self.remove(self.chosen), "Ctrl+D": self._duplicate}  # fmt: skip
+                               "Del": lambda: self.remove_entry(self.chosen), "Ctrl+D": self._duplicate}  # fmt: skip
             self.list.setAccessibleDescription("Alt+Up and Alt+Down move entries, Delete removes them")
         else:
-            self.list.itemClicked.connect(lambda item: self.open(self.list.row(item)))
+            self.list.itemClicked.connect(lambda item: self.open_entry(self.list.row(item)))
         self.box.addWidget(self.list)
 
-    def filled_with(self) -> object:
+    def row_content(self) -> object:
         """Return the state of the entries that, when it changes, requires new rows."""
         return self.row.entries
 
-    def fill(self) -> None:
+    def fill_rows(self) -> None:
         raise NotImplementedError
 
     def show_value(self) -> None:
-        if self._filled == (filled := self.filled_with()):
+        if self._filled == (filled := self.row_content()):
             return
         self._filled, held = filled, self.window().focusWidget()
         inside = held is not None and held is not self.list and self.list.isAncestorOf(held)
@@ -186,11 +186,11 @@ class EntryList(Field):
             held.clearFocus()
         self.rows = []
         self.list.clear()
-        self.fill()
+        self.fill_rows()
         self.list.setFixedHeight(len(self.rows) * (FIELD_PX + 6) + 4)
         if 0 <= chosen < len(self.rows):
             self.list.setCurrentRow(chosen)
-        name_bars(self.list)
+        name_scroll_bars(self.list)
         if inside:
             self.take_keyboard()
 
@@ -202,7 +202,7 @@ class EntryList(Field):
         self.rows.append(made)
         return made
 
-    def freeze(self) -> None:
+    def make_read_only(self) -> None:
         """Make the list read-only; entries can still be opened."""
         self.list.setDragEnabled(False)
         self.list.setAccessibleDescription("")
@@ -216,17 +216,17 @@ class EntryList(Field):
     def take_keyboard(self) -> None:
         (self if self.chosen < 0 else self.list).setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def place(self, at: int) -> tuple[str | int, ...]:
+    def entry_path(self, at: int) -> tuple[str | int, ...]:
         return self.row.entries[at].path if self.row.entries else (*self.row.path, at)
 
-    def open(self, at: int) -> None:
+    def open_entry(self, at: int) -> None:
         if at < len(self.row.entries) and (target := self.row.entries[at].target):
             self.asked.emit(Do("select", (target,)))
 
     def _open_current(self) -> None:
-        self.open(self.list.currentRow())
+        self.open_entry(self.list.currentRow())
 
-    def _change(self, asked: Request, after: int) -> None:
+    def _request_step(self, asked: Request, after: int) -> None:
         """Request a step, after which the entry at ``after`` is selected."""
         self._after = after
         self.asked.emit(asked)
@@ -236,15 +236,15 @@ class EntryList(Field):
         """Request to move an entry before the one at ``to``."""
         after = to - (at < to)
         if at >= 0 and 0 <= to <= len(self.rows) and after != at:
-            self._change(MoveTo(self.place(at), to, stays=True), after)
+            self._request_step(MoveTo(self.entry_path(at), to, stays=True), after)
 
-    def remove(self, at: int) -> None:
+    def remove_entry(self, at: int) -> None:
         if at >= 0:
-            self._change(RemoveKey(self.place(at)), min(at, len(self.rows) - 2))
+            self._request_step(RemoveKey(self.entry_path(at)), min(at, len(self.rows) - 2))
 
     def _duplicate(self) -> None:
         if self.chosen >= 0 and self.row.kind != "references":  # listing a name twice is a fault
-            self._change(DuplicateElement(self.place(self.chosen), stays=True), self.chosen + 1)
+            self._request_step(DuplicateElement(self.entry_path(self.chosen), stays=True), self.chosen + 1)
 
 
 class NamesList(Choice):
@@ -254,9 +254,9 @@ class NamesList(Choice):
 
     def __init__(self, name: str, placeholder: str) -> None:
         super().__init__()
-        dense(self, name)
+        make_dense(self, name)
         self.setPlaceholderText(placeholder)
-        self.activated.connect(self._take)
+        self.activated.connect(self._choose_at)
 
     def show_items(self, items: Iterable[tuple[str, Any]]) -> None:
         self.clear()
@@ -265,7 +265,7 @@ class NamesList(Choice):
         self.setCurrentIndex(-1)
         self.setEnabled(bool(self.count()))
 
-    def _take(self, at: int) -> None:
+    def _choose_at(self, at: int) -> None:
         self.setCurrentIndex(-1)
         self.chosen.emit(self.itemData(at))
 
@@ -293,10 +293,10 @@ class EntriesField(EntryList):
             row = self.row
             items: list[tuple[str, Request]]
             items = [(str(choice.value), AddEntry(row.path, str(choice.value))) for choice in row.choices]
-            items += [(new_words(section), AddNamed(row.path, section)) for section in row.sections]
+            items += [(new_element_label(section), AddNamed(row.path, section)) for section in row.sections]
             self.names.show_items(items)
 
-    def fill(self) -> None:
+    def fill_rows(self) -> None:
         label, count = self.row.label, len(self.row.entries)
         for at, entry in enumerate(self.row.entries):
             title = cut_text(entry.title, "label", "bad" if entry.faults else "text")
@@ -307,10 +307,12 @@ class EntriesField(EntryList):
                     move = partial(self.move_entry, at, at - 1 if by < 0 else at + 2)
                     shown.add_button(icon, f"Move {entry.title} {word}", move, word).setEnabled(0 <= at + by < count)
             action = "open entry" if self.ordered else ""
-            opens = shown.add_button("arrow_right", f"Open {entry.title}", partial(self.open, at), action)
+            opens = shown.add_button("arrow_right", f"Open {entry.title}", partial(self.open_entry, at), action)
             opens.setEnabled(bool(entry.target))
             if self.ordered:
-                shown.add_button("cross", f"Remove {entry.title} from {label}", partial(self.remove, at), "delete")
+                shown.add_button(
+                    "cross", f"Remove {entry.title} from {label}", partial(self.remove_entry, at), "delete"
+                )
 
     def add_facts(self, shown: EntryRow, at: int) -> None:
         entry = self.row.entries[at]
@@ -324,7 +326,7 @@ class ConditionsField(EntriesField):
 
     caption = CAPTION
 
-    def filled_with(self) -> object:
+    def row_content(self) -> object:
         return self.row.entries, self.row.facts
 
     def add_facts(self, shown: EntryRow, at: int) -> None:
@@ -350,18 +352,18 @@ class LinesField(EntryList):
         self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)
         self.show_value()
 
-    def filled_with(self) -> object:
+    def row_content(self) -> object:
         return len(self.row.value or ())
 
-    def fill(self) -> None:
+    def fill_rows(self) -> None:
         self.lines, row = [], self.row
         count = len(row.value or ())
         for at in range(count):
             line = TypedLine(f"{row.label} {at + 1}")
-            line.typed.connect(partial(self._take, at))
+            line.typed.connect(partial(self._take_line, at))
             line.came.connect(self.came)
             shown = self.add_row(f"{row.label} {at + 1} of {count}", (line, 1))
-            shown.add_button("cross", f"Remove {line.accessibleName()}", partial(self.remove, at), "delete")
+            shown.add_button("cross", f"Remove {line.accessibleName()}", partial(self.remove_entry, at), "delete")
             self.lines.append(line)
         self.setFocusProxy(self.lines[0] if self.lines else self.add)
 
@@ -369,17 +371,17 @@ class LinesField(EntryList):
         super().show_value()
         for line, value in zip(self.lines, self.row.value or (), strict=False):
             if not (self.refusal and line.property("state")):
-                line.show_text(written(value))
+                line.show_text(typed_value(value))
 
-    def _value(self, text: str) -> Any:
+    def _value_of(self, text: str) -> Any:
         return text if self.row.kind == "texts" else [number for _, number in typed_numbers(text)]
 
-    def _take(self, at: int, text: str) -> None:
+    def _take_line(self, at: int, text: str) -> None:
         self.refusal, value = "", None
         try:
-            value = self._value(text)
+            value = self._value_of(text)
         except ValueError as unclear:
-            self.refusal = f"{unclear}. {kept(self.row.value[at])}"
+            self.refusal = f"{unclear}. {kept_value_sentence(self.row.value[at])}"
         self.lines[at].show_refused(bool(self.refusal))
         self.came.emit()
         if not self.refusal:
@@ -391,7 +393,7 @@ class LanguageListField(EntryList):
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
-        self.freeze()
+        self.make_read_only()
         self.copies: dict[str, ActionButton] = {}
         self.names = NamesList("Add a language to every text", "Language …")
         self.names.chosen.connect(lambda code: self.asked.emit(ChangeLanguage("add", code)))
@@ -399,7 +401,7 @@ class LanguageListField(EntryList):
         self.setFocusProxy(self.names)
         self.show_value()
 
-    def fill(self) -> None:
+    def fill_rows(self) -> None:
         row, self.copies = self.row, {}
         codes = [str(code) for code in row.value] if isinstance(row.value, tuple) else []
         first = row.entries[0].title if row.entries else ""
@@ -422,5 +424,7 @@ class LanguageListField(EntryList):
 
 CONDITIONS: Final = SpecialEditor(
     (("Block", "conditions"),), ConditionsField, wide=True,
-    facts=lambda study, row: tuple(_line(study, name) for name in (row.value if isinstance(row.value, tuple) else ())),
+    facts=lambda study, row: tuple(
+        _condition_line(study, name) for name in (row.value if isinstance(row.value, tuple) else ())
+    ),
 )  # fmt: skip

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Final
 
-from study_app.designer.document.fields import Choice, Row, label_of, singular
+from study_app.designer.document.fields import Choice, Row, element_noun, label_of
 from study_app.designer.document.steps import Request
 from study_app.designer.document.study import Study
 from study_app.protocol.source.document import Path, value_at
@@ -44,12 +44,14 @@ def question_lines(study: Study, path: Path) -> QuestionLines:
     items = listed if isinstance(listed, tuple) else ()
     numbers = {str(item.get("id")): at for at, item in enumerate(items, start=1) if isinstance(item, Mapping)}
     lines = tuple(
-        _line(study, (*path, at), item, codes, numbers) for at, item in enumerate(items) if isinstance(item, Mapping)
+        _question_line(study, (*path, at), item, codes, numbers)
+        for at, item in enumerate(items)
+        if isinstance(item, Mapping)
     )
     return QuestionLines(tuple(language_name(code) for code in codes), lines)
 
 
-def _line(
+def _question_line(
     study: Study, path: Path, item: Mapping[str, Any], codes: Sequence[str], numbers: Mapping[str, int]
 ) -> QuestionLine:
     kind, text = str(item.get("kind", STATEMENT)), item.get("text", "")
@@ -63,12 +65,12 @@ def _line(
         kind=kind,
         icon=ICONS.get(kind, "scale"),
         texts=shown,
-        note=_note(item, numbers),
+        note=_show_if_note(item, numbers),
         faults=faults,
     )
 
 
-def _note(item: Mapping[str, Any], numbers: Mapping[str, int]) -> str:
+def _show_if_note(item: Mapping[str, Any], numbers: Mapping[str, int]) -> str:
     rule = item.get("show_if")
     if not isinstance(rule, Mapping):
         return ""
@@ -107,7 +109,7 @@ class FormRow(Row):
     languages: tuple[tuple[str, str], ...] = ()  # code and name of each language of the study, for texts
     entries: tuple[Entry, ...] = ()  # what a list holds, or what references name
     target: Path | None = None  # what a reference names
-    notes: tuple[tuple[str, str], ...] = ()  # elements that a reference can name, each with its `brief` fact
+    notes: tuple[tuple[str, str], ...] = ()  # elements that a reference can name, each with its `short_note` fact
     number: int | None = None  # of alternatives ("either"), which one the value is
     # keys of which exactly one is given, with their labels: this row's and the other one
     keys: tuple[tuple[str, str], ...] = ()
@@ -115,7 +117,7 @@ class FormRow(Row):
     facts: Any = None  # the facts shown by its special editor; None without one
 
     @property
-    def removable(self) -> bool:
+    def is_removable(self) -> bool:
         path = self.path
         given = self.value is not None and isinstance(path[-1], str)
         section = len(path) == 1 or path == STUDY_LANGUAGES
@@ -171,7 +173,7 @@ class Form:
     around: tuple[tuple[Path, str], ...] = ()
     feel: str = ""  # the label of the button that opens the lab with its liquids, "" if it has none
     series: bool = False  # whether a series of it is possible: elements that differ in one number
-    used: str = ""  # how many other elements use it (`used_by`); "" if that is not shown
+    used: str = ""  # how many other elements use it (`usage_text`); "" if that is not shown
     asks: tuple[tuple[str, Request], ...] = ()  # places where a questionnaire can be added
     # whether nothing can be edited but the text of the file, in which the study cannot be read
     unreadable: bool = False
@@ -192,12 +194,12 @@ def is_right_to_left(code: str) -> bool:
     return code in LANGUAGES and LANGUAGES[code].right_to_left
 
 
-def new_words(section: str) -> str:
+def new_element_label(section: str) -> str:
     """Return the label of the choice that adds an element to a section and refers to it."""
-    return f"New {label_of(singular(section)).lower()} …"
+    return f"New {label_of(element_noun(section)).lower()} …"
 
 
-def choice_words(choice: Choice, default: object) -> str:
+def choice_label(choice: Choice, default: object) -> str:
     """Return the label of a choice; the default is marked."""
     if choice.value is None:
         return "Not set"

@@ -23,13 +23,13 @@ from study_app.designer.form.fields import (
     TypedLine,
     TypedSentence,
     add_button,
-    kept,
-    written,
+    kept_value_sentence,
+    typed_value,
 )
 from study_app.designer.form.rows import FormRow, QuestionLine, is_right_to_left, question_lines
 from study_app.designer.measures.cards import Verdict
 from study_app.designer.measures.study_facts import valid_part
-from study_app.designer.parts import FIELD_PX, dense, small_button
+from study_app.designer.parts import FIELD_PX, make_dense, small_button
 from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.theme import TypeRole, font
 from study_app.gui.theme.themed import Themed, remove_widget
@@ -42,7 +42,7 @@ from study_app.number_text import capitalised, number_of, unclear_number
 from study_app.protocol import questions
 from study_app.protocol.model import OF_LEVELS
 from study_app.protocol.orders.balance import block_orders_by_group
-from study_app.protocol.sequences import borders_even, row_count
+from study_app.protocol.sequences import has_even_borders, row_count
 from study_app.protocol.source.document import entries, names, value_at
 from study_app.protocol.trials import designs, tasks
 from study_app.protocol.wording.languages import language_name, languages_of
@@ -69,7 +69,7 @@ def order_balance(study: Study, row: Row) -> tuple[Verdict, str] | None:
     square, repetitions = SQUARES[order], block.get("repetitions", 1)
     rows = row_count(square, codes)
     numbers = ", ".join(str(rows * number) for number in range(1, ROUNDS + 1))
-    carries = square == "williams" and isinstance(repetitions, int) and borders_even(codes, max(1, repetitions))
+    carries = square == "williams" and isinstance(repetitions, int) and has_even_borders(codes, max(1, repetitions))
     at = f"at every multiple of {rows} participants{' in a group' if study.document.get('groups') else ''}."
     if carries or codes == 2:
         return ("ok", "check", f"balanced at {numbers} …"), f"Positions and carry-over are balanced {at}"
@@ -115,14 +115,14 @@ class QuestionRow(Themed, QWidget):
         across = hbox(number, Icon(line.icon, "text2", ICON_PX), spacing=8, margins=(0, 3, 0, 3), parent=self)
         self.write: ActionButton | None = None
         for at, text in enumerate(line.texts):
-            across.addWidget(self._text(text, line.note if at == 0 else ""), 1)
+            across.addWidget(self._text_part(text, line.note if at == 0 else ""), 1)
         self.open = IconButton("chevron", f"Open question {line.number}, {title}", size=OPEN_PX, role="plain")
         self.open.clicked.connect(self.opened)
         across.addWidget(self.open)
 
-    def _text(self, text: str, note: str) -> QWidget:
+    def _text_part(self, text: str, note: str) -> QWidget:
         if not text:
-            return self._missing()
+            return self._missing_part()
         if not note:
             return _column_text(text, "label")
         both = QWidget()
@@ -130,7 +130,7 @@ class QuestionRow(Themed, QWidget):
         both.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Minimum)
         return both
 
-    def _missing(self) -> QWidget:
+    def _missing_part(self) -> QWidget:
         made = QWidget()
         made.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Minimum)
         self.write = small_button("", "Write", height=32)
@@ -257,7 +257,7 @@ class PointsField(Field):
                 line.setPlaceholderText(f"Missing in {language}")
                 if is_right_to_left(code):
                     line.setLayoutDirection(Qt.LayoutDirection.RightToLeft)
-                line.typed.connect(partial(self.take, at, column))
+                line.typed.connect(partial(self.take_text, at, column))
                 line.came.connect(self.came)
                 cells.addWidget(line, at + 1, column + 1)
             away = IconButton("cross", f"Remove Point {at + 1}", size=FIELD_PX, role="plain")
@@ -275,24 +275,24 @@ class PointsField(Field):
             for line, text in zip(lines, texts, strict=True):
                 line.show_text(text)
 
-    def _written(self, code: str) -> int:
+    def _count_written(self, code: str) -> int:
         return len((self.row.value or {}).get(code, ()))
 
-    def take(self, at: int, column: int, text: str) -> None:
+    def take_text(self, at: int, column: int, text: str) -> None:
         code = self.row.facts.languages[column][0]
-        path, count = (*self.row.path, code), self._written(code)
+        path, count = (*self.row.path, code), self._count_written(code)
         missing = [*((self.row.value or {}).get(code, ())), *[""] * (at - count), text]
         changed = SetValue((*path, at), text, typing=True) if at < count else SetValue(path, missing, typing=True)
         self.asked.emit(changed)
 
     def add_entry(self) -> None:
         path, label = self.row.path, f"Point {len(self.lines) + 1}"
-        added = (AddEntry((*path, code), label) for code, _ in self.row.facts.languages if self._written(code))
+        added = (AddEntry((*path, code), label) for code, _ in self.row.facts.languages if self._count_written(code))
         self.asked.emit(Several("Add point", tuple(added)))
 
     def remove(self, at: int) -> None:
         path = self.row.path
-        gone = (RemoveKey((*path, code, at)) for code, _ in self.row.facts.languages if at < self._written(code))
+        gone = (RemoveKey((*path, code, at)) for code, _ in self.row.facts.languages if at < self._count_written(code))
         self.asked.emit(Several(f"Remove point {at + 1}", tuple(gone)))
 
 
@@ -385,27 +385,29 @@ class Compared:
     words: str
     measures: tuple[tuple[str, str], ...]
 
-    def others(self, every: tuple["Compared", ...]) -> tuple["Compared", ...]:
+    def comparable_with(self, every: tuple["Compared", ...]) -> tuple["Compared", ...]:
         """Return the items it can be compared with: other blocks with a common measure, or items of the same block."""
         alike = (item for item in every if item.key == self.key and item.name != self.name)
-        return tuple(item for item in alike if self.shared(item) and (self.key == "blocks" or item.block == self.block))
+        return tuple(
+            item for item in alike if self.shared_measures(item) and (self.key == "blocks" or item.block == self.block)
+        )
 
-    def shared(self, other: "Compared") -> tuple[tuple[str, str], ...]:
+    def shared_measures(self, other: "Compared") -> tuple[tuple[str, str], ...]:
         """Return the measures that both items have."""
         return tuple(measure for measure in self.measures if measure in other.measures)
 
 
-def compared(study: Study, _row: Row) -> tuple[Compared, ...]:
+def comparable_items(study: Study, _row: Row) -> tuple[Compared, ...]:
     """Return the items that hypotheses can compare, in file order; equal titles get the block's id."""
-    every = tuple(_compared(study.document))
+    every = tuple(_comparable_items(study.document))
     times = Counter(item.words for item in every)
     every = tuple(
         replace(item, words=f"{item.words} ({item.block})") if times[item.words] > 1 else item for item in every
     )
-    return tuple(item for item in every if item.others(every))
+    return tuple(item for item in every if item.comparable_with(every))
 
 
-def _compared(document: Mapping[str, Any]) -> Iterator[Compared]:
+def _comparable_items(document: Mapping[str, Any]) -> Iterator[Compared]:
     for place, block in entries(document, "blocks.*"):
         if not isinstance(block, Mapping) or block.get("phase", "main") != "main":
             continue
@@ -438,10 +440,10 @@ class Hypothesis(QWidget):
         self.value: Mapping[str, Any] = {}
         boxes = self.measure, self.first, self.relation, self.second = [Choice() for _ in range(4)]
         for box, part in zip(boxes, ("measure", "of what", "relation", "than what"), strict=True):
-            dense(box, f"{name}, {part}")
+            make_dense(box, f"{name}, {part}")
             box.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
             box.setMinimumContentsLength(6)
-            box.activated.connect(self._take)
+            box.activated.connect(self._take_choice)
         self.within = label("within", "label")
         self.bound = TypedLine(f"{name}, largest difference that would not matter")
         self.bound.setFixedWidth(64)
@@ -460,44 +462,50 @@ class Hypothesis(QWidget):
         at = [(key, name if key == "blocks" else next(iter(blocks), ""), name) for name in named]
         items = [next((item for item in known if (item.key, item.block, item.name) == place), None) for place in at]
         first, second = (*items, None, None)[:2]
-        self.others = () if first is None else first.others(known)
-        self.measures = MEASURES if first is None else first.measures if second is None else first.shared(second)
+        self.others = () if first is None else first.comparable_with(known)
+        self.measures = (
+            MEASURES if first is None else first.measures if second is None else first.shared_measures(second)
+        )
         measure, relation = value.get("measure", "threshold"), _relation(value)
         first_name, two = (*named, "", "")[:2]
         for box, word in ((self.measure, measure), (self.first, first_name), (self.second, two)):
             box.setPlaceholderText(str(word))  # shown where it is not among the choices
-        self._fill(self.measure, self.measures, measure)
-        self._fill(self.relation, RELATIONS, relation)
-        self._fill(self.first, tuple((item, item.words) for item in known), first)
-        self._fill(self.second, tuple((item, item.words) for item in self.others), second)
-        self.bound.show_text("" if (bound := value.get("bound")) is None else written(bound))
+        self._fill_choice(self.measure, self.measures, measure)
+        self._fill_choice(self.relation, RELATIONS, relation)
+        self._fill_choice(self.first, tuple((item, item.words) for item in known), first)
+        self._fill_choice(self.second, tuple((item, item.words) for item in self.others), second)
+        self.bound.show_text("" if (bound := value.get("bound")) is None else typed_value(bound))
         for part in (self.within, self.bound):
             part.setVisible(bound is not None)
 
     @staticmethod
-    def _fill(box: Choice, values: tuple[tuple[Any, str], ...], chosen: Any) -> None:
+    def _fill_choice(box: Choice, values: tuple[tuple[Any, str], ...], chosen: Any) -> None:
         labels = [word for _, word in values]
         if labels != [box.itemText(at) for at in range(box.count())]:
             box.clear()
             box.addItems(labels)
         box.setCurrentIndex(next((at for at, (value, _) in enumerate(values) if value == chosen), -1))
 
-    def _take(self) -> None:
+    def _take_choice(self) -> None:
         """Emit the chosen hypothesis; replace choices that no longer fit the first item."""
         relation = RELATIONS[max(0, self.relation.currentIndex())][0]
         if not self.known or self.first.currentIndex() < 0:  # what it compares is not among the choices
             keys = ("measure", "blocks", "conditions", "groups")
             table = {key: self.value[key] for key in keys if key in self.value}
-            self.changed.emit(table | _related(relation, self._bound(relation, str(self.value.get("measure")))))
+            self.changed.emit(
+                table | _relation_keys(relation, self._kept_bound(relation, str(self.value.get("measure"))))
+            )
             return
         first, others, at = self.known[self.first.currentIndex()], self.others, self.second.currentIndex()
-        fitting = first.others(self.known)
+        fitting = first.comparable_with(self.known)
         second = others[at] if 0 <= at < len(others) and others[at] in fitting else fitting[0]
-        chosen, shared = self.measures[max(0, self.measure.currentIndex())], first.shared(second)
+        chosen, shared = self.measures[max(0, self.measure.currentIndex())], first.shared_measures(second)
         measure = (chosen if chosen in shared else shared[0])[0]
-        self.changed.emit(_table(first, second, measure) | _related(relation, self._bound(relation, measure)))
+        self.changed.emit(
+            _comparison_keys(first, second, measure) | _relation_keys(relation, self._kept_bound(relation, measure))
+        )
 
-    def _bound(self, relation: Any, measure: str) -> Any:
+    def _kept_bound(self, relation: Any, measure: str) -> Any:
         """Return the present bound, the default bound of a new equality, or None."""
         before = self.value.get("bound")
         if relation == "equal" and before is None:
@@ -506,18 +514,20 @@ class Hypothesis(QWidget):
 
     def _take_bound(self, text: str) -> None:
         bound = number_of(text)
-        self.refused.emit("" if bound is not None else f"{unclear_number(text)}. {kept(self.value.get('bound'))}")
+        self.refused.emit(
+            "" if bound is not None else f"{unclear_number(text)}. {kept_value_sentence(self.value.get('bound'))}"
+        )
         if bound is not None:
             self.changed.emit({**self.value, "bound": bound})
 
 
-def _related(relation: Any, bound: Any) -> dict[str, Any]:
+def _relation_keys(relation: Any, bound: Any) -> dict[str, Any]:
     """Return the keys that state the relation of a hypothesis."""
     table = {} if relation in {None, "equal"} else {"expected": relation}
     return table if bound is None else {**table, "bound": bound}
 
 
-def _table(first: Compared, second: Compared, measure: str) -> dict[str, Any]:
+def _comparison_keys(first: Compared, second: Compared, measure: str) -> dict[str, Any]:
     """Return the keys that state the items that a hypothesis compares."""
     pair = [first.name, second.name]
     table: dict[str, Any] = {"measure": measure, "blocks": pair if first.key == "blocks" else [first.block]}
@@ -534,14 +544,14 @@ class HypothesesField(Field):
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
         self.box.setDirection(QBoxLayout.Direction.TopToBottom)
-        self.lines = [Hypothesis(f"Hypothesis {at + 1}") for at in range(count_of(row))]
+        self.lines = [Hypothesis(f"Hypothesis {at + 1}") for at in range(hypothesis_count(row))]
         for at, line in enumerate(self.lines):
-            line.changed.connect(lambda value, at=at: self._change(at, value))
+            line.changed.connect(lambda value, at=at: self._change_hypothesis(at, value))
             line.refused.connect(self._refuse)
-            line.away.clicked.connect(lambda _on=False, at=at: self._remove(at))
+            line.away.clicked.connect(lambda _on=False, at=at: self._remove_hypothesis(at))
             self.box.addWidget(line)
         self.add, self.why = add_button("Add a hypothesis", "Hypothesis"), label("", "small", "text2", wraps=True)
-        self.add.clicked.connect(self._add)
+        self.add.clicked.connect(self._add_hypothesis)
         add_layout(self.box, hbox(self.add, (self.why, 1), spacing=8))
         self.setFocusProxy(self.lines[-1].measure if self.lines else self.add)
         self.show_value()
@@ -552,10 +562,12 @@ class HypothesesField(Field):
         self.add.setEnabled(bool(self.row.facts))
         self.why.setText("" if self.row.facts else NOTHING_TO_COMPARE)
 
-    def _add(self) -> None:
+    def _add_hypothesis(self) -> None:
         first: Compared = self.row.facts[0]
-        second = first.others(self.row.facts)[0]
-        value = _table(first, second, first.shared(second)[0][0]) | _related(RELATIONS[0][0], None)
+        second = first.comparable_with(self.row.facts)[0]
+        value = _comparison_keys(first, second, first.shared_measures(second)[0][0]) | _relation_keys(
+            RELATIONS[0][0], None
+        )
         self.asked.emit(AddEntry(self.row.path, value))
 
     def _refuse(self, why: str) -> None:
@@ -563,11 +575,11 @@ class HypothesesField(Field):
             self.refusal = why
             self.came.emit()
 
-    def _remove(self, at: int) -> None:
+    def _remove_hypothesis(self, at: int) -> None:
         path = self.row.path
         self.asked.emit(RemoveKey(path if len(self.lines) == 1 else (*path, at)))
 
-    def _change(self, at: int, value: Mapping[str, Any]) -> None:
+    def _change_hypothesis(self, at: int, value: Mapping[str, Any]) -> None:
         path, before = (*self.row.path, at), self.row.value[at]
         if not isinstance(before, Mapping):
             self.asked.emit(SetValue(path, value))
@@ -582,11 +594,11 @@ class HypothesesField(Field):
             self.asked.emit(Several("Change hypothesis", tuple(asked)))
 
 
-def count_of(row: FormRow) -> int:
+def hypothesis_count(row: FormRow) -> int:
     """Return the number of a row's hypotheses; 0 if the file has another value there."""
     return len(row.value) if isinstance(row.value, tuple) else 0
 
 
 HYPOTHESES: Final = SpecialEditor(
-    (("Analysis", "contrasts"),), HypothesesField, wide=True, structure=count_of, facts=compared
+    (("Analysis", "contrasts"),), HypothesesField, wide=True, structure=hypothesis_count, facts=comparable_items
 )

@@ -163,7 +163,7 @@ class NumbersRow(QWidget):
         self.grid = grid_of(8, 8, margins=0, parent=self)
         self.parts = [NumberPart() for _ in range(NUMBERS)]
         self._columns = 0
-        self._lay(NUMBERS)
+        self._lay_out(NUMBERS)
 
     def show_numbers(self, shown: tuple[NumberCard, ...], waiting: str) -> None:
         self.setVisible(bool(shown))
@@ -172,9 +172,9 @@ class NumbersRow(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._lay(NUMBERS if self.width() >= ONE_ROW_FROM else NUMBERS // 2)
+        self._lay_out(NUMBERS if self.width() >= ONE_ROW_FROM else NUMBERS // 2)
 
-    def _lay(self, columns: int) -> None:
+    def _lay_out(self, columns: int) -> None:
         if columns != self._columns:
             self._columns = columns
             for at, part in enumerate(self.parts):
@@ -225,7 +225,7 @@ class CardWidget(Card):
         self.shown, self.opens = shown, opens
         self.setAccessibleName(shown.title)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)  # columns are equally wide
-        add_parts(self.column, *map(self._part, shown.parts), STRETCH)
+        add_parts(self.column, *map(self._part_widget, shown.parts), STRETCH)
         self._beside = True
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -242,13 +242,13 @@ class CardWidget(Card):
             else:
                 self.column.insertWidget(1, self.aside)
 
-    def _part(self, part: Part) -> QWidget:
+    def _part_widget(self, part: Part) -> QWidget:
         if part is None:
             return Rule()
         if isinstance(part, str):
             return label(part, "small", "text2")
         if isinstance(part, Lines):
-            return _lines(part)
+            return _lines_widget(part)
         made = QWidget()
         if isinstance(part, Figures):
             row = hbox(spacing=6, margins=0, parent=made)
@@ -266,7 +266,9 @@ class CardWidget(Card):
                 notes.addWidget(note)
             vbox(Strip(part.segments, self.opens), notes, spacing=8, margins=0, parent=made)
         elif isinstance(part[0], Table):
-            tables = ((_table(table), 0, Qt.AlignmentFlag.AlignTop) for table in part if isinstance(table, Table))
+            tables = (
+                (_table_widget(table), 0, Qt.AlignmentFlag.AlignTop) for table in part if isinstance(table, Table)
+            )
             hbox(*tables, STRETCH, spacing=18, margins=0, parent=made)
         else:
             return verdict_line(part)
@@ -283,7 +285,7 @@ def verdict_line(verdict: Verdict) -> QWidget:
     return made
 
 
-def _table(table: Table) -> QWidget:
+def _table_widget(table: Table) -> QWidget:
     made = QWidget()
     grid = grid_of(3, 3, margins=0, parent=made)
     grid.addWidget(label(table.name, "small", "text2"), 0, 0, 1, len(table.codes) + 1)
@@ -314,7 +316,7 @@ class _Cell(Themed, QWidget):
         painter.drawText(QRectF(self.rect()), Qt.AlignmentFlag.AlignCenter, str(self._count))
 
 
-def _lines(shown: Lines) -> QWidget:
+def _lines_widget(shown: Lines) -> QWidget:
     made = QWidget()
     ink: Ink = "text3" if shown.grey else "text"
     grid = QGridLayout(made)

@@ -106,7 +106,7 @@ class LevelBlock:
             return None
         return self.words.at(level), "norm" if self.limits.force == self.limits.lowest else "slope"
 
-    def measures(self, threshold: float) -> bool:
+    def can_measure(self, threshold: float) -> bool:
         """Return whether a threshold is below the highest unclipped level."""
         paced = self.clipping is not None and self.clipping.paced
         return not paced or self.clipping is None or threshold < self.clipping.highest(self.words.stimulus)

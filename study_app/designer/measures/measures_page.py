@@ -22,7 +22,7 @@ from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.numbers import NumberField
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
 from study_app.number_text import capitalised, unclear_number
-from study_app.protocol.checks.force_limits import clipped, clipped_unpaced
+from study_app.protocol.checks.force_limits import check_clipping, unpaced_clipping_warning
 
 if TYPE_CHECKING:
     from study_app.designer.measures.plots import ForcesView, FunctionView, TrackView
@@ -53,8 +53,8 @@ class Control(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Preferred)
         hbox(self.words, self.field, self.unit, spacing=6, margins=0, parent=self)
         self.show_words(text, unit)
-        self.field.entered.connect(self._take)
-        self.field.unread.connect(self._refuse)
+        self.field.entered.connect(self._enter_value)
+        self.field.unread.connect(self._show_refusal)
         self.field.abandoned.connect(lambda: self.field.show_state(""))
         self.field.stepped.connect(lambda steps: self.entered.emit(self._value + steps * self._step))
 
@@ -64,11 +64,11 @@ class Control(QWidget):
         self.unit.setVisible(bool(unit))
         self.field.setAccessibleName(f"{text}, {unit}" if unit else text)
 
-    def _take(self, value: float) -> None:
+    def _enter_value(self, value: float) -> None:
         self.field.show_state("")
         self.entered.emit(value)
 
-    def _refuse(self, text: str) -> None:
+    def _show_refusal(self, text: str) -> None:
         """Leave the text in the field and show above it why it is not a number."""
         why = f"{unclear_number(text)}, or press Esc"
         self.field.show_state("refused")
@@ -186,9 +186,9 @@ def clipped_sentence(of: LevelBlock) -> str:
     """Return a sentence on the clipped levels, "" if there are none."""
     if of.limits is None:
         return NO_FORCES
-    messages = [fault.message for fault in clipped(of.protocol, [of.block], ASSUMED_TICKS)]
+    messages = [fault.message for fault in check_clipping(of.protocol, [of.block], ASSUMED_TICKS)]
     said = ". ".join(capitalised(message) for message in messages)
-    return said or clipped_unpaced(of.protocol, [of.block]) or ""
+    return said or unpaced_clipping_warning(of.protocol, [of.block]) or ""
 
 
 class MeasureCards(QScrollArea):

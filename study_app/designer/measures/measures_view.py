@@ -30,7 +30,7 @@ from study_app.designer.measures.simulation import (
     focus_of,
     hypotheses_of,
 )
-from study_app.designer.measures.study_facts import Facts, copied_texts, revealing, valid_part
+from study_app.designer.measures.study_facts import Facts, copied_texts, revealing_texts, valid_part
 from study_app.designer.problems import ProblemRow
 from study_app.haptics.model.slope_limits import HAND_MPS, steady_force
 from study_app.number_text import capitalised, counted, duration, duration_figure, duration_range
@@ -127,7 +127,7 @@ def _cards(
         cards += balance_card(study, protocol, block, controls)
     if block is not None and focus.compares:
         known = simulated.detectable
-        who = people(controls.participants if known is None else known.participants, controls.planned)
+        who = people_text(controls.participants if known is None else known.participants, controls.planned)
         cards.append(detectable_card(study, block, who, simulated))
     cards.append(force_card(study, facts, protocol, _liquids(protocol, path, block)))
     if block is not None and path[0] == "blocks":
@@ -146,7 +146,7 @@ def _liquids(protocol: Protocol, path: Path, block: Block | None) -> list[str]:
     return list(liquids) or list(protocol.liquids)
 
 
-def people(participants: int, planned: int | None) -> str:
+def people_text(participants: int, planned: int | None) -> str:
     """Return the number of simulated participants, and whether the file plans as many."""
     return f"{participants} {'planned' if participants == planned else 'simulated'}"
 
@@ -158,26 +158,26 @@ def number_cards(
     breaks = f", {counted(order.breaks, 'break')}" if order.breaks else ""
     figure, unit = duration_figure(duration_s)
     return (
-        _range(of, simulated, controls),
-        _one_person(of, simulated),
-        _people(of, simulated, controls),
+        _range_card(of, simulated, controls),
+        _one_person_card(of, simulated),
+        _group_card(of, simulated, controls),
         NumberCard(
             "Lasts", figure, unit=unit, note=("neutral", "clock", f"{order.trials} trials{breaks}"), simulated=False
         ),
     )
 
 
-def _unknown(title: str, unit: str, simulated: Simulated) -> NumberCard:
+def _unknown_card(title: str, unit: str, simulated: Simulated) -> NumberCard:
     """Return the card of an unknown number: not simulated yet, failed, or never simulated."""
     if simulated.failed:
         return NumberCard(title, UNKNOWN, unit=unit, note=FAILED, more=simulated.failed)
     return NumberCard(title, UNKNOWN, unit=unit, note=("neutral", "info", "not simulated"))
 
 
-def _range(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberCard:
+def _range_card(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberCard:
     title, measurable, wording = (f"{capitalised(of.words.name)}s it can measure", simulated.measurable, of.words)
     if measurable is None:
-        return _unknown(title, wording.unit, simulated)
+        return _unknown_card(title, wording.unit, simulated)
     clipped = of.clipped_words
     if measurable.ends is None:
         if measurable.planted:
@@ -198,23 +198,23 @@ def _range(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberCa
     )
 
 
-def _one_person(of: LevelBlock, simulated: Simulated) -> NumberCard:
+def _one_person_card(of: LevelBlock, simulated: Simulated) -> NumberCard:
     observed = simulated.observed
     if observed is None:
-        return _unknown("One person", "%", simulated)
-    if not of.measures(observed.threshold):
+        return _unknown_card("One person", "%", simulated)
+    if not of.can_measure(observed.threshold):
         return NumberCard("One person", UNKNOWN, unit="%", note=CLIPPED, more=of.clipped_words)
     note: Verdict = ("neutral", "people", f"at a {of.words.name} of {of.words.words(observed.threshold)}")
     return NumberCard("One person", f"± {100 * observed.error:.0f}", unit="%", note=note, more=of.as_asked)
 
 
-def _people(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberCard:
+def _group_card(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberCard:
     precision = simulated.group
     if precision is None:
-        title = f"{people(controls.participants, controls.planned)} in ± {100 * controls.precision:g} %"
-        return _unknown(title, "% of studies", simulated)
-    title = f"{people(precision.participants, controls.planned)} in ± {100 * precision.precision:g} %"
-    if not of.measures(controls.threshold):
+        title = f"{people_text(controls.participants, controls.planned)} in ± {100 * controls.precision:g} %"
+        return _unknown_card(title, "% of studies", simulated)
+    title = f"{people_text(precision.participants, controls.planned)} in ± {100 * precision.precision:g} %"
+    if not of.can_measure(controls.threshold):
         return NumberCard(title, UNKNOWN, unit="% of studies", note=CLIPPED, more=of.clipped_words)
     enough = precision.share >= ENOUGH
     note: Verdict = ("ok", "check", "Enough") if enough else ("warn", "warning", "Not enough")
@@ -230,11 +230,11 @@ def session_card(study: Study, facts: Facts, path: Path) -> MeasureCard:
     verdicts = text_verdicts(study, facts)
     if facts.expected_s is None or facts.range_s is None:
         unknown = tuple((UNKNOWN, word) for word in ("min", "answers", "trials"))
-        return MeasureCard("Session", "", (Figures(unknown), *_ruled(verdicts)))
+        return MeasureCard("Session", "", (Figures(unknown), *_below_rule(verdicts)))
     figures = (
         duration_figure(facts.expected_s),
-        (str(facts.answers), _word(facts.answers, "answer")),
-        (str(facts.trials), _word(facts.trials, "trial")),
+        (str(facts.answers), _noun(facts.answers, "answer")),
+        (str(facts.trials), _noun(facts.trials, "trial")),
     )
     whole = max(1e-9, sum(facts.steps_s.values()))
     chosen = str(path[1]) if len(path) > 1 else ""
@@ -248,10 +248,10 @@ def session_card(study: Study, facts: Facts, path: Path) -> MeasureCard:
     breaks = counted(facts.breaks, "break") if facts.breaks else ""
     least_to_most = duration_range(*facts.range_s)
     aside = ", ".join(filter(None, (least_to_most if " to " in least_to_most else "", breaks)))
-    return MeasureCard("Session", aside, (Figures(figures), Segments(segments, notes), *_ruled(verdicts)))
+    return MeasureCard("Session", aside, (Figures(figures), Segments(segments, notes), *_below_rule(verdicts)))
 
 
-def _ruled(verdicts: Iterable[Verdict]) -> tuple[Part, ...]:
+def _below_rule(verdicts: Iterable[Verdict]) -> tuple[Part, ...]:
     """Return verdicts below a rule; empty if there are none."""
     return (None, *states) if (states := tuple(verdicts)) else ()
 
@@ -264,7 +264,7 @@ def hypotheses_card(protocol: Protocol, path: Path, controls: Controls, simulate
     said = [
         f"{capitalised(contrast.described())}: {known.get(contrast.described(), waiting)}" for contrast in contrasts
     ]
-    who = people(controls.participants, controls.planned)
+    who = people_text(controls.participants, controls.planned)
     return (
         MeasureCard("Hypotheses", who, tuple(("neutral", "flag", sentence) for sentence in said), wide=True)
         if said
@@ -272,7 +272,7 @@ def hypotheses_card(protocol: Protocol, path: Path, controls: Controls, simulate
     )
 
 
-def _word(count: int | None, word: str) -> str:
+def _noun(count: int | None, word: str) -> str:
     return word if count == 1 else f"{word}s"
 
 
@@ -283,8 +283,8 @@ def block_card(study: Study, facts: Facts, protocol: Protocol, block: Block) -> 
     duration_s = facts.steps_s.get(block.id)
     figures = (
         (UNKNOWN, "min") if duration_s is None else duration_figure(duration_s),
-        (str(order.trials), _word(order.trials, "trial")),
-        (str(order.trials * answers), _word(order.trials * answers, "answer")),
+        (str(order.trials), _noun(order.trials, "trial")),
+        (str(order.trials * answers), _noun(order.trials * answers, "answer")),
     )
     aside = counted(order.breaks, "break") if order.breaks else ""
     return MeasureCard(_title(study, block.id), aside, (Figures(figures),))
@@ -292,7 +292,7 @@ def block_card(study: Study, facts: Facts, protocol: Protocol, block: Block) -> 
 
 def text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
     """Return verdicts on missing texts and on texts that reveal a condition."""
-    if study.unreadable:
+    if study.is_unreadable:
         return ()
     missing = ", ".join(f"{count} in {language_name(code)}" for code, count in facts.missing.items())
     codes = languages_of(study.document)
@@ -303,7 +303,7 @@ def text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
     if copied := ", ".join(f"{count} in {language_name(code)}" for code, count in copied_texts(study).items()):
         verdicts = [*(verdicts if missing else ()), ("neutral", "info", f"Texts to translate: {copied}")]
     if (protocol := valid_part(study).protocol) is not None:
-        revealed = revealing(study, protocol)
+        revealed = revealing_texts(study, protocol)
         named = f"{revealed[0].element}: “{revealed[0].word}” reveals a condition" if revealed else ""
         more = f", and {len(revealed) - 1} more" if len(revealed) > 1 else ""
         verdicts.append(
@@ -334,7 +334,7 @@ def balance_card(study: Study, protocol: Protocol, block: Block, controls: Contr
         verdict = ("warn", "warning", "all participants have the same order, which reveals the codes")
     else:
         verdict = ("neutral", "info", "balanced on average only: drawn for each session")
-    aside = f"{_title(study, block.id)}, {people(participants, controls.planned)}"
+    aside = f"{_title(study, block.id)}, {people_text(participants, controls.planned)}"
     if len(evenness.codes) > MOST_CODES:
         cells = [count for line in evenness.positions for count in line]
         after = evenness.after_another
@@ -353,7 +353,7 @@ def lines_card(
 ) -> MeasureCard:
     """Return lines with bars, and sentences below them; grey lines where others are simulated (``waiting``)."""
     rows, said = tuple(lines), tuple(sentences)
-    parts = (Lines(rows, grey=bool(waiting)), *_ruled(said)) if rows else said
+    parts = (Lines(rows, grey=bool(waiting)), *_below_rule(said)) if rows else said
     return MeasureCard(title, waiting or aside, parts)
 
 

@@ -23,7 +23,7 @@ from study_app.designer.measures.simulation import Observed
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.live_plots import Floats, Plot, pen
-from study_app.protocol.presented.presented_levels import Level, standard_of
+from study_app.protocol.presented.presented_levels import Level, standard_level
 
 BARS = 0.14  # of the height, for how often each level is asked
 SYMBOLS = ("o", "t1", "s", "d")
@@ -80,24 +80,24 @@ class MeasurePlot(Plot):
         super().apply_theme(theme)
         self._draw()
 
-    def add(self, item: pg.GraphicsObject, z: float = 0.0) -> None:
+    def add_item(self, item: pg.GraphicsObject, z: float = 0.0) -> None:
         """Draw an item at a z value; higher ones are in front."""
         item.setZValue(z)
         self.box.addItem(item, ignoreBounds=True)
         self.drawn.append(item)
 
-    def band(self, x: np.ndarray, low: np.ndarray, high: np.ndarray, opacity: float) -> None:
+    def draw_band(self, x: np.ndarray, low: np.ndarray, high: np.ndarray, opacity: float) -> None:
         colour = QColor(self.theme.ctl if self.grey else self.theme.accent)
         colour.setAlphaF(opacity)
         curves = (pg.PlotCurveItem(x, curve) for curve in (low, high))
-        self.add(pg.FillBetweenItem(*curves, brush=QBrush(colour)), -5)
+        self.add_item(pg.FillBetweenItem(*curves, brush=QBrush(colour)), -5)
 
-    def curve(self, x: object, y: object, colour: str, width: float = 2.0, *, dashed: bool = False) -> None:
+    def draw_curve(self, x: object, y: object, colour: str, width: float = 2.0, *, dashed: bool = False) -> None:
         made = pg.PlotCurveItem(np.asarray(x, float), np.asarray(y, float), antialias=True)
         made.setPen(self.stroke(colour, width, DASHED if dashed else None))
-        self.add(made, 2)
+        self.add_item(made, 2)
 
-    def zone(self, limit: Limit, first: float, last: float, *, upright: bool) -> None:
+    def draw_zone(self, limit: Limit, first: float, last: float, *, upright: bool) -> None:
         colour = QColor(limit_colour(self.theme, limit))
         edge = colour.name()
         colour.setAlphaF(0.16)
@@ -105,16 +105,16 @@ class MeasurePlot(Plot):
             (first, last), orientation="vertical" if upright else "horizontal", movable=False, brush=QBrush(colour),
             pen=pen(edge, 1, DASHED),
         )  # fmt: skip
-        self.add(made, -8)
+        self.add_item(made, -8)
 
-    def words(
+    def write_text(
         self, text: str, x: float, y: float, colour: str, anchor: tuple[float, float], *, over: bool = False
     ) -> None:
         """Write a text at a position; with ``over`` it interrupts the grid line behind it."""
         made = pg.TextItem(text, color=QColor(colour), anchor=anchor, fill=QColor(self.theme.surface) if over else None)
         made.textItem.setFont(font("small", weight=600, tabular=True))
         made.setPos(QPointF(x, y))
-        self.add(made, 5)
+        self.add_item(made, 5)
 
 
 class FunctionView(MeasurePlot):
@@ -132,27 +132,29 @@ class FunctionView(MeasurePlot):
         planted, quantiles = 100 * np.array(observed.planted), [100 * np.array(quantile) for quantile in observed.found]
         low = 10.0 * math.floor(10.0 * min(observed.planted[0], *(quantile[0] for quantile in observed.found)) + 1e-9)
         bottom, top = low - 1.0, 101.5
-        self.band(x, quantiles[-1], quantiles[0], 0.18)
-        self.band(x, quantiles[-2], quantiles[1], 0.30)
-        self.curve(x, planted, theme.ctl if self.grey else theme.accent, 2.4)
+        self.draw_band(x, quantiles[-1], quantiles[0], 0.18)
+        self.draw_band(x, quantiles[-2], quantiles[1], 0.30)
+        self.draw_curve(x, planted, theme.ctl if self.grey else theme.accent, 2.4)
         at, percent = wording.at(observed.threshold), 100 * observed.at_threshold
         for xs, ys in (([left, at], [percent, percent]), ([at, at], [bottom, percent])):
-            self.curve(xs, ys, theme.text, 1.2, dashed=True)
+            self.draw_curve(xs, ys, theme.text, 1.2, dashed=True)
         dot = pg.ScatterPlotItem([at], [percent], size=9, pen=pen(theme.text, 2), brush=QBrush(QColor(theme.surface)))
-        self.add(dot, 4)
+        self.add_item(dot, 4)
         before = at > (left + right) / 2
-        self.words(wording.words(observed.threshold), at, percent, theme.text, (1.08, 1.0) if before else (-0.08, 0.0))
+        self.write_text(
+            wording.words(observed.threshold), at, percent, theme.text, (1.08, 1.0) if before else (-0.08, 0.0)
+        )
         asked = np.array([(wording.at(level), share) for level, share in observed.asked]).reshape(-1, 2)
-        self._bars(asked[:, 0], asked[:, 1], right - left, (bottom, top), clipped_from)
+        self._draw_bars(asked[:, 0], asked[:, 1], right - left, (bottom, top), clipped_from)
         if clipped_from is not None and clipped_from[0] < right:
-            self.zone(clipped_from[1], max(left, clipped_from[0]), right, upright=True)
+            self.draw_zone(clipped_from[1], max(left, clipped_from[0]), right, upright=True)
         self.show_ticks("left", [(percent, f"{percent:g}") for percent in even_ticks(low, 100.0, 7)])
         self.show_ticks("bottom", list(wording.ticks()))
         beyond = 0.03 * (right - left)
         self.box.setXRange(left - beyond, right + beyond, padding=0)
         self.box.setYRange(bottom, top, padding=0)
 
-    def _bars(
+    def _draw_bars(
         self,
         places: Floats,
         shares: Floats,
@@ -174,7 +176,7 @@ class FunctionView(MeasurePlot):
                     x=places[some], y0=ends[0], height=heights[some], width=0.72 * apart, brush=QBrush(colour),
                     pen=QPen(Qt.PenStyle.NoPen),
                 )  # fmt: skip
-                self.add(bars, -2)
+                self.add_item(bars, -2)
 
 
 class TrackView(MeasurePlot):
@@ -191,10 +193,10 @@ class TrackView(MeasurePlot):
         last, planted = _last_trial(observed), wording.at(observed.threshold)
         x = np.array([number for number, _ in observed.course], float)
         quantiles = np.array([[wording.at(level) for level in levels] for _, levels in observed.course]).T
-        self.band(x, quantiles[0], quantiles[-1], 0.18)
-        self.band(x, quantiles[1], quantiles[-2], 0.30)
-        self.curve(x, quantiles[len(quantiles) // 2], theme.ctl if self.grey else theme.accent, 2.4)
-        self.curve([0, last], [planted, planted], theme.text, 1.2, dashed=True)
+        self.draw_band(x, quantiles[0], quantiles[-1], 0.18)
+        self.draw_band(x, quantiles[1], quantiles[-2], 0.30)
+        self.draw_curve(x, quantiles[len(quantiles) // 2], theme.ctl if self.grey else theme.accent, 2.4)
+        self.draw_curve([0, last], [planted, planted], theme.text, 1.2, dashed=True)
         ink = QColor(theme.ctl if self.grey else theme.trace_y)
         for track in sorted({asked.track for asked in observed.one}):
             for success in (True, False):
@@ -204,9 +206,9 @@ class TrackView(MeasurePlot):
                     symbol=SYMBOLS[(track - 1) % len(SYMBOLS)], pen=pen(ink.name(), 1.2),
                     brush=QBrush(ink) if success else QBrush(QColor(theme.surface)),
                 )  # fmt: skip
-                self.add(points, 3)
+                self.add_item(points, 3)
         if clipped_from is not None and clipped_from[0] < top:
-            self.zone(clipped_from[1], max(bottom, clipped_from[0]), top, upright=False)
+            self.draw_zone(clipped_from[1], max(bottom, clipped_from[0]), top, upright=False)
         self.show_ticks("left", list(wording.ticks()))
         self.show_ticks("bottom", [(trial or 1, f"{trial or 1:g}") for trial in even_ticks(0, last, 7)])
         beyond = 0.04 * (top - bottom)
@@ -228,7 +230,7 @@ class ForcesView(MeasurePlot):
         if not shown or of.limits is None:
             self.show_plot(forces_sentence(of))
             return
-        bars = list(shown) if of.standard is None else [standard_of(of.protocol, of.block.id, of.standard), *shown]
+        bars = list(shown) if of.standard is None else [standard_level(of.protocol, of.block.id, of.standard), *shown]
         values = [*([] if of.standard is None else [of.standard]), *(level.comparison for level in shown)]
         limits: dict[Limit, float] = {"norm": of.protocol.device.force_limit_n}
         if clipped := [level.sent_n or 0.0 for level in shown if level.clipped_by == "slope"]:
@@ -251,7 +253,7 @@ class ForcesView(MeasurePlot):
                     x=[at], y0=sent, height=[asked - sent], width=0.62, brush=QBrush(Qt.BrushStyle.NoBrush),
                     pen=pen(limit_colour(theme, bar.clipped_by), 1.2, (2.0, 2.0)),
                 )  # fmt: skip
-                self.add(lost, 1)
+                self.add_item(lost, 1)
         inks = [limit_colour(theme, bar.clipped_by) if bar.clipped_by else theme.accent for bar in bars]
         inks[:1] = [theme.ctl] if has_standard else inks[:1]
         for ink in dict.fromkeys(inks):
@@ -260,13 +262,13 @@ class ForcesView(MeasurePlot):
                 x=places, y0=0.0, height=[forces[at][1] for at in places], width=0.62,
                 brush=QBrush(QColor(ink)), pen=QPen(Qt.PenStyle.NoPen),
             )  # fmt: skip
-            self.add(bars, 0)
+            self.add_item(bars, 0)
         room = count * LIMITS_PX / max(LIMITS_PX + 1.0, self.box.width() - LIMITS_PX)
         for name, force_n in limits.items():
             ink, text = limit_colour(theme, name), f"{LIMIT_NAMES[name]} {force_n:.3g} N"
             above = 0.5 if len(limits) == 1 else 1.0 if name == "norm" else 0.0  # the limits may be nearly equal
-            self.curve([-0.7, count - 0.3], [force_n, force_n], ink, 1.5, dashed=True)
-            self.words(text, count - 0.2, force_n, ink, (0.0, above), over=True)
+            self.draw_curve([-0.7, count - 0.3], [force_n, force_n], ink, 1.5, dashed=True)
+            self.write_text(text, count - 0.2, force_n, ink, (0.0, above), over=True)
         self.box.setXRange(-0.8, count - 0.2 + room, padding=0)
         self.box.setYRange(0.0, 1.16 * top, padding=0)
 
@@ -274,7 +276,7 @@ class ForcesView(MeasurePlot):
 def function_sentence(scale: LevelWords, seen: Observed) -> str:
     """Describe the psychometric function in a sentence."""
     most, _ = max(seen.asked, key=lambda pair: pair[1], default=(0.0, 0.0))
-    low, high = _middle(seen)
+    low, high = _middle_half(seen)
     return (
         f"Share of answers that are {scale.success}, over the {scale.kind}: {100 * seen.planted[0]:.0f} % at "
         f"{scale.words(seen.levels[0])} to {100 * seen.planted[-1]:.0f} % at {scale.words(seen.levels[-1])}, "
@@ -286,7 +288,7 @@ def function_sentence(scale: LevelWords, seen: Observed) -> str:
 
 def track_sentence(scale: LevelWords, seen: Observed) -> str:
     """Describe the expected track in a sentence."""
-    low, high = _middle(seen)
+    low, high = _middle_half(seen)
     return (
         f"Estimates of the {scale.name} over {_last_trial(seen)} trials: after the last one half of the observers are "
         f"between {scale.number(low)} and {scale.words(high)}, the simulated value is {scale.words(seen.threshold)}. "
@@ -311,7 +313,7 @@ def forces_sentence(of: LevelBlock) -> str:
     )
 
 
-def _middle(observed: Observed) -> tuple[float, float]:
+def _middle_half(observed: Observed) -> tuple[float, float]:
     """Return the 25 and 75 % quantiles of the estimates after all trials."""
     quantiles = observed.course[-1][1]
     return quantiles[1], quantiles[3]

@@ -16,7 +16,7 @@ from study_app.designer.document.study import Study
 from study_app.designer.measures.study_facts import text_keys
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Contrast, Protocol
-from study_app.protocol.orders.balance import Evenness, balances, numbered
+from study_app.protocol.orders.balance import Evenness, balances, numbered_participants
 from study_app.protocol.presented.presented_levels import clipping
 from study_app.protocol.raters import TYPICAL
 from study_app.protocol.sequences import row_count
@@ -53,7 +53,7 @@ Check: TypeAlias = Callable[[], None]
 Values: TypeAlias = tuple[float, ...]
 
 
-def unchecked() -> None:
+def never_stop() -> None:
     """Let simulations run to their end."""
 
 
@@ -179,7 +179,7 @@ class Simulated:
     failed: str = ""
 
 
-def observe(plan: ThresholdPlan, threshold: float, lapses: float, check: Check = unchecked) -> Observed:
+def simulate_observers(plan: ThresholdPlan, threshold: float, lapses: float, check: Check = never_stop) -> Observed:
     """Simulate observers with a threshold (a level) and return their answers and estimates."""
     stimulus, random = plan.stimulus, np.random.default_rng(SEED)
     u = stimulus.coordinate(threshold)
@@ -187,11 +187,11 @@ def observe(plan: ThresholdPlan, threshold: float, lapses: float, check: Check =
     first: ObserverAnswers | None = None
     for _ in range(0, OBSERVERS, AT_ONCE):
         check()
-        answered = plan.answers(np.full(AT_ONCE, u), random, (_lapsing(plan, lapses),))
+        answered = plan.answers(np.full(AT_ONCE, u), random, (_lapsing_person(plan, lapses),))
         medians.append(plan.estimates(answered).medians)
         presented += [track.levels[~np.isnan(track.levels)] for track in answered.tracks]
         if first is None:
-            first, course = answered, _course(plan, answered, check)
+            first, course = answered, _estimate_course(plan, answered, check)
     assert first is not None  # noqa: S101 - there is a first one
     estimates, planted = np.concatenate(medians), replace(first.observers, thresholds=np.array(u), moves=0.0)
     errors = (estimates - u) * math.log(10) if stimulus.spacing == "log" else (estimates - u) / u
@@ -204,22 +204,22 @@ def observe(plan: ThresholdPlan, threshold: float, lapses: float, check: Check =
         at_threshold=float(planted.probability(u)),
         levels=tuple(stimulus.level_of(float(place)) for place in at),
         planted=tuple(planted.probability(at).tolist()),
-        found=tuple(tuple(_function(first, float(quantile), at)) for quantile in quantiles),
-        asked=_asked(plan, np.concatenate(presented)),
+        found=tuple(tuple(_psychometric_function(first, float(quantile), at)) for quantile in quantiles),
+        asked=_presented_shares(plan, np.concatenate(presented)),
         course=course or (),
-        one=tuple(_one(plan, first)),
+        one=tuple(_first_observer_trials(plan, first)),
         error=float(np.std(errors)) if plan.measures(np.array(u)) else math.inf,
         trials=plan.trials,
     )
 
 
-def _lapsing(plan: ThresholdPlan, lapses: float) -> Person:
+def _lapsing_person(plan: ThresholdPlan, lapses: float) -> Person:
     """Return an observer with a lapse rate: some of the random answers are correct by chance."""
     return Person(lapse=lapses / Person(lapse=1.0).wrong(len(plan.design.answers)))
 
 
-def measurable(
-    plan: ThresholdPlan, lapses: float, least: float, check: Check = unchecked, most: float = math.inf
+def measurable_thresholds(
+    plan: ThresholdPlan, lapses: float, least: float, check: Check = never_stop, most: float = math.inf
 ) -> Measurable:
     """Return the range of thresholds that a block can measure.
 
@@ -235,16 +235,16 @@ def measurable(
         levels, held = [], []
         for _ in range(0, OBSERVERS, AT_ONCE):
             check()
-            answered = plan.answers(np.full(AT_ONCE, u), random, (_lapsing(plan, lapses),))
+            answered = plan.answers(np.full(AT_ONCE, u), random, (_lapsing_person(plan, lapses),))
             estimates = plan.estimates(answered)
             levels += [stimulus.level_of(median) for median in estimates.medians.tolist()]
             held.append((estimates.lows <= u) & (u <= estimates.highs))
         bias = float(np.mean(levels)) / threshold - 1.0
         measured.append(Planted(threshold=threshold, bias=bias, coverage=float(np.mean(np.concatenate(held)))))
-    return Measurable(_longest(measured), tuple(measured))
+    return Measurable(_longest_measurable(measured), tuple(measured))
 
 
-def _longest(planted: list[Planted]) -> tuple[float, float] | None:
+def _longest_measurable(planted: list[Planted]) -> tuple[float, float] | None:
     """Return the ends of the longest run of measurable thresholds."""
     best: list[Planted] = []
     run: list[Planted] = []
@@ -254,14 +254,14 @@ def _longest(planted: list[Planted]) -> tuple[float, float] | None:
     return (best[0].threshold, best[-1].threshold) if best else None
 
 
-def _function(answered: ObserverAnswers, u: float, at: Floats) -> list[float]:
+def _psychometric_function(answered: ObserverAnswers, u: float, at: Floats) -> list[float]:
     """Return the unclipped success rates of an observer with threshold ``u`` at some levels [u]."""
     observer = replace(answered.observers, thresholds=np.array(u), moves=0.0, presented=None)
     probabilities: list[float] = observer.probability(at).tolist()
     return probabilities
 
 
-def _asked(plan: ThresholdPlan, presented: Floats) -> tuple[tuple[float, float], ...]:
+def _presented_shares(plan: ThresholdPlan, presented: Floats) -> tuple[tuple[float, float], ...]:
     """Return levels with their shares of the trials, on a grid if there are many."""
     places = np.unique(presented)
     if len(places) > MOST_BARS:
@@ -271,7 +271,7 @@ def _asked(plan: ThresholdPlan, presented: Floats) -> tuple[tuple[float, float],
     return tuple((plan.stimulus.level_of(u), share) for u, share in zip(places.tolist(), counts.tolist(), strict=True))
 
 
-def _course(plan: ThresholdPlan, answered: ObserverAnswers, check: Check) -> tuple[tuple[int, Values], ...]:
+def _estimate_course(plan: ThresholdPlan, answered: ObserverAnswers, check: Check) -> tuple[tuple[int, Values], ...]:
     """Return quantiles of the estimates after increasing numbers of trials."""
     trials, tracks = answered.tracks[0].levels.shape[1], len(answered.tracks)
     course: list[tuple[int, Values]] = []
@@ -283,7 +283,7 @@ def _course(plan: ThresholdPlan, answered: ObserverAnswers, check: Check) -> tup
     return tuple(course)
 
 
-def _one(plan: ThresholdPlan, answered: ObserverAnswers) -> list[Asked]:
+def _first_observer_trials(plan: ThresholdPlan, answered: ObserverAnswers) -> list[Asked]:
     tracks = len(answered.tracks)
     trials = answered.tracks[0].levels.shape[1]
     asked = []
@@ -301,7 +301,7 @@ def balance_of(protocol: Protocol, block: Block, participants: int) -> tuple[str
 
     None where the block has one code.
     """
-    for judged in balances(protocol, numbered(participants), SEED):
+    for judged in balances(protocol, numbered_participants(participants), SEED):
         for judged_block in judged.blocks:
             if judged_block.id == block.id:
                 rows = (
@@ -398,14 +398,14 @@ class Simulation:
 def simulation_of(protocol: Protocol, focus: Focus, controls: Controls) -> Simulation | None:
     """Return the simulation that an element needs; None if it needs none."""
     simulated = focus.block is not None and (focus.plan is not None or focus.compares)
-    if not simulated and not advises(protocol):
+    if not simulated and not needs_precision_check(protocol):
         return None
     block = focus.block.id if focus.block is not None and simulated else ""
     depends = json.dumps(_without_texts(protocol.model_dump(mode="json", exclude={"pages"})), sort_keys=True)
     return Simulation(depends, block, controls if block else Controls(), protocol)
 
 
-def advises(protocol: Protocol) -> bool:
+def needs_precision_check(protocol: Protocol) -> bool:
     """Return whether ``check`` warns about the precision of the study's thresholds, which it simulates."""
     decided = protocol.analysis
     planned = decided is not None and decided.precision is not None and decided.participants is not None
@@ -439,7 +439,7 @@ def threshold_of(plan: ThresholdPlan) -> float:
     return float(f"{stimulus.level_of(sum(stimulus.domain) / 2):.2g}")
 
 
-def least_of(protocol: Protocol, plan: ThresholdPlan) -> float:
+def smallest_level(protocol: Protocol, plan: ThresholdPlan) -> float:
     """Return the smallest level that can be estimated: twice the largest error of a valid trial."""
     limits = protocol.limits
     if plan.stimulus.vary.endswith("_ms"):
@@ -460,10 +460,10 @@ MeasureClient: TypeAlias = WorkerClient[Simulation, Simulated]
 
 def start_measure_worker() -> MeasureClient:
     """Start the worker process, at the lowest priority."""
-    return WorkerClient("study_app.designer.measures.simulation:carry_out", name="measures", background=True)
+    return WorkerClient("study_app.designer.measures.simulation:run_simulation", name="measures", background=True)
 
 
-def carry_out(order: Simulation, _send: Send, stop: Stop) -> Simulated:
+def run_simulation(order: Simulation, _send: Send, stop: Stop) -> Simulated:
     """Run a simulation; raise Stopped if another order came or the client has ended."""
 
     def check() -> None:
@@ -476,35 +476,35 @@ def carry_out(order: Simulation, _send: Send, stop: Stop) -> Simulated:
         clips = plan.clipping or clipping(protocol, focus.block)
         most = math.inf if clips is None else clips.highest(plan.stimulus)
         simulated = Simulated(
-            observe(plan, controls.threshold, controls.lapses, check),
-            measurable(plan, controls.lapses, least_of(protocol, plan), check, most),
-            _group(plan, controls, check),
+            simulate_observers(plan, controls.threshold, controls.lapses, check),
+            measurable_thresholds(plan, controls.lapses, smallest_level(protocol, plan), check, most),
+            _group_precision(plan, controls, check),
         )
-    shown = tuple(_ratios(protocol, order.block, controls.participants, check)) if order.block else ()
+    shown = tuple(_ratio_sentences(protocol, order.block, controls.participants, check)) if order.block else ()
     if focus.compares:
-        detectable, powers = _detectable(order, check)
+        detectable, powers = _detectable_differences(order, check)
         simulated, shown = replace(simulated, detectable=detectable), (*shown, *powers)
     simulated = replace(simulated, hypotheses=shown)
-    if advises(protocol):
-        simulated = replace(simulated, warnings=_warnings(replace(order, block="", controls=Controls())))
+    if needs_precision_check(protocol):
+        simulated = replace(simulated, warnings=_precision_warnings(replace(order, block="", controls=Controls())))
     return simulated
 
 
 @lru_cache(maxsize=1)
-def _warnings(order: Simulation) -> tuple[str, ...]:
+def _precision_warnings(order: Simulation) -> tuple[str, ...]:
     protocol = order.protocol
     return tuple(sentence for block in protocol.main_blocks for sentence in imprecise(protocol, block))
 
 
-def _group(plan: ThresholdPlan, controls: Controls, check: Check) -> GroupPrecision:
+def _group_precision(plan: ThresholdPlan, controls: Controls, check: Check) -> GroupPrecision:
     people, precision = controls.participants, controls.precision
     more = plan.with_trials(round(MORE * plan.trials))
-    shares = [_studies(part, (people,), check).within(0, precision) for part in (plan, more)]
+    shares = [_simulate_studies(part, (people,), check).within(0, precision) for part in (plan, more)]
     enough = people if shares[0] >= ENOUGH else None
     last = people
     while enough is None and last < MOST_PEOPLE:
         sizes = range(last + 1, min(2 * last, MOST_PEOPLE) + 1)
-        precisions, last = _studies(plan, sizes, check), sizes[-1]
+        precisions, last = _simulate_studies(plan, sizes, check), sizes[-1]
         enough = next((size for place, size in enumerate(sizes) if precisions.within(place, precision) >= ENOUGH), None)
     most = max(MOST_PEOPLE, people)
     return GroupPrecision(
@@ -520,7 +520,7 @@ def _group(plan: ThresholdPlan, controls: Controls, check: Check) -> GroupPrecis
     )
 
 
-def _studies(plan: ThresholdPlan, sizes: Sequence[int], check: Check) -> threshold_studies.PrecisionResult:
+def _simulate_studies(plan: ThresholdPlan, sizes: Sequence[int], check: Check) -> threshold_studies.PrecisionResult:
     """Simulate studies of so many participants, as ``power`` does."""
     from study_app.analysis.planning import threshold_studies  # noqa: PLC0415 - loads scipy: only in this process
 
@@ -536,7 +536,7 @@ SHOWN: Final = "{} of studies of {} show it, if people answer as the model does"
 EQUALITY: Final = "{} of studies of {} show equality, if there is no difference"
 
 
-def _ratios(protocol: Protocol, block: str, people: int, check: Check) -> Iterator[tuple[str, str]]:
+def _ratio_sentences(protocol: Protocol, block: str, people: int, check: Check) -> Iterator[tuple[str, str]]:
     """Yield a sentence for each hypothesis about thresholds, computed as ``power`` does."""
     from study_app.analysis.data.blocks import decisions  # noqa: PLC0415 - loads scipy: only in this process
     from study_app.analysis.planning.power_curves import detectable, shown_equal  # noqa: PLC0415 - the same
@@ -563,8 +563,8 @@ def _ratios(protocol: Protocol, block: str, people: int, check: Check) -> Iterat
                 yield contrast.described(), EQUALITY.format(f"{share:.0%}", people)
 
 
-def _detectable(order: Simulation, check: Check) -> tuple[Detectable | None, tuple[tuple[str, str], ...]]:
-    """Return the smallest differences that studies show, and how many show each hypothesis about statements."""
+def _detectable_differences(order: Simulation, check: Check) -> tuple[Detectable | None, tuple[tuple[str, str], ...]]:
+    """Return the smallest detectable differences, and the share of studies that detect each statement hypothesis."""
     from study_app.analysis.planning.power_curves import Curve, difference_text, powers, with_range  # noqa: PLC0415
     from study_app.analysis.planning.simulated_studies import (  # noqa: PLC0415 - loads scipy
         BATCH,
@@ -579,7 +579,7 @@ def _detectable(order: Simulation, check: Check) -> tuple[Detectable | None, tup
 
     if not compares_statements(order.protocol):
         return None, ()
-    planned = plan(order.protocol, _features(order, check))
+    planned = plan(order.protocol, _condition_features(order, check))
     people = order.controls.participants
     counts = dict[str, Counts]()
     for number in range(STUDIES // BATCH):
@@ -588,7 +588,7 @@ def _detectable(order: Simulation, check: Check) -> tuple[Detectable | None, tup
     power = powers(planned, (people,), STUDIES, STUDIES, SEED, counts)
 
     def difference_of(curve: Curve) -> str:
-        return with_range([difference_text(detections.points(0), 1) for detections in power.among_kinds(curve)])
+        return with_range([difference_text(of_kind.points(0), 1) for of_kind in power.among_kinds(curve)])
 
     findings = [
         Finding(curve.item, curve.points(0), difference_of(curve))
@@ -596,13 +596,13 @@ def _detectable(order: Simulation, check: Check) -> tuple[Detectable | None, tup
         if curve.block == order.block and curve.item is not None and curve.question in ("settings differ", "trend")
         and curve.item not in planned.unknown
     ]  # fmt: skip
-    findings.sort(key=lambda one: (one.detectable is None, one.detectable or 0.0))
+    findings.sort(key=lambda finding: (finding.detectable is None, finding.detectable or 0.0))
     shares = {
-        one.over: with_range([f"{kind.power[0]:.0%}" for kind in power.among_kinds(one)])
-        for one in power.curves
-        if one.question == "contrast"
+        curve.over: with_range([f"{kind.power[0]:.0%}" for kind in power.among_kinds(curve)])
+        for curve in power.curves
+        if curve.question == "contrast"
     }
-    stated = [(one.described(), one.bound) for one in hypotheses_of(order.protocol, order.block)]
+    stated = [(contrast.described(), contrast.bound) for contrast in hypotheses_of(order.protocol, order.block)]
     shown = tuple(
         (
             sentence,
@@ -622,7 +622,7 @@ def _detectable(order: Simulation, check: Check) -> tuple[Detectable | None, tup
 _features_of: dict[str, ConditionFeatures] = {}
 
 
-def _features(order: Simulation, check: Check) -> ConditionFeatures:
+def _condition_features(order: Simulation, check: Check) -> ConditionFeatures:
     """Return the features of each condition, cached for the last study: rehearsing them takes most of the time."""
     from study_app.session.simulated.rehearsal import condition_features  # noqa: PLC0415 - the compiler: only here
 

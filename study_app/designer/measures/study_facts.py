@@ -9,13 +9,13 @@ from typing import Any, Final
 
 from study_app.designer.document.additions import texts_of
 from study_app.designer.document.elements import title_of
-from study_app.designer.document.fields import alternatives, initial, is_localised, label_of, named_at
+from study_app.designer.document.fields import alternatives, initial_value, is_localised, label_of, named_at
 from study_app.designer.document.study import Study
-from study_app.designer.document.toml_edits import Set, Unset, meaning
+from study_app.designer.document.toml_edits import Set, Unset, meant_document
 from study_app.designer.document.toml_text import Refused
 from study_app.haptics.model.slope_limits import HAND_MPS, steady_force
 from study_app.protocol.json_schema import schema
-from study_app.protocol.load import examined
+from study_app.protocol.load import validate_document
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s, step_duration_s
@@ -65,14 +65,14 @@ def copied_texts(study: Study) -> dict[str, int]:
     return dict(Counter(text.language for text in untranslated_texts(study.document)))
 
 
-def to_translate(study: Study) -> tuple[str, ...]:
+def translation_warnings(study: Study) -> tuple[str, ...]:
     """Return a warning for each language with untranslated texts."""
     return tuple(describe_untranslated(study.document, lists_places=False))
 
 
-def revealing(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:
+def revealing_texts(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:
     """Return the texts that name a liquid, condition or delay which participants must not know."""
-    telltales = Telltales(_words(protocol))
+    telltales = Telltales(_telltale_words(protocol))
     debriefs = {name for name, page in protocol.pages.items() if page.kind == "debrief"}
     revealing = []
     for path, value in texts_of(study):
@@ -86,7 +86,7 @@ def revealing(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:
     return tuple(revealing)
 
 
-def _words(protocol: Protocol) -> set[str]:
+def _telltale_words(protocol: Protocol) -> set[str]:
     """Return the names of everything that main blocks compare, and their delays with the unit."""
     telltales: set[str] = set()
     for block in protocol.main_blocks:
@@ -150,14 +150,16 @@ def restored_part(study: Study, before: Mapping[str, Any]) -> ValidPart:
     if study.formed is not None or not (study.is_toml or before):
         return ValidPart(study.formed, whole=study.formed is not None)
     document: Any = study.document
-    faults: list[Fault] = list(study.faults) if study.is_toml else examined(document)[1]
+    faults: list[Fault] = list(study.faults) if study.is_toml else validate_document(document)[1]
     whole = forces = True
     for number in range(ROUNDS):
-        for fault in sorted(faults, key=_place, reverse=True):
-            place, value = _restored(document, fault, before) or _mended(document, fault, of_others=number > 0)
+        for fault in sorted(faults, key=_sort_key, reverse=True):
+            place, value = _restoring_change(document, fault, before) or _repairing_change(
+                document, fault, of_others=number > 0
+            )
             known = value is not None or fault.kind == "unknown key" or place[:1] in _APART
             if not place:
-                place, value = fault.path[:2], _initial(document, fault.path[:2])
+                place, value = fault.path[:2], _initial_value(document, fault.path[:2])
                 if value is None:
                     return ValidPart(None, whole=False)
             if value_at(document, place) is None and value is None:
@@ -166,14 +168,14 @@ def restored_part(study: Study, before: Mapping[str, Any]) -> ValidPart:
             forces = forces and (fault.kind == "unknown key" or fault.path[:1] not in _OF_FORCES)
             edit = Unset(place) if value is None else Set(place, value)
             with suppress(Refused):  # its table was removed
-                document = frozen(meaning(document, edit))
-        protocol, faults = examined(document)
+                document = frozen(meant_document(document, edit))
+        protocol, faults = validate_document(document)
         if protocol is not None:
             return ValidPart(protocol, whole, forces)
     return ValidPart(None, whole=False)
 
 
-def _restored(document: Any, fault: Fault, before: Mapping[str, Any]) -> tuple[Path, Any] | None:
+def _restoring_change(document: Any, fault: Fault, before: Mapping[str, Any]) -> tuple[Path, Any] | None:
     """Return the place to change because of a fault, and its earlier value; None if it had none."""
     if not before or fault.missing_language:
         return None
@@ -208,12 +210,12 @@ def _path_before(document: Any, path: Path, before: Any) -> Path:
     return tuple(path_before)
 
 
-def _place(fault: Fault) -> tuple[str, ...]:
+def _sort_key(fault: Fault) -> tuple[str, ...]:
     """Return a sort key that puts later entries of a list after earlier ones."""
     return tuple(f"{step:06}" if isinstance(step, int) else step for step in fault.path)
 
 
-def _mended(document: Any, fault: Fault, *, of_others: bool) -> tuple[Path, Any]:
+def _repairing_change(document: Any, fault: Fault, *, of_others: bool) -> tuple[Path, Any]:
     """Return the place to change because of a fault, and its value (None omits it); () if nothing helps.
 
     A key that is wrong only because another element was left out (``of_others``) is left out before its own element.
@@ -230,7 +232,7 @@ def _mended(document: Any, fault: Fault, *, of_others: bool) -> tuple[Path, Any]
     named = 0 if path[:1] == ("study",) else 1  # the name of an element may be that of a text
     for length in range(len(path), 1 + named, -1):
         if path[length - 1] in text_keys():
-            return path[:length], _text(document)
+            return path[:length], _neutral_text(document)
     if path[:2] in _STAND_IN:
         return path[:2], _STAND_IN[path[0], path[1]]  # type: ignore[index]
     if path[:1] == ("questionnaires",) and path[2:3] == ("items",) and len(path) > 3:
@@ -242,7 +244,7 @@ def _mended(document: Any, fault: Fault, *, of_others: bool) -> tuple[Path, Any]
     if path[:1] in _LEFT_OUT:
         return path[:1], None
     if path[:1] in _OF_FORCES:
-        return path[:2], None if value_at(document, path[:2]) is not None else _initial(document, path[:2])
+        return path[:2], None if value_at(document, path[:2]) is not None else _initial_value(document, path[:2])
     listed = len(path) > 1 and isinstance(path[-1], int) and isinstance(value_at(document, path), str)
     if listed:
         return path, None
@@ -251,15 +253,15 @@ def _mended(document: Any, fault: Fault, *, of_others: bool) -> tuple[Path, Any]
     return (path[:2], None) if len(path) > 1 and isinstance(value_at(document, path[:2]), Mapping) else ((), None)
 
 
-def _initial(document: Any, path: Path) -> Any:
+def _initial_value(document: Any, path: Path) -> Any:
     """Return a valid value for a key; None where there is none."""
     try:
-        return initial(document, path) if path else None
+        return initial_value(document, path) if path else None
     except Refused:
         return None
 
 
-def _text(document: Any) -> Any:
+def _neutral_text(document: Any) -> Any:
     codes = languages_of(document)
     return dict.fromkeys(codes, TEXT) if len(codes) > 1 else TEXT
 
@@ -286,7 +288,7 @@ class Facts:
 @lru_cache(maxsize=2)
 def facts(study: Study) -> Facts:
     """Return the facts of a study."""
-    missing, translate = missing_texts(study), to_translate(study)
+    missing, translate = missing_texts(study), translation_warnings(study)
     valid = valid_part(study)
     if (protocol := valid.protocol) is None:
         return Facts(missing=missing, warnings=translate)

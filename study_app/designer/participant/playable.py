@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, Signal
 from study_app.designer.document.document import Document
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import named_places
-from study_app.designer.document.study import Study, read
+from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Edit, Set, Unset
 from study_app.designer.document.toml_text import Refused
 from study_app.designer.editing import Editing
@@ -27,7 +27,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import variants
 from study_app.protocol.orders.schedule import FormStep, PageStep, Step, Trial, build_schedule
 from study_app.protocol.source.document import Path, has, value_at
-from study_app.protocol.source.files import file_of, unbundled, with_liquid_files
+from study_app.protocol.source.files import liquid_file_name, unbundle, with_liquid_files
 from study_app.protocol.wording.languages import language_name, languages_of
 from study_app.session.pages import Page
 from study_app.session.transitions.page_builder import PARTICIPANT, SEED, Moment, Preview, preview
@@ -73,7 +73,7 @@ class ParticipantView:
         return f"Participant's page, {language_name(self.language)}"
 
 
-def step_words(shown: Preview, step: Step, language: str) -> str:
+def step_label(shown: Preview, step: Step, language: str) -> str:
     """Return the label of a step: "Welcome", "Liquids, trial 3 of 6"."""
     protocol = shown.protocol
     if isinstance(step, Trial):
@@ -85,7 +85,7 @@ def step_words(shown: Preview, step: Step, language: str) -> str:
     return step.form.replace("_", " ").capitalize() if form is None else protocol.text(form, language)
 
 
-def moment_words(moments: tuple[Moment, ...]) -> tuple[tuple[Moment, str], ...]:
+def moment_labels(moments: tuple[Moment, ...]) -> tuple[tuple[Moment, str], ...]:
     """Return the pages of a step with their labels; none if there is only one."""
     tanks = sum(moment.kind == "tank" for moment in moments)
     named = {
@@ -109,7 +109,7 @@ Graph: TypeAlias = Mapping[Path, frozenset[Path]]
 def first_step(shown: Preview, path: Path) -> int | None:
     """Return the index of the first step that shows an element, or a place within it; None if none does."""
     graph = graph_of(shown.protocol.model_dump())
-    tables = (_shown_by(shown, step, graph) for step in shown.schedule.steps)
+    tables = (_tables_of_step(shown, step, graph) for step in shown.schedule.steps)
     return next((at for at, tables_of_step in enumerate(tables) if path[:2] in tables_of_step), None)
 
 
@@ -121,7 +121,7 @@ def graph_of(document: Mapping[str, object]) -> Graph:
     return {table: frozenset(named) for table, named in names.items()}
 
 
-def reached(graph: Graph, first: Iterable[Path]) -> frozenset[Path]:
+def reachable_tables(graph: Graph, first: Iterable[Path]) -> frozenset[Path]:
     """Return tables and everything that they refer to, directly or not."""
     tables = dict.fromkeys(first)
     todo = list(tables)
@@ -132,17 +132,17 @@ def reached(graph: Graph, first: Iterable[Path]) -> frozenset[Path]:
     return frozenset(tables)
 
 
-def _shown_by(shown: Preview, step: Step, graph: Graph) -> frozenset[Path]:
+def _tables_of_step(shown: Preview, step: Step, graph: Graph) -> frozenset[Path]:
     """Return the tables that a step presents and those they refer to; for a trial only its own condition."""
     if isinstance(step, PageStep):
-        return reached(graph, [("pages", step.page_id)])
+        return reachable_tables(graph, [("pages", step.page_id)])
     if isinstance(step, FormStep):
-        return reached(graph, [("questionnaires", step.form)])
+        return reachable_tables(graph, [("questionnaires", step.form)])
     block: Path = ("blocks", step.block)
     parts = [part for part in graph.get(block, ()) if part[0] not in {"conditions", "pages"}]
     named = (shown.codes[step.block][step.code], shown.protocol.blocks[step.block].standard)
     presented = [("conditions", name) for name in named if name in shown.protocol.conditions]  # not of a varied number
-    return reached(graph, [*parts, *presented]) | {block}
+    return reachable_tables(graph, [*parts, *presented]) | {block}
 
 
 Side: TypeAlias = Literal["tank", "questions"]
@@ -191,7 +191,7 @@ def previews(study: Protocol) -> Iterator[tuple[str, Preview]]:
             yield variant.name, replace(first, protocol=variant.protocol, schedule=schedule)
 
 
-def showing(study: Protocol, path: Path) -> Found | None:
+def first_showing(study: Protocol, path: Path) -> Found | None:
     """Return the first step that shows an element, None if none does.
 
     A page or questionnaire that is in no session is shown on its own.
@@ -236,12 +236,12 @@ MOST_EARLIER: Final = 5
 """So many kept versions are looked at for one without faults."""
 
 
-def last_valid(opened: Document) -> Study | None:
+def last_valid_study(opened: Document) -> Study | None:
     """Return the study of the file or of its newest kept version without faults."""
     earlier = (kept_content(version.hash) or b"" for version in reversed(kept_versions(opened.file)[-MOST_EARLIER:]))
-    for text in (opened.saved.encode(), *(unbundled(content)[0] for content in earlier)):
+    for text in (opened.saved.encode(), *(unbundle(content)[0] for content in earlier)):
         with suppress(Refused):
-            study = read(text, opened.study.folder)
+            study = read_study(text, opened.study.folder)
             if study.protocol is not None:
                 return study
     return None
@@ -267,7 +267,7 @@ class NotPlayableError(StudyError):
         super().__init__("; ".join(map(str, problems)))
 
 
-def playable(study: Study, path: Path, position: StepPosition | None = None) -> Playable:
+def part_to_play(study: Study, path: Path, position: StepPosition | None = None) -> Playable:
     """Return the part to play from a position, or from the first step that shows an element.
 
     ``position``: where the preview is. Raises NotPlayableError if the study has faults, but for texts that are missing
@@ -277,8 +277,8 @@ def playable(study: Study, path: Path, position: StepPosition | None = None) -> 
     if not study.is_toml:
         raise NotPlayableError(study.problems)
     language = position.language or languages_of(study.document)[0]
-    filled = tuple(_filled_texts(study, language))
-    completed = study.edited(*filled)[0] if filled else study
+    filled = tuple(_edits_to_fill_in(study, language))
+    completed = study.with_edits(*filled)[0] if filled else study
     if completed.protocol is None:
         known = {(problem.place, problem.message): problem for problem in study.problems}
         own = tuple(
@@ -296,12 +296,12 @@ def playable(study: Study, path: Path, position: StepPosition | None = None) -> 
         completed.folder,
         completed.protocol,
         step,
-        step_words(shown, shown.schedule.steps[step], language),
+        step_label(shown, shown.schedule.steps[step], language),
         StepPosition(position.name, position.trial, language, position.seed),
     )
 
 
-def _filled_texts(study: Study, language: str) -> Iterator[Edit]:
+def _edits_to_fill_in(study: Study, language: str) -> Iterator[Edit]:
     """Yield the edits that fill in missing texts of languages that are not shown."""
     for fault in study.faults:
         text = value_at(study.document, fault.path)
@@ -339,9 +339,9 @@ class Feeling(QObject):
         self.editing, self.place = editing, place
         self._sides: dict[LabSide, Liquid] = {}
         self._file = File()
-        place.form.head.feel_asked.connect(self.feel)
+        place.form.head.feel_asked.connect(self.feel_liquids)
 
-    def feel(self, path: Path) -> None:
+    def feel_liquids(self, path: Path) -> None:
         """Open an element's liquids in the lab, with unsaved values: the first as A, the second as B."""
         self.place.flush()
         opened = self.editing.opened
@@ -365,7 +365,7 @@ class Feeling(QObject):
         self._file = opened.file
         self.asked.emit(LabLiquids(settings[0], settings[1], "" if opened.read_only else opened.file.stem))
 
-    def put_back(self, side: LabSide, setting: Setting) -> None:
+    def put_liquid_back(self, side: LabSide, setting: Setting) -> None:
         """Set the liquid of a side to the values of a setting, as one step."""
         opened, before = self.editing.opened, self._sides.get(side)
         if opened is None or before is None or opened.file != self._file:
@@ -380,15 +380,15 @@ class Feeling(QObject):
             self.place.message.emit("It was not put back", f"The study has no liquid {before.id} any more.")
             return
         title = title_of(document, path)
-        if file_of(value_at(document, path)) is not None:
+        if liquid_file_name(value_at(document, path)) is not None:
             sentence = f"{title} is in a liquid file of its own. Save it there as a preset."
             self.place.message.emit("It was not put back", sentence)
             return
         after = setting.scene.liquids[0]
-        edits = tuple(_edits(document, path, _values(before), _values(after)))
+        edits = tuple(_liquid_edits(document, path, _liquid_values(before), _liquid_values(after)))
         try:
             if edits:
-                self.editing.make(f"Put {title} back from the lab", *edits, select=path)
+                self.editing.make_step(f"Put {title} back from the lab", *edits, select=path)
         except Refused as refusal:
             self.place.message.emit("It was not put back", f"{refusal}.")
             return
@@ -411,11 +411,11 @@ def _liquids(protocol: Protocol, path: Path) -> tuple[str, ...]:
     return tuple(dict.fromkeys(ids))[:2]
 
 
-def _values(liquid: Liquid) -> dict[str, Any]:
+def _liquid_values(liquid: Liquid) -> dict[str, Any]:
     return liquid.model_dump(exclude_none=True, exclude={"id"})
 
 
-def _edits(
+def _liquid_edits(
     document: Mapping[str, Any], path: Path, before: Mapping[str, Any], after: Mapping[str, Any]
 ) -> Iterator[Edit]:
     """Yield the edits for the differences between two liquid tables."""
@@ -427,15 +427,15 @@ def _edits(
         if old == value:
             continue
         if isinstance(value, Mapping) and isinstance(old, Mapping) and has(value_at(document, path), key):
-            yield from _edits(document, place, old, value)
+            yield from _liquid_edits(document, place, old, value)
         else:
-            yield Set(place, _plain(value))
+            yield Set(place, _as_written(value))
 
 
-def _plain(value: Any) -> Any:
+def _as_written(value: Any) -> Any:
     """Return a value as TOML writes it: lists, and whole numbers without a decimal point."""
     if isinstance(value, Mapping):
-        return {key: _plain(entry) for key, entry in value.items()}
+        return {key: _as_written(entry) for key, entry in value.items()}
     if isinstance(value, tuple):
-        return [_plain(entry) for entry in value]
+        return [_as_written(entry) for entry in value]
     return int(value) if isinstance(value, float) and value.is_integer() else value

@@ -45,25 +45,25 @@ from study_app.designer.participant.playable import (
     ParticipantView,
     ScreenSize,
     StepPosition,
-    last_valid,
-    moment_words,
+    first_showing,
+    last_valid_study,
+    moment_labels,
     same_step,
-    showing,
     side_of,
+    step_label,
     step_name,
-    step_words,
 )
-from study_app.designer.parts import Segments, dense
+from study_app.designer.parts import Segments, make_dense
 from study_app.designer.window import DesignerPlace, PanePage
 from study_app.gui.display.screens import choose_screens
-from study_app.gui.kit.commands import add_commands, tip
+from study_app.gui.kit.commands import add_commands, command_tip
 from study_app.gui.kit.devices import screen_number, settings_here, text_scale_on
 from study_app.gui.participant.forms.questions_page import QuestionsPage
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Coloured
-from study_app.gui.widgets.accessible import say
-from study_app.gui.widgets.background import delayed
+from study_app.gui.widgets.accessible import announce
+from study_app.gui.widgets.background import delayed_call
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, fill_rounded
 from study_app.gui.widgets.controls import Choice, IconButton
@@ -144,14 +144,14 @@ class LivePage(Coloured, QGraphicsView):
             self._since_s = time.monotonic()
         window = self.page_window
         if window is None or view.language != before.language or view.photodiode != before.photodiode:
-            window = self._open(view)
+            window = self._open_page(view)
         elif (
             isinstance(before.page, TaskPage)
             and isinstance(view.page, TaskPage)
             and before.page.trial == view.page.trial
         ):
-            window = window if before.page == view.page else self._open(view)
-        elif _bare(view.page) == _bare(before.page) and not another:
+            window = window if before.page == view.page else self._open_page(view)
+        elif _without_answers(view.page) == _without_answers(before.page) and not another:
             if view.focused != before.focused:
                 self._go_to(view.focused)
             return
@@ -176,7 +176,7 @@ class LivePage(Coloured, QGraphicsView):
     def show_screen(self, screen: ScreenSize) -> None:
         self._screen = screen
         if self._view.page is not None:
-            self._open(self._view).show_page(self._view.page)
+            self._open_page(self._view).show_page(self._view.page)
             self._go_to(self._view.focused)
             self._time_frames()
         self._scale()
@@ -205,7 +205,7 @@ class LivePage(Coloured, QGraphicsView):
             return 1.0
         return min(self.width() / self._screen.width, self.height() / self._screen.height)
 
-    def _open(self, view: ParticipantView) -> ParticipantWindow:
+    def _open_page(self, view: ParticipantView) -> ParticipantWindow:
         self.close_page()
         made = ParticipantWindow(
             words(view.language),
@@ -290,7 +290,7 @@ class LivePage(Coloured, QGraphicsView):
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         QAbstractScrollArea.focusInEvent(self, event)
-        say(self, LEAVES)
+        announce(self, LEAVES)
         self.viewport().update()
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
@@ -354,7 +354,7 @@ def _close_pages() -> None:
             page.close_page()
 
 
-def _bare(page: Page | None) -> Page | None:
+def _without_answers(page: Page | None) -> Page | None:
     return replace(page, chosen=()) if isinstance(page, QuestionnairePage) else page
 
 
@@ -380,7 +380,7 @@ class ParticipantPreview(Card):
         self.note = label("", "small", "warn", wraps=True)
         self.note.hide()
         self.languages = Segments("Language of the page")
-        self.screens = dense(Choice(), "Screen")
+        self.screens = make_dense(Choice(), "Screen")
         self.screens.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.screens.setMinimumContentsLength(9)
         self.aside = QWidget()
@@ -411,13 +411,15 @@ class ParticipantPreview(Card):
         self._ball_of: object = None
         self._since_s = 0.0
         self._photodiode = False
-        self._after_form = delayed(self, 0, self._follow)  # after another selection the form is painted first
-        editing.opened_other.connect(self._begin)
+        self._after_form = delayed_call(
+            self, 0, self._show_if_visible
+        )  # after another selection the form is painted first
+        editing.opened_other.connect(self._forget_study)
         editing.changed.connect(self._after_form.start)
-        editing.edited.connect(self._follow)
+        editing.edited.connect(self._show_if_visible)
         place.entered.connect(self._look_at_screen)
-        self.page.shown.connect(self._follow)
-        self.page.happened.connect(self._hear)
+        self.page.shown.connect(self._show_if_visible)
+        self.page.happened.connect(self._handle_page_event)
         self.page.frame_due.connect(self._move_ball)
         self.page.left.connect(lambda: self.before.setFocus(Qt.FocusReason.OtherFocusReason))
         self.languages.chosen.connect(lambda code: self.show_language(str(code)))
@@ -427,7 +429,7 @@ class ParticipantPreview(Card):
         self.moments.chosen.connect(self.show_moment)
         self.zoom.chosen.connect(self._show_fitted)
         page = PanePage(name="participant", words="Participant", body=self, aside=self.aside,
-                        most_px=lambda: self.most_px, tip=tip("page"))  # fmt: skip
+                        most_px=lambda: self.most_px, tip=command_tip("page"))  # fmt: skip
         place.pane.add_page(page, first=True)
         add_commands(place, {"page": self.enter_page, "language": self.show_next_language})
         self._look_at_screen()
@@ -435,7 +437,7 @@ class ParticipantPreview(Card):
     @property
     def position(self) -> StepPosition | None:
         """The previewed position; None if there is none, or the page is not in the first session."""
-        self._update()
+        self._find_step()
         shown = self._found
         if shown is None or shown.session:
             return None
@@ -446,10 +448,10 @@ class ParticipantPreview(Card):
     # requests
 
     def enter_page(self) -> None:
-        self._come_forward()
+        self._show_tab()
         self.page.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
-    def _come_forward(self) -> None:
+    def _show_tab(self) -> None:
         self.place.sides.chosen.emit("pane")
         self.place.pane.show_tab("participant")
 
@@ -457,7 +459,7 @@ class ParticipantPreview(Card):
         """Show the pages in the next language; the keyboard focus stays, if its part is still visible."""
         form = self.place.form
         hides = form.isVisible()
-        self._come_forward()
+        self._show_tab()
         if hides and not form.isVisible():
             self.place.pane.tabs.setFocus(Qt.FocusReason.ShortcutFocusReason)
         languages = self.view.languages
@@ -466,7 +468,7 @@ class ParticipantPreview(Card):
 
     def show_language(self, language: str) -> None:
         self._language = language
-        self._show()
+        self._show_step()
 
     def go(self, by: int) -> None:
         if (shown := self._found) is None:
@@ -475,27 +477,27 @@ class ParticipantPreview(Card):
         if 0 <= index < len(shown.shown.schedule.steps):
             self._found = Found(shown.shown, index, shown.session)
             self._moment = None
-            self._show()
+            self._show_step()
 
     def show_moment(self, moment: Moment) -> None:
         self._moment = moment
         self._side = "tank" if moment.kind == "tank" else "questions"
-        self._show()
+        self._show_step()
 
-    def _hear(self, event: object) -> None:
+    def _handle_page_event(self, event: object) -> None:
         """Keep an answer for this page; go to the next page where the participant would."""
         if isinstance(event, LanguageChosen):
             self.show_language(event.language)
         elif isinstance(event, Chosen):
             self._answers.setdefault(self._page_key, {})[event.item] = event.value
             if isinstance(self.view.page, DesignPage):
-                self._go_on()
+                self._go_to_next()
         elif isinstance(event, Retracted):
             self._answers.get(self._page_key, {}).pop(event.item, None)
         elif isinstance(event, Submitted | Continue):
-            self._go_on()
+            self._go_to_next()
 
-    def _go_on(self) -> None:
+    def _go_to_next(self) -> None:
         if (shown := self._found) is None:
             return
         pages = pages_of_step(shown.shown, shown.index)
@@ -508,7 +510,7 @@ class ParticipantPreview(Card):
 
     # updates
 
-    def _begin(self) -> None:
+    def _forget_study(self) -> None:
         self._found = self._moment = self._protocol = self._study = self._valid = None
         self._selected, self._answers, self._language = (), {}, ""
         self._side = "questions"
@@ -524,12 +526,12 @@ class ParticipantPreview(Card):
                          text_scale_on(settings, screen))  # fmt: skip
         self.offer_screens((*SIZES, own))
 
-    def _follow(self) -> None:
+    def _show_if_visible(self) -> None:
         self._after_form.stop()
         if self.editing.opened is not None and self.isVisible():
-            self._show()
+            self._show_step()
 
-    def _update(self) -> None:
+    def _find_step(self) -> None:
         """Find the shown step in the present study; another step if another element was selected."""
         opened = self.editing.opened
         if opened is None:
@@ -540,17 +542,17 @@ class ParticipantPreview(Card):
             if study.protocol is not None:
                 self._valid = study
             elif self._valid is None and before is None:
-                self._valid = last_valid(opened)
+                self._valid = last_valid_study(opened)
             valid = {} if self._valid is None else self._valid.document
             self._protocol = study.protocol or restored_part(study, valid).protocol
             if self._protocol is None and self._valid is not None:
                 self._protocol = self._valid.protocol
             if self._protocol is not None and before is not None and self._found is not None:
-                self._found = self._again(self._found)
+                self._found = self._same_step(self._found)
         if self._protocol is None:
             self._found = None
         elif selected != self._selected or self._found is None:
-            step = showing(self._protocol, selected)
+            step = first_showing(self._protocol, selected)
             if step is None and self._found is None:
                 shown = preview(self._protocol)
                 step = Found(shown, 0) if shown.schedule.steps else None
@@ -571,19 +573,19 @@ class ParticipantPreview(Card):
         whole = self._selected[:1] in {("questionnaires",), ("blocks",), ("scales",)}
         return step_name(old) == step_name(other) and (not isinstance(old, Trial) or whole)
 
-    def _again(self, previous: Found) -> Found | None:
+    def _same_step(self, previous: Found) -> Found | None:
         assert self._protocol is not None  # noqa: S101 - the caller has looked
         step = previous.shown.schedule.steps[previous.index]
         if previous.session == STANDALONE:
-            return showing(self._protocol, self._selected)
+            return first_showing(self._protocol, self._selected)
         return same_step(
             self._protocol, step_name(step), step.index if isinstance(step, Trial) else 1, previous.session
         )
 
     # display
 
-    def _show(self) -> None:
-        self._update()
+    def _show_step(self) -> None:
+        self._find_step()
         study, place = self._study, self._found
         if study is None:
             return
@@ -600,7 +602,7 @@ class ParticipantPreview(Card):
         if isinstance(page, TaskPage):
             self._place_ball(page, presented_condition(shown, index))
         now = shown.schedule.steps[index]
-        step = step_words(shown, now, shown.protocol.study.languages[0])
+        step = step_label(shown, now, shown.protocol.study.languages[0])
         if place.session and place.session != STANDALONE:
             step = f"{step} ({place.session})"
         self.show_view(
@@ -611,10 +613,10 @@ class ParticipantPreview(Card):
                 step=step,
                 has_before=index > 0,
                 has_after=index + 1 < len(shown.schedule.steps),
-                moments=moment_words(pages),
+                moments=moment_labels(pages),
                 moment=self._moment,
-                focused=self._question(study),
-                note=self._note(study, place),
+                focused=self._selected_question(study),
+                note=self._page_note(study, place),
                 photodiode=self._photodiode,
             )
         )
@@ -626,14 +628,14 @@ class ParticipantPreview(Card):
         step = self._found.shown.schedule.steps[self._found.index]
         return step_name(step), step.index if isinstance(step, Trial) else 0
 
-    def _question(self, study: Study) -> str | None:
+    def _selected_question(self, study: Study) -> str | None:
         if "items" not in self._selected:
             return None
         item = value_at(study.document, self._selected[: self._selected.index("items") + 2])
         name = item.get("id") if isinstance(item, Mapping) else None
         return name if isinstance(name, str) else None
 
-    def _note(self, study: Study, step: Found) -> str:
+    def _page_note(self, study: Study, step: Found) -> str:
         """Return a note, in the page's language, on parts that are not shown as written."""
         first = step.shown.protocol.study.languages[0]
         faults = [fault for fault in study.faults if fault.concerns(self._language, first)]
@@ -671,8 +673,8 @@ class ParticipantPreview(Card):
         before, self.view = self.view, view
         self.setAccessibleName(view.name)
         if before.language and view.language != before.language:
-            say(self.languages, view.name)
-        self.languages.tips = dict.fromkeys(view.languages, tip("language"))
+            announce(self.languages, view.name)
+        self.languages.tips = dict.fromkeys(view.languages, command_tip("language"))
         self.languages.setVisible(len(view.languages) > 1)
         self.languages.show_values([(code, code.upper()) for code in view.languages], view.language)
         self.note.setText(view.note)

@@ -85,7 +85,7 @@ class DiagnosisDialog(QDialog):
         self.resize(SIZE.boundedTo(QSize(room.width() - 40, room.height() - 60)))
         apply_theme(self, theme)
         self._timer = QTimer(self, interval=LOOK_MS)
-        self._timer.timeout.connect(self._look)
+        self._timer.timeout.connect(self._read_answers)
         self.examine()
 
     def _lay_out(self, title: str) -> None:
@@ -108,16 +108,16 @@ class DiagnosisDialog(QDialog):
     def _connect(self) -> None:
         self.close_button.clicked.connect(self.reject)
         self.again.clicked.connect(self.examine)
-        self.copy.clicked.connect(self._copy)
-        self.support.clicked.connect(self._ask_where)
+        self.copy.clicked.connect(self._copy_report)
+        self.support.clicked.connect(self._ask_for_path)
         for button in (self.again, self.copy, self.support):
             button.setAutoDefault(False)
         self.close_button.setDefault(True)
 
     def examine(self) -> None:
-        self._let_go()
+        self._end_process()
         self.report = None
-        self._say(PREPARING, "text2", "pulse", "accent")
+        self._show_step(PREPARING, "text2", "pulse", "accent")
         self.saved.hide()
         self.text.clear()
         self.bar.show()
@@ -127,52 +127,52 @@ class DiagnosisDialog(QDialog):
         self.close_button.show_action("", "Cancel")
         self._wanted = True
         self._timer.start()
-        self._look()
+        self._read_answers()
 
-    def _look(self) -> None:
+    def _read_answers(self) -> None:
         """Begin once nothing else uses the device; then read the diagnosis' answers."""
         if self._wanted and (self.leaving is None or self.leaving.ended):
             self._wanted = False
             self._examination = self._begin(self._name, options=self._options)
         for _, answer in [] if self._examination is None else self._examination.answers():
             if isinstance(answer, str):
-                self._say(answer, "text", "pulse", "accent")
+                self._show_step(answer, "text", "pulse", "accent")
                 self.text.appendPlainText(answer)
             else:
-                self._finish(answer)
+                self._show_conclusion(answer)
 
-    def _finish(self, said: Report | Refused | Crashed) -> None:
+    def _show_conclusion(self, said: Report | Refused | Crashed) -> None:
         self._timer.stop()
         self.bar.hide()
         self.again.setEnabled(True)
         self.support.setEnabled(True)
         self.close_button.show_action("", "Close")
-        self._let_go()
+        self._end_process()
         if not isinstance(said, Report):
-            self._say(_sentence(said.sentence), "bad", "warning", "bad")
+            self._show_step(_sentence(said.sentence), "bad", "warning", "bad")
             self.over.emit(False)
             return
         self.report = said
         self.copy.setEnabled(True)
         well = said.well
         sentence = said.conclusion if said.failure is None else _sentence(said.failure)
-        self._say(sentence, "text2" if well else "bad", "check" if well else "warning", "ok" if well else "bad")
-        self.text.setPlainText(self._written())
+        self._show_step(sentence, "text2" if well else "bad", "check" if well else "warning", "ok" if well else "bad")
+        self.text.setPlainText(self._report_text())
         self.over.emit(well)
 
-    def _say(self, sentence: str, ink: str, sign: str, sign_ink: str) -> None:
+    def _show_step(self, sentence: str, ink: str, sign: str, sign_ink: str) -> None:
         self.step.setText(sentence)
         set_ink(self.step, ink)  # type: ignore[arg-type]
         self.sign.show_icon(sign, sign_ink)  # type: ignore[arg-type]
 
-    def _copy(self) -> None:
-        QGuiApplication.clipboard().setText(self._written())
+    def _copy_report(self) -> None:
+        QGuiApplication.clipboard().setText(self._report_text())
         self.copy.show_action("check", "Copied")
 
-    def _written(self) -> str:
+    def _report_text(self) -> str:
         return "" if self.report is None else "\n".join(report_lines(self.report)).strip() + "\n"
 
-    def _ask_where(self) -> None:
+    def _ask_for_path(self) -> None:
         dialog = QFileDialog(self, "Save a zip file for support", NAME, "Zip files (*.zip)")
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setDefaultSuffix("zip")
@@ -183,7 +183,7 @@ class DiagnosisDialog(QDialog):
     def save_support(self, path: Path) -> None:
         """Write versions, settings, log, last error and report to ``path``; show the path or the error."""
         try:
-            write_support(path, self._written())
+            write_support(path, self._report_text())
         except StoreError as error:
             self.saved.setText(_sentence(str(error)))
         else:
@@ -192,7 +192,7 @@ class DiagnosisDialog(QDialog):
             )
         self.saved.show()
 
-    def _let_go(self) -> None:
+    def _end_process(self) -> None:
         """Ask the process to end without waiting: it closes the device first."""
         if self._examination is not None:
             self._examination.close()
@@ -202,7 +202,7 @@ class DiagnosisDialog(QDialog):
         """End the examination, whichever way the dialog is closed."""
         self._timer.stop()
         self._wanted = False
-        self._let_go()
+        self._end_process()
         super().done(result)
 
 
@@ -216,7 +216,7 @@ HELD = (
 )
 
 
-def diagnosis(
+def open_diagnosis(
     parent: QWidget, theme: Theme, name: str, settings: MachineSettings, *, held: bool = False
 ) -> DiagnosisDialog:
     """Open the diagnosis of a device; ``held``: a session has the device open."""

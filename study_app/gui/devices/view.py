@@ -9,9 +9,9 @@ from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QLabel, QWidget
 
 from study_app.devices.descriptor import Backend, DeviceOption
 from study_app.devices.registry import backends
-from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog, diagnosis
+from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog, open_diagnosis
 from study_app.gui.kit.devices import DeviceShown, devices_shown, remembered_options
-from study_app.gui.kit.fields import LEAST_WORDS, Editor, Field, file_of
+from study_app.gui.kit.fields import LEAST_WORDS, Editor, Field, typed_file
 from study_app.gui.theme.theme import SHADOW, font
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
@@ -33,9 +33,9 @@ class DeviceRow(QWidget):
         self.title: Radio | QLabel = Radio(shown.title) if shown.choosable else label(shown.title, "strong")
         self.title.setFont(font("strong"))
         self.chip = Chip(small=True)
-        self.can = _words("text2")
-        self.why = _words("warn")
-        self.by = _words("text3", small=True)
+        self.can = _text_label("text2")
+        self.why = _text_label("warn")
+        self.by = _text_label("text3", small=True)
         self.diagnose = ActionButton("pulse", "Diagnose …", height=36)
         self.diagnose.setAccessibleName(f"Diagnose {shown.title}")
         self.diagnose.setVisible(shown.diagnosable)
@@ -57,7 +57,7 @@ class DeviceRow(QWidget):
         self.title.setAccessibleName(f"{shown.title}. {shown.word}. {shown.can} {shown.why}".strip())
 
 
-def _words(ink: str, *, small: bool = False) -> QLabel:
+def _text_label(ink: str, *, small: bool = False) -> QLabel:
     made = label("", "small" if small else "label", ink, wraps=True)  # type: ignore[arg-type]
     made.setFont(font("small" if small else "label", weight=400))
     made.setMinimumWidth(LEAST_WORDS)
@@ -77,7 +77,7 @@ class OptionCard(Card):
         super().__init__(option.title, gap=8)
         about = label(option.about, "label", "text2", wraps=True, weight=400)
         about.setMinimumWidth(LEAST_WORDS)
-        exists = partial(file_of, option.name)
+        exists = partial(typed_file, option.name)
         field = Field(option.name, "File", "file", (), placeholder=NONE, file_filter=option.file_filter, parse=exists)
         self.editor = Editor(field)
         add_parts(self.column, about, self.editor)
@@ -114,7 +114,7 @@ class DevicesPlace(Place):
         super().__init__()
         self._settings, self.backends = settings, look
         self.looking = Background(self, refusals=Exception)  # a driver's bug is a result of the search
-        self.looking.done.connect(self._show_found)
+        self.looking.done.connect(self._show_devices_found)
         self.looking.failed.connect(self._show_unexamined)
         self._ended = False
         self.shown: tuple[DeviceShown, ...] = ()
@@ -125,7 +125,7 @@ class DevicesPlace(Place):
         self.options = {option.name: OptionCard(option) for option in remembered_options()}
         self.help = HelpCard()
         self.refresh = ActionButton("repeat", "Refresh", key="F5")
-        self.refresh.clicked.connect(self.look)
+        self.refresh.clicked.connect(self.look_for_devices)
         for card in self.options.values():
             card.editor.changed.connect(lambda name, path: self.changed.emit({name: path}))
         self._lay_out()
@@ -147,18 +147,18 @@ class DevicesPlace(Place):
 
     def enter(self) -> None:
         """Search for devices again: one may have been plugged in."""
-        self.look()
+        self.look_for_devices()
 
     def leave(self) -> None:
         """End a running examination, so that it releases its device."""
         self.end_diagnosis()
 
-    def look(self) -> None:
+    def look_for_devices(self) -> None:
         if not self.looking.busy and not self._ended:
             self.show_looking(True)
             self.looking.run(lambda: devices_shown(self.backends()))
 
-    def end(self, patience_s: float = PATIENCE_S) -> None:
+    def stop_looking(self, patience_s: float = PATIENCE_S) -> None:
         """Stop searching, wait for the running search and ignore its result: the windows close."""
         self._ended = True
         self.looking.wait(min(patience_s, PATIENCE_S))
@@ -168,7 +168,7 @@ class DevicesPlace(Place):
         preferred = self._settings.device
         asked = preferred if preferred.partition(":")[0] == name else name
         self.end_diagnosis()
-        self.dialog = diagnosis(self.window(), self.theme, asked, self._settings)
+        self.dialog = open_diagnosis(self.window(), self.theme, asked, self._settings)
         self.dialog.finished.connect(self._forget_dialog)
         self.dialog.show()
 
@@ -179,7 +179,7 @@ class DevicesPlace(Place):
     def _forget_dialog(self) -> None:
         self.dialog = None
 
-    def _show_found(self, devices: tuple[DeviceShown, ...]) -> None:
+    def _show_devices_found(self, devices: tuple[DeviceShown, ...]) -> None:
         if not self._ended:
             self.show_looking(False)
             self.show_devices(devices)
@@ -197,14 +197,14 @@ class DevicesPlace(Place):
             if device.name in self.rows:
                 self.rows[device.name].show_device(device)
             else:
-                self._add(device)
+                self._add_row(device)
         self._group.setExclusive(False)  # otherwise the marked button could not be unmarked
         for name, row in self.rows.items():
             if isinstance(row.title, Radio):
                 row.title.setChecked(name == self._settings.device.partition(":")[0])
         self._group.setExclusive(True)
 
-    def _add(self, device: DeviceShown) -> None:
+    def _add_row(self, device: DeviceShown) -> None:
         card = self.lists[device.simulated]
         row = self.rows[device.name] = DeviceRow(device, self.diagnose)
         add_parts(card.column, *([Rule()] if card.findChild(DeviceRow) else []), row)

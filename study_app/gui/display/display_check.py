@@ -43,7 +43,7 @@ def check_display(environment: Mapping[str, str] = os.environ, platform: str = s
             f"or over SSH with ssh -X ({NEEDS_NO_DISPLAY})"
         )
     _load_plugin()
-    _reach(display)
+    _connect_to_display(display)
 
 
 def missing_for_windows() -> str:
@@ -68,7 +68,7 @@ def missing_library(error: OSError | ImportError) -> DisplayError:
 
 
 @contextmanager
-def qt_imported() -> Iterator[None]:
+def naming_missing_library() -> Iterator[None]:
     """Name the missing system library if an import within the block needs one.
 
     Raises
@@ -101,7 +101,7 @@ def _load_plugin() -> None:
         raise missing_library(error) from error
 
 
-def _reach(display: str) -> None:
+def _connect_to_display(display: str) -> None:
     try:
         xcb = ctypes.CDLL("libxcb.so.1")
     except OSError as error:

@@ -86,7 +86,7 @@ def describe_screen(screen: QScreen) -> dict[str, Any]:
     }
 
 
-def place(window: QWidget, screen: QScreen, *, corner: bool) -> None:
+def place_window(window: QWidget, screen: QScreen, *, corner: bool) -> None:
     """Give ``window`` its size, at most the screen's, and put it in the middle or the lower right corner.
 
     The system's frame is not known before the window is shown, and on a busy machine some time later: once it is, the
@@ -94,7 +94,7 @@ def place(window: QWidget, screen: QScreen, *, corner: bool) -> None:
     """
     room = screen.availableGeometry()
     window.setScreen(screen)
-    window.setGeometry(_inside(window, room, corner=corner))
+    window.setGeometry(_rectangle_inside(window, room, corner=corner))
     for after_ms in FRAME_LOOKS_MS:
         QTimer.singleShot(after_ms, window, partial(make_room_for_frame, window, corner=corner))
 
@@ -112,10 +112,10 @@ def make_room_for_frame(window: QWidget, *, corner: bool = False) -> None:
     if least.boundedTo(room.size()) != least:
         return  # the screen is too small for it anyway
     window.setMinimumSize(least)
-    window.setGeometry(_inside(window, room, corner=corner))
+    window.setGeometry(_rectangle_inside(window, room, corner=corner))
 
 
-def _inside(window: QWidget, room: QRect, *, corner: bool) -> QRect:
+def _rectangle_inside(window: QWidget, room: QRect, *, corner: bool) -> QRect:
     """Return the rectangle of ``window`` in ``room``, from its upper left corner if it is larger."""
     size = window.size().boundedTo(room.size()).expandedTo(window.minimumSize())
     share = 1.0 if corner else 0.5
@@ -132,7 +132,7 @@ WITHOUT_OPENGL: Final = {"offscreen", "minimal", "vnc", "linuxfb"}
 
 
 @cache
-def renderer() -> str | None:
+def opengl_renderer() -> str | None:
     """Return OpenGL's name for its renderer; None without OpenGL."""
     if QGuiApplication.platformName() in WITHOUT_OPENGL:
         return None
@@ -149,9 +149,9 @@ def renderer() -> str | None:
         context.doneCurrent()
 
 
-def has_card() -> bool:
+def has_graphics_card() -> bool:
     """Return whether OpenGL uses a graphics card and not software."""
-    name = renderer()
+    name = opengl_renderer()
     return name is not None and not any(word in name.lower() for word in IN_SOFTWARE)
 
 
@@ -176,16 +176,16 @@ class Frames(QObject):
         self._drawn_ns = -NS_PER_S
         self._swapped_ns: int | None = None
         self._timer = QTimer(self, timerType=Qt.TimerType.PreciseTimer, singleShot=True)
-        self._timer.timeout.connect(self._draw)
+        self._timer.timeout.connect(self._request_frame)
 
     @property
-    def locked(self) -> bool:
+    def is_locked(self) -> bool:
         swapped_ns = self._swapped_ns
         return swapped_ns is not None and self._now_ns() - swapped_ns < STALE_REFRESHES * self.period_ns
 
     @property
-    def paced(self) -> str:
-        return LOCKED if self.locked else BY_CLOCK
+    def pacing(self) -> str:
+        return LOCKED if self.is_locked else BY_CLOCK
 
     @property
     def next_ns(self) -> int:
@@ -193,12 +193,12 @@ class Frames(QObject):
 
     def start(self) -> None:
         self._next_ns = self._now_ns() + self.period_ns
-        self._arm()
+        self._start_timer()
 
     def stop(self) -> None:
         self._timer.stop()
 
-    def swapped(self) -> None:
+    def note_swap(self) -> None:
         """Note a buffer swap: from now on, a frame is drawn shortly before each swap."""
         self._swapped_ns = self._now_ns()
         aim_ns = self._swapped_ns - min(LEAD_NS, self.period_ns // 2)
@@ -207,15 +207,15 @@ class Frames(QObject):
         while self._next_ns < self._drawn_ns + half_ns:  # the refresh that was just drawn is not drawn twice
             self._next_ns += self.period_ns
         if self._timer.isActive():
-            self._arm()
+            self._start_timer()
 
-    def _draw(self) -> None:
+    def _request_frame(self) -> None:
         """Request a frame; the timer of the next one already runs, so that a slow frame does not delay it."""
         now_ns = self._drawn_ns = self._now_ns()
         missed = max(0, (now_ns - self._next_ns) // self.period_ns)
         self._next_ns += (missed + 1) * self.period_ns
-        self._arm()
+        self._start_timer()
         self.due.emit()
 
-    def _arm(self) -> None:
+    def _start_timer(self) -> None:
         self._timer.start(max(0, round((self._next_ns - self._now_ns()) / 1e6)))

@@ -68,7 +68,7 @@ class HelpEntry:
 
 
 @cache
-def entries() -> tuple[HelpEntry, ...]:
+def help_entries() -> tuple[HelpEntry, ...]:
     """Return the pages in the order of the sections, each page followed by its sections."""
     rows = [HelpEntry(page=FIRST_PAGE, title="Start page", heads=True)]
     for section, pages in documentation.sections().items():
@@ -77,11 +77,11 @@ def entries() -> tuple[HelpEntry, ...]:
     return tuple(rows)
 
 
-def found(text: str) -> tuple[HelpEntry, ...]:
+def matching_entries(text: str) -> tuple[HelpEntry, ...]:
     """Return the pages that contain the text, best first, each at its best heading; all pages for an empty text."""
     if not text.strip():
-        return entries()
-    titles = {entry.page: entry.title for entry in entries()}
+        return help_entries()
+    titles = {entry.page: entry.title for entry in help_entries()}
     return tuple(
         HelpEntry(
             page=section.page,
@@ -93,7 +93,7 @@ def found(text: str) -> tuple[HelpEntry, ...]:
 
 
 @cache
-def text_of(page: str) -> str:
+def page_markdown(page: str) -> str:
     """Return a page as Markdown without comments, HTML, empty cells, which Qt joins, and bars in cells."""
     text = _HTML_IMAGE.sub(r"![\2](\1)", _COMMENT.sub("", documentation.page(page)))
     return "\n".join(
@@ -125,7 +125,7 @@ def code_font() -> QFont:
     return made
 
 
-def _face(used: QFont) -> QTextCharFormat:
+def _text_format(used: QFont) -> QTextCharFormat:
     made = QTextCharFormat()
     made.setFont(used)
     return made
@@ -145,13 +145,13 @@ class PageReader(Coloured, QTextBrowser):
         self.setOpenLinks(False)
         self.setFrameShape(QTextBrowser.Shape.NoFrame)
         self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOn)  # else it changes the width: drawn twice
-        self.anchorClicked.connect(self._follow)
+        self.anchorClicked.connect(self._follow_link)
 
     def show_page(self, name: str, anchor: str = "") -> None:
         """Show a page from its start, or from the heading with an anchor."""
         if name != self.page:
             self.page = name
-            self._draw()
+            self._draw_page()
         self.verticalScrollBar().setValue(0)
         if anchor:
             self._scroll_to(anchor)
@@ -159,13 +159,13 @@ class PageReader(Coloured, QTextBrowser):
     def apply_theme(self, theme: Theme) -> None:
         self.setStyleSheet(f"QTextBrowser {{ background: {theme.surface}; color: {theme.text}; }}")
         if self.page:
-            self._draw()
+            self._draw_page()
 
     def loadResource(self, kind: int, name: QUrl | str) -> Any:
         if kind != QTextDocument.ResourceType.ImageResource.value:
             return super().loadResource(kind, name)
         path = name.toString() if isinstance(name, QUrl) else name
-        picture = QImage(str(self._folder / self._here(path)))
+        picture = QImage(str(self._folder / self._path_from_docs(path)))
         ratio = self.devicePixelRatioF()
         width = round(max(200, min(WIDEST_TEXT, self.viewport().width() - 2 * MARGIN)) * ratio)
         if picture.width() > width:
@@ -178,16 +178,16 @@ class PageReader(Coloured, QTextBrowser):
         at = self.verticalScrollBar().value() / max(1, self.verticalScrollBar().maximum())
         super().resizeEvent(event)
         if self.page and event.size().width() != event.oldSize().width():
-            self._draw()
+            self._draw_page()
             self.verticalScrollBar().setValue(round(at * self.verticalScrollBar().maximum()))
 
-    def _here(self, path: str) -> str:
+    def _path_from_docs(self, path: str) -> str:
         """Return the target of a path on the page, relative to the folder of the pages."""
         return posixpath.normpath(posixpath.join(posixpath.dirname(self.page), path))
 
-    def _draw(self) -> None:
+    def _draw_page(self) -> None:
         document = QTextDocument(self, defaultFont=font("body", weight=400), documentMargin=MARGIN)
-        document.setMarkdown(text_of(self.page), QTextDocument.MarkdownFeature.MarkdownDialectGitHub)
+        document.setMarkdown(page_markdown(self.page), QTextDocument.MarkdownFeature.MarkdownDialectGitHub)
         self._style_blocks(document)
         self._style_tables(document)
         self.setDocument(document)  # last: laid out once
@@ -205,11 +205,11 @@ class PageReader(Coloured, QTextBrowser):
             cursor.movePosition(QTextCursor.MoveOperation.EndOfBlock, QTextCursor.MoveMode.KeepAnchor)
             shape = block.blockFormat()
             if shape.headingLevel():
-                cursor.mergeCharFormat(_face(heading_font(shape.headingLevel())))
+                cursor.mergeCharFormat(_text_format(heading_font(shape.headingLevel())))
                 shape.setTopMargin(0 if shape.headingLevel() == 1 else 22)
                 shape.setBottomMargin(6)
             elif any(shape.hasProperty(key) for key in CODE):
-                cursor.mergeCharFormat(_face(code_font()))
+                cursor.mergeCharFormat(_text_format(code_font()))
                 shape.setBackground(QColor(self.theme.sunk))
                 shape.setNonBreakableLines(False)
             elif not in_table:
@@ -265,14 +265,14 @@ class PageReader(Coloured, QTextBrowser):
                 return
             block = block.next()
 
-    def _follow(self, link: QUrl) -> None:
+    def _follow_link(self, link: QUrl) -> None:
         path, anchor = link.path(), link.fragment()
         if link.scheme() in {"http", "https"}:
             QDesktopServices.openUrl(link)
         elif not path:
             self._scroll_to(anchor)
         elif path.endswith(ENDING):
-            self.page_asked.emit(self._here(path.removesuffix(ENDING)), anchor)
+            self.page_asked.emit(self._path_from_docs(path.removesuffix(ENDING)), anchor)
 
 
 LIST_WIDTH, ROW_PX, HEAD_PX = 280, 30, 40
@@ -301,16 +301,16 @@ class HelpPlace(Place):
         self.back = ActionButton("chevron_left", "Back", height=38)
         self.back.setEnabled(False)
         self._lay_out()
-        self.words.textChanged.connect(lambda text: self._show_rows(found(text)))
+        self.words.textChanged.connect(lambda text: self._show_rows(matching_entries(text)))
         self.words.installEventFilter(self)
-        self.list.currentItemChanged.connect(self._chosen)
+        self.list.currentItemChanged.connect(self._open_chosen)
         self.reader.page_asked.connect(self.open_page)
         self.back.clicked.connect(self.go_back)
         self.back.setToolTip("Back (Alt+←); Esc leads to where Help was opened")
         QShortcut(QKeySequence("Alt+Left"), self, self.go_back)
         QShortcut(QKeySequence("Esc"), self, self._go_to_origin)
         QShortcut(QKeySequence(QKeySequence.StandardKey.Find), self, self.words.setFocus)
-        self._show_rows(entries())
+        self._show_rows(help_entries())
         self.open_page(FIRST_PAGE)
 
     def _lay_out(self) -> None:
@@ -381,7 +381,7 @@ class HelpPlace(Place):
             if not rows:
                 self.list.clearSelection()
 
-    def _chosen(self, item: QListWidgetItem | None) -> None:
+    def _open_chosen(self, item: QListWidgetItem | None) -> None:
         if item is not None:
             self.open_page(item.data(PAGE), item.data(ANCHOR))
 

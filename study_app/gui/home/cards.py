@@ -186,14 +186,14 @@ class SessionsCard(Card):
         parts = (label("Sessions", "card"), (self.nothing, 1), self.kind, (self.where, 1), self.details, self.all)
         self.rows = SessionsTable(COLUMNS, NONE[""])
         add_parts(self.column, hbox(*parts, spacing=12, margins=(12, 0, 12, 0)), (self.rows, 1))
-        self.kind.currentIndexChanged.connect(self._filter)
+        self.kind.currentIndexChanged.connect(self._apply_filter)
         self.rows.opened.connect(self.open_asked)
         self.rows.chosen_changed.connect(lambda: self.details.setEnabled(self.rows.chosen is not None))
         self.details.clicked.connect(self.rows.open_chosen)
         self.details.setEnabled(False)
         self.details.setAccessibleName("Details of the selected session")
         self._show_kinds()
-        self._filter()
+        self._apply_filter()
 
     @property
     def is_empty(self) -> bool:
@@ -209,7 +209,7 @@ class SessionsCard(Card):
         self.where.show_text(f"in {where}")
         self._show_kinds()
         self.rows.show_rows(self._found, now)
-        self._filter()
+        self._apply_filter()
 
     def show_kind(self, kind: str) -> None:
         """Show the sessions of a kind: "" for participants', one of `KINDS`, or `EVERY`."""
@@ -225,7 +225,7 @@ class SessionsCard(Card):
             self.kind.addItem(f"All ({len(self._found)})", EVERY)
             self.kind.setCurrentIndex(self.kind.findData(chosen))
 
-    def _filter(self) -> None:
+    def _apply_filter(self) -> None:
         kind = str(self.kind.currentData() or "") if self._found else EVERY
         self.rows.show_matching(lambda session: kind in (session.kind, EVERY))
         hidden = [

@@ -17,7 +17,7 @@ from study_app.gui.home.startup_window import FIRST_TIME
 from study_app.gui.home.study_facts import StudyFacts
 from study_app.gui.kit.devices import device_label, device_or_default, window_options
 from study_app.gui.kit.dialogs import Question, Work
-from study_app.gui.kit.fields import Editor, Field, choice, file_of, seed
+from study_app.gui.kit.fields import Editor, Field, choice_field, seed_field, typed_file
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.background import Background
@@ -25,7 +25,7 @@ from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
 from study_app.gui.widgets.cards import Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
-from study_app.protocol.groups import refuse_beyond_last
+from study_app.protocol.groups import check_session_number
 from study_app.protocol.load import read_document
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.files import source_bytes
@@ -81,13 +81,13 @@ class RehearsalDialog(Work):
             self.editors[name].show_value(value)
         self.worker: RehearsalClient | None = None
         self._done = 0
-        self.begun.connect(self._start)
-        self.stop_asked.connect(self._stop)
+        self.begun.connect(self._start_rehearsal)
+        self.stop_asked.connect(self._stop_rehearsal)
         self.opened.connect(lambda: self.done(QDialog.DialogCode.Accepted.value))
         self._listening = QTimer(self, interval=LISTEN_MS)
-        self._listening.timeout.connect(self._listen)
+        self._listening.timeout.connect(self._read_answers)
 
-    def _start(self) -> None:
+    def _start_rehearsal(self) -> None:
         count = self.value("participants")
         self._done = 0
         self.show_progress(f"0 of {count}: rehearsing …", 0.0)
@@ -99,17 +99,17 @@ class RehearsalDialog(Work):
         self.worker.order(RehearsalOrder(self._facts.source, count, self.value("seed"), self.folder))
         self._listening.start()
 
-    def _stop(self) -> None:
+    def _stop_rehearsal(self) -> None:
         if self.worker is not None:
             self.worker.close()
 
-    def _listen(self) -> None:
+    def _read_answers(self) -> None:
         """Read the new answers; close the dialog once a stopped rehearsal's process has ended."""
         assert self.worker is not None  # noqa: S101 - listening begins with it
         if not self.back.isEnabled():
             if self.worker.ended:
                 self._listening.stop()
-                self.stopped()
+                self.close_stopped()
             return
         count = self.value("participants")
         for _, answer in self.worker.answers():
@@ -210,12 +210,14 @@ class NewSessionDialog(QDialog):
         self._lay_out()
         apply_theme(self, theme)
         for name, editor in self.editors.items():
-            editor.edited.connect({"device": self._choose_device, "pilot": self._choose_pilot}.get(name, self._check))
+            editor.edited.connect(
+                {"device": self._choose_device, "pilot": self._choose_pilot}.get(name, self._check_answers)
+            )
         another.clicked.connect(lambda: self.editors["session"].show_value(self._free[0]))
         new.clicked.connect(lambda: self.editors["participant"].show_value(self._free[1]))
         self.begin.clicked.connect(self.accept)
         self.cancel.clicked.connect(self.reject)
-        self._check()
+        self._check_answers()
         participant = self.editors["participant"].control
         assert isinstance(participant, QLineEdit)  # noqa: S101 - an id is typed
         participant.setFocus()
@@ -230,15 +232,15 @@ class NewSessionDialog(QDialog):
         fields = (
             Field("participant", "Participant", aside="letters and digits, no name"),
             Field("session", "Session", "count", limits=(1, MAX_SESSION)),
-            seed("determines every order; recorded"),
+            seed_field("determines every order; recorded"),
             Field("operator", "Operator", longest=40, placeholder="Initials, such as AK"),
-            choice("language", "Language of the participant's pages", languages),
-            choice("device", "Device", {name: device_label(name) for name in devices}),
-            choice("screen", "Participant's screen", screen_titles),
+            choice_field("language", "Language of the participant's pages", languages),
+            choice_field("device", "Device", {name: device_label(name) for name in devices}),
+            choice_field("screen", "Participant's screen", screen_titles),
             Field("windowed", "In a window instead of full screen", "check"),
             Field("pilot", "Pilot: marked by a frame, stored separately", "check"),
             Field("results", "Results folder of this study", "folder"),
-            choice("group", "Group", {name: name for name in self.facts.protocol.groups}, aside=GROUP_HINT),
+            choice_field("group", "Group", {name: name for name in self.facts.protocol.groups}, aside=GROUP_HINT),
             Field(
                 "row_of", "Replaces participant", aside=PLACE_HINT if self.facts.protocol.groups else ROW_HINT,
                 parse=lambda text: text or None,
@@ -247,7 +249,7 @@ class NewSessionDialog(QDialog):
                 Field(
                     option.name, option.title, "file" if option.file_filter else "line", aside=option.hint,
                     placeholder=option.placeholder, file_filter=option.file_filter,
-                    parse=partial(file_of, option.name) if option.file_filter else str,
+                    parse=partial(typed_file, option.name) if option.file_filter else str,
                 )
                 for option in window_options()
             ),
@@ -269,7 +271,7 @@ class NewSessionDialog(QDialog):
         }
         for name, value in values.items():
             self.editors[name].show_value(value)
-        self.editors["participant"].show_value(self._state_now().used.suggested())
+        self.editors["participant"].show_value(self._current_state().used.suggested())
         self.editors["group"].show_value(None)  # chosen, never assumed
         self.editors["group"].setVisible(self.facts.protocol.asks_group)
         self.editors["row_of"].setVisible(self.facts.protocol.assigns_rows or bool(self.facts.protocol.groups))
@@ -322,9 +324,9 @@ class NewSessionDialog(QDialog):
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
-        QTimer.singleShot(0, self, self._fit)  # once the parts have their style
+        QTimer.singleShot(0, self, self._fit_height)  # once the parts have their style
 
-    def _fit(self) -> None:
+    def _fit_height(self) -> None:
         """Make the dialog as high as its questions, at most the screen's height; then they scroll."""
         inside, whole = self._inside.layout(), self.layout()
         assert inside is not None and whole is not None  # noqa: S101, PT018 - laid out above
@@ -338,7 +340,7 @@ class NewSessionDialog(QDialog):
 
     def _choose_device(self) -> None:
         self._suggest_folder()
-        self._check()
+        self._check_answers()
 
     def _suggest_folder(self) -> None:
         """Suggest separate folders for pilots and simulated hands, unless the operator chose one."""
@@ -355,12 +357,12 @@ class NewSessionDialog(QDialog):
         windowed.show_value(pilot or self._windowed_without_pilot)
         windowed.setEnabled(not pilot)
         self._suggest_folder()
-        self._check()
+        self._check_answers()
 
     def _value(self, name: str) -> Any:
         return self.editors[name].value
 
-    def _check(self) -> None:
+    def _check_answers(self) -> None:
         """Check the answers, and read the folder again outside the windows' thread."""
         self._show_verdict()
         if text := self._value("results"):
@@ -371,7 +373,7 @@ class NewSessionDialog(QDialog):
             self._state = state
             self._show_verdict()
 
-    def _state_now(self) -> StudyFolderState:
+    def _current_state(self) -> StudyFolderState:
         """Return the last state of the study's folder; read a newly chosen folder at once."""
         path = Path(self._value("results") or ".")
         if self._state is None or self._state.path != path:
@@ -382,9 +384,9 @@ class NewSessionDialog(QDialog):
         inside = Path(self._value("results")).resolve().is_relative_to(workspace().folder.resolve())
         self.editors["results"].aside.setText(INSIDE if inside else OUTSIDE)
         for option in window_options():
-            self.editors[option.name].setVisible(option.name in self._asked())
-        participant, session, used = self._value("participant"), self._value("session"), self._state_now().used
-        self._show_recorded_group(self._state_now().group_of(participant))
+            self.editors[option.name].setVisible(option.name in self._asked_options())
+        participant, session, used = self._value("participant"), self._value("session"), self._current_state().used
+        self._show_recorded_group(self._current_state().group_of(participant))
         numbers = used.numbers(participant)
         self._ways_row.setVisible(session in numbers)
         if session in numbers:  # choices that need no decision; resuming is on the home page
@@ -393,7 +395,7 @@ class NewSessionDialog(QDialog):
             self.ways[1].show_action("", f"New participant {self._free[1]}")
         fault = ""
         try:
-            self._refuse()
+            self._raise_if_refused()
         except (StudyError, ValueError) as error:
             fault = str(error)
         sentence = fault or f"{participant} is free, session {session}"
@@ -402,7 +404,7 @@ class NewSessionDialog(QDialog):
         set_ink(self.verdict, "bad" if fault else "ok")
         self.verdict_icon.show_icon(*(("warning", "bad") if fault else ("check", "ok")))
         self.begin.setEnabled(not fault)
-        self._fit()
+        self._fit_height()
 
     def _show_recorded_group(self, recorded: str | None) -> None:
         """Show the recorded group of a participant, which cannot change; otherwise it can be chosen."""
@@ -411,11 +413,11 @@ class NewSessionDialog(QDialog):
             group.show_value(recorded)
         group.setEnabled(recorded is None)
 
-    def _refuse(self) -> None:
+    def _raise_if_refused(self) -> None:
         """Raise an error if the session cannot begin; nothing is changed."""
         if not self._value("results"):
             raise ValueError("choose a results folder")
-        participant, session, state = self._value("participant"), self._value("session"), self._state_now()
+        participant, session, state = self._value("participant"), self._value("session"), self._current_state()
         if not self._value("pilot"):
             check_translated(self._document)
         check_participant(participant, pilot=self._value("pilot"))
@@ -424,7 +426,7 @@ class NewSessionDialog(QDialog):
         state.used.check_unused(participant, session)
         protocol, group, row_of = self.facts.protocol, self._value("group"), self._value("row_of")
         check_row(row_of, protocol)
-        refuse_beyond_last(protocol, session)
+        check_session_number(protocol, session)
         if protocol.asks_group and group is None:
             raise ValueError("choose the participant's group")
         check_choice(protocol, state.held, participant, group=group, row_of=row_of)
@@ -434,12 +436,12 @@ class NewSessionDialog(QDialog):
     def _document(self) -> Mapping[str, Any]:
         return read_document(source_bytes(self.facts.source), self.facts.source)[0]
 
-    def _asked(self) -> set[str]:
+    def _asked_options(self) -> set[str]:
         return {option.name for option in descriptor_of(self._value("device")).window_options}
 
     def chosen(self) -> NewSession:
         """Return the chosen session; raise ValueError for values that are not permitted."""
-        asked, options = self._asked(), {option.name for option in window_options()}
+        asked, options = self._asked_options(), {option.name for option in window_options()}
         values = {name: editor.value for name, editor in self.editors.items() if name in asked or name not in options}
         chosen = {name: values.pop(name) for name in asked}
         return NewSession(

@@ -13,7 +13,7 @@ from study_app.errors import StudyError
 from study_app.gui.kit.dialogs import Question
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import DARK, LIGHT, RADIUS_CONTROL, Theme, font
-from study_app.gui.theme.themed import Coloured, Themed, apply_theme, give_ground, name_bars
+from study_app.gui.theme.themed import Coloured, Themed, apply_theme, give_ground, name_scroll_bars
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Logo, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, PressedByEnter
@@ -57,9 +57,9 @@ class RailButton(Themed, PressedByEnter):
         self.setAccessibleName(word)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
-        self.narrow(False)
+        self.set_narrow(False)
 
-    def narrow(self, yes: bool) -> None:
+    def set_narrow(self, yes: bool) -> None:
         self._narrow = yes
         self.setText(self.short if yes else self.word)
         self.updateGeometry()
@@ -82,10 +82,10 @@ class RailButton(Themed, PressedByEnter):
         self.setAccessibleDescription("You are here" if yes else "")
         self.update()
 
-    def say(self, icon: str, word: str, short: str) -> None:
+    def set_texts(self, icon: str, word: str, short: str) -> None:
         self.icon_name, self.word, self.short = icon, word, short
         self.setAccessibleName(word)
-        self.narrow(self._narrow)
+        self.set_narrow(self._narrow)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
@@ -132,30 +132,30 @@ class Rail(Coloured, QWidget):
         self.name = label("Liquid Study", "card")
         self.switch = RailButton("moon", "Dark theme", "Dark")
         self._head = hbox(Logo(), self.name, STRETCH, spacing=10)
-        self.buttons = {place.name: self._button(place) for place in DESTINATIONS if place.name in names}
+        self.buttons = {place.name: self._make_button(place) for place in DESTINATIONS if place.name in names}
         self._column = vbox(self._head, 22, *self.buttons.values(), STRETCH, self.switch, spacing=6, parent=self)
 
-    def _button(self, place: Destination) -> RailButton:
+    def _make_button(self, place: Destination) -> RailButton:
         made = RailButton(place.icon, place.word, place.short)
         made.clicked.connect(lambda: self.go_asked.emit(place.name))
         return made
 
-    def mark(self, name: str) -> None:
+    def mark_place(self, name: str) -> None:
         for other, button in self.buttons.items():
             button.here = other == name
 
-    def narrow(self, yes: bool) -> None:
+    def set_narrow(self, yes: bool) -> None:
         self.setFixedWidth(NARROW_RAIL if yes else WIDE_RAIL)
         margin = NARROW_MARGIN if yes else WIDE_MARGIN
         self._column.setContentsMargins(margin, 20, margin, 16)
         self._head.setContentsMargins(20 - margin, 0, 0, 0)
         self.name.setVisible(not yes)
         for button in (*self.buttons.values(), self.switch):
-            button.narrow(yes)
+            button.set_narrow(yes)
 
     def apply_theme(self, theme: Theme) -> None:
         word = "Light" if theme.dark else "Dark"
-        self.switch.say("sun" if theme.dark else "moon", f"{word} theme", word)
+        self.switch.set_texts("sun" if theme.dark else "moon", f"{word} theme", word)
 
 
 FULL = QSize(1440, 900)
@@ -163,7 +163,7 @@ LEAST = QSize(1024, 640)
 NARROW_BELOW = 1680
 
 
-def bug_words(error: BaseException) -> str:
+def bug_sentence(error: BaseException) -> str:
     """Return the sentence about a bug of the program or a plug-in."""
     if isinstance(said := explained(error), StudyError):
         return f"{said}."
@@ -221,7 +221,7 @@ class MainWindow(Themed, QMainWindow):
             try:
                 made = self._makers[name]()
             except Exception as error:
-                self._say_not_opened(name, error)
+                self._show_not_opened(name, error)
                 raise
             finally:
                 QGuiApplication.restoreOverrideCursor()
@@ -230,7 +230,7 @@ class MainWindow(Themed, QMainWindow):
             made.go_asked.connect(self.go)
             self._places[name] = made
             self.stack.addWidget(made)
-            name_bars(made)
+            name_scroll_bars(made)
         return self._places[name]
 
     def go(self, name: str) -> None:
@@ -241,12 +241,12 @@ class MainWindow(Themed, QMainWindow):
                 self._close_notice(self._here)
                 self._places[self._here].leave()
             self._here = name
-            self.rail.mark(name)
+            self.rail.mark_place(name)
             self.stack.setCurrentWidget(asked)
             asked.enter()
-        self._lead_in(self.rail.buttons[name], asked)
+        self._give_keyboard(self.rail.buttons[name], asked)
 
-    def _lead_in(self, button: QWidget, place: Place) -> None:
+    def _give_keyboard(self, button: QWidget, place: Place) -> None:
         """Move the keyboard focus from a rail button into its place: to the part that had it last, else the first."""
         if self.focusWidget() is not button:
             return
@@ -258,25 +258,25 @@ class MainWindow(Themed, QMainWindow):
         if not place.isAncestorOf(self.focusWidget()):
             button.setFocus()
 
-    def _say_not_opened(self, name: str, error: BaseException) -> None:
+    def _show_not_opened(self, name: str, error: BaseException) -> None:
         if not self.isVisible():
             return
         self.not_opened = error
         word = next(place.word for place in DESTINATIONS if place.name == name)
-        what = bug_words(error)
+        what = bug_sentence(error)
         again = ActionButton("", "Try again", role="primary")
         notice = Question(self, self.theme, f"“{word}” could not be opened", what, again, back="Close")
         notice.accepted.connect(lambda: self.go(name))
         self._show_notice(notice)
 
-    def rest(self) -> None:
+    def hide_for_session(self) -> None:
         """Leave the present place and hide the window during a session."""
         self._places[self._here].leave()
         self._had_keyboard = self.focusWidget()
         self._resting = True
         self.hide()
 
-    def come_back(self) -> None:
+    def return_from_session(self) -> None:
         """Show the window again, at the same place.
 
         A window that becomes the active one while it is hidden, as when the dialog before a session closes, gives the
@@ -326,7 +326,7 @@ class MainWindow(Themed, QMainWindow):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self.rail.narrow(self.width() < NARROW_BELOW)
+        self.rail.set_narrow(self.width() < NARROW_BELOW)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         for place in self._places.values():

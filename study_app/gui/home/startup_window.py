@@ -48,14 +48,14 @@ class OpeningWindow(QWidget):
         vbox(head, (self.step, 1), bar, foot, spacing=14, margins=(28, 24, 28, 24), parent=self)
         self._now_s, self._since_s = now_s, now_s()
         self._timer = QTimer(self)
-        self._timer.timeout.connect(self._tell)
+        self._timer.timeout.connect(self._show_elapsed)
         self._timer.start(250)
         self._done = False
         self._said = False
         apply_theme(self, theme)
         give_role(self, QAccessible.Role.Window)
 
-    def _tell(self) -> None:
+    def _show_elapsed(self) -> None:
         seconds = self._now_s() - self._since_s
         self.lasted.setText(minutes(seconds))
         if seconds > LONG_AFTER_S and not self._said:
@@ -67,7 +67,7 @@ class OpeningWindow(QWidget):
         self._bar.setRange(0, 100)
         self._bar.setValue(round(100 * share))
 
-    def say(self, line: str) -> None:
+    def show_line(self, line: str) -> None:
         """Show what the device asks for instead of the progress."""
         self._said = True
         self.step.setText(line)

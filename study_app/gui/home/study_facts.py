@@ -14,17 +14,23 @@ from study_app.errors import ProtocolError, StudyError
 from study_app.gui.sessions.session_facts import (
     SAMPLE,
     SessionFacts,
-    counted_each,
+    count_range_text,
     extent_of,
     operator_language,
-    started_words,
+    start_time_text,
     step_title,
 )
 from study_app.number_text import counted
 from study_app.protocol.load import is_scene_file, load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial
-from study_app.protocol.source.files import at_hand, find, shipped, shipped_file, without_mark
+from study_app.protocol.source.files import (
+    known_protocols,
+    protocol_file,
+    shipped,
+    shipped_file,
+    without_byte_order_mark,
+)
 from study_app.protocol.wording.languages import language_name
 from study_app.session.resume import begun_schedule, find_protocol, is_rehearsal, resume_at, source_to_resume
 from study_app.store import receipt
@@ -100,9 +106,9 @@ class DraftFacts:
     draft: DraftNote
 
 
-def sources() -> tuple[str, ...]:
+def known_sources() -> tuple[str, ...]:
     """Return the known studies: recent files, the workspace's, then shipped ones; no liquid files."""
-    names = sorted(at_hand(), key=lambda name: (is_shipped(name), name != "rek2024", name == "demo", name))
+    names = sorted(known_protocols(), key=lambda name: (is_shipped(name), name != "rek2024", name == "demo", name))
     known = dict.fromkeys((*recent_protocols(), *names))
     return tuple(source for source in known if not holds_liquids_alone(source))
 
@@ -125,14 +131,14 @@ class DraftWords(typing.Protocol):
 
     def draft_title(self, draft: str, folder: Path) -> str: ...
 
-    def edited_words(self, saved: str, draft: str, folder: Path) -> str: ...
+    def edited_elements_text(self, saved: str, draft: str, folder: Path) -> str: ...
 
 
 LoadWords: TypeAlias = Callable[[], DraftWords] | None
 """Loads the designer's modules, only where there is a draft; None where a draft's content is not described."""
 
 
-def held_ns(session: Path) -> int:
+def last_written_ns(session: Path) -> int:
     """Return the time of the last line of a session's journal [ns]; 0 if it is unknown."""
     with suppress(OSError):
         return (session / "journal.jsonl").stat().st_mtime_ns
@@ -144,7 +150,8 @@ def last_study(results: Path) -> str:
     folders = results.glob("*/data/sub-*/ses-*")
     with suppress(StudyError, ValueError):
         last = max(
-            (folder for folder in folders if not folder.relative_to(results).parts[0].startswith(SAMPLE)), key=held_ns
+            (folder for folder in folders if not folder.relative_to(results).parts[0].startswith(SAMPLE)),
+            key=last_written_ns,
         )
         return start_of(journal.read(last / "journal.jsonl")).study
     return ""
@@ -161,10 +168,10 @@ def read_studies(
     opened = tuple(opened)
     last = "" if results is None else last_study(results)
     begins = results is not None and not last
-    drafts = (_of_draft(file, draft_words) for file in unsaved_files(workspace().protocols))
+    drafts = (_draft_facts(file, draft_words) for file in unsaved_files(workspace().protocols))
     facts = (
         *filter(None, drafts),
-        *(study_facts(source, draft_words) for source in dict.fromkeys((*opened, *sources()))),
+        *(study_facts(source, draft_words) for source in dict.fromkeys((*opened, *known_sources()))),
     )
 
     def place(it: StudyFacts | BrokenFacts | DraftFacts) -> tuple[float, bool, bool]:
@@ -174,19 +181,19 @@ def read_studies(
     return tuple(sorted(facts, key=place))
 
 
-def _of_draft(file: Path, draft_words: LoadWords) -> DraftFacts | None:
+def _draft_facts(file: Path, draft_words: LoadWords) -> DraftFacts | None:
     draft = draft_of(file)
     if draft is None:  # it was saved meanwhile
         return None
     title = draft_words().draft_title(draft.text, file.parent) if draft_words else ""
-    note = DraftNote(f"Draft of {time_words(draft.kept_at)}, never saved", draft.kept_at)
+    note = DraftNote(f"Draft of {time_text(draft.kept_at)}, never saved", draft.kept_at)
     return DraftFacts(source=str(file), title=title or file.stem, origin=origin_of(str(file)), draft=note)
 
 
 def holds_liquids_alone(source: str) -> bool:
     """Return whether a file holds liquids and no study; False if it cannot be read."""
     try:
-        path = find(source)
+        path = protocol_file(source)
         state = path.stat()
         return _holds_liquids_alone(path, state.st_mtime_ns, state.st_size)
     except (ProtocolError, OSError):
@@ -204,7 +211,7 @@ def _holds_liquids_alone(path: Path, _changed_ns: int, _size: int) -> bool:
 def is_shipped(source: str) -> bool:
     """Return whether a source is a shipped study, not one of the same name in the workspace."""
     try:
-        return source in shipped() and find(source).resolve() == shipped_file(source).resolve()
+        return source in shipped() and protocol_file(source).resolve() == shipped_file(source).resolve()
     except ProtocolError:
         return False
 
@@ -214,7 +221,7 @@ def origin_of(source: str) -> str:
     if is_shipped(source):
         return SHIPPED
     with suppress(ProtocolError):
-        file = Path(source) if Path(source).suffix == ".toml" else find(source)
+        file = Path(source) if Path(source).suffix == ".toml" else protocol_file(source)
         if original := kept_original(file):
             return f"Copy of {original}"
     return "Own study"
@@ -243,9 +250,9 @@ def study_facts(source: str, draft_words: LoadWords = None) -> StudyFacts | Brok
         languages=", ".join(sorted(language_name(code) for code in protocol.study.languages)),
         extent=", ".join(
             (
-                counted_each(extent.parts, "part"),
-                counted_each(extent.settings, extent.setting),
-                counted_each(extent.answers, "answer"),
+                count_range_text(extent.parts, "part"),
+                count_range_text(extent.settings, extent.setting),
+                count_range_text(extent.answers, "answer"),
             )
         ),
         duration=f"about {extent.duration}",
@@ -258,19 +265,19 @@ def study_facts(source: str, draft_words: LoadWords = None) -> StudyFacts | Brok
 def _draft_note(source: str, draft_words: LoadWords) -> DraftNote | None:
     """Return the note on a draft: "Draft of today 14:02, not saved: Water"; None if everything is saved."""
     with suppress(ProtocolError, OSError):
-        file = find(source)
-        draft, content = None if is_shipped(source) else draft_of(file), without_mark(file.read_bytes())
+        file = protocol_file(source)
+        draft, content = None if is_shipped(source) else draft_of(file), without_byte_order_mark(file.read_bytes())
         if draft is not None and draft.text.encode() != content:
             edited = (
-                draft_words().edited_words(content.decode("utf-8", "replace"), draft.text, file.parent)
+                draft_words().edited_elements_text(content.decode("utf-8", "replace"), draft.text, file.parent)
                 if draft_words
                 else ""
             )
-            return DraftNote(f"Draft of {time_words(draft.kept_at)}, not saved{edited}", draft.kept_at)
+            return DraftNote(f"Draft of {time_text(draft.kept_at)}, not saved{edited}", draft.kept_at)
     return None
 
 
-def time_words(moment: str) -> str:
+def time_text(moment: str) -> str:
     """Return the time of a draft: "today 14:02", "2026-11-20 14:02"."""
     if not (seconds := _seconds(moment)):
         return "an unknown time"
@@ -297,7 +304,7 @@ class Interrupted:
     line: str
 
 
-def interrupted(
+def interrupted_session(
     sessions: Iterable[SessionFacts], studies: Iterable[StudyFacts | BrokenFacts], now: datetime
 ) -> Interrupted | None:
     """Return the newest session that can resume here: unfinished, not open in a program, with a known protocol.
@@ -324,8 +331,8 @@ def interrupted(
             step = resume_at(protocol, schedule, lines).step
         except StudyError:
             continue  # its errors are reported when its folder is requested
-        where = place_words(protocol, schedule, step)
-        stopped = started_words(datetime.fromisoformat(lines[-1].at).astimezone(now.tzinfo), now)
+        where = place_text(protocol, schedule, step)
+        stopped = start_time_text(datetime.fromisoformat(lines[-1].at).astimezone(now.tzinfo), now)
         whole = f" of {session.answers_of}" if session.answers_of is not None else ""
         kind = "Pilot " if session.pilot else ""
         return Interrupted(
@@ -338,7 +345,7 @@ def interrupted(
     return None
 
 
-def place_words(protocol: Protocol, schedule: Schedule, step: int) -> str:
+def place_text(protocol: Protocol, schedule: Schedule, step: int) -> str:
     """Return where a session resumes, without a condition: "in part 2, delay setting 3"."""
     language = operator_language(protocol)
     if step >= len(schedule.steps):
@@ -351,7 +358,7 @@ def place_words(protocol: Protocol, schedule: Schedule, step: int) -> str:
     return f"in part {here.part}, {label}" if here.part else f"in {label}"
 
 
-def held(sessions: Iterable[SessionFacts], study: str) -> str:
+def session_counts_text(sessions: Iterable[SessionFacts], study: str) -> str:
     """Return the numbers of a study's sessions: "5 sessions, 3 complete, 1 incomplete, 1 excluded, 2 pilots"."""
     of_study = [session for session in sessions if session.study == study]
     own = [session for session in of_study if not session.kind]

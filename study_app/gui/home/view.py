@@ -32,14 +32,14 @@ from study_app.gui.home.study_facts import (
     LoadWords,
     StudyFacts,
     file_states,
-    held,
-    held_ns,
     holds_liquids_alone,
-    interrupted,
+    interrupted_session,
+    last_written_ns,
     read_studies,
+    session_counts_text,
 )
 from study_app.gui.kit.commands import add_commands, key_cap, with_key
-from study_app.gui.kit.devices import DeviceShown, looking
+from study_app.gui.kit.devices import DeviceShown, device_before_look
 from study_app.gui.kit.dialogs import choose_protocol
 from study_app.gui.sessions.session_facts import SessionFacts, extent_of, sessions
 from study_app.gui.theme.theme import SHADOW
@@ -114,24 +114,24 @@ class HomePlace(Place):
         add_commands(self, {"open": self.open_protocol.click, "new": self.new_study.click})
         self.open_protocol.clicked.connect(self._open_protocol)
         self.new_study.clicked.connect(lambda: self.new_asked.emit(""))
-        self.banner.resume_asked.connect(self._resume)
+        self.banner.resume_asked.connect(self._ask_to_resume)
         self.sessions.all.clicked.connect(lambda: self.go_asked.emit("results"))
         self.sessions.open_asked.connect(self._open_session)
         self.sessions.emptied.connect(self._arrange)
         self.device.devices.clicked.connect(lambda: self.go_asked.emit("devices"))
         self.device.display.clicked.connect(lambda: self.go_asked.emit("machine"))
         self.lab.open.clicked.connect(lambda: self.go_asked.emit("lab"))
-        self.show_machine(DEFAULTS, looking(DEFAULTS.device))
+        self.show_machine(DEFAULTS, device_before_look(DEFAULTS.device))
 
     def show_machine(self, settings: MachineSettings, device: DeviceShown) -> None:
         """Use these settings for new sessions; ``device`` is the state of the preferred device."""
         self.machine = settings
         self.device.show_device(device)
-        self.device.show_screens(_screens(settings))
+        self.device.show_screens(_screen_lines(settings))
 
     def enter(self) -> None:
         """Read protocols and results again; screens may have changed, too."""
-        self.device.show_screens(_screens(self.machine))
+        self.device.show_screens(_screen_lines(self.machine))
         QTimer.singleShot(0, self, self.read_changes)
         QTimer.singleShot(0, self, self.show_sessions)
 
@@ -164,11 +164,11 @@ class HomePlace(Place):
         self.cards_area.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Ignored)  # no more than is free
         inside = QWidget()
         self._page = vbox(
-            _beside_bar(head),
-            _beside_bar(self.banner),
+            _row_beside_bar(head),
+            _row_beside_bar(self.banner),
             (self.waiting, 1, Qt.AlignmentFlag.AlignCenter),
             (self.cards_area, CARDS_SHARE),
-            (_beside_bar(self.below), BELOW_SHARE),
+            (_row_beside_bar(self.below), BELOW_SHARE),
             spacing=14,
             parent=inside,
         )
@@ -187,7 +187,7 @@ class HomePlace(Place):
         self._page.setContentsMargins(MARGIN, 20, MARGIN - BAR_PX * (1 + bar), 12)
 
     @property
-    def reading(self) -> bool:
+    def is_reading(self) -> bool:
         return self._studies.busy or self._reader.busy
 
     def show_results(self, results: Path) -> None:
@@ -243,8 +243,8 @@ class HomePlace(Place):
         """Return place, study and button number of the focused card; None if none has the focus."""
         now = self.window().focusWidget() if self.isVisible() else None
         for at, card in enumerate(self.grid.cards):
-            if isinstance(card, StudyCard | BrokenCard) and now in _buttons(card):
-                return at, card.facts.source, _buttons(card).index(now)
+            if isinstance(card, StudyCard | BrokenCard) and now in _card_buttons(card):
+                return at, card.facts.source, _card_buttons(card).index(now)
         return None
 
     def _focus_card(self, at: int, source: str, button: int) -> None:
@@ -255,7 +255,7 @@ class HomePlace(Place):
             cards[at] if at < len(cards) else None,
         )
         if card is not None:
-            _buttons(card)[min(button, len(_buttons(card)) - 1)].setFocus(Qt.FocusReason.OtherFocusReason)
+            _card_buttons(card)[min(button, len(_card_buttons(card)) - 1)].setFocus(Qt.FocusReason.OtherFocusReason)
             QTimer.singleShot(0, card, lambda: self.cards_area.ensureWidgetVisible(card))  # once it has its place
 
     def _order_focus(self) -> None:
@@ -264,7 +264,7 @@ class HomePlace(Place):
         sessions, device = self.sessions, self.device
         parts: tuple[QWidget, ...] = (
             self.open_protocol, self.new_study, self.banner.resume,
-            *(button for card in cards for button in _buttons(card)),
+            *(button for card in cards for button in _card_buttons(card)),
             sessions.kind, sessions.details, sessions.all, sessions.rows.table,
             device.devices, device.display, self.lab.open,
         )  # fmt: skip
@@ -274,7 +274,7 @@ class HomePlace(Place):
     def show_sessions(self) -> None:
         """Read the results folder again, outside the windows' thread, after the studies."""
         if not self._studies.busy:
-            self._reader.run(partial(_read, self.results, self._facts))
+            self._reader.run(partial(_read_sessions, self.results, self._facts))
 
     def _show_read(self, read: tuple[Path, tuple[SessionFacts, ...], Interrupted | None]) -> None:
         results, sessions, stopped = read
@@ -283,13 +283,13 @@ class HomePlace(Place):
         self.banner.show_interrupted(stopped)
         for card in self.grid.cards:
             if isinstance(card, StudyCard):
-                card.held.setText(held(sessions, card.facts.protocol.study.name))
+                card.held.setText(session_counts_text(sessions, card.facts.protocol.study.name))
 
     def _show_last(self, sessions: tuple[SessionFacts, ...]) -> None:
         """After a new session, show the sessions of its kind and move its study to the front."""
         last = max(
             (session for session in sessions if session.kind != "sample"),
-            key=lambda session: held_ns(session.folder),
+            key=lambda session: last_written_ns(session.folder),
             default=None,
         )
         before, self._last = self._last, None if last is None else last.folder
@@ -302,10 +302,10 @@ class HomePlace(Place):
     def ask_for_session(self, facts: StudyFacts) -> None:
         """Open the dialog for a new session; ``session_asked`` carries the answers."""
         dialog = NewSessionDialog(facts, self.results, machine=self.machine, theme=self.theme, parent=self)
-        self._open(dialog)
+        self._open_dialog(dialog)
         dialog.accepted.connect(lambda: self.session_asked.emit(dialog.chosen()))
 
-    def _resume(self, session: Interrupted) -> None:
+    def _ask_to_resume(self, session: Interrupted) -> None:
         """Ask to resume a session as it was begun, on the present screens."""
         try:
             names = [screen.name for screen in screens_shown()]
@@ -323,7 +323,7 @@ class HomePlace(Place):
     def ask_for_rehearsal(self, facts: StudyFacts) -> None:
         """Open the rehearsal dialog; the table shows the results."""
         dialog = RehearsalDialog(facts, self.results, theme=self.theme, parent=self)
-        self._open(dialog)
+        self._open_dialog(dialog)
         dialog.finished.connect(self.show_sessions)
         dialog.accepted.connect(lambda: self.results_asked.emit(dialog.folder))
 
@@ -331,13 +331,13 @@ class HomePlace(Place):
         from study_app.gui.sessions.session_page import SessionPage  # noqa: PLC0415 - pyqtgraph: only once it is needed
 
         page = SessionPage(self, self.theme, session, open_here)
-        self._open(page)
+        self._open_dialog(page)
 
     def end(self) -> None:
         for dialog in self.findChildren(RehearsalDialog):
             dialog.end()
 
-    def _open(self, dialog: QDialog) -> None:
+    def _open_dialog(self, dialog: QDialog) -> None:
         self.dialog = dialog
         dialog.finished.connect(dialog.deleteLater)
         dialog.open()
@@ -389,25 +389,27 @@ class HomePlace(Place):
         self._arrange()
 
 
-def _beside_bar(part: QWidget | QLayout) -> QHBoxLayout:
+def _row_beside_bar(part: QWidget | QLayout) -> QHBoxLayout:
     """Return a row with room for the cards' scroll bar."""
     return hbox(part, margins=(0, 0, BAR_PX, 0))
 
 
-def _buttons(card: StudyCard | BrokenCard) -> tuple[QWidget, ...]:
+def _card_buttons(card: StudyCard | BrokenCard) -> tuple[QWidget, ...]:
     return (card.pen, card.new, card.rehearse) if isinstance(card, StudyCard) else (card.pen,)
 
 
-def _read(results: Path, studies: tuple[Facts, ...]) -> tuple[Path, tuple[SessionFacts, ...], Interrupted | None]:
+def _read_sessions(
+    results: Path, studies: tuple[Facts, ...]
+) -> tuple[Path, tuple[SessionFacts, ...], Interrupted | None]:
     """Return the sessions in the results folder, and the one that can resume."""
     counts = {it.name: set(extent_of(it.protocol).answers) for it in studies if isinstance(it, StudyFacts)}
     answers = {name: max(numbers) for name, numbers in counts.items() if len(numbers) == 1}
     known = sessions(results, answers)
     saved = [it for it in studies if not isinstance(it, DraftFacts)]
-    return results, known, interrupted(known, saved, datetime.now().astimezone())
+    return results, known, interrupted_session(known, saved, datetime.now().astimezone())
 
 
-def _screens(settings: MachineSettings) -> tuple[str, ...]:
+def _screen_lines(settings: MachineSettings) -> tuple[str, ...]:
     """Return a line for each screen: whose it is, size, rate and scaling."""
     screens = screens_shown()
     participants = settings.screen_among([screen.name for screen in screens])

@@ -36,9 +36,9 @@ class Command:
     run: Callable[[Any], object] | None = None
 
     @property
-    def shown(self) -> tuple[str, ...]:
+    def key_labels(self) -> tuple[str, ...]:
         """Its keys as printed on a keyboard: "Ctrl+Enter", "hold Esc"."""
-        return tuple(f"{'hold ' * self.held}{key_words(keys)}" for keys in self.keys)
+        return tuple(f"{'hold ' * self.held}{key_label(keys)}" for keys in self.keys)
 
     def action(self, place: QWidget, run: Callable[[], object]) -> QAction:
         """Add its action to a widget and return it: the keys act anywhere in the window while the widget is shown."""
@@ -94,7 +94,7 @@ _NAMES: Final = {"Return": "Enter", "Escape": "Esc", "Insert": "Ins", "Delete": 
 def keys_markdown() -> str:
     """Return every command with its keys, as a table of Markdown."""
     rows = (
-        f"| {', '.join(command.shown)} | {command.words}{command.within and f' ({command.within})'} |"
+        f"| {', '.join(command.key_labels)} | {command.words}{command.within and f' ({command.within})'} |"
         for command in COMMANDS
     )
     return "\n".join(("| key | does |", "| --- | --- |", *rows, ""))
@@ -105,7 +105,7 @@ def add_commands(place: QWidget, runs: Mapping[str, Callable[[], object]]) -> di
     return {name: _OF[name].action(place, run) for name, run in runs.items()}
 
 
-def press(button: QAbstractButton, action: QAction) -> None:
+def connect_button(button: QAbstractButton, action: QAction) -> None:
     """Connect a button to an action, with its tip and enabled state."""
     button.setToolTip(action.toolTip())
     button.clicked.connect(action.trigger)
@@ -117,14 +117,14 @@ def keys_of(action: str) -> tuple[str, ...]:
     return _OF[action].keys
 
 
-def key_words(keys: str) -> str:
+def key_label(keys: str) -> str:
     """Return keys as printed on a keyboard: "Ctrl+Enter"."""
     return "+".join(_NAMES.get(key, key) for key in keys.split("+"))
 
 
 def key_cap(action: str) -> str:
     """Return the key cap's text on an action's button: "Ctrl D"."""
-    return _OF[action].shown[0].replace("+", " ")
+    return _OF[action].key_labels[0].replace("+", " ")
 
 
 def with_key(text: str, action: str) -> str:
@@ -133,9 +133,9 @@ def with_key(text: str, action: str) -> str:
 
 
 def _with_keys(command: Command, text: str = "") -> str:
-    return f"{text or command.words} ({command.shown[0]})"
+    return f"{text or command.words} ({command.key_labels[0]})"
 
 
-def tip(action: str) -> str:
+def command_tip(action: str) -> str:
     """Return the tip of an action, with its key."""
     return with_key(_OF[action].words, action)

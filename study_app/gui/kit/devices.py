@@ -12,7 +12,14 @@ from study_app.devices import DEFAULT_DEVICE
 from study_app.devices.descriptor import DRIVER_READY, NONE, READY, Backend, DeviceDescriptor, DeviceOption
 from study_app.devices.registry import DEVICES, all_devices, descriptor_of, list_devices, title_of
 from study_app.errors import DeviceError
-from study_app.gui.display.screens import BY_CLOCK, LOCKED, describe_screen, has_card, screen_shown, screens_shown
+from study_app.gui.display.screens import (
+    BY_CLOCK,
+    LOCKED,
+    describe_screen,
+    has_graphics_card,
+    screen_shown,
+    screens_shown,
+)
 from study_app.gui.theme.theme import DARK, LIGHT, Theme
 from study_app.store import workstation
 from study_app.store.workstation import DEFAULTS, REMEMBERED_OPTIONS, MachineSettings
@@ -45,14 +52,14 @@ class DeviceShown:
     diagnosable: bool = False
 
     @property
-    def ready(self) -> bool:
+    def is_ready(self) -> bool:
         return self.tone == "ok"
 
 
 def devices_shown(backends: Sequence[Backend]) -> tuple[DeviceShown, ...]:
     """Return the description of each device, common ones first; a device's backends are merged."""
     names = list(dict.fromkeys(backend.name for backend in backends))
-    shown = [_shown(name, [backend for backend in backends if backend.name == name]) for name in names]
+    shown = [_device_shown(name, [backend for backend in backends if backend.name == name]) for name in names]
     return tuple(sorted(shown, key=lambda device: device.simulated))
 
 
@@ -74,10 +81,10 @@ def device_named(name: str, shown: Iterable[DeviceShown]) -> DeviceShown:
     for device in shown:
         if device.name.partition(":")[0] == kind:
             return device
-    return looking(name)
+    return device_before_look(name)
 
 
-def looking(name: str) -> DeviceShown:
+def device_before_look(name: str) -> DeviceShown:
     """Return the description of a device before the search."""
     device = _descriptor(name)
     icon = "device" if device is None else device.icon
@@ -115,11 +122,11 @@ def remembered_options() -> tuple[DeviceOption, ...]:
     return tuple(option for option in window_options() if option.name in REMEMBERED_OPTIONS)
 
 
-def _shown(name: str, ways: Sequence[Backend]) -> DeviceShown:
+def _device_shown(name: str, ways: Sequence[Backend]) -> DeviceShown:
     device = _descriptor(name)
     best = min(ways, key=_rank)
     by_command = device is not None and device.argument_required
-    tone, sign, word = _state(best, by_command=by_command)
+    tone, sign, word = _device_state(best, by_command=by_command)
     choosable = device is not None and not by_command
     return DeviceShown(
         name=name,
@@ -139,17 +146,17 @@ def _shown(name: str, ways: Sequence[Backend]) -> DeviceShown:
 
 def _rank(backend: Backend) -> int:
     """Return how close a backend is to being usable; a ready driver has not found a device yet."""
-    if _connected(backend):
+    if _is_connected(backend):
         return 0
     return {READY: 1, DRIVER_READY: 1, NONE: 2}.get(backend.state, 3)
 
 
-def _connected(backend: Backend) -> bool:
+def _is_connected(backend: Backend) -> bool:
     return backend.state.startswith("connected")
 
 
-def _state(backend: Backend, *, by_command: bool) -> tuple[Tone, str, str]:
-    if _connected(backend):
+def _device_state(backend: Backend, *, by_command: bool) -> tuple[Tone, str, str]:
+    if _is_connected(backend):
         return ("warn", "warning", "Check it") if backend.why else ("ok", "check", "Connected")
     if backend.state == DRIVER_READY:
         return "neutral", "ring", "Driver ready"
@@ -195,12 +202,12 @@ def text_scale_on(settings: MachineSettings, screen: QScreen) -> float:
     return settings.text_scale(shown.width_px, shown.width_mm)
 
 
-def described(settings: MachineSettings, participant: QScreen, operator: QScreen) -> dict[str, Any]:
+def described_screens(settings: MachineSettings, participant: QScreen, operator: QScreen) -> dict[str, Any]:
     """Return the receipt's description of both screens, with the measurements of the participant's.
 
     ``frames`` says what times the participant's frames: the screen's swaps where a graphics card draws, else a clock.
     """
     shown = screen_shown(participant)
-    frames = {"frames": LOCKED if has_card() else BY_CLOCK}
+    frames = {"frames": LOCKED if has_graphics_card() else BY_CLOCK}
     measured = settings.describe(shown.name, shown.width_px, shown.width_mm)
     return {"participant": describe_screen(participant) | frames | measured, "operator": describe_screen(operator)}

@@ -131,7 +131,7 @@ class Question(QDialog):
 class Work(Question):
     """A question whose answer is worked on: it says how far that is, then leads to what came of it.
 
-    ``begun`` when the work is to begin, ``stop_asked`` when it is to be given up, `stopped` closes the dialog then.
+    ``begun`` when the work is to begin, ``stop_asked`` when it is to be given up, `close_stopped` closes the dialog.
     ``opened`` when what came of it is to be shown.
     """
 
@@ -155,7 +155,7 @@ class Work(Question):
 
     def show_done(self, sentence: str, opens: str) -> None:
         """Show the result; the button ``opens`` it."""
-        self._end(sentence)
+        self._show_end(sentence)
         self.over = True
         self.back.show_action("", "Close")
         self.go_on.show_action("", opens)
@@ -166,9 +166,9 @@ class Work(Question):
         for editor in self.editors.values():
             editor.show()
         set_ink(self.said, "bad")
-        self._end(sentence)
+        self._show_end(sentence)
 
-    def stopped(self) -> None:
+    def close_stopped(self) -> None:
         """Close after the work was cancelled."""
         self.working = False
         super().reject()
@@ -196,7 +196,7 @@ class Work(Question):
             self.said.setText("Stopping …")
             self.stop_asked.emit()
 
-    def _end(self, sentence: str) -> None:
+    def _show_end(self, sentence: str) -> None:
         self.working = False
         self.bar.hide()
         self.said.setText(sentence)

@@ -49,12 +49,12 @@ class Field:
     write: Callable[[Any], str] = str
 
 
-def choice(name: str, label: str, options: Mapping[Any, str], aside: str = "") -> Field:
+def choice_field(name: str, label: str, options: Mapping[Any, str], aside: str = "") -> Field:
     """Return the field of a choice between values with labels."""
     return Field(name, label, "choice", tuple(options.items()), aside=aside)
 
 
-def number(
+def number_field(
     name: str, label: str, unit: str, limits: tuple[float, float], decimals: int = 1, *, may_miss: bool = True
 ) -> Field:
     """Return the field of a number within limits; an empty field gives None if it ``may_miss``."""
@@ -73,7 +73,7 @@ def number(
     )
 
 
-def seed(aside: str = "") -> Field:
+def seed_field(aside: str = "") -> Field:
     """Return the field of a seed."""
 
     def parse(text: str) -> int:
@@ -84,7 +84,7 @@ def seed(aside: str = "") -> Field:
     return Field("seed", "Seed", aside=aside, parse=parse)
 
 
-def file_of(name: str, text: str) -> Path | None:
+def typed_file(name: str, text: str) -> Path | None:
     """Return the file whose path was typed, None for an empty text."""
     if text and not Path(text).is_file():
         raise ValueError(f"there is no {name} in {text}: choose the file, or leave the field empty")
@@ -139,7 +139,7 @@ class Editor(QWidget):
         self.aside = label(field.aside, "small", "text3")
         self.below = label("", "small", "text2", wraps=True)
         self.below.setMinimumWidth(LEAST_WORDS)
-        self.control = self._made()
+        self.control = self._make_control()
         self.control.setFont(font("label" if field.unit else "body", tabular=bool(field.unit)))
         if isinstance(self.control, QAbstractButton):
             vbox(self.control, self.below, spacing=2, margins=0, parent=self)
@@ -151,7 +151,7 @@ class Editor(QWidget):
         if field.kind in {"file", "folder"}:
             button = ActionButton("", "Choose …" if field.kind == "file" else "Change …", height=40)
             button.setAutoDefault(False)
-            button.clicked.connect(self._browse)
+            button.clicked.connect(self._choose_path)
         if field.unit:
             unit = label(field.unit, "label", "text2")
             unit.setFixedWidth(UNIT_WIDTH)
@@ -162,7 +162,7 @@ class Editor(QWidget):
         vbox(*rows, self.below, spacing=6, margins=0, parent=self)
         self.show_refusal("")
 
-    def _made(self) -> QWidget:
+    def _make_control(self) -> QWidget:
         match self.field.kind:
             case "radio":
                 return Radios(self.field.options)
@@ -190,7 +190,7 @@ class Editor(QWidget):
             line.setProperty("dense", "true")
             line.setFixedWidth(96)
             line.setAlignment(Qt.AlignmentFlag.AlignRight)
-        line.editingFinished.connect(self._take)
+        line.editingFinished.connect(self._take_text)
         line.textChanged.connect(lambda _text: self.edited.emit(self.field.name))
         line.restored.connect(lambda: self._show_text(self._text))
         return line
@@ -213,7 +213,7 @@ class Editor(QWidget):
             case QLineEdit():
                 return self.field.parse(self.control.text().strip())
 
-    def offer(self, options: Mapping[Any, str]) -> None:
+    def show_options(self, options: Mapping[Any, str]) -> None:
         """Offer other values, with the first one chosen."""
         assert isinstance(self.control, QComboBox)  # noqa: S101 - only of a choice
         self._values = [*options]
@@ -248,7 +248,7 @@ class Editor(QWidget):
         self.control.setCursorPosition(0)
         self.show_refusal("")
 
-    def _take(self) -> None:
+    def _take_text(self) -> None:
         assert isinstance(self.control, QLineEdit)  # noqa: S101 - only lines are typed
         if not self.control.isModified():
             return
@@ -262,7 +262,7 @@ class Editor(QWidget):
         self.show_refusal("")
         self.changed.emit(self.field.name, value)
 
-    def _browse(self) -> None:
+    def _choose_path(self) -> None:
         assert isinstance(self.control, QLineEdit)  # noqa: S101 - files are typed, too
         if self.field.kind == "file":
             chosen, _ = QFileDialog.getOpenFileName(self, self.field.label, self.control.text(), self.field.file_filter)

@@ -18,7 +18,7 @@ from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Bar, Card, Icon, MaskedPanel, Rule, fill_rounded, smooth_painter
 from study_app.gui.widgets.labels import Elided, figures, label, set_ink
-from study_app.gui.widgets.live_plots import MINUS, Plot, draw_quickly, number, pen
+from study_app.gui.widgets.live_plots import MINUS, Plot, draw_quickly, pen, tick_text
 from study_app.lab.live import LimiterCount
 from study_app.number_text import grouped
 
@@ -60,18 +60,18 @@ class Legend(Themed, QWidget):
         if entries != self._entries:
             self._entries = entries
             self.setAccessibleName(", ".join(text for _, text in entries))
-            self._fit()
+            self._fit_height()
             self.update()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._fit()
+        self._fit_height()
 
-    def _fit(self) -> None:
-        lines = {place.y() for place in self._places()}
+    def _fit_height(self) -> None:
+        lines = {place.y() for place in self._entry_places()}
         self.setFixedHeight(LEGEND_LINE * max(1, len(lines)))
 
-    def _places(self) -> list[QPointF]:
+    def _entry_places(self) -> list[QPointF]:
         metrics = QFontMetricsF(self._font)
         places, x, y = [], 0.0, LEGEND_LINE / 2
         for _, text in self._entries:
@@ -85,7 +85,7 @@ class Legend(Themed, QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = smooth_painter(self)
         painter.setFont(self._font)
-        for (style, text), place in zip(self._entries, self._places(), strict=True):
+        for (style, text), place in zip(self._entries, self._entry_places(), strict=True):
             ink = style.colour(self.theme)
             painter.setPen(pen(ink, style.width * self.devicePixelRatioF(), DASH[style.stroke]))
             painter.drawLine(place, place + QPointF(STROKE_WIDTH, 0))
@@ -146,7 +146,7 @@ class CurvePlot(Plot):
         step = next((it for it in STEPS if self._peak / it <= ticks), STEPS[-1])
         rows = max(1, int(np.ceil(self._peak / step - 1e-9)))
         self._top = rows * step
-        self.show_ticks("left", [(k * step, number(round(k * step, 6))) for k in range(rows + 1)])
+        self.show_ticks("left", [(k * step, tick_text(round(k * step, 6))) for k in range(rows + 1)])
         self._make_room()
 
     def _make_room(self) -> None:
@@ -211,7 +211,9 @@ class ForceCard(PlotCard):
         trace = view.trace
         nothing = np.empty(0)
         t_s = nothing if trace is None else trace.t_s
-        forces = (nothing, nothing) if trace is None else (_size(trace.force_b_n), _size(trace.force_a_n))
+        forces = (
+            (nothing, nothing) if trace is None else (_vector_sizes(trace.force_b_n), _vector_sizes(trace.force_a_n))
+        )
         self.plot.show_curves(t_s, forces, limit)
 
 
@@ -232,7 +234,7 @@ class SpeedCard(PlotCard):
             self.plot.show_curves(trace.t_s, (trace.body_mps, trace.wake_b_mps, trace.wake_a_mps))
 
 
-def _size(vectors: Floats) -> Floats:
+def _vector_sizes(vectors: Floats) -> Floats:
     return np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
 
 
@@ -314,15 +316,15 @@ class CostCard(ReadingCard):
     def show_view(self, view: LabView) -> None:
         if self.show_blind(view.workbench.blind):
             return
-        self.aside.setText(_aside(view))
+        self.aside.setText(_aside_text(view))
         if view.measuring and not view.cost and self.lines:
-            self._wait()
+            self._show_waiting()
             return
         here = [row for row in view.cost if row.ns is not None]
         away = [row for row in view.cost if row.ns is None]
         most_ns = max((row.ns or 0.0 for row in here), default=0.0)
-        _fit(self.lines, len(here), CostLine, self._costs)
-        _fit(self.absent, len(away), AbsentLine, self._absent)
+        _match_count(self.lines, len(here), CostLine, self._costs)
+        _match_count(self.absent, len(away), AbsentLine, self._absent)
         for line, row in zip(self.lines, here, strict=True):
             line.show_cost(row, most_ns)
         for gone, row in zip(self.absent, away, strict=True):
@@ -331,7 +333,7 @@ class CostCard(ReadingCard):
         period_ms = 1000 / view.workbench.in_hand.scene.rate_hz
         self.sum.setText(f"{grouped(round(tick_ns))} ns of {period_ms:g} ms" if view.cost else "not measured yet")
 
-    def _wait(self) -> None:
+    def _show_waiting(self) -> None:
         """Clear the numbers and keep the lines, so that nothing jumps while a slider is dragged."""
         for line in self.lines:
             line.show_waiting()
@@ -370,7 +372,7 @@ class ErrorCard(ReadingCard):
         rows = view.errors or (ErrorRow(measure="Not measured yet", value=""),)
         if view.measuring and not view.errors and self.lines and self.lines[0].value.text():
             rows = tuple(ErrorRow(measure=line.name.whole, value=UNKNOWN) for line in self.lines)
-        _fit(self.lines, len(rows), ErrorLine, self._lines)
+        _match_count(self.lines, len(rows), ErrorLine, self._lines)
         for line, row in zip(self.lines, rows, strict=True):
             line.show_error(row)
 
@@ -431,18 +433,18 @@ class LimiterCard(ReadingCard):
     def show_view(self, view: LabView) -> None:
         if self.show_blind(view.workbench.blind):
             return
-        _fit(self.lines, len(view.limiters), LimiterLine, self._lines)
+        _match_count(self.lines, len(view.limiters), LimiterLine, self._lines)
         for line, limiter in zip(self.lines, view.limiters, strict=True):
             line.show_limiter(limiter)
 
 
-def _aside(view: LabView) -> str:
+def _aside_text(view: LabView) -> str:
     if view.measuring:
         return f"{view.felt}, measuring …"
     return f"{view.felt}, measured" if view.cost else ""
 
 
-def _fit(lines: list, count: int, kind: type, layout: QVBoxLayout) -> None:
+def _match_count(lines: list, count: int, kind: type, layout: QVBoxLayout) -> None:
     while len(lines) > count:
         remove_widget(lines.pop())
     while len(lines) < count:

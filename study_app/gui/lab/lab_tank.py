@@ -32,7 +32,7 @@ from study_app.gui.lab.lab_state import Floats, LabView, Point
 from study_app.gui.participant.tank import sprites
 from study_app.gui.participant.tank.arrows import HEIGHTS, Arrow, draw_head, paint_arrows
 from study_app.gui.participant.tank.frame import BallPlace, BallPlacer, Box, Camera
-from study_app.gui.participant.tank.layers import Backdrop, backdrop
+from study_app.gui.participant.tank.layers import Backdrop, paint_backdrop
 from study_app.gui.participant.window import PointerCapture
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, TANK, font
@@ -80,10 +80,10 @@ def tail_places(tail: Tail, camera: Camera, box: Box) -> TailPlaces:
     heads: list[tuple[QPointF, float, int]] = []
     for first, behind in itertools.pairwise(bounds if count else ()):
         rows = np.arange(max(0, first - 1), behind)  # a segment begins where the one before ended
-        rows = rows[_kept(pixels[rows])]
-        runs += _runs(_points(pixels[rows]), shades[rows])
+        rows = rows[_drawn_rows(pixels[rows])]
+        runs += _shade_runs(_points(pixels[rows]), shades[rows])
         shadows.append(QPolygonF(_points(floor[rows])))
-        head = _head(pixels[rows])
+        head = _arrow_head(pixels[rows])
         if head is not None:
             place, turn, row = head
             heads.append((place, turn, int(shades[rows[row]])))
@@ -134,7 +134,7 @@ def shade_style(shade: int) -> tuple[QColor, float]:
     return ink, THINNEST_PX + (THICKEST_PX - THINNEST_PX) * newness
 
 
-def _runs(points: list[QPointF], shades: NDArray[np.int_]) -> list[tuple[int, QPolygonF]]:
+def _shade_runs(points: list[QPointF], shades: NDArray[np.int_]) -> list[tuple[int, QPolygonF]]:
     """Return the stretches of one shade, each beginning at the end of the previous one."""
     cuts = [0, *(int(cut) for cut in np.flatnonzero(np.diff(shades)) + 1), len(points) - 1]
     return [
@@ -144,7 +144,7 @@ def _runs(points: list[QPointF], shades: NDArray[np.int_]) -> list[tuple[int, QP
     ]
 
 
-def _head(pixels: Floats) -> tuple[QPointF, float, int] | None:
+def _arrow_head(pixels: Floats) -> tuple[QPointF, float, int] | None:
     """Return midpoint, direction and row of a segment; None if it is too short."""
     steps = np.hypot(*np.diff(pixels, axis=0).T)
     length = float(steps.sum())
@@ -155,7 +155,7 @@ def _head(pixels: Floats) -> tuple[QPointF, float, int] | None:
     return QPointF(*pixels[row].tolist()), math.atan2(down, right), row
 
 
-def _kept(pixels: Floats) -> NDArray[np.int_]:
+def _drawn_rows(pixels: Floats) -> NDArray[np.int_]:
     """Return the rows that are drawn: both ends, and one every few px between."""
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pixels, axis=0).T))])
     kept = np.flatnonzero(np.diff(np.floor(arc / STEP_PX), prepend=-1.0))
@@ -207,7 +207,7 @@ class LabTank(Themed, QWidget):
         self._painting.done.connect(self._take_still)
         self.pointer = PointerCapture(self)
         self.pointer.moved.connect(self.moved)
-        self.pointer.pressed.connect(self._press)
+        self.pointer.pressed.connect(self._press_buttons)
 
     def sizeHint(self) -> QSize:
         return QSize(784, 470)
@@ -220,13 +220,13 @@ class LabTank(Themed, QWidget):
             self.camera = None
         if view.body_radius_m != self._radius_m:
             self._radius_m, self._placer = view.body_radius_m, None
-        if self.pointer.held and not self._takes_pointer:
+        if self.pointer.is_held and not self._takes_pointer:
             self.pointer.release()
-        self.setAccessibleName(f"Tank. {self._first_words()}. {self._hint()}".replace("..", "."))
+        self.setAccessibleName(f"Tank. {self._first_note()}. {self._hint()}".replace("..", "."))
         self.update()
 
     def let_go(self) -> None:
-        if self.pointer.held:
+        if self.pointer.is_held:
             self.pointer.release()
             self.update()
 
@@ -237,12 +237,12 @@ class LabTank(Themed, QWidget):
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
-            self._take()
+            self._capture_pointer()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space} and not self.pointer.held:
-            self._take()
-        elif event.key() == Qt.Key.Key_Escape and self.pointer.held:
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space} and not self.pointer.is_held:
+            self._capture_pointer()
+        elif event.key() == Qt.Key.Key_Escape and self.pointer.is_held:
             self.let_go()
         else:
             event.ignore()
@@ -255,18 +255,18 @@ class LabTank(Themed, QWidget):
         super().resizeEvent(event)
         self.camera = None
 
-    def _take(self) -> None:
+    def _capture_pointer(self) -> None:
         self.setFocus(Qt.FocusReason.MouseFocusReason)
-        if self._takes_pointer and self._view is not None and not self.pointer.held:
-            self.pointer.take(self, self._view.workspace_m)
+        if self._takes_pointer and self._view is not None and not self.pointer.is_held:
+            self.pointer.capture(self, self._view.workspace_m)
             self.update()
 
-    def _press(self, bits: int) -> None:
+    def _press_buttons(self, bits: int) -> None:
         self.pressed.emit(bits)
         if bits & 1:
             self.let_go()
 
-    def _ready(self) -> Camera:
+    def _ready_camera(self) -> Camera:
         if self.camera is None:
             room = (self.width() - 2 * MARGIN_X, self.height() - MARGIN_TOP - MARGIN_BOTTOM)
             self.camera = Camera.fitted(self.box, MARGIN_X, MARGIN_TOP, *room, pitch=PITCH)
@@ -276,8 +276,8 @@ class LabTank(Themed, QWidget):
         return self.camera
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        camera = self._ready()
-        still = self._still_of(camera)
+        camera = self._ready_camera()
+        still = self._still_image(camera)
         painter = QPainter(self)
         if still is None:
             painter.fillRect(self.rect(), QColor(PARTICIPANT.window))
@@ -290,25 +290,25 @@ class LabTank(Themed, QWidget):
         places = tail_places(tail, camera, self.box) if tail is not None else None
         if places is not None:
             paint_floor(painter, places)
-        ball = self._ball()
+        ball = self._ball_place()
         self._paint_ball_below(painter, ball)
         if places is not None:
             paint_tail(painter, places)
         if ball is not None:
             if open_view is not None:
                 paint_arrows(painter, camera, self._arrows(open_view))
-            sprite = sprites.ball(ball.radius, self.devicePixelRatioF(), ball.haze)
-            sprites.draw(painter, sprite, ball.middle)
+            sprite = sprites.ball_sprite(ball.radius, self.devicePixelRatioF(), ball.haze)
+            sprites.draw_sprite(painter, sprite, ball.middle)
         painter.drawImage(still.front_at.topLeft(), still.front)
         self._paint_words(painter, places)
         self._paint_corners(painter)
 
-    def _still_of(self, camera: Camera) -> Backdrop | None:
+    def _still_image(self, camera: Camera) -> Backdrop | None:
         """Return the image of the still parts at this size; None while it is painted in the background."""
         wanted = ((self.width(), self.height()), self.devicePixelRatioF(), self.box, camera)
         if wanted != self._wanted:
             self._wanted, self.still = wanted, None
-            self._painting.run(lambda: (wanted, backdrop(*wanted)))
+            self._painting.run(lambda: (wanted, paint_backdrop(*wanted)))
         return self.still
 
     def _take_still(self, painted: tuple[object, Backdrop]) -> None:
@@ -316,7 +316,7 @@ class LabTank(Themed, QWidget):
             self.still = painted[1]
             self.update()
 
-    def _ball(self) -> BallPlace | None:
+    def _ball_place(self) -> BallPlace | None:
         if self._view is None or self._view.now is None or self._placer is None:
             return None
         return self._placer.place(self._view.now.position_m)
@@ -324,8 +324,8 @@ class LabTank(Themed, QWidget):
     def _paint_ball_below(self, painter: QPainter, ball: BallPlace | None) -> None:
         if ball is None:
             return
-        dark = sprites.shadow(ball.floor_radius, self.devicePixelRatioF(), ball.floor_flat)
-        sprites.draw(painter, dark, ball.floor, opacity=ball.shade, grown=ball.spread)
+        dark = sprites.shadow_sprite(ball.floor_radius, self.devicePixelRatioF(), ball.floor_flat)
+        sprites.draw_sprite(painter, dark, ball.floor, opacity=ball.shade, grown=ball.spread)
         ink = QColor(TANK.proxy_light)
         ink.setAlphaF(0.62)
         painter.setPen(QPen(ink, 1.6, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
@@ -345,7 +345,7 @@ class LabTank(Themed, QWidget):
             )
         ]
 
-    def _first_words(self) -> str:
+    def _first_note(self) -> str:
         view = self._view
         if view is None:
             return ""
@@ -359,7 +359,7 @@ class LabTank(Themed, QWidget):
         return f"{segments}, {grouped(view.tail.alive)} of {grouped(view.tail.elements)} elements"
 
     def _hint(self) -> str:
-        if self.pointer.held:
+        if self.pointer.is_held:
             return "The mouse moves the ball: click or press Esc to release it"
         return "Click to move the ball with the mouse" if self._takes_pointer else ""
 
@@ -372,7 +372,7 @@ class LabTank(Themed, QWidget):
         angle = bench.in_hand.value("wake.breaking_angle_deg") if places is not None else None
         pairs: list[tuple[Words, Words]] = [
             (
-                (self._first_words(), "lock" if bench.blind else ""),
+                (self._first_note(), "lock" if bench.blind else ""),
                 (f"break: turn of more than {angle:g}°" if isinstance(angle, int | float) else "", RING),
             ),
             (
@@ -385,18 +385,18 @@ class LabTank(Themed, QWidget):
         ]
         for row, (left, right) in enumerate(pairs):
             both = left[0] and right[0]
-            crowded = both and self._wide(left) + self._wide(right) > self.width() - 2.5 * CHIP_EDGE
+            crowded = both and self._note_width(left) + self._note_width(right) > self.width() - 2.5 * CHIP_EDGE
             top = CHIP_EDGE if row == 0 else self.height() - CHIP_EDGE - CHIP_HEIGHT
             y = top + (CHIP_HEIGHT + 6) * (1 if row == 0 else -1) if crowded else top
-            self._chip(painter, left, CHIP_EDGE, top)
-            self._chip(painter, right, self.width() - CHIP_EDGE - self._wide(right), y)
+            self._draw_note(painter, left, CHIP_EDGE, top)
+            self._draw_note(painter, right, self.width() - CHIP_EDGE - self._note_width(right), y)
 
-    def _wide(self, note: Words) -> float:
-        return plate(note, self.devicePixelRatioF()).width() / self.devicePixelRatioF() if note[0] else 0.0
+    def _note_width(self, note: Words) -> float:
+        return note_plate(note, self.devicePixelRatioF()).width() / self.devicePixelRatioF() if note[0] else 0.0
 
-    def _chip(self, painter: QPainter, note: Words, left: float, top: float) -> None:
+    def _draw_note(self, painter: QPainter, note: Words, left: float, top: float) -> None:
         if note[0]:
-            painter.drawImage(QPointF(left, top), plate(note, self.devicePixelRatioF()))
+            painter.drawImage(QPointF(left, top), note_plate(note, self.devicePixelRatioF()))
 
     def _paint_corners(self, painter: QPainter) -> None:
         """Round the corners in the window's colour, and paint the focus ring."""
@@ -412,7 +412,7 @@ class LabTank(Themed, QWidget):
 
 
 @lru_cache(maxsize=64)
-def plate(note: Words, ratio: float) -> QImage:
+def note_plate(note: Words, ratio: float) -> QImage:
     """Return a text with its icon on a dark plate, for a screen with pixel ratio ``ratio``."""
     text, icon = note
     face = font("label", weight=600, tabular=True)
@@ -463,9 +463,9 @@ class TankNote(Card):
         self.bar.setFixedHeight(6)
         row = hbox(self.sign, (self.words, 1), self.cancel, self.diagnose, self.fade_in, self.dismiss, spacing=10)
         add_parts(self.column, row, self.bar)
-        self.dismiss.clicked.connect(self._put_away)
+        self.dismiss.clicked.connect(self._dismiss)
         self._wait = QTimer(self, singleShot=True, interval=SHOWN_AFTER_MS)
-        self._wait.timeout.connect(self._appear)
+        self._wait.timeout.connect(self._show_note)
         parent.installEventFilter(self)
         self.hide()
 
@@ -480,14 +480,14 @@ class TankNote(Card):
             if self.isHidden() and not self._wait.isActive():
                 self._wait.start()
             if not self.isHidden():
-                self._appear()
+                self._show_note()
             return
         self._wait.stop()
         self._dismissed = self._dismissed if view.trouble == self._dismissed else ""
         if view.force_on and view.trouble == self._dismissed:
             self.hide()
-        elif self.isHidden() or before is None or _said(before) != _said(view):
-            self._appear()
+        elif self.isHidden() or before is None or _note_parts(before) != _note_parts(view):
+            self._show_note()
 
     def place(self) -> None:
         """Put the note in the middle of the tank's lower edge, wide enough for its text and below the tank's top."""
@@ -501,17 +501,17 @@ class TankNote(Card):
             below = min(FOOT, parent.height() - self.height() - EDGE)
             self.move((parent.width() - width) // 2, max(0, parent.height() - self.height() - below))
 
-    def _put_away(self) -> None:
+    def _dismiss(self) -> None:
         """Hide this problem; the force stays on."""
         if self._view is not None:
             self._dismissed = self._view.trouble
         self.hide()
 
-    def _appear(self) -> None:
+    def _show_note(self) -> None:
         view = self._view
         if view is None:
             return
-        icon, ink, sentence = _said(view)
+        icon, ink, sentence = _note_parts(view)
         self.sign.show_icon(icon, ink)
         self.words.setText(sentence)
         self.setAccessibleName(sentence)
@@ -528,7 +528,7 @@ class TankNote(Card):
         self.place()
 
 
-def _said(view: LabView) -> tuple[str, Ink, str]:
+def _note_parts(view: LabView) -> tuple[str, Ink, str]:
     if view.trouble:
         return "warning", "bad", view.trouble
     if view.busy:

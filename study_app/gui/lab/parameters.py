@@ -149,7 +149,7 @@ class Picker(Choice):
                 self.addItem(text, value)
         self.setCurrentIndex(self.findData(chosen))
 
-    def show_whole(self, yes: bool) -> None:
+    def set_whole(self, yes: bool) -> None:
         """Make the list as wide as its longest label, or elide long ones."""
         policy = self.SizeAdjustPolicy
         self.setSizeAdjustPolicy(policy.AdjustToContents if yes else policy.AdjustToMinimumContentsLengthWithIcon)
@@ -205,7 +205,7 @@ class LabHeader(QWidget):
             return
         self._narrow = narrow
         for picker in (self.device, self.path):
-            picker.show_whole(narrow)
+            picker.set_whole(narrow)
         for row in (self._left, self._middle, self._right):
             self._grid.removeItem(row)
         if narrow:
@@ -311,7 +311,7 @@ class NumberRow(ParameterRow):
     def __init__(self, parameter: Parameter) -> None:
         super().__init__(parameter)
         self._row: FormRow | None = None
-        self.name = _name(parameter.label)
+        self.name = _name_label(parameter.label)
         self.slider = Slider()
         self.field = NumberField()
         self.field.setFixedWidth(FIELD_WIDTH)
@@ -321,10 +321,10 @@ class NumberRow(ParameterRow):
         name = f"{parameter.label}, {parameter.shown_unit}".rstrip(", ")
         self.slider.setAccessibleName(name)
         self.field.setAccessibleName(name)
-        self.slider.slid.connect(self._slide)
-        self.field.entered.connect(self._enter)
-        self.field.unread.connect(self._misread)
-        self.field.abandoned.connect(self._forget)
+        self.slider.slid.connect(self._take_slide)
+        self.field.entered.connect(self._take_number)
+        self.field.unread.connect(self._show_misread)
+        self.field.abandoned.connect(self._restore_number)
         self.field.stepped.connect(self.slider.step)
 
     def show_row(self, row: FormRow) -> None:
@@ -359,7 +359,7 @@ class NumberRow(ParameterRow):
     def let_go(self) -> None:
         super().let_go()
         self.slider.let_go()
-        self.field.put_back()
+        self.field.restore_text()
 
     def parts(self) -> tuple[QWidget, ...]:
         return self.slider, self.field
@@ -367,13 +367,13 @@ class NumberRow(ParameterRow):
     def _text(self, value: float) -> str:
         return write_number(value * self.parameter.factor, self.parameter.decimals)
 
-    def _slide(self, shown: float, held: bool) -> None:
+    def _take_slide(self, shown: float, held: bool) -> None:
         self.show_refused("")
         self.field.show_text(write_number(shown, self.parameter.decimals))
-        self.field.put_back()
+        self.field.restore_text()
         self.changed.emit(self.parameter.name, self._value(shown), held)
 
-    def _enter(self, shown: float) -> None:
+    def _take_number(self, shown: float) -> None:
         self.show_refused("")
         self.changed.emit(self.parameter.name, self._value(shown), False)
 
@@ -385,7 +385,7 @@ class NumberRow(ParameterRow):
                 return float(known)
         return shown / self.parameter.factor
 
-    def _misread(self, text: str) -> None:
+    def _show_misread(self, text: str) -> None:
         preset = self._row.preset if self._row is not None else None
         example = self._text(preset) if isinstance(preset, int | float) else "1.5"
         if len(readings_of(text)) == 2:
@@ -394,11 +394,11 @@ class NumberRow(ParameterRow):
         said = f"“{text}” is not a number" if text.strip() else "This needs a number"
         self.show_refused(f"{said}: write one such as {example}, or press Esc.")
 
-    def _forget(self) -> None:
+    def _restore_number(self) -> None:
         self.show_refused("")
         if self._row is not None:
             self.show_row(self._row)
-            self.field.put_back()
+            self.field.restore_text()
 
 
 class ChoiceRow(ParameterRow):
@@ -407,14 +407,14 @@ class ChoiceRow(ParameterRow):
     def __init__(self, parameter: Parameter) -> None:
         super().__init__(parameter)
         self._value: Value = None
-        self.name = _name(parameter.label)
+        self.name = _name_label(parameter.label)
         self.choice = Choice()
         self.choice.setProperty("dense", "true")
         self.choice.setFont(font("label"))
         self.choice.setAccessibleName(parameter.label)
         for value, text in parameter.choices:
             self.choice.addItem(text, value)
-        self.choice.activated.connect(self._choose)
+        self.choice.activated.connect(self._ask_for_choice)
         add_parts(self.line, self.name, (self.choice, 1))
 
     def show_row(self, row: FormRow) -> None:
@@ -429,7 +429,7 @@ class ChoiceRow(ParameterRow):
     def parts(self) -> tuple[QWidget, ...]:
         return (self.choice,)
 
-    def _choose(self, index: int) -> None:
+    def _ask_for_choice(self, index: int) -> None:
         """Request another choice; the view shows it once it applies."""
         self.show_refused("")
         self.choice.setCurrentIndex(self.choice.findData(self._value))
@@ -443,7 +443,7 @@ class SwitchRow(ParameterRow):
         super().__init__(parameter)
         self.toggle = Toggle(parameter.label)
         self.toggle.setFont(font("label"))
-        self.toggle.clicked.connect(self._switch)
+        self.toggle.clicked.connect(self._ask_to_switch)
         add_parts(self.line, self.toggle, STRETCH)
 
     def show_row(self, row: FormRow) -> None:
@@ -455,7 +455,7 @@ class SwitchRow(ParameterRow):
     def parts(self) -> tuple[QWidget, ...]:
         return (self.toggle,)
 
-    def _switch(self, on: bool) -> None:
+    def _ask_to_switch(self, on: bool) -> None:
         """Request the other state; the view shows it once it applies."""
         self.show_refused("")
         self.toggle.setChecked(not on)
@@ -469,7 +469,7 @@ def row_for(parameter: Parameter) -> ParameterRow:
     return (SwitchRow if {value for value, _ in parameter.choices} == SWITCHED else ChoiceRow)(parameter)
 
 
-def _name(text: str) -> QLabel:
+def _name_label(text: str) -> QLabel:
     made = label(text, "label", "text")
     made.setFixedWidth(LABEL_WIDTH)
     made.setMinimumHeight(HEIGHT)
@@ -526,7 +526,7 @@ class FormPanel(Card):
         self.liquid = Choice()
         self.liquid.setProperty("dense", "true")
         self.liquid.setFont(font("label"))
-        self.liquid.activated.connect(self._choose)
+        self.liquid.activated.connect(self._choose_liquid)
         self.copy = ActionButton("copy", "Copy to B", height=32)
         self.copy.setProperty("dense", "true")
         self.open = ActionButton("file", "Open preset …", height=32)
@@ -591,14 +591,14 @@ class FormPanel(Card):
         parts = sections(setting.scene)
         shape = [(section.title, tuple(it.name for it in section.parameters)) for section in parts]
         if shape != [(title, tuple(block.rows)) for title, block in self.blocks.items()]:
-            self._make(parts)
+            self._make_rows(parts)
         elif forget:
             for row in self.rows.values():
                 row.let_go()
         for section in parts:
             self.blocks[section.title].show_section(section, setting)
 
-    def _make(self, form_sections: tuple[Section, ...]) -> None:
+    def _make_rows(self, form_sections: tuple[Section, ...]) -> None:
         """Make new rows; the keyboard focus and the scroll position stay."""
         rows = self.rows.items()
         focused = [(name, at) for name, row in rows for at, part in enumerate(row.parts()) if part.hasFocus()]
@@ -622,5 +622,5 @@ class FormPanel(Card):
             if name in self.rows:
                 self.rows[name].parts()[at].setFocus()
 
-    def _choose(self, index: int) -> None:
+    def _choose_liquid(self, index: int) -> None:
         self.liquid_chosen.emit(self._side, self._liquids[index])

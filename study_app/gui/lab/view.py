@@ -132,10 +132,10 @@ class LabPlace(Place):
         for button, ask in (
             (header.save, self.ask_where_to_save),
             (form.open, self.ask_which_to_open),
-            (form.back, self.put_back),
+            (form.back, self.ask_to_put_back),
         ):
             button.clicked.connect(ask)
-        self._escape.held.connect(self._stop)
+        self._escape.held.connect(self._ask_to_stop)
 
     def ask(self, what: str, *details: Any) -> None:
         """Emit a request by name."""
@@ -154,20 +154,20 @@ class LabPlace(Place):
 
     def ask_where_to_save(self) -> None:
         """Ask for the preset's file; the dialog is not modal, so that the force can be stopped."""
-        if (setting := self._free_to_ask()) is not None:
+        if (setting := self._setting_unless_asking()) is not None:
             dialog = self._ask_for_file(f"Save preset: {setting.title}", "Presets", "save", setting, saves=True)
             dialog.setDefaultSuffix(SUFFIX[1:])
             dialog.selectFile(f"{preset_name(setting.title)}{SUFFIX}")
 
     def ask_which_to_open(self) -> None:
-        if self._free_to_ask() is not None:
+        if self._setting_unless_asking() is not None:
             self._ask_for_file("Open preset", "Presets and protocols", "preset")
 
-    def put_back(self) -> None:
-        if (setting := self._free_to_ask()) is not None and self._view is not None:
+    def ask_to_put_back(self) -> None:
+        if (setting := self._setting_unless_asking()) is not None and self._view is not None:
             self.put_back_asked.emit(self._view.felt, setting)
 
-    def _free_to_ask(self) -> Setting | None:
+    def _setting_unless_asking(self) -> Setting | None:
         """Return the felt setting; None while another question is open or the comparison is blind."""
         if self.dialog is not None or self._view is None or self._view.workbench.blind:
             return None
@@ -190,7 +190,7 @@ class LabPlace(Place):
             self.dialog.deleteLater()
         self.dialog = None
 
-    def _stop(self) -> None:
+    def _ask_to_stop(self) -> None:
         """Request zero force after Esc was held in any window of the program."""
         if self.isVisible():
             self.ask("stop")

@@ -43,7 +43,7 @@ class Actions(Card):
         self.close_session.hide()
         add_parts(self.column, row, self.hint)
 
-    def narrow(self, yes: bool) -> None:
+    def set_narrow(self, yes: bool) -> None:
         """Hide the buttons' icons if there is no room for them."""
         self._signs = not yes
         for button, sign in ((self.repeat, "repeat"), (self.end, "cross")):
@@ -64,15 +64,15 @@ class Actions(Card):
         if view.over and self.close_session.isHidden():
             self.close_session.show()
             self.close_session.setFocus()
-        self.hint.setText(_hint(view))
+        self.hint.setText(_hint_text(view))
 
     @property
-    def paused(self) -> str:
+    def pause_request(self) -> str:
         """The request of the first button."""
         return "resume" if self._resumes else "pause"
 
 
-def _hint(view: OperatorView) -> str:
+def _hint_text(view: OperatorView) -> str:
     if view.over and view.trouble:
         return ""
     if view.over:
@@ -135,8 +135,8 @@ class NotesCard(Card):
         self.mark = ActionButton("flag", "Mark", key="M")
         buttons = hbox((self.add, 1), (self.mark, 1), spacing=12)
         add_parts(self.column, self._head, self._list, (self.field, 1), self.hint, buttons)
-        self.field.entered.connect(self._keep)
-        self.add.clicked.connect(self._add)
+        self.field.entered.connect(self._keep_note)
+        self.add.clicked.connect(self._add_note)
 
     def show_lines(self, most: int) -> None:
         """Show at most so many notes; heading and hint are hidden with the first omitted note."""
@@ -160,13 +160,13 @@ class NotesCard(Card):
             button.setEnabled(not view.over)
         self.field.setEnabled(not view.over)
 
-    def _add(self) -> None:
+    def _add_note(self) -> None:
         if self.field.toPlainText().strip():
-            self._keep()
+            self._keep_note()
         else:
             self.field.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
-    def _keep(self) -> None:
+    def _keep_note(self) -> None:
         text = self.field.toPlainText().strip()
         if text:
             self.field.clear()
@@ -249,16 +249,16 @@ class StopPanel(Card):
 
     def show_view(self, view: OperatorView) -> None:
         if view.over:
-            self._say("minus", "text2", "Force is off")
+            self._show_word("minus", "text2", "Force is off")
         elif view.force_on and self._felt:
-            self._say("check", "ok", "Force is on")
+            self._show_word("check", "ok", "Force is on")
         elif view.force_on:
-            self._say("minus", "text2", "Visual only, no force")
+            self._show_word("minus", "text2", "Visual only, no force")
         else:
-            self._say("stop", "warn", "Force is off")
+            self._show_word("stop", "warn", "Force is off")
         self.fade_in.setVisible(not view.force_on and view.may_resume)
 
-    def _say(self, icon: str, ink: str, word: str) -> None:
+    def _show_word(self, icon: str, ink: str, word: str) -> None:
         self.sign.show_icon(icon, ink)  # type: ignore[arg-type]  # one of three literals above
         self.word.setText(word)
 

@@ -12,7 +12,7 @@ from typing import Final, Literal
 
 from study_app.devices.descriptor import Icon
 from study_app.gui.operator.servo_health import ForceFigures, Tile, Vitals, force_rows, health_tiles
-from study_app.gui.sessions.session_facts import broken_words, operator_language, step_title
+from study_app.gui.sessions.session_facts import broken_limit_text, operator_language, step_title
 from study_app.number_text import grouped, minutes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import FormStep, Schedule, Step, Trial
@@ -158,7 +158,7 @@ class Session:
         main = [at for at, step in enumerate(self.schedule.steps) if isinstance(step, Trial) and step.phase == "main"]
         return sum(at < progress.here or progress.reached_end for at in main), len(main)
 
-    def broken(self, progress: Progress) -> dict[int, tuple[Broken, ...]]:
+    def broken_limits(self, progress: Progress) -> dict[int, tuple[Broken, ...]]:
         """Return the limits that finished trials broke and the operator may know: lateness and gaps if double-blind."""
         hidden = SEALED if self.protocol.study.blinding == "double" else frozenset()
         return {
@@ -211,7 +211,7 @@ def operator_view(
         setting_line=_setting_line(session, progress, answering=answering),
         trial_time=_trial_time(session, progress, now_s),
         steps=tuple(_step_row(stage, progress) for stage in session.stages),
-        counts=_counts(session, progress),
+        counts=_count_rows(session, progress),
         tiles=health_tiles(vitals, rate_hz, session.lateness_limit_s),
         device=DeviceView(
             session.device_name,
@@ -228,25 +228,27 @@ def operator_view(
         trial=None if trial is None else trial.number,
         waits=waits,
         beyond=(
-            *_slower(vitals),
+            *_delay_sentences(vitals),
             *(f"{title}: {reason}" for title, reason in {**progress.outlets_lost, **(outlets_lost or {})}.items()),
-            *_lost(session, progress, {**progress.lost, **(lost or {})}),
-            *_lacking(session, progress, {trial.number: dropped} if trial is not None and dropped else {}),
+            *_lost_recording_sentences(session, progress, {**progress.lost, **(lost or {})}),
+            *_incomplete_recording_sentences(
+                session, progress, {trial.number: dropped} if trial is not None and dropped else {}
+            ),
             *filter(None, [str(progress.missing_trials)]),
-            *_beyond(session, progress),
+            *_limit_sentences(session, progress),
         ),
         blinding=session.protocol.study.blinding,
-        track=_track(session, progress),
+        track=_track_lines(session, progress),
     )
 
 
-def _track(session: Session, progress: Progress) -> tuple[str, ...]:
+def _track_lines(session: Session, progress: Progress) -> tuple[str, ...]:
     trial = next((planned for planned in session.schedule.trials if planned.number == progress.of_intervals), None)
     if trial is None or progress.ended:
         return ()
     design = design_of(session.protocol, session.protocol.blocks[trial.block])
     names = words(session.language).design_answers
-    lines = track_words(progress, session.schedule, trial, {answer: names[answer] for answer in design.answers})
+    lines = track_lines(progress, session.schedule, trial, {answer: names[answer] for answer in design.answers})
     own = session.protocol.study.codes == "participant"
     return (lines[0].replace(f" {trial.code}:", ":", 1), *lines[1:]) if own else lines
 
@@ -357,8 +359,8 @@ def _step_row(stage: Stage, progress: Progress) -> StepRow:
     return StepRow(stage.label, "open", "")
 
 
-def _counts(session: Session, progress: Progress) -> tuple[tuple[str, str], ...]:
-    broken, missing = session.broken(progress).values(), progress.missing_trials
+def _count_rows(session: Session, progress: Progress) -> tuple[tuple[str, str], ...]:
+    broken, missing = session.broken_limits(progress).values(), progress.missing_trials
     return (
         ("Answers on disk", f"{sum(progress.answered.values())} of {session.answers_of}"),
         ("Trials within limits", f"{sum(not limits for limits in broken)} of {len(broken)}"),
@@ -367,7 +369,7 @@ def _counts(session: Session, progress: Progress) -> tuple[tuple[str, str], ...]
     )
 
 
-def _slower(vitals: Vitals) -> tuple[str, ...]:
+def _delay_sentences(vitals: Vitals) -> tuple[str, ...]:
     """Return a sentence if the device's delay is longer than at the start."""
     if vitals.delay_ticks <= vitals.first_delay_ticks:
         return ()
@@ -377,7 +379,7 @@ def _slower(vitals: Vitals) -> tuple[str, ...]:
     )
 
 
-def _lost(session: Session, progress: Progress, lost: Mapping[int, str]) -> tuple[str, ...]:
+def _lost_recording_sentences(session: Session, progress: Progress, lost: Mapping[int, str]) -> tuple[str, ...]:
     """Return a sentence for every trial whose recording was lost, newest first."""
     trials = {trial.number: trial for trial in session.schedule.trials}
     return tuple(
@@ -386,7 +388,7 @@ def _lost(session: Session, progress: Progress, lost: Mapping[int, str]) -> tupl
     )
 
 
-def _lacking(session: Session, progress: Progress, now: Mapping[int, int]) -> tuple[str, ...]:
+def _incomplete_recording_sentences(session: Session, progress: Progress, now: Mapping[int, int]) -> tuple[str, ...]:
     """Return a sentence for every trial whose recording lacks samples, newest first."""
     labels = {trial.number: trial.label(session.protocol, session.language) for trial in session.schedule.trials}
     return tuple(
@@ -395,12 +397,12 @@ def _lacking(session: Session, progress: Progress, now: Mapping[int, int]) -> tu
     )
 
 
-def _beyond(session: Session, progress: Progress) -> tuple[str, ...]:
+def _limit_sentences(session: Session, progress: Progress) -> tuple[str, ...]:
     """Return a sentence for every finished trial that broke a limit, newest first."""
     labels = {trial.number: trial.label(session.protocol, session.language) for trial in session.schedule.trials}
     return tuple(
-        f"{labels[number]} out of limits: " + "; ".join(broken_words(*limit) for limit in beyond)
-        for number, beyond in reversed(session.broken(progress).items())
+        f"{labels[number]} out of limits: " + "; ".join(broken_limit_text(*limit) for limit in beyond)
+        for number, beyond in reversed(session.broken_limits(progress).items())
         if beyond
     )
 
@@ -442,7 +444,7 @@ FAST_S: Final = 0.3
 """A median time to answer below this is marked [s]."""
 
 
-def track_words(progress: Progress, schedule: Schedule, trial: Trial, choices: Mapping[str, str]) -> tuple[str, ...]:
+def track_lines(progress: Progress, schedule: Schedule, trial: Trial, choices: Mapping[str, str]) -> tuple[str, ...]:
     """Return lines about the track of ``trial``; ``choices`` maps its answers to labels.
 
     A line that ends in "check" deserves attention.
@@ -454,14 +456,14 @@ def track_words(progress: Progress, schedule: Schedule, trial: Trial, choices: M
     reasons = Counter(reason for number in own for reason in progress.repeated.get(number, ()))
     return (
         f"Track {trial.code}: {len(answers)} of at most {grouped(len(own))} answered",
-        *(_of_answers(answers, choices) if answers else ()),
+        *(_answer_lines(answers, choices) if answers else ()),
         *(f"repeated {count}: {reason}" for reason, count in reasons.items()),
         *(f"not delivered {count}: {REASONS.get(limit, limit)}" for limit, count in limits.items()),
         *([f"{len(given_up)} unanswered: no attempt was delivered"] if given_up else []),
     )
 
 
-def _of_answers(answers: Sequence[TrialAnswer], choices: Mapping[str, str]) -> list[str]:
+def _answer_lines(answers: Sequence[TrialAnswer], choices: Mapping[str, str]) -> list[str]:
     given = [str(answer.value) for answer in answers]
     shares = ", ".join(f"{label} {100 * given.count(choice) / len(given):.0f} %" for choice, label in choices.items())
     run = max(len(list(same)) for _, same in groupby(given))

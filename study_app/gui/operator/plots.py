@@ -20,7 +20,7 @@ from study_app.gui.widgets.live_plots import (
     LatenessPlot,
     TracePlot,
     lateness_histogram,
-    number,
+    tick_text,
 )
 
 FIELD = QSize(320, 210)
@@ -47,7 +47,7 @@ class ForcePlot(TracePlot):
         self.size_field = pg.PlotCurveItem(fillLevel=0.0)  # the last curve's field, without its line
         self.size_field.setZValue(-5)
         self.limits = tuple(pg.InfiniteLine(sign * limit_n, angle=0) for sign in (1, -1))
-        self.limit_name = pg.TextItem(f"limit {number(limit_n)} N", anchor=(0, 0))
+        self.limit_name = pg.TextItem(f"limit {tick_text(limit_n)} N", anchor=(0, 0))
         self.limit_name.textItem.setFont(font("small", weight=600, tabular=True))
         self.limit_name.textItem.document().setDocumentMargin(NAME_MARGIN)
         for item in (self.size_field, *self.limits, self.limit_name):
@@ -207,9 +207,9 @@ class Tiles(QWidget):
         super().__init__()
         self._grid = grid(10, 10, margins=0, parent=self)
         self.cards = [TileCard() for _ in range(4)]
-        self.narrow(False)
+        self.set_narrow(False)
 
-    def narrow(self, yes: bool) -> None:
+    def set_narrow(self, yes: bool) -> None:
         self.across = across = 2 if yes else 4
         for index, card in enumerate(self.cards):
             self._grid.addWidget(card, index // across, index % across)

@@ -73,7 +73,7 @@ class ServoHealth:
         self._path = np.full((rows, 4), np.nan)  # t [s], x, y, z [m]
         self._path_rows = 0
 
-    def take(self, samples: Any) -> None:
+    def add_samples(self, samples: Any) -> None:
         """Add new telemetry samples, in order (a recarray of ``layout.SAMPLE``)."""
         count = len(samples)
         if count == 0:
@@ -86,14 +86,14 @@ class ServoHealth:
         self._latenesses += count
         self._ticks += count
 
-    def hand(self, at_s: float, position_m: Any) -> None:
+    def add_hand_position(self, at_s: float, position_m: Any) -> None:
         """Add the hand's position [m, hand frame]; positions more frequent than the trace's resolution are ignored."""
         if self._path_rows and at_s < self._path[(self._path_rows - 1) % len(self._path), 0] + TRACE_STEP_S:
             return
         self._path[self._path_rows % len(self._path)] = (at_s, *position_m)
         self._path_rows += 1
 
-    def frame(self, painted_ns: int) -> None:
+    def add_frame(self, painted_ns: int) -> None:
         """Add the time at which a frame of the tank was painted; refreshes since the last one were missed.
 
         Whether what a frame shows is late is another matter: the trial's row has that (``frames_late``).
@@ -107,15 +107,15 @@ class ServoHealth:
             self._missed += refreshes - 1
         self._last_frame_ns = painted_ns
 
-    def frames_rest(self) -> None:
+    def pause_frames(self) -> None:
         """Pause the count of missed refreshes while the tank is hidden."""
         self._last_frame_ns = 0
 
     def vitals(self) -> Vitals:
         gaps = self._frame_gaps_ns[: min(self._frames, len(self._frame_gaps_ns))]
         return Vitals(
-            rate_hz=self._rate(),
-            lateness_p99_s=float(np.percentile(self._kept(), 99)) * 1e-9 if self._latenesses else None,
+            rate_hz=self._rate_hz(),
+            lateness_p99_s=float(np.percentile(self._kept_latenesses(), 99)) * 1e-9 if self._latenesses else None,
             overruns=self.overruns,
             ticks=self._ticks,
             refreshes=self._refreshes,
@@ -128,7 +128,7 @@ class ServoHealth:
     @property
     def latenesses_us(self) -> Floats:
         """The latenesses of the last minute's ticks [µs] (n,)."""
-        return self._kept().astype(np.float64) * 1e-3
+        return self._kept_latenesses().astype(np.float64) * 1e-3
 
     def trace(self, now_s: float) -> tuple[Floats, Floats]:
         """Return times before now [s] (n,), oldest first, and positions [m] (n, 3) of the last ten seconds."""
@@ -137,10 +137,10 @@ class ServoHealth:
         path = path[path[:, 0] >= now_s - TRACE_WINDOW_S]
         return path[:, 0] - now_s, path[:, 1:]
 
-    def _kept(self) -> NDArray[np.int64]:
+    def _kept_latenesses(self) -> NDArray[np.int64]:
         return self.lateness_ns[: min(self._latenesses, len(self.lateness_ns))]
 
-    def _rate(self) -> float | None:
+    def _rate_hz(self) -> float | None:
         kept = min(self._ticks, len(self._recent))
         if kept < 2:
             return None
@@ -251,15 +251,15 @@ class Forces:
         self._limited = np.zeros(len(LIMITERS), np.int64)
         self._sums_n = np.zeros(2)  # permitted, withheld
 
-    def take(self, samples: Any) -> None:
+    def add_samples(self, samples: Any) -> None:
         """Add new samples, in order (a recarray of ``layout.SAMPLE``)."""
         if len(samples) == 0:
             return
         rows = np.empty((len(samples), 4))
         rows[:, FORCE] = samples["device_force_n"]
         rows[:, SIZE] = np.sqrt(np.einsum("ij,ij->i", rows[:, FORCE], rows[:, FORCE]))
-        self._keep(samples["time_ns"] // STEP_NS, rows)
-        self._count(samples, rows[:, SIZE])
+        self._keep_rows(samples["time_ns"] // STEP_NS, rows)
+        self._count_samples(samples, rows[:, SIZE])
 
     def trace(self, now_ns: int) -> tuple[Floats, Floats]:
         """Return times before now [s] (n,), oldest first, and forces [N] (n, 4: x, y, z, size)."""
@@ -279,7 +279,7 @@ class Forces:
             share=self._now_n / self.limit_n, most=self._most_n / self.limit_n, limiters=counted, withheld=withheld
         )
 
-    def _keep(self, steps: NDArray[np.int64], rows: Floats) -> None:
+    def _keep_rows(self, steps: NDArray[np.int64], rows: Floats) -> None:
         firsts = np.concatenate(([0], np.flatnonzero(np.diff(steps)) + 1))
         for first, end in zip(firsts, (*firsts[1:], len(steps)), strict=True):
             strongest = rows[first + int(np.argmax(rows[first:end, SIZE]))]
@@ -291,7 +291,7 @@ class Forces:
             elif strongest[SIZE] > self._rows[newest, SIZE]:
                 self._rows[newest] = strongest
 
-    def _count(self, samples: Any, sizes_n: Floats) -> None:
+    def _count_samples(self, samples: Any, sizes_n: Floats) -> None:
         """Count limiters, forces and the strongest force of the newest scene except rest."""
         scenes = samples["scene"]
         self._now_n = float(sizes_n[-1])

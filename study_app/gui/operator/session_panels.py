@@ -195,9 +195,9 @@ class Now(QWidget):
         vbox(self.part, self.heading, self.setting, STRETCH, spacing=6, margins=0, parent=self._words)
         vbox(row, self.bar, self.least, STRETCH, spacing=6, margins=0, parent=self._time)
         self._grid = grid(24, 12, margins=0, parent=self)
-        self.lie_flat(False)
+        self.set_flat(False)
 
-    def lie_flat(self, yes: bool) -> None:
+    def set_flat(self, yes: bool) -> None:
         self._grid.addWidget(self._words, 0, 0)
         self._grid.addWidget(self._time, 0 if yes else 1, 1 if yes else 0)
         self._grid.setColumnStretch(0, 3)
@@ -246,9 +246,9 @@ class Tally(QWidget):
         self._flat = False
         self._grid = grid(8, 8, margins=0, parent=self)
 
-    def lie_flat(self, yes: bool) -> None:
+    def set_flat(self, yes: bool) -> None:
         self._flat = yes
-        self._place()
+        self._place_counts()
 
     def show_view(self, view: OperatorView) -> None:
         """Show the counts, the newest broken limit (the tip lists all), and the track's state."""
@@ -256,7 +256,7 @@ class Tally(QWidget):
             for _ in range(len(view.counts) - len(self.counts)):
                 value = figures("", "label", weight=600)
                 self.counts.append((label("", "label", "text2"), value))
-            self._place()
+            self._place_counts()
         for (name, value), (word, count) in zip(self.counts, view.counts, strict=True):
             name.setText(word)
             value.setText(count)
@@ -266,7 +266,7 @@ class Tally(QWidget):
         self.track.setVisible(bool(view.track))
         self.track.setText("  ·  ".join(view.track))
 
-    def _place(self) -> None:
+    def _place_counts(self) -> None:
         left, right = Qt.AlignmentFlag.AlignLeft, Qt.AlignmentFlag.AlignRight
         for index, (name, value) in enumerate(self.counts):
             row, column = (0, 3 * index) if self._flat else (index, 0)
@@ -302,7 +302,7 @@ class StepLine(Themed, QWidget):
         """Return the room that a row likes; where there are many, each takes less."""
         return QSize(super().sizeHint().width(), ROW_HEIGHT)
 
-    def slim(self, yes: bool) -> None:
+    def set_slim(self, yes: bool) -> None:
         """Show the dot alone; its text is in the tip."""
         self._layout.setContentsMargins(0 if yes else 37, 0, 0, 0)
         for part in (self.name, self.note):
@@ -365,26 +365,26 @@ class Rail(Card):
         self.steps_area = scrolled(self._steps)
         self._rules = Rule(), Rule()
         add_parts(self.column, self._rules[0], (self.steps_area, 1), self._rules[1])
-        self.take_back()
+        self.take_back_panels()
 
-    def take_back(self) -> None:
+    def take_back_panels(self) -> None:
         """Show the present step and the counts above and below the steps."""
         for part in (self.now, self.tally):
-            part.lie_flat(False)
+            part.set_flat(False)
         self.column.insertWidget(0, self.now)
         self.column.addWidget(self.tally)
-        self._be(slim=False)
+        self._set_slim(slim=False)
 
-    def give_away(self) -> None:
+    def give_away_panels(self) -> None:
         """Show only the steps' dots: the present step and the counts are elsewhere."""
         for part in (self.now, self.tally):
-            part.lie_flat(True)
-        self._be(slim=True)
+            part.set_flat(True)
+        self._set_slim(slim=True)
 
-    def narrow(self, yes: bool) -> None:
+    def set_narrow(self, yes: bool) -> None:
         self.setFixedWidth(SLIM if self._slim else NARROW if yes else WIDTH)
 
-    def _be(self, *, slim: bool) -> None:
+    def _set_slim(self, *, slim: bool) -> None:
         self._slim = slim
         for part in self._rules:
             part.setVisible(not slim)
@@ -392,14 +392,14 @@ class Rail(Card):
         bars = Qt.ScrollBarPolicy
         self.steps_area.setVerticalScrollBarPolicy(bars.ScrollBarAlwaysOff if slim else bars.ScrollBarAsNeeded)
         for line in self.lines:
-            line.slim(slim)
+            line.set_slim(slim)
 
     def show_view(self, view: OperatorView) -> None:
         """Show the steps; ``now`` and ``tally`` are shown separately, since each may fail alone."""
         rows = view.steps
         while len(self.lines) < len(rows):
             line = StepLine()
-            line.slim(self._slim)
+            line.set_slim(self._slim)
             self.lines.append(line)
             self._steps_column.insertWidget(len(self.lines) - 1, line)
         for index, (line, row) in enumerate(zip(self.lines, rows, strict=True)):

@@ -90,7 +90,7 @@ class Arrangement(QWidget):
         self._parts.stop.setFixedSize(SIDE, STOPS[height])
         self._parts.notes.show_lines(NOTES[height])
         self._parts.device.show_rows(DEVICE_ROWS[height])
-        self._parts.buttons.narrow(not signs)
+        self._parts.buttons.set_narrow(not signs)
         self._parts.buttons.hint.setVisible(width == "wide")
         self._fill_middle(across=across)
 
@@ -99,13 +99,13 @@ class Arrangement(QWidget):
         for part in (header.bar, header.trials):  # "Now" says them, too
             part.setHidden(slim)
         if slim:
-            rail.give_away()
+            rail.give_away_panels()
             self.now.column.addWidget(rail.now)
             self.now.column.addWidget(rail.tally)
         else:
-            rail.take_back()
+            rail.take_back_panels()
         self.now.setVisible(slim)
-        rail.narrow(width != "wide")
+        rail.set_narrow(width != "wide")
         margin = MARGINS[width]
         self._body.setContentsMargins(margin, margin, margin, margin - 4)
         self._body.setHorizontalSpacing(GAPS[width])
@@ -117,7 +117,7 @@ class Arrangement(QWidget):
         p, span = self._parts, 1 if across else 2
         for card, least in ((p.lateness, 210), (p.force, 210), (p.position, 170)):
             card.setMinimumHeight(least)
-        p.tiles.narrow(not across)
+        p.tiles.set_narrow(not across)
         self._middle.addWidget(p.banner, 0, 0, 1, 2)
         self._middle.addWidget(self.now, 1, 0, 1, 2)
         self._middle.addWidget(p.tiles, 2, 0, 1, 2)
@@ -200,8 +200,8 @@ class OperatorWindow(Themed, QMainWindow):
             (self.banner.reconnect.clicked, "reconnect"),
             (self.header.page.clicked, "page"),
         ):
-            signal.connect(partial(self._press, what))
-        buttons.pause.clicked.connect(lambda: ask(buttons.paused))
+            signal.connect(partial(self._ask_by_button, what))
+        buttons.pause.clicked.connect(lambda: ask(buttons.pause_request))
         buttons.repeat.clicked.connect(self.ask_to_repeat)
         buttons.end.clicked.connect(self.ask_to_end)
         buttons.close_session.clicked.connect(self.close)
@@ -212,17 +212,17 @@ class OperatorWindow(Themed, QMainWindow):
         """Emit the request of a button by name."""
         self.asked.emit(what, details)
 
-    def _press(self, what: str, _checked: bool = False) -> None:
+    def _ask_by_button(self, what: str, _checked: bool = False) -> None:
         self.ask(what)
 
-    def draw(self, show: Callable[..., object], *shown: object) -> None:
+    def show_guarded(self, show: Callable[..., object], *shown: object) -> None:
         """Show a part that the session does not depend on; if it fails, the session continues."""
         try:
             show(*shown)
         except Exception as error:  # noqa: BLE001 - told, and passed on to the log and the journal
-            self.tell_of_failure(error)
+            self.report_failure(error)
 
-    def tell_of_failure(self, error: BaseException) -> None:
+    def report_failure(self, error: BaseException) -> None:
         """Report once that a part of the window failed."""
         clear_frames(error.__traceback__)  # frames may hold a painter, and Qt would then paint no window
         if (what := f"{type(error).__name__}: {PASSED_ON.sub('', str(error))}") not in self._failures:
@@ -236,30 +236,30 @@ class OperatorWindow(Themed, QMainWindow):
             return
         self.banner.show_view(view)
         self.may_close = view.over
-        if self.question is not None and self._asks_about not in {"", _setting(view) if view.may_repeat else None}:
+        if self.question is not None and self._asks_about not in {"", _setting_name(view) if view.may_repeat else None}:
             self.question.reject()  # its trial is over: the answer would apply to the next one
         for part in (self.stop, self.header, self.buttons):
             part.show_view(view)
         for show in (self.rail.now, self.rail.tally, self.tiles, self.notes, self.rail, self.device):
-            self.draw(show.show_view, view)
+            self.show_guarded(show.show_view, view)
         self._view = view
 
     def show_traces(self, health: ServoHealth, now_s: float) -> None:
-        self.draw(self.position.show_health, health, now_s)
+        self.show_guarded(self.position.show_health, health, now_s)
 
     def show_forces(self, forces: Forces, now_ns: int) -> None:
         """Draw the force (30 times a second) unless it is hidden."""
         if isinstance(self.force, ForceCard):
-            self.draw(self.force.show_forces, forces, now_ns)
+            self.show_guarded(self.force.show_forces, forces, now_ns)
 
     def show_lateness(self, health: ServoHealth) -> None:
-        self.draw(self.lateness.show_health, health)
+        self.show_guarded(self.lateness.show_health, health)
 
     def ask_to_repeat(self) -> None:
         """Ask for the reason of a repetition, which is required."""
         if self._view is not None and self._view.may_repeat:
-            setting = _setting(self._view)
-            self._ask(
+            setting = _setting_name(self._view)
+            self._open_question(
                 "repeat",
                 "Repeat this trial?",
                 f"{setting} starts again from the beginning. The first recording is kept, together with your reason.",
@@ -271,7 +271,7 @@ class OperatorWindow(Themed, QMainWindow):
 
     def ask_to_end(self) -> None:
         if self._view is not None and not self._view.over:
-            self._ask(
+            self._open_question(
                 "end",
                 "End this session now?",
                 f"{dict(self._view.counts)['Answers on disk']} answers are on disk and are kept. The force is turned "
@@ -286,7 +286,7 @@ class OperatorWindow(Themed, QMainWindow):
             assert self.question is not None  # noqa: S101 - just made
             self.question.back.setDefault(True)
 
-    def _ask(self, what: str, title: str, explanation: str, go_on: ActionButton, **more: Any) -> None:
+    def _open_question(self, what: str, title: str, explanation: str, go_on: ActionButton, **more: Any) -> None:
         """Open a question unless one is open; its answer emits the request with the values."""
         if self.question is not None:
             self.question.raise_()
@@ -303,7 +303,7 @@ class OperatorWindow(Themed, QMainWindow):
         notice.finished.connect(self._take_keyboard)
         notice.show()
 
-    def come_forward(self) -> None:
+    def bring_forward(self) -> None:
         self.raise_()
         self.activateWindow()
 
@@ -330,6 +330,6 @@ class OperatorWindow(Themed, QMainWindow):
         self.ask("close")
 
 
-def _setting(view: OperatorView) -> str:
+def _setting_name(view: OperatorView) -> str:
     """Return the neutral name of the present trial, with its number so that it is unique."""
     return f"{view.setting_line.split('  ·  ')[0]} ({view.heading.lower()})"

@@ -28,8 +28,8 @@ from study_app.gui.participant.tank.frame import (
     Point,
     TargetPlace,
     TaskShown,
-    ball_things,
-    changes,
+    ball_parts,
+    changed_region,
     paint_marks,
     target_place,
 )
@@ -38,13 +38,13 @@ from study_app.gui.participant.tank.layers import (
     OnsetPatch,
     Pane,
     VideoLayer,
-    backdrop,
+    paint_backdrop,
     paint_patch,
     patch_place,
     video_place,
 )
 from study_app.gui.theme.theme import TANK
-from study_app.gui.widgets.accessible import say
+from study_app.gui.widgets.accessible import announce
 from study_app.protocol.wording.languages import Words
 from study_app.session.pages import TaskPage
 from study_app.session.tasks import TankView, new_tracker
@@ -55,20 +55,20 @@ NEAR_RADII = 2.0  # in target radii: distance within which the ball is before or
 ALWAYS = QRegion(0, 0, 1, 1)  # a frame without motion counts, too
 
 
-def look(page: TaskPage, captions: Captions, width: int, height: int) -> tuple[Box, Camera]:
+def tank_and_camera(page: TaskPage, captions: Captions, width: int, height: int) -> tuple[Box, Camera]:
     """Return the tank of a page and the camera for a window of ``width`` × ``height`` [px]."""
     box = Box.around(page.workspace_m, page.body_radius_m)
     left, top, wide, high = AREA
-    top = max(top, captions.above(width, height) / height)
-    room = (1 - top) * height - captions.below(width, height)
+    top = max(top, captions.height_above(width, height) / height)
+    room = (1 - top) * height - captions.height_below(width, height)
     return box, Camera.fitted(box, left * width, top * height, wide * width, min(high * height, room))
 
 
 def paint_ahead(page: TaskPage, wording: Words, text_scale: float, size: QSize, ratio: float) -> Thread:
     """Paint the still images of a coming page in a thread of their own, so that it appears at once."""
     width, height = size.width(), size.height()
-    box, camera = look(page, Captions(page, wording, text_scale), width, height)
-    painting = Thread(target=backdrop, args=((width, height), ratio, box, camera), name="backdrop")
+    box, camera = tank_and_camera(page, Captions(page, wording, text_scale), width, height)
+    painting = Thread(target=paint_backdrop, args=((width, height), ratio, box, camera), name="backdrop")
     painting.start()
     return painting
 
@@ -104,7 +104,7 @@ class TankWidget(QWidget):
         self._words = wording
         self._by_mouse = by_mouse
         self._photodiode = photodiode
-        self._pane: QWidget | None = self._made_pane() if on_card else None
+        self._pane: QWidget | None = self._make_pane() if on_card else None
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setAccessibleName(page.instruction)
         self._page = page
@@ -147,17 +147,17 @@ class TankWidget(QWidget):
     def sizeHint(self) -> QSize:
         return QSize(1920, 1080)
 
-    def turn_to(self, page: TaskPage) -> None:
+    def show_interval(self, page: TaskPage) -> None:
         """Show another interval of the same trial, or the rest before it; earlier views are discarded."""
         self._page = page
-        self._captions.turn_to(page)
+        self._captions.show_interval(page)
         if self.controls is not None:
-            self.controls.turn_to(page)
+            self.controls.show_interval(page)
         if self.view is not None:  # the ball stays where it is until the next view
             self.view = replace(self.view, task=new_tracker(page.task).now(), ball_hidden=False)
         self._unpainted = False
-        self.video.show(None)
-        self.things = self._frame()
+        self.video.show_frame(None)
+        self.things = self._frame_parts()
         self._announce()
         if self._pane is None:
             self.repaint()
@@ -168,28 +168,28 @@ class TankWidget(QWidget):
         interval = self._page.interval
         if interval is not None:
             self.setAccessibleName(f"{interval.announced}. {self._page.said}")
-            say(self, self.accessibleName() if self._page.adjusts else interval.announced)
+            announce(self, self.accessibleName() if self._page.adjusts else interval.announced)
 
-    def prepare(self) -> None:
+    def paint_ahead(self) -> None:
         """Paint the still images now, so that the first frame does not wait."""
-        self._ready()
+        self._still_images()
 
     def show_view(self, view: TankView) -> None:
         """Draw the proxy's position in ``view``, and the task at that time."""
         self.view = view
         self._unpainted = True
         x, y, z = (float(value) for value in view.position_m)
-        self.patch.follow((x, y, z), view.sample_time_ns)
-        self.video.show(view.video)
-        self._ready()
-        things = self._frame()
-        changed = changes(self.things, things) + ALWAYS
+        self.patch.follow_motion((x, y, z), view.sample_time_ns)
+        self.video.show_frame(view.video)
+        self._still_images()
+        things = self._frame_parts()
+        changed = changed_region(self.things, things) + ALWAYS
         self.things = things
         if self._pane is None:
             self._drawn_ns, self._showing = None, True
             self.repaint(changed)  # pending work would make the view older
             self._showing = False
-            self._tell()
+            self._emit_painted()
         else:
             self._pane.update()
 
@@ -210,26 +210,26 @@ class TankWidget(QWidget):
         self._paint(painter, event.region())
         painter.end()
         if not self._showing:
-            self._tell()
+            self._emit_painted()
 
-    def _made_pane(self) -> QWidget:
+    def _make_pane(self) -> QWidget:
         pane = Pane(self, self._paint)
         pane.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        pane.swapped.connect(self._swapped)
+        pane.swapped.connect(self._handle_swap)
         return pane
 
-    def _swapped(self) -> None:
+    def _handle_swap(self) -> None:
         self.swapped.emit()
-        self._tell()
+        self._emit_painted()
 
-    def _tell(self) -> None:
+    def _emit_painted(self) -> None:
         """Emit once for every view that it was painted."""
         if self._unpainted and self._drawn_ns is not None:
             self._unpainted = False
             self.painted.emit(self._drawn_ns)
 
     def _paint(self, painter: QPainter, region: QRegion) -> None:
-        still = self._ready()
+        still = self._still_images()
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         if self._page.video:
             self.video.paint(painter, region)
@@ -239,7 +239,7 @@ class TankWidget(QWidget):
             self._paint_things(painter, region)
         if not self._page.video and region.intersects(still.front_at.toAlignedRect()):
             painter.drawImage(still.front_at.topLeft(), still.front)
-        self._captions.draw(painter, region, self._task, self._hint())
+        self._captions.draw(painter, region, self._task, self._hint_text())
         place = self.patch_area()
         if self._photodiode and region.intersects(place.toAlignedRect()):
             paint_patch(painter, place, lit=self.patch.lit)
@@ -249,7 +249,7 @@ class TankWidget(QWidget):
     def _task(self) -> TaskShown | None:
         return None if self.view is None else self.view.task
 
-    def _hint(self) -> str:
+    def _hint_text(self) -> str:
         """Return how the ball reaches the target; nearer or further if a wheel moves it and only the depth is wrong.
 
         In a rest that waits for the ball, that it is to come back; otherwise "".
@@ -268,29 +268,29 @@ class TankWidget(QWidget):
             return wording.nearer if z > 0 else wording.further_away
         return wording.back_to_target if self.resting and math.hypot(x, y, z) > todo.radius_m else ""
 
-    def _ready(self) -> Backdrop:
+    def _still_images(self) -> Backdrop:
         """Return the still images for the present size and screen; lay everything out if they changed."""
         ratio = self.devicePixelRatioF()
         if self.camera is None:
             self._lay_out(ratio)
         assert self.camera is not None  # noqa: S101  # _lay_out has just set it
-        return backdrop((self.width(), self.height()), ratio, self._box, self.camera)
+        return paint_backdrop((self.width(), self.height()), ratio, self._box, self.camera)
 
     def _lay_out(self, ratio: float) -> None:
         width, height = self.width(), self.height()
-        self._box, self.camera = look(self._page, self._captions, width, height)
+        self._box, self.camera = tank_and_camera(self._page, self._captions, width, height)
         self._captions.lay_out(width, height, self.camera.point((0, self._box.floor, self._box.z))[1])
         if self.controls is not None:
-            self.controls.place(self._captions.small_scale, self._captions.controls_middle)
+            self.controls.place_at_foot(self._captions.small_scale, self._captions.controls_middle)
         self.placer = BallPlacer(self.camera, self._box, self._page.body_radius_m)
         self.video.place = video_place(self.camera, self._box)
         for step in range(DEPTH_STEPS):
             radius, haze = self.placer.size(step)
-            sprites.ball(radius, ratio, haze)
+            sprites.ball_sprite(radius, ratio, haze)
         todo = self._page.task
         self.targets = self._placed_targets(todo.targets_m)
         self._stroke = max(2.0, self.camera.scale((0, 0, 0)) * 0.0010)
-        self.things = self._frame()
+        self.things = self._frame_parts()
 
     def _placed_targets(self, centres_m: tuple[Point, ...]) -> tuple[TargetPlace, ...]:
         if self.camera is None:
@@ -299,7 +299,7 @@ class TankWidget(QWidget):
         around_m = self._page.task.radius_m + self._page.body_radius_m
         return tuple(target_place(self.camera, self._box, centre, around_m) for centre in centres_m)
 
-    def _frame(self) -> dict[str, Placed]:
+    def _frame_parts(self) -> dict[str, Placed]:
         task = self._task
         lit = task.lit if task else None
         if (moving_m := (task and task.target_m) or self._page.task.target_m(0.0)) is not None:
@@ -313,10 +313,10 @@ class TankWidget(QWidget):
         if self.view is not None and not self.view.ball_hidden and self.placer is not None:
             x, y, z = (float(value) for value in self.view.position_m)
             self.ball = self.placer.place((x, y, z))
-            things |= ball_things(self.ball)
-        things |= self._captions.things(task, self._hint())
+            things |= ball_parts(self.ball)
+        things |= self._captions.things(task, self._hint_text())
         if self._page.video:
-            things["video"] = self.video.thing
+            things["video"] = self.video.placed_frame
         if self._photodiode:
             things["patch"] = Placed(self.patch.lit, self.patch_area())
         return things
@@ -330,8 +330,8 @@ class TankWidget(QWidget):
         ratio = self.devicePixelRatioF()
         ball = self.ball
         if ball is not None and region.intersects(self.things["shadow"].place.toAlignedRect()):
-            dark = sprites.shadow(ball.floor_radius, ratio, ball.floor_flat)
-            sprites.draw(painter, dark, ball.floor, opacity=ball.shade, grown=ball.spread)
+            dark = sprites.shadow_sprite(ball.floor_radius, ratio, ball.floor_flat)
+            sprites.draw_sprite(painter, dark, ball.floor, opacity=ball.shade, grown=ball.spread)
         order = sorted(range(len(self.targets)), key=lambda index: -self.targets[index].depth_m)
         drawn = False
         for index in order:
@@ -347,9 +347,11 @@ class TankWidget(QWidget):
     def _paint_target(self, painter: QPainter, target: TargetPlace, *, is_lit: bool) -> None:
         ratio = self.devicePixelRatioF()
         if not is_lit:
-            sprites.draw(painter, sprites.diamond(target.radius, ratio, self._stroke * 0.42), target.middle)
+            sprites.draw_sprite(
+                painter, sprites.diamond_sprite(target.radius, ratio, self._stroke * 0.42), target.middle
+            )
             return
-        sprites.draw(painter, sprites.ring(target.radius, ratio, self._stroke), target.middle)
+        sprites.draw_sprite(painter, sprites.ring_sprite(target.radius, ratio, self._stroke), target.middle)
         dwell = self._task.dwell if self._task else 0.0
         if dwell > 0:
             pen = QPen(QColor(TANK.lit), self._stroke * 1.3, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap)
@@ -366,8 +368,8 @@ class TankWidget(QWidget):
             painter.setPen(QPen(ink, self._stroke * 0.36, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
             painter.drawPoints(ball.feet)
         if region.intersects(self.things["ball"].place.toAlignedRect()):
-            sprite = sprites.ball(ball.radius, self.devicePixelRatioF(), ball.haze)
-            sprites.draw(painter, sprite, ball.middle)
+            sprite = sprites.ball_sprite(ball.radius, self.devicePixelRatioF(), ball.haze)
+            sprites.draw_sprite(painter, sprite, ball.middle)
 
     def patch_area(self) -> QRectF:
         return patch_place(self.width(), self.height())

@@ -24,7 +24,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QWidget
 
-from study_app.gui.display.screens import place
+from study_app.gui.display.screens import place_window
 from study_app.gui.key_presses import ignores_clicks, key_presses
 from study_app.gui.participant.forms.questionnaire import QuestionnaireWidget
 from study_app.gui.participant.forms.questions_page import FormWidget
@@ -80,10 +80,10 @@ class PointerCapture(QObject):
         self._returning = False
 
     @property
-    def held(self) -> bool:
+    def is_held(self) -> bool:
         return self._widget is not None
 
-    def take(self, widget: QWidget, workspace_m: tuple[float, float, float]) -> None:
+    def capture(self, widget: QWidget, workspace_m: tuple[float, float, float]) -> None:
         """Hide the pointer in ``widget`` and turn its motion into the hand's, within the workspace (full sizes)."""
         self.release()
         self._widget = widget
@@ -95,10 +95,10 @@ class PointerCapture(QObject):
         widget.installEventFilter(self)
         if QGuiApplication.platformName() not in WITHOUT_GRAB:
             widget.grabMouse()
-        self._last = self._middle()
+        self._last = self._middle_of_widget()
         self._returning = False
         QCursor.setPos(self._last)
-        self._move(0.0, 0.0, 0.0)
+        self._move_hand(0.0, 0.0, 0.0)
 
     def release(self) -> None:
         """Release the pointer; its buttons count as released."""
@@ -117,11 +117,11 @@ class PointerCapture(QObject):
         if watched is not self._widget:
             return False
         if isinstance(event, QWheelEvent):
-            self._move(0.0, 0.0, -2 * self._half[2] * event.angleDelta().y() / NOTCH / NOTCHES)
+            self._move_hand(0.0, 0.0, -2 * self._half[2] * event.angleDelta().y() / NOTCH / NOTCHES)
             return True
         if isinstance(event, QMouseEvent):
             if event.type() == QEvent.Type.MouseMove:
-                self._follow(event.globalPosition().toPoint(), event.modifiers())
+                self._follow_pointer(event.globalPosition().toPoint(), event.modifiers())
             else:
                 bit = BUTTONS.get(event.button(), 0)
                 bits = self._bits & ~bit if event.type() == QEvent.Type.MouseButtonRelease else self._bits | bit
@@ -131,27 +131,27 @@ class PointerCapture(QObject):
             return True
         return False
 
-    def _middle(self) -> QPoint:
+    def _middle_of_widget(self) -> QPoint:
         assert self._widget is not None  # noqa: S101  # asked only while held
         return self._widget.mapToGlobal(self._widget.rect().center())
 
-    def _follow(self, place: QPoint, modifiers: Qt.KeyboardModifier) -> None:
+    def _follow_pointer(self, place: QPoint, modifiers: Qt.KeyboardModifier) -> None:
         """Move the hand by the pointer's step; recentre a pointer that strays."""
         assert self._widget is not None  # noqa: S101  # events come only while held
-        middle = self._middle()
-        if self._returning and _apart(place, middle) < _apart(place, self._last):
+        middle = self._middle_of_widget()
+        if self._returning and _distance_px(place, middle) < _distance_px(place, self._last):
             self._last, self._returning = middle, False
         step = place - self._last
         self._last = place
         right, down = step.x() * self.gain, step.y() * self.gain
         if modifiers & Qt.KeyboardModifier.ShiftModifier:
-            self._move(right, 0.0, down)
+            self._move_hand(right, 0.0, down)
         else:
-            self._move(right, -down, 0.0)
-        if not self._returning and _apart(place, middle) > min(self._widget.width(), self._widget.height()) // 4:
-            self._bring_back(middle)
+            self._move_hand(right, -down, 0.0)
+        if not self._returning and _distance_px(place, middle) > min(self._widget.width(), self._widget.height()) // 4:
+            self._recentre_pointer(middle)
 
-    def _bring_back(self, middle: QPoint) -> None:
+    def _recentre_pointer(self, middle: QPoint) -> None:
         """Put the pointer into the middle and follow it from there.
 
         On X11 the answer to the question where it is comes after the jump, and Qt then delivers only the last of all
@@ -165,14 +165,14 @@ class PointerCapture(QObject):
         else:
             self._returning = True
 
-    def _move(self, right: float, up: float, near: float) -> None:
+    def _move_hand(self, right: float, up: float, near: float) -> None:
         for axis, step in enumerate((right, up, near)):
             half = self._half[axis]
             self._hand[axis] = min(max(self._hand[axis] + step, -half), half)
         self.moved.emit(*self._hand)
 
 
-def _apart(first: QPoint, other: QPoint) -> int:
+def _distance_px(first: QPoint, other: QPoint) -> int:
     return (first - other).manhattanLength()
 
 
@@ -253,21 +253,21 @@ class ParticipantWindow(QWidget):
         self._widget: PageWidget | TankWidget = self._wait_page(said.preparing)
         self._capture = PointerCapture(self)
         self._capture.moved.connect(self.pointer)
-        self._capture.pressed.connect(self._press)
+        self._capture.pressed.connect(self._take_click)
         self.settling = QTimer(self, interval=SETTLING_MS)
         self.settling.timeout.connect(self._pause_if_left)
         self.waiting = QTimer(self, interval=WAITING_MS)
         self.waiting.timeout.connect(self._show_if_painted)
         self.time_up = QTimer(self, singleShot=True, interval=TIME_UP_MS)
-        self.time_up.timeout.connect(self._ask)
+        self.time_up.timeout.connect(self._show_questions)
         self._ahead = QTimer(self, singleShot=True, interval=AHEAD_MS)
         self._ahead.timeout.connect(self._paint_ahead)
         self._escape = EscapeKey(self)
         self._escape.held.connect(self._stop_force)
-        self._escape.tapped.connect(self._pause)
+        self._escape.tapped.connect(self._ask_to_pause)
         self.installEventFilter(self._escape)
         self._pilot = pilot
-        self._title()
+        self._set_title()
         self.setObjectName("participant")
         self.setFont(font("body"))
         self.given_theme = PARTICIPANT
@@ -299,14 +299,14 @@ class ParticipantWindow(QWidget):
             self.move(screen.geometry().topLeft())
         if self._windowed:
             self.resize(WINDOWED_SIZE)
-            place(self, self.screen(), corner=False)
+            place_window(self, self.screen(), corner=False)
             self.show()
         else:
             self.setGeometry(self.screen().geometry())
             self.showFullScreen()
         self.activateWindow()
 
-    def come_forward(self) -> None:
+    def bring_forward(self) -> None:
         self.raise_()
         self.activateWindow()
 
@@ -315,33 +315,33 @@ class ParticipantWindow(QWidget):
         tank = self.tank
         if isinstance(page, TaskPage) and page.interval and tank is not None and tank.page.trial == page.trial:
             self._page = page
-            tank.turn_to(page)
+            tank.show_interval(page)
             return
         self._capture.release()
         self.waiting.stop()
         self.time_up.stop()
         if isinstance(page, TextPage) and page.language != self._words.language:
             self._words = words(page.language)
-            self._title()
+            self._set_title()
         self._page = page
         up = tank is not None and tank.page.interval is None and tank.time_is_up
         if isinstance(page, QuestionnairePage) and up:
             self.time_up.start()
-            self._put(self._wait_page(self._words.time_is_up))
+            self._show_widget(self._wait_page(self._words.time_is_up))
         elif isinstance(page, TaskPage) and self.painting is not None and self.painting.is_alive():
             self.waiting.start()
-            self._put(self._wait_page(self._words.trouble_title))
+            self._show_widget(self._wait_page(self._words.trouble_title))
         else:
-            self._put(self._make(page, self._widget))
+            self._show_widget(self._make_widget(page, self._widget))
 
-    def _put(self, made: PageWidget | TankWidget) -> None:
+    def _show_widget(self, made: PageWidget | TankWidget) -> None:
         self._presses.begin_page(made)
         old = self._widget
         if isinstance(old, TankWidget):
             old.painted.disconnect(self.painted)  # a late frame of one trial's tank must not begin the next trial
         made.setGeometry(self._room())
         if isinstance(made, TankWidget):
-            made.prepare()
+            made.paint_ahead()
         self._widget = made
         made.show()
         made.raise_()
@@ -350,7 +350,7 @@ class ParticipantWindow(QWidget):
             self.setFocus()
             made.setCursor(Qt.CursorShape.BlankCursor)
             if self._captures:
-                self._capture.take(made, made.page.workspace_m)
+                self._capture.capture(made, made.page.workspace_m)
         else:
             made.focus_first()
         old.hide()  # only now, or Qt would move the focus itself
@@ -365,7 +365,7 @@ class ParticipantWindow(QWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         controls = None if self.tank is None else self.tank.controls
-        if controls is not None and controls.press(event):
+        if controls is not None and controls.press_key(event):
             return
         key = event.key()
         if key in (Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Enter) and self._may_leave_tank():
@@ -376,7 +376,7 @@ class ParticipantWindow(QWidget):
     def keyReleaseEvent(self, event: QKeyEvent) -> None:
         super().keyReleaseEvent(event)
         if self.tank is not None and self.tank.controls is not None:
-            self.tank.controls.release(event)
+            self.tank.controls.release_key(event)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         if self.tank is not None and self.tank.controls is not None:
@@ -387,12 +387,12 @@ class ParticipantWindow(QWidget):
         if event.type() != QEvent.Type.ActivationChange or self.tank is None:
             return
         if self.tank.controls is not None and not self.isActiveWindow():
-            self.tank.controls.let_go()
+            self.tank.controls.stop_stepping()
         if not self._captures:
             return
-        if self.isActiveWindow() and self.isVisible() and not self._capture.held:
-            self._capture.take(self.tank, self.tank.page.workspace_m)
-        elif not self.isActiveWindow() and self._capture.held:
+        if self.isActiveWindow() and self.isVisible() and not self._capture.is_held:
+            self._capture.capture(self.tank, self.tank.page.workspace_m)
+        elif not self.isActiveWindow() and self._capture.is_held:
             self._capture.release()
             self.tank.setCursor(Qt.CursorShape.BlankCursor)
             self.settling.start()
@@ -409,7 +409,7 @@ class ParticipantWindow(QWidget):
         """Pause instead of closing: the participant must not end a session by accident."""
         if not self.may_close and not isinstance(self._page, EndPage | None):
             event.ignore()
-            self._pause()
+            self._ask_to_pause()
             return
         self._capture.release()
         super().closeEvent(event)
@@ -437,14 +437,14 @@ class ParticipantWindow(QWidget):
         """Replace the waiting page by the tank once it is painted."""
         if isinstance(self._page, TaskPage) and self.painting is not None and not self.painting.is_alive():
             self.waiting.stop()
-            self._put(self._make(self._page, self._widget))
+            self._show_widget(self._make_widget(self._page, self._widget))
 
-    def _ask(self) -> None:
+    def _show_questions(self) -> None:
         """Replace the page "Time is up" by the questions."""
         if isinstance(self._page, QuestionnairePage):
-            self._put(self._make(self._page, self._widget))
+            self._show_widget(self._make_widget(self._page, self._widget))
 
-    def _title(self) -> None:
+    def _set_title(self) -> None:
         self.setWindowTitle(self._words.window_title + (" – pilot" if self._pilot else ""))
         self.setAccessibleName(self.windowTitle())
 
@@ -457,7 +457,7 @@ class ParticipantWindow(QWidget):
     def _context(self) -> PageContext:
         return PageContext(self._words, self._clock, self, self.text_scale, by_mouse=self._captures)
 
-    def _make(self, page: Page, old: QWidget) -> PageWidget | TankWidget:
+    def _make_widget(self, page: Page, old: QWidget) -> PageWidget | TankWidget:
         if isinstance(page, TaskPage):
             return self._make_tank(page)
         context = self._context
@@ -492,7 +492,7 @@ class ParticipantWindow(QWidget):
     def _may_leave_tank(self) -> bool:
         return self.tank is not None and self.tank.may_leave
 
-    def _press(self, bits: int) -> None:
+    def _take_click(self, bits: int) -> None:
         """Handle a click of the mouse that is the device: as Space to continue, else as a device button."""
         if bits and ignores_clicks(self._widget):
             return
@@ -503,13 +503,13 @@ class ParticipantWindow(QWidget):
 
     def _pause_if_left(self) -> None:
         """Pause if the pointer is the device and left for another program; the operator's window does not count."""
-        if self.tank is None or self._capture.held:
+        if self.tank is None or self._capture.is_held:
             self.settling.stop()
         elif QGuiApplication.focusWindow() is None:
             self.settling.stop()
-            self._pause()
+            self._ask_to_pause()
 
-    def _pause(self) -> None:
+    def _ask_to_pause(self) -> None:
         """Pause the session, or close the last page."""
         if isinstance(self._page, TextPage | TaskPage | QuestionnairePage | DesignPage | FeedbackPage):
             self.event.emit(PauseRequested(self._clock(), "participant"))

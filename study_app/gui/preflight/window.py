@@ -23,7 +23,7 @@ from study_app.gui.widgets.cards import Bar, Card, Chip, Rule, scrolled, smooth_
 from study_app.gui.widgets.controls import ActionButton, Choice, Number
 from study_app.gui.widgets.labels import Ink, figures, label
 from study_app.gui.widgets.live_plots import LatenessPlot, lateness_histogram
-from study_app.protocol.describe import spread
+from study_app.protocol.describe import number_range
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import Schedule, Trial
@@ -67,7 +67,7 @@ class PreflightView:
         return sum(check.verdict == "failure" for check in self.checks)
 
     @property
-    def passed(self) -> str:
+    def passed_words(self) -> str:
         well = len(self.checks) - self.warnings - self.failures
         return f"{well} of {len(self.checks)} passed"
 
@@ -114,9 +114,9 @@ def planned_rows(
     ends = now + timedelta(seconds=max(extent.expected_s))
     error = WAITING if error_n is None else "< 0.01 N" if error_n < 0.01 else f"{error_n:.2f} N"
     return (
-        ("Parts", spread(extent.parts)),
-        (f"{extent.setting.capitalize()}s", spread(extent.settings)),
-        ("Answers", spread(extent.answers)),
+        ("Parts", number_range(extent.parts)),
+        (f"{extent.setting.capitalize()}s", number_range(extent.settings)),
+        ("Answers", number_range(extent.answers)),
         ("Expected time", extent.duration),
         ("Force limit", f"{protocol.device.force_limit_n:g} N"),
         *((("Expected force error", error),) if asked_error else ()),
@@ -140,10 +140,10 @@ def computer_checks(
     """
     of_servo = {check.name: check for check in preflight_checks(facts, protocol)}
     results = [of_servo[name] for name in OF_THE_COMPUTER]
-    return (*results, _devices(devices), _compiled(cache, compiled))
+    return (*results, _device_check(devices), _compiled_check(cache, compiled))
 
 
-def _devices(devices: Sequence[Backend]) -> Check:
+def _device_check(devices: Sequence[Backend]) -> Check:
     """Return the check of the connected haptic devices; without one, sessions use the mouse."""
     haptic = [device for device in devices if device.state.startswith("connected")]
     missing = [device.name for device in devices if device.state == NOT_AVAILABLE]
@@ -154,7 +154,7 @@ def _devices(devices: Sequence[Backend]) -> Check:
     return Check("Haptic devices", "warning", "none connected", about=about, advice=advice)
 
 
-def _compiled(cache: Path | None, compiled: int) -> Check:
+def _compiled_check(cache: Path | None, compiled: int) -> Check:
     if cache is None:
         return Check("Compiled code", "warning", "not stored", about="no folder is writable", advice=RECOMPILES)
     value = f"{compiled} functions compiled" if compiled else "stored"
@@ -277,7 +277,7 @@ class PreflightWindow(QWidget):
         self._lay_out()
         self.cancel.clicked.connect(self.close)
         self.again.clicked.connect(self.again_asked)
-        self.start.clicked.connect(self._start)
+        self.start.clicked.connect(self._ask_to_start)
         apply_theme(self, theme)
         give_role(self, QAccessible.Role.Window)
         self.start.setFocus()
@@ -288,13 +288,13 @@ class PreflightWindow(QWidget):
         inside = QWidget()
         vbox(self.checks, STRETCH, margins=0, parent=inside)
         area = self._area = scrolled(inside)
-        middle = hbox((area, 1), self._beside(), spacing=20)
+        middle = hbox((area, 1), self._column_beside(), spacing=20)
         foot = hbox(self.cancel, self.again, spacing=16)
         self.note = label(NOTHING_YET, "label", "text2")
         add_parts(foot, self.note, STRETCH, self.start)
         vbox(head, (middle, 1), Rule(), foot, spacing=16, margins=(32, 22, 32, 20), parent=self)
 
-    def _beside(self) -> QWidget:
+    def _column_beside(self) -> QWidget:
         """Return the scrolling column beside the checks: the servo's lateness and the coming session."""
         lateness = Card("Servo lateness", label("measured at rest, µs", "small", "text2"), padding=18, gap=6)
         self.plot.setMinimumHeight(150)
@@ -329,11 +329,11 @@ class PreflightWindow(QWidget):
         if view.busy:
             self.chip.show_state("neutral", "clock", WAITING.capitalize())
         elif view.failures:
-            self.chip.show_state("bad", "cross", view.passed)
+            self.chip.show_state("bad", "cross", view.passed_words)
         elif view.warnings:
-            self.chip.show_state("warn", "warning", view.passed)
+            self.chip.show_state("warn", "warning", view.passed_words)
         else:
-            self.chip.show_state("ok", "check", view.passed)
+            self.chip.show_state("ok", "check", view.passed_words)
 
     def _show_rows(self, view: PreflightView) -> None:
         for place, (name, text) in enumerate(view.rows):
@@ -349,7 +349,7 @@ class PreflightWindow(QWidget):
     def values(self) -> tuple[QLabel, ...]:
         return tuple(self._values.values())
 
-    def _start(self) -> None:
+    def _ask_to_start(self) -> None:
         if not self._done and self.start.isEnabled():
             self._done = True
             self.start_asked.emit()

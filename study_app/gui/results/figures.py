@@ -42,14 +42,14 @@ def kind_of(study: StudyAt) -> Kind:
     return "pilot" if study.pilot else "simulated" if study.simulated else ""
 
 
-def unblinded_words(reveal: Mapping[str, str]) -> str:
+def unblinding_text(reveal: Mapping[str, str]) -> str:
     """Return who opened the key, when and why: "Unblinded 19 Nov by AK: collection closed"."""
     at = time_of(reveal.get("at"))
     day = "" if at is None else f" {at.day} {at:%b}"
     return f"Unblinded{day} by {reveal.get('by', 'unknown')}: {reveal.get('reason', 'no reason given')}"
 
 
-def excluded_words(exclusion: Exclusion) -> str:
+def exclusion_text(exclusion: Exclusion) -> str:
     """Return the subject of an exclusion: "P003, session 2, trial 4"."""
     name = exclusion.participant if exclusion.session == 1 else f"{exclusion.participant}, session {exclusion.session}"
     return name if exclusion.trial is None else f"{name}, trial {exclusion.trial}"
@@ -116,20 +116,20 @@ class ResultsView:
         return self.chosen is not None and bool(self.sessions)
 
 
-def in_figures(sessions: Sequence[SessionFacts]) -> tuple[str, str]:
+def figure_counts(sessions: Sequence[SessionFacts]) -> tuple[str, str]:
     """Return how many sessions the figures include, and why others are left out; empty without sessions."""
-    inside = [session for session in sessions if session.counts]
+    inside = [session for session in sessions if session.is_counted]
     head = f"{len(inside)} of {counted(len(sessions), 'session')} in the figures"
     if not sessions:
         return "", ""
     excluded = [session.name for session in sessions if session.excluded is not None]
-    open_ones = [session.name for session in sessions if session.excluded is None and not session.counts]
-    parts = [_are(open_ones, "not complete"), _are(excluded, "excluded")]
+    open_ones = [session.name for session in sessions if session.excluded is None and not session.is_counted]
+    parts = [_names_with_verb(open_ones, "not complete"), _names_with_verb(excluded, "excluded")]
     line = "; ".join(filter(None, parts))
     return head, f"{line}." if line else ""
 
 
-def _are(names: Sequence[str], what: str) -> str:
+def _names_with_verb(names: Sequence[str], what: str) -> str:
     """Return "P007 is excluded", "P007, P009 and 12 others are excluded"; empty without names."""
     if not names:
         return ""
@@ -157,8 +157,8 @@ def themed_svg(svg: bytes, colours: Mapping[str, str], theme: Theme) -> bytes:
     family = b"font-family: " + FAMILIES[0].encode()
     parts = LETTERS.split(svg)  # every second part is a text
     accent = colours.get("accent", "#").lower().encode()
-    parts[::2] = [_dyed(part, paper, accent) for part in parts[::2]]
-    parts[1::2] = [FAMILY.sub(family, _dyed(part, letters, accent)) for part in parts[1::2]]
+    parts[::2] = [_with_colours(part, paper, accent) for part in parts[::2]]
+    parts[1::2] = [FAMILY.sub(family, _with_colours(part, letters, accent)) for part in parts[1::2]]
     return b"".join(parts)
 
 
@@ -172,14 +172,14 @@ def _ink(theme: Theme, role: str) -> str:
     return QColor(*mixed).name()
 
 
-def _dyed(part: bytes, by: Mapping[bytes, bytes], accent: bytes) -> bytes:
+def _with_colours(part: bytes, by: Mapping[bytes, bytes], accent: bytes) -> bytes:
     """Replace colours; the accent as a translucent shade under letters keeps its depth."""
     shade = b"fill: " + re.escape(accent) + rb"; (?:fill-)?opacity"
     pattern = re.compile(b"|".join([shade, *map(re.escape, sorted(by, key=len, reverse=True))]))
     return pattern.sub(lambda match: by.get(match[0], match[0]), part)
 
 
-def drawn(svg: bytes, size: QSize, ratio: float) -> QImage:
+def drawn_svg(svg: bytes, size: QSize, ratio: float) -> QImage:
     """Return an SVG as an image of ``size`` logical px for a screen with that device pixel ratio."""
     renderer = QSvgRenderer(svg)
     image = QImage(round(size.width() * ratio), round(size.height() * ratio), QImage.Format.Format_ARGB32_Premultiplied)
@@ -200,14 +200,14 @@ class FigureView(Coloured, QWidget):
         self._image = QImage()
         self._wanted: tuple[object, ...] = ()
         self._drawing = Background(self)
-        self._drawing.done.connect(self._take)
+        self._drawing.done.connect(self._show_image)
         policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         policy.setHeightForWidth(True)
         self.setSizePolicy(policy)
         self.show_figure(figure, colours)
 
     @property
-    def settled(self) -> bool:
+    def is_settled(self) -> bool:
         return not self._drawing.busy and not self._image.isNull()
 
     def show_figure(self, figure: FigureDrawn, colours: Mapping[str, str]) -> None:
@@ -218,10 +218,10 @@ class FigureView(Coloured, QWidget):
         self.setAccessibleName(figure.title)
         self.setAccessibleDescription(figure.caption)
         self.updateGeometry()
-        self._ask()
+        self._request_image()
 
     def apply_theme(self, theme: Theme) -> None:
-        self._ask()
+        self._request_image()
 
     def heightForWidth(self, width: int) -> int:
         return round(width * self._proportion)
@@ -234,9 +234,9 @@ class FigureView(Coloured, QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._ask()
+        self._request_image()
 
-    def _ask(self) -> None:
+    def _request_image(self) -> None:
         """Request a drawing at the present size and theme, unless it exists."""
         if self.width() < 2 or self.height() < 2 or not self.testAttribute(Qt.WidgetAttribute.WA_Resized):
             return
@@ -246,20 +246,20 @@ class FigureView(Coloured, QWidget):
             return
         self._wanted = wanted
         figure, colours, theme = self._figure, self._colours, self.theme
-        self._drawing.run(lambda: drawn(themed_svg(figure.svg, colours, theme), size, ratio))
+        self._drawing.run(lambda: drawn_svg(themed_svg(figure.svg, colours, theme), size, ratio))
 
-    def _take(self, image: QImage) -> None:
+    def _show_image(self, image: QImage) -> None:
         self._image = image
         self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         if self._image.isNull():
-            self._ask()
+            self._request_image()
             return
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         if self.devicePixelRatioF() != self._image.devicePixelRatioF():
-            self._ask()
+            self._request_image()
         painter.drawImage(QRectF(self.rect()), self._image)
 
 
@@ -314,7 +314,7 @@ class FigureCard(Card):
             self._place.addWidget(self.drawing, 0, Qt.AlignmentFlag.AlignHCenter)
             self.more.raise_()
 
-    def fit(self, width: int) -> None:
+    def fit_width(self, width: int) -> None:
         size = QSize(width, 0 if self.drawing is None else self.drawing.heightForWidth(width))
         if self.drawing is not None and self.drawing.maximumSize() != size:
             self.drawing.setFixedSize(size)
@@ -421,7 +421,7 @@ class FiguresPanel(QScrollArea):
         """Show the figures; a card stays while its figure is drawn again."""
         names = [figure.name for figure in view.figures]
         if [card.figure.name for card in self.cards] != names:
-            self._order(view)
+            self._order_cards(view)
         for card, figure in zip(self.cards, view.figures, strict=True):
             if card.figure is not figure:
                 card.show_figure(figure, view.colours)
@@ -431,9 +431,9 @@ class FiguresPanel(QScrollArea):
             self.trouble.show_going(view.drawing)
         self.trouble.setVisible(view.trouble is not None or (view.drawing is not None and not view.figures))
         self.work.show_going(view.testing or (view.drawing if view.figures else None), untested=view.untested)
-        self.fit()
+        self.fit_width()
 
-    def _order(self, view: ResultsView) -> None:
+    def _order_cards(self, view: ResultsView) -> None:
         """Keep the cards of present figures and make the others, in the figures' order."""
         kept = {card.figure.name: card for card in self.cards}
         self.cards = []
@@ -444,14 +444,14 @@ class FiguresPanel(QScrollArea):
         for gone in kept.values():
             remove_widget(gone)
 
-    def show_whole(self, yes: bool) -> None:
+    def set_whole(self, yes: bool) -> None:
         """Be as high as the figures, for a page that scrolls as a whole."""
         self._whole = yes
         off = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
         self.setVerticalScrollBarPolicy(off if yes else Qt.ScrollBarPolicy.ScrollBarAsNeeded)
-        self.fit()
+        self.fit_width()
 
-    def fit(self) -> None:
+    def fit_width(self) -> None:
         """Set the figures' width; smaller if two of them fit side by side then."""
         bar = 0 if self._whole else self.verticalScrollBar().sizeHint().width()  # reserved: figures would flicker
         width = min(self.width() - bar - AROUND, MOST_WIDTH)
@@ -461,9 +461,9 @@ class FiguresPanel(QScrollArea):
             frames = len(first) * (AROUND - 4) + (len(first) - 1) * self._column.spacing()
             width = min(width, max(int((self.height() - frames) / heights), LEAST_WIDTH))
         for card in self.cards:
-            card.fit(max(width, 320))
+            card.fit_width(max(width, 320))
         self.setMinimumHeight(self._inside.sizeHint().height() if self._whole else 0)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self.fit()
+        self.fit_width()

@@ -34,18 +34,25 @@ from study_app.analysis.worker_messages import (
 )
 from study_app.gui.application import open_here
 from study_app.gui.kit.dialogs import REASON, Question, Work
-from study_app.gui.kit.fields import Field, choice
+from study_app.gui.kit.fields import Field, choice_field
 from study_app.gui.results.figures import (
     FiguresPanel,
     ResultsView,
     Trouble,
-    excluded_words,
-    in_figures,
+    exclusion_text,
+    figure_counts,
     kind_of,
     time_of,
-    unblinded_words,
+    unblinding_text,
 )
-from study_app.gui.sessions.session_facts import Column, SessionFacts, matching, session_facts, started_words, states_of
+from study_app.gui.sessions.session_facts import (
+    Column,
+    SessionFacts,
+    occurring_states,
+    session_facts,
+    session_filter,
+    start_time_text,
+)
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.sessions.sessions_table import SessionsTable
 from study_app.gui.theme.theme import SHADOW, Theme, font
@@ -121,7 +128,7 @@ class WriteDialog(Work):
 NEEDS: Final = {"by": "Please enter a name; it is recorded.", "reason": REASON}
 
 
-def by_and_reason(by: str, who: str, example: str) -> tuple[Field, Field]:
+def decision_fields(by: str, who: str, example: str) -> tuple[Field, Field]:
     """Return the fields for name and reason of a decision."""
     return Field("by", by, placeholder=who), Field("reason", "Reason", placeholder=f"For example: {example}")
 
@@ -152,9 +159,11 @@ class LeaveOutDialog(Question):
             "state what was excluded, by whom and why.",
             ActionButton("minus", "Exclude", role="primary"),
             fields=(
-                choice("session", "Session", {(facts.participant, facts.session): facts.name for facts in sessions}),
-                choice("trial", "Scope", {}),
-                *by_and_reason("By", "Your initials, or the rule's name", "fell asleep"),
+                choice_field(
+                    "session", "Session", {(facts.participant, facts.session): facts.name for facts in sessions}
+                ),
+                choice_field("trial", "Scope", {}),
+                *decision_fields("By", "Your initials, or the rule's name", "fell asleep"),
             ),
             needs=NEEDS,
             width=QUESTION_PX,
@@ -167,7 +176,9 @@ class LeaveOutDialog(Question):
 
     def _show_trials(self) -> None:
         trials = self._trials.get(self.value("session"), ())
-        self.editors["trial"].offer({None: "Whole session", **{at: f"Trial {at}: {text}" for at, text in trials}})
+        self.editors["trial"].show_options(
+            {None: "Whole session", **{at: f"Trial {at}: {text}" for at, text in trials}}
+        )
 
     @property
     def chosen(self) -> tuple[str, int, int | None]:
@@ -212,8 +223,8 @@ class SessionsCard(Card):
         filters = hbox((self.search, 1), (self.state, 1), self.details, self.version, spacing=8)
         foot = vbox(self.head, self.why, spacing=2, margins=(10, 2, 10, 0))
         add_parts(self.column, filters, (self.rows, 1), Rule(), foot)
-        self.search.textChanged.connect(self._filter)
-        self.state.currentIndexChanged.connect(self._filter)
+        self.search.textChanged.connect(self._apply_filter)
+        self.state.currentIndexChanged.connect(self._apply_filter)
 
     def _enable(self) -> None:
         chosen = self.rows.chosen
@@ -228,20 +239,20 @@ class SessionsCard(Card):
         with QSignalBlocker(self.state):
             self.state.clear()
             self.state.addItem(EVERY, "")
-            for state, text in states_of(sessions):
+            for state, text in occurring_states(sessions):
                 self.state.addItem(text, state)
             self.state.setCurrentIndex(max(0, self.state.findData(chosen)))
-        head, why = in_figures(sessions)
+        head, why = figure_counts(sessions)
         self.head.setText(head)
         self.why.setText(why)
         self.why.setVisible(bool(why))
-        self._filter()
+        self._apply_filter()
 
-    def _filter(self) -> None:
+    def _apply_filter(self) -> None:
         state = str(self.state.currentData() or "")
         filtered = bool(state or self.search.text().strip())
         self.rows.none.setText("No session matches." if filtered else self._none)
-        self.rows.show_matching(matching(self.search.text(), state))
+        self.rows.show_matching(session_filter(self.search.text(), state))
 
 
 class ExclusionsCard(Card):
@@ -275,7 +286,7 @@ class ExclusionsCard(Card):
             self.leave_out.setFocus()
         for line in self.lines:
             remove_widget(line)
-        self.lines = [self._line(exclusion) for exclusion in reversed(listed)]
+        self.lines = [self._exclusion_row(exclusion) for exclusion in reversed(listed)]
         for place, line in enumerate(self.lines):
             self._rows.insertWidget(place, line)
         self.none.setVisible(not listed)
@@ -284,19 +295,19 @@ class ExclusionsCard(Card):
         grows = QSizePolicy.Policy.Preferred if listed else QSizePolicy.Policy.Maximum
         self.setSizePolicy(QSizePolicy.Policy.Preferred, grows)
 
-    def _line(self, exclusion: Exclusion) -> QWidget:
+    def _exclusion_row(self, exclusion: Exclusion) -> QWidget:
         """Return the row of one exclusion: what, why, who and when."""
         back = ActionButton("undo", "Include again …", role="plain", height=30)
-        back.setAccessibleName(f"Include again: {excluded_words(exclusion)}")
+        back.setAccessibleName(f"Include again: {exclusion_text(exclusion)}")
         back.clicked.connect(lambda: self.take_back_asked.emit(exclusion))
         made = QWidget()
-        what = label(excluded_words(exclusion), "label", wraps=True, weight=600)
+        what = label(exclusion_text(exclusion), "label", wraps=True, weight=600)
         why = label(exclusion.reason, "label", "text2", wraps=True, weight=400)
         now, at = datetime.now().astimezone(), time_of(exclusion.excluded_at)
-        by = exclusion.rule_or_person + ("" if at is None else f", {started_words(at.astimezone(now.tzinfo), now)}")
+        by = exclusion.rule_or_person + ("" if at is None else f", {start_time_text(at.astimezone(now.tzinfo), now)}")
         who = label(by, "small", "text2")
         vbox(hbox((what, 1), back), why, who, spacing=0, margins=(0, 0, 6, 0), parent=made)
-        made.setAccessibleName(f"{excluded_words(exclusion)}: {exclusion.reason} ({by})")
+        made.setAccessibleName(f"{exclusion_text(exclusion)}: {exclusion.reason} ({by})")
         return made
 
 
@@ -371,7 +382,7 @@ class ResultsPlace(Place):
         self._redrawn: set[str] = set()
         self._blocks = 0
         self._listening = QTimer(self, interval=LISTEN_MS)
-        self._listening.timeout.connect(self._listen)
+        self._listening.timeout.connect(self._read_answers)
         self.study = Choice()
         self.study.setAccessibleName("Study")
         self.study.setFont(font("body"))
@@ -390,14 +401,14 @@ class ResultsPlace(Place):
         self.show_view(ResultsView())
 
     def _connect(self) -> None:
-        self.study.activated.connect(lambda: self._choose(self.study.currentData()))
+        self.study.activated.connect(lambda: self._choose_study(self.study.currentData()))
         self.unblind.clicked.connect(self._ask_unblind)
         self.export.clicked.connect(self._ask_tables)
         self.report.clicked.connect(self._ask_report)
         self.exclusions.leave_out.clicked.connect(self._ask_leave_out)
         self.exclusions.take_back_asked.connect(self._ask_take_back)
         self.exclusions.open.clicked.connect(lambda: self._opener(self.view.exclusions_file or self.results))
-        self.figures.asked.connect(self._mend)
+        self.figures.asked.connect(self._apply_remedy)
         self.sessions.rows.opened.connect(self._open_session)
         self.sessions.rows.version_asked.connect(self.version_asked)
 
@@ -422,7 +433,7 @@ class ResultsPlace(Place):
         vbox(self.area, margins=0, parent=self)
 
     def enter(self) -> None:
-        self.look()
+        self.read_studies()
 
     def leave(self) -> None:
         self._listening.stop()
@@ -432,8 +443,8 @@ class ResultsPlace(Place):
         self.reader = self._writer = None
         self._orders = {}
         if self.writing is not None:
-            self.writing.stopped()
-        self._show(drawing=None, testing=None)
+            self.writing.close_stopped()
+        self._update_view(drawing=None, testing=None)
 
     def show_view(self, view: ResultsView) -> None:
         """Show a view; only changed parts are made anew."""
@@ -496,27 +507,27 @@ class ResultsPlace(Place):
         dialog = Question(
             self,
             self.theme,
-            f"Unblind {self._name()}?",
+            f"Unblind {self._study_name()}?",
             "Everyone who opens this study will see which setting was which, here and in every table, figure and "
             "report. This cannot be undone. Your name, the reason and the time are stored with the data.",
             ActionButton("eye", "Unblind", role="danger"),
-            fields=by_and_reason("Name", "Your name or initials, such as AK", "collection closed"),
+            fields=decision_fields("Name", "Your name or initials, such as AK", "collection closed"),
             needs=NEEDS,
             warning=later,
             width=QUESTION_PX,
         )
-        decide = partial(self._decide, "opening the key", OpenKey)
+        decide = partial(self._order_decision, "opening the key", OpenKey)
         dialog.accepted.connect(lambda: decide(by=dialog.value("by"), reason=dialog.value("reason")))
-        self._open(dialog)
+        self._open_dialog(dialog)
 
     def _open_session(self, session: SessionFacts) -> None:
         page = SessionPage(self, self.theme, session, self._opener)
-        self._open(page)
+        self._open_dialog(page)
 
     def _ask_leave_out(self) -> None:
         included = [session for session in self.view.sessions if session.excluded is None]
         dialog = LeaveOutDialog(self, self.theme, included, self.view.trials, self.sessions.rows.chosen)
-        decide = partial(self._decide, "leaving out", LeaveOut)
+        decide = partial(self._order_decision, "leaving out", LeaveOut)
 
         def leave_out() -> None:
             participant, session, trial = dialog.chosen
@@ -524,24 +535,24 @@ class ResultsPlace(Place):
             decide(participant=participant, session=session, trial=trial, by=by, reason=reason)
 
         dialog.accepted.connect(leave_out)
-        self._open(dialog)
+        self._open_dialog(dialog)
 
     def _ask_take_back(self, exclusion: Exclusion) -> None:
         dialog = Question(
             self,
             self.theme,
-            f"Include again: {excluded_words(exclusion)}",
+            f"Include again: {exclusion_text(exclusion)}",
             f"It was excluded for this reason: “{exclusion.reason}”. It will count again in measures, figures and "
             "tests. Your name, the reason and the time are stored in exclusions_reversed.jsonl.",
             ActionButton("undo", "Include again", role="primary"),
-            fields=by_and_reason("By", "Your name or initials, such as AK", "wrong participant"),
+            fields=decision_fields("By", "Your name or initials, such as AK", "wrong participant"),
             needs=NEEDS,
             width=QUESTION_PX,
         )
         which = {"participant": exclusion.participant, "session": exclusion.session, "trial": exclusion.trial}
-        decide = partial(self._decide, "taking the exclusion back", TakeBack, **which)
+        decide = partial(self._order_decision, "taking the exclusion back", TakeBack, **which)
         dialog.accepted.connect(lambda: decide(by=dialog.value("by"), reason=dialog.value("reason")))
-        self._open(dialog)
+        self._open_dialog(dialog)
 
     def _ask_tables(self) -> None:
         no_sav = "" if importlib.util.find_spec("pyreadstat") else NO_SAV
@@ -549,28 +560,28 @@ class ResultsPlace(Place):
         dialog = WriteDialog(
             self,
             self.theme,
-            f"Export {self._name()}",
+            f"Export {self._study_name()}",
             "Answers, trials and counts of all participants as CSV, with a codebook that explains every column."
-            f"{self._by_code()}",
+            f"{self._code_note()}",
             go_on="Export",
-            to=self.results.resolve().parent / f"{self._name()}-tables",
+            to=self.results.resolve().parent / f"{self._study_name()}-tables",
             extras=extras,
         )
-        dialog.begun.connect(lambda: self._write(WriteTables, *dialog.asked))
+        dialog.begun.connect(lambda: self._start_writing(WriteTables, *dialog.asked))
         self._open_writing(dialog)
 
     def _ask_report(self) -> None:
         dialog = WriteDialog(
             self,
             self.theme,
-            f"Report of {self._name()}",
+            f"Report of {self._study_name()}",
             "One page with figures, tests and conclusions, and every number, table and figure as a file. Large studies "
-            f"take some minutes.{self._by_code()}",
+            f"take some minutes.{self._code_note()}",
             go_on="Write the report",
-            to=self.results.resolve().parent / f"{self._name()}-report",
+            to=self.results.resolve().parent / f"{self._study_name()}-report",
             opens_file=True,
         )
-        dialog.begun.connect(lambda: self._write(WriteReport, dialog.asked[0]))
+        dialog.begun.connect(lambda: self._start_writing(WriteReport, dialog.asked[0]))
         self._open_writing(dialog)
 
     def _open_writing(self, dialog: WriteDialog) -> None:
@@ -578,24 +589,24 @@ class ResultsPlace(Place):
         dialog.stop_asked.connect(self._stop_writing)
         dialog.opened.connect(lambda: self._opener(dialog.result_path or self.results))
         dialog.finished.connect(self._forget_writing)
-        self._open(dialog)
+        self._open_dialog(dialog)
 
     def _forget_writing(self) -> None:
         self.writing = None
 
-    def _open(self, dialog: QDialog) -> None:
+    def _open_dialog(self, dialog: QDialog) -> None:
         self.dialog = dialog
         dialog.finished.connect(dialog.deleteLater)
         dialog.open()
 
-    def _by_code(self) -> str:
+    def _code_note(self) -> str:
         return " Settings appear as codes because the key is sealed." if self.view.sealed else ""
 
-    def _name(self) -> str:
+    def _study_name(self) -> str:
         return "" if self.view.chosen is None else self.view.chosen.name
 
     @property
-    def busy(self) -> bool:
+    def is_busy(self) -> bool:
         """Whether a request has not ended."""
         return bool(self._orders) or self._writer is not None
 
@@ -603,17 +614,17 @@ class ResultsPlace(Place):
         self.results = results
         self.show_view(ResultsView())
         if self.reader is not None:
-            self.look()
+            self.read_studies()
 
-    def look(self) -> None:
+    def read_studies(self) -> None:
         """Read the list of studies, and the chosen study again."""
-        self._ask(FindStudies(self.results), "looking for studies")
+        self._send_order(FindStudies(self.results), "looking for studies")
 
-    def choose(self, folder: Path) -> None:
+    def choose_study(self, folder: Path) -> None:
         """Show this study the next time the place is entered."""
         self.show_view(ResultsView(studies=self.view.studies, chosen=folder))
 
-    def _ask(self, order: Order, what: str) -> None:
+    def _send_order(self, order: Order, what: str) -> None:
         if self.reader is None or not self.reader.works:
             if self.reader is not None:
                 self.reader.close()
@@ -624,21 +635,21 @@ class ResultsPlace(Place):
         self._going = Progress(what, 0.0)
         self._listening.start()
 
-    def _listen(self) -> None:
+    def _read_answers(self) -> None:
         """Read the answers to the last request; show the activity if it takes long."""
         if self.reader is not None and self._orders:
             for number, answer in self.reader.answers():
-                self._take(number, answer)
+                self._handle_answer(number, answer)
             if self._orders and time.monotonic() - self._since_s > PATIENCE_S:
                 if self._blocks and len(self._redrawn) >= self._blocks:
-                    self._show(testing=self._going, drawing=None)
+                    self._update_view(testing=self._going, drawing=None)
                 else:
-                    self._show(drawing=self._going, testing=None)
-        self._listen_to_writer()
-        if not self.busy:
+                    self._update_view(drawing=self._going, testing=None)
+        self._read_writer_answers()
+        if not self.is_busy:
             self._listening.stop()
 
-    def _take(self, number: int, answer: Answer | Refused | Crashed) -> None:
+    def _handle_answer(self, number: int, answer: Answer | Refused | Crashed) -> None:
         order = self._orders.get(number)
         if order is None:
             return
@@ -648,14 +659,14 @@ class ResultsPlace(Place):
                 del self._orders[number]
                 if isinstance(order, OpenKey) and answer.warnings:
                     self.message.emit("Some tables were not updated", "\n".join(answer.warnings))
-                self._end(order, newest=newest)
+                self._finish_order(order, newest=newest)
             case Refused():
                 del self._orders[number]
                 if newest or isinstance(order, Decided):
-                    self._refused(order, answer)
+                    self._show_refusal(order, answer)
             case Crashed():
                 self._orders = {}
-                self._show(trouble=MISTAKE, figures=(), drawing=None, testing=None)
+                self._update_view(trouble=MISTAKE, figures=(), drawing=None, testing=None)
             case Progress() if newest:
                 self._going = answer
             case StudiesFound() if newest:
@@ -667,7 +678,7 @@ class ResultsPlace(Place):
                 nothing = Trouble(
                     title="No figures", sentence="This study has no questionnaire.", button="Refresh", remedy="again"
                 )
-                self._show(
+                self._update_view(
                     trials=answer.trials,
                     doubts=answer.doubts,
                     colours=answer.colours,
@@ -677,7 +688,7 @@ class ResultsPlace(Place):
                 self._redrawn.add(answer.name)
                 names = [figure.name for figure in self.view.figures]
                 figures = [answer if figure.name == answer.name else figure for figure in self.view.figures]
-                self._show(figures=tuple(figures if answer.name in names else [*figures, answer]))
+                self._update_view(figures=tuple(figures if answer.name in names else [*figures, answer]))
 
     def _take_studies(self, answer: StudiesFound) -> None:
         folders = [study.folder for study in answer.studies]
@@ -692,47 +703,47 @@ class ResultsPlace(Place):
                 )
             )
             return
-        self._show(studies=answer.studies)
-        self._read(chosen)
+        self._update_view(studies=answer.studies)
+        self._read_study(chosen)
 
-    def _choose(self, folder: Path) -> None:
+    def _choose_study(self, folder: Path) -> None:
         if folder != self.view.chosen:
-            self._read(folder)
+            self._read_study(folder)
 
-    def _read(self, folder: Path) -> None:
+    def _read_study(self, folder: Path) -> None:
         """Read a study; its present view stays until then."""
         if folder != self.view.chosen:
             self.show_view(ResultsView(studies=self.view.studies, chosen=folder))
             self._blocks = 0
         self._redrawn = set()
-        self._show(trouble=None, untested=False, listed=False)
-        self._ask(ReadStudy(folder), f"reading {folder.name}")
+        self._update_view(trouble=None, untested=False, listed=False)
+        self._send_order(ReadStudy(folder), f"reading {folder.name}")
 
     def _take_sessions(self, answer: SessionsFound) -> None:
         facts = session_facts(answer.folder, answer.rows, answer.exclusions, {})
         facts.sort(key=lambda session: (not session.needs_care, session.participant, session.session))
         reveal = answer.reveal
-        self._show(
+        self._update_view(
             sessions=tuple(facts),
             listed=True,
             left_out=answer.exclusions,
             exclusions_file=exclusions_at(answer.folder),
             sealed=reveal is None,
-            opened="" if reveal is None else unblinded_words(reveal),
+            opened="" if reveal is None else unblinding_text(reveal),
         )
 
-    def _end(self, order: Order, *, newest: bool) -> None:
+    def _finish_order(self, order: Order, *, newest: bool) -> None:
         if isinstance(order, Decided):
-            self._read(order.folder)
+            self._read_study(order.folder)
         elif isinstance(order, ReadStudy) and newest:
             kept = tuple(figure for figure in self.view.figures if figure.name in self._redrawn)
-            self._show(figures=kept, drawing=None, testing=None)
+            self._update_view(figures=kept, drawing=None, testing=None)
 
-    def _refused(self, order: Order, refused: Refused) -> None:
+    def _show_refusal(self, order: Order, refused: Refused) -> None:
         sentence = f"{refused.sentence}."
         if isinstance(order, Decided):
             self.message.emit(REFUSALS[type(order)], sentence)
-            self._read(order.folder)  # it may have changed meanwhile, and its reading was cancelled
+            self._read_study(order.folder)  # it may have changed meanwhile, and its reading was cancelled
         elif refused.stopped:
             all_drawn = self._blocks and len(self._redrawn) >= self._blocks
             trouble = (
@@ -740,7 +751,7 @@ class ResultsPlace(Place):
                 if all_drawn
                 else Trouble(title="Stopped", sentence="There are no figures yet.", button="Go on", remedy="read")
             )
-            self._show(untested=bool(all_drawn), trouble=trouble, drawing=None, testing=None)
+            self._update_view(untested=bool(all_drawn), trouble=trouble, drawing=None, testing=None)
         elif isinstance(order, FindStudies):
             trouble = Trouble(
                 title="The results folder cannot be read", sentence=sentence, button="Refresh", remedy="again"
@@ -749,37 +760,37 @@ class ResultsPlace(Place):
         elif refused.lacks_extra:
             sentence = sentence.replace("this needs", "Figures need")
             trouble = Trouble(title="Your data are complete", sentence=sentence, button="Refresh", remedy="again")
-            self._show(trouble=trouble, figures=(), drawing=None, testing=None)
+            self._update_view(trouble=trouble, figures=(), drawing=None, testing=None)
         elif self.view.listed and not self.view.sessions:
             sentence = "Results appear after the first session has started."
             trouble = Trouble(title="No sessions yet", sentence=sentence, button="Go to Home", remedy="home")
-            self._show(trouble=trouble, figures=(), drawing=None, testing=None)
+            self._update_view(trouble=trouble, figures=(), drawing=None, testing=None)
         else:
             trouble = Trouble(title="The study cannot be read", sentence=sentence, button="Refresh", remedy="again")
-            self._show(trouble=trouble, figures=(), drawing=None, testing=None)
+            self._update_view(trouble=trouble, figures=(), drawing=None, testing=None)
 
-    def _show(self, **changes: Any) -> None:
+    def _update_view(self, **changes: Any) -> None:
         view = replace(self.view, **changes)
         if view != self.view:
             self.show_view(view)
 
-    def _mend(self, remedy: str) -> None:
+    def _apply_remedy(self, remedy: str) -> None:
         if remedy == "home":
             self.go_asked.emit("home")
         elif remedy == "stop":
             if self.reader is not None:
                 self.reader.stop()
         elif remedy == "read" and self.view.chosen is not None:
-            self._read(self.view.chosen)
+            self._read_study(self.view.chosen)
         else:
-            self._show(trouble=None)
-            self.look()
+            self._update_view(trouble=None)
+            self.read_studies()
 
-    def _decide(self, what: str, order: Callable[..., Decided], **details: Any) -> None:
+    def _order_decision(self, what: str, order: Callable[..., Decided], **details: Any) -> None:
         if self.view.chosen is not None:
-            self._ask(order(folder=self.view.chosen, **details), what)
+            self._send_order(order(folder=self.view.chosen, **details), what)
 
-    def _write(self, make: Callable[..., WriteTables | WriteReport], *details: Any) -> None:
+    def _start_writing(self, make: Callable[..., WriteTables | WriteReport], *details: Any) -> None:
         if self.view.chosen is not None:
             self._writer = self._start_worker()
             self._writer.order(make(self.view.chosen, *details))
@@ -789,7 +800,7 @@ class ResultsPlace(Place):
         if self._writer is not None:
             self._writer.stop()
 
-    def _listen_to_writer(self) -> None:
+    def _read_writer_answers(self) -> None:
         """Show the writer's progress; end its process after the last answer."""
         dialog = self.writing
         if self._writer is None:
@@ -811,7 +822,7 @@ class ResultsPlace(Place):
         if isinstance(last, Done):
             dialog.show_written(last.files, last.warnings)
         elif last.stopped:
-            dialog.stopped()
+            dialog.close_stopped()
         else:
             dialog.show_refused(f"{last.sentence}.")
 
@@ -827,7 +838,7 @@ class ResultsPlace(Place):
         self._panel.setMaximumSize(most if stacked else QSize(width, QWIDGETSIZE_MAX))
         self.exclusions.setMaximumWidth(EXCLUSIONS if stacked else QWIDGETSIZE_MAX)
         self._left.setAlignment(self.exclusions, Qt.AlignmentFlag.AlignTop if stacked else Qt.AlignmentFlag(0))
-        self.figures.show_whole(stacked)
+        self.figures.set_whole(stacked)
         self._head.removeWidget(self._chips_there)
         self._below.removeWidget(self._chips_there)
         room = self.width() - 48 - self._head.sizeHint().width()

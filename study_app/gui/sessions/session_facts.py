@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 from study_app.errors import StoreError
 from study_app.gui.theme.theme import Tone
 from study_app.number_text import counted, duration_range
-from study_app.protocol.describe import spread
+from study_app.protocol.describe import number_range
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s, variants
@@ -86,7 +86,7 @@ class SessionFacts:
         return self.status in {"unfinished", "damaged"}
 
     @property
-    def counts(self) -> bool:
+    def is_counted(self) -> bool:
         return self.status in REACHED_END and self.excluded is None
 
     @property
@@ -102,7 +102,7 @@ def sessions(results: Path, answers_of: Mapping[str, int]) -> tuple[SessionFacts
     """
     facts: list[SessionFacts] = []
     for data in sorted(results.glob("*/data")):
-        with contextlib.suppress(StoreError):  # not ours, or not readable: the commands report why when asked about it
+        with contextlib.suppress(StoreError):  # not a study folder, or unreadable: the commands report why
             rows = participant_rows(StudyFolder(data.parent))
             facts += session_facts(data.parent, rows, _exclusions(data.parent), answers_of)
     return tuple(sorted(facts, key=lambda session: (not session.needs_care, -session.started.timestamp())))
@@ -125,7 +125,7 @@ def session_facts(
             participant=row["participant"],
             session=int(row["session"]),
             study=str(row["study"]),
-            started=_started(_began(row, session), session.path),
+            started=_start_time(_beginning_of(row, session), session.path),
             status="running" if row["status"] == "unfinished" and is_open(session.path) else row["status"],
             validity=row["validity"],
             answers=int(row["responses"] or 0),
@@ -137,20 +137,20 @@ def session_facts(
             lost=lost,
             reconnected=reconnected,
             outlets_lost=outlets_lost,
-            missing=_missing(session) if row.get(TRIALS_MISSING.name) else None,
+            missing=_missing_trials(session) if row.get(TRIALS_MISSING.name) else None,
         )
         for (row, session), (lost, reconnected, outlets_lost) in zip(placed, counts, strict=True)
     ]
 
 
-def _missing(session: SessionFolder) -> MissingTrials | None:
+def _missing_trials(session: SessionFolder) -> MissingTrials | None:
     """Return the undelivered trials of a session; None if its journal cannot be read."""
     with contextlib.suppress(StoreError):
         return progress_of(journal.read(session.journal)).missing_trials
     return None
 
 
-def _began(row: Mapping[str, Any], session: SessionFolder) -> object:
+def _beginning_of(row: Mapping[str, Any], session: SessionFolder) -> object:
     """Return the time at which a session began; for a pilot played from a later step, the time of playing."""
     if row["pilot"] and row["simulated"] and row.get("resumed"):
         with contextlib.suppress(StoreError):
@@ -158,7 +158,7 @@ def _began(row: Mapping[str, Any], session: SessionFolder) -> object:
     return row["session_started_at"]
 
 
-def _started(time: object, folder: Path) -> datetime:
+def _start_time(time: object, folder: Path) -> datetime:
     """Return the time at which a session began; for a damaged journal, the time of the folder's last change."""
     with contextlib.suppress(ValueError):
         return datetime.fromisoformat(str(time))
@@ -174,7 +174,7 @@ def _exclusions(study: Path) -> tuple[Exclusion, ...]:
     return ()
 
 
-def started_words(started: datetime, now: datetime) -> str:
+def start_time_text(started: datetime, now: datetime) -> str:
     """Return the start of a session in words: "Today 09:31", "Yesterday 16:11", "18 Nov 15:20"."""
     days = (now.date() - started.date()).days
     day = {0: "Today", 1: "Yesterday"}.get(days, f"{started.day} {started:%b}")
@@ -217,7 +217,7 @@ LIMIT_WORDS: Mapping[str, tuple[str, str]] = {
 """Of every measure that a limit judges: what it is, and its unit."""
 
 
-def broken_words(measure: str, value: float, limit: float) -> str:
+def broken_limit_text(measure: str, value: float, limit: float) -> str:
     """Return a sentence about a broken limit."""
     what, unit = LIMIT_WORDS[measure]
     return f"{what}: {value:.3g} {unit}, limit {limit:g} {unit}"
@@ -246,7 +246,7 @@ def validity_chip(facts: SessionFacts) -> Chipped:
     return VALIDITY[None if facts.needs_care or facts.status == "running" else facts.validity]
 
 
-def incidents(facts: SessionFacts) -> str:
+def incidents_text(facts: SessionFacts) -> str:
     """Return the incidents of device, recordings and outlets: "2 recordings lost, device reconnected"; "" if none."""
     lost = f"{counted(facts.lost, 'recording')} lost" if facts.lost else ""
     times = "" if facts.reconnected == 1 else f" {facts.reconnected} times"
@@ -254,12 +254,12 @@ def incidents(facts: SessionFacts) -> str:
     return ", ".join(filter(None, (lost, f"device reconnected{times}" if facts.reconnected else "", outlets)))
 
 
-def answers_words(facts: SessionFacts) -> str:
+def answers_text(facts: SessionFacts) -> str:
     """Return "12 of 62", or "12" if the total is unknown."""
     return f"{facts.answers} of {facts.answers_of}" if facts.answers_of is not None else str(facts.answers)
 
 
-def matching(text: str, status: str) -> Callable[[SessionFacts], bool]:
+def session_filter(text: str, status: str) -> Callable[[SessionFacts], bool]:
     """Return a predicate: the participant contains ``text`` and the state is ``status`` ("" for any).
 
     ``status`` is one of `STATUS`, "excluded", "invalid" or "lost".
@@ -278,7 +278,7 @@ def matching(text: str, status: str) -> Callable[[SessionFacts], bool]:
     return matches
 
 
-def states_of(sessions: Iterable[SessionFacts]) -> list[tuple[str, str]]:
+def occurring_states(sessions: Iterable[SessionFacts]) -> list[tuple[str, str]]:
     """Return the states that occur among sessions with their labels, in the order of `STATUS`."""
     listed = list(sessions)
     states = [
@@ -343,6 +343,6 @@ def extent_of(protocol: Protocol) -> Extent:
     )
 
 
-def counted_each(numbers: Sequence[int], word: str) -> str:
+def count_range_text(numbers: Sequence[int], word: str) -> str:
     """Return "1 part", "2 parts", or "1 to 2 parts" if sessions differ."""
-    return f"{spread(numbers)} {word}" if set(numbers) == {1} else f"{spread(numbers)} {word}s"
+    return f"{number_range(numbers)} {word}" if set(numbers) == {1} else f"{number_range(numbers)} {word}s"

@@ -14,8 +14,8 @@ from study_app.errors import StoreError
 from study_app.gui.sessions.session_facts import (
     VALIDITY,
     SessionFacts,
-    broken_words,
-    incidents,
+    broken_limit_text,
+    incidents_text,
     session_facts,
     status_chip,
     validity_chip,
@@ -95,10 +95,10 @@ def read_record(folder: Path) -> SessionRecord:
     own = tuple(exclusion for exclusion in listed if exclusion.what[:2] == (facts.participant, facts.session))
     start = start_of(lines)
     rows = session_tables.SessionRows(lines).trials
-    trials = _trials(rows, lines, start.limits, own)
+    trials = _trial_records(rows, lines, start.limits, own)
     return SessionRecord(
         facts=facts,
-        about=_about(lines, incidents(facts)),
+        about=_about_text(lines, incidents_text(facts)),
         limits=limits_sentence(
             trials,
             progress_of(lines).missing_trials,
@@ -106,7 +106,7 @@ def read_record(folder: Path) -> SessionRecord:
             sealed=key is None and bool(start.measures_sealed),
         ),
         trials=trials,
-        notes=tuple(_notes(lines)),
+        notes=tuple(_note_texts(lines)),
         files=tuple(
             (path.relative_to(session.path).as_posix(), path.stat().st_size)
             for path in sorted(session.path.rglob("*"))
@@ -154,7 +154,7 @@ def _judged_sentence(trials: Sequence[TrialRecord], *, sealed: bool) -> str:
     )
 
 
-def _trials(
+def _trial_records(
     rows: Sequence[Mapping[str, Any]], lines: Sequence[Event], limits: Mapping[str, float], own: Sequence[Exclusion]
 ) -> tuple[TrialRecord, ...]:
     reasons = {exclusion.trial: exclusion.reason for exclusion in own}
@@ -167,13 +167,13 @@ def _trials(
         TrialRecord(
             number=row["trial"],
             attempt=row["attempt"],
-            words=_words(row),
+            words=_setting_text(row),
             outcome=row["outcome"] or "running",
             valid=row["valid"],
-            broken=tuple(broken_words(*limit) for limit in beyond_limits(row, limits)),
+            broken=tuple(broken_limit_text(*limit) for limit in beyond_limits(row, limits)),
             answers=answered.get((row["trial"], row["attempt"]), 0),
-            unconfirmed=_choices(unconfirmed.get((row["trial"], row["attempt"]), {})),
-            notes=" · ".join(_row_notes(row)),
+            unconfirmed=_choice_texts(unconfirmed.get((row["trial"], row["attempt"]), {})),
+            notes=" · ".join(_row_note_texts(row)),
             lost=row["recording_lost"] or "",
             excluded=reasons.get(row["trial"]),
         )
@@ -181,25 +181,25 @@ def _trials(
     )
 
 
-def _choices(given: Mapping[str, Answer]) -> tuple[str, ...]:
+def _choice_texts(given: Mapping[str, Answer]) -> tuple[str, ...]:
     """Return answers as "item: value", in the order of the first answers."""
     chosen = sorted(given.items(), key=lambda entry: entry[1].first_s or 0.0)
     return tuple(f"{item}: {'cannot judge' if answer.value is None else answer.value}" for item, answer in chosen)
 
 
-def _row_notes(row: Mapping[str, Any]) -> list[str]:
+def _row_note_texts(row: Mapping[str, Any]) -> list[str]:
     said = [("recording lost", row["recording_lost"]), ("marked", row["marked"])]
     return [word for word, holds in said if holds] + (row["notes"] or "").splitlines()
 
 
-def _words(row: Mapping[str, Any]) -> str:
+def _setting_text(row: Mapping[str, Any]) -> str:
     """Return a trial's setting without a condition: "Part 1, L2", "practice, 2nd attempt"."""
     phase = f"Part {row['part']}" if row["part"] is not None else str(row["phase"]).capitalize()
     again = "" if row["attempt"] == 1 else f", attempt {row['attempt']}"
     return f"{phase}, {row['code']}{again}"
 
 
-def _about(lines: Sequence[Event], happened: str) -> str:
+def _about_text(lines: Sequence[Event], happened: str) -> str:
     start, row = start_of(lines), session_tables.participant_row(lines)
     ended = row["session_ended_at"]
     said = [
@@ -215,7 +215,7 @@ def _about(lines: Sequence[Event], happened: str) -> str:
     return capitalised("  ·  ".join(filter(None, said)))
 
 
-def _notes(lines: Sequence[Event]) -> list[str]:
+def _note_texts(lines: Sequence[Event]) -> list[str]:
     trial, notes = None, []
     for line in lines:
         if isinstance(line, TrialStarted):  # recordings of the trial before are reported later
@@ -247,7 +247,7 @@ def trial_cell(trial: TrialRecord, heading: str) -> dict[int, Any]:
     return {
         Qt.ItemDataRole.DisplayRole: text,
         Qt.ItemDataRole.AccessibleTextRole: text,
-        Qt.ItemDataRole.ToolTipRole: trial_words(trial),
+        Qt.ItemDataRole.ToolTipRole: trial_limits_text(trial),
         CHIP_ROLE: chip if heading == "Limits" else None,
     }
 
@@ -259,7 +259,7 @@ def trial_chip(trial: TrialRecord) -> Any:
     return VALIDITY[None if trial.valid is None else "valid" if trial.valid else "invalid"]
 
 
-def trial_words(trial: TrialRecord) -> str:
+def trial_limits_text(trial: TrialRecord) -> str:
     """Return a line about a trial's limits."""
     said = f"Trial {trial.number}: "
     if trial.excluded is not None:
@@ -284,7 +284,7 @@ class SessionPage(Themed, QDialog):
         self.record: SessionRecord | None = None
         self.watched: QDialog | None = None
         self._reader = Background(self)
-        self._reader.done.connect(self._show)
+        self._reader.done.connect(self._show_record)
         self._reader.failed.connect(self._show_unread)
         self.setWindowTitle(f"{facts.name}, {facts.study}")
         tone, icon, word = status_chip(facts)
@@ -302,7 +302,7 @@ class SessionPage(Themed, QDialog):
         self._lay_out()
         self.trials.selectionModel().selectionChanged.connect(lambda *_changes: self._choose_trial())
         for asks in (self.watch.clicked, self.trials.opened):
-            asks.connect(self._watch)
+            asks.connect(self._open_watch_window)
         self.folder.clicked.connect(lambda: opener(facts.folder))
         self.close_button.clicked.connect(self.accept)
         for button in (self.watch, self.folder):
@@ -312,9 +312,9 @@ class SessionPage(Themed, QDialog):
         available = self.screen().availableSize()
         self.resize(min(SIZE[0], available.width() - 40), min(SIZE[1], available.height() - 60))
         self.trials.setFocus()
-        self.read()
+        self.read_folder()
 
-    def read(self) -> None:
+    def read_folder(self) -> None:
         self._reader.run(partial(read_record, self.facts.folder))
 
     def _lay_out(self) -> None:
@@ -346,7 +346,7 @@ class SessionPage(Themed, QDialog):
         self.limits.setText(f"{str(error)[:1].upper()}{str(error)[1:]}.")
         set_ink(self.limits, "bad")
 
-    def _show(self, record: SessionRecord) -> None:
+    def _show_record(self, record: SessionRecord) -> None:
         row = self.trials.currentIndex().row()
         self.record = record
         set_ink(self.limits, "text")
@@ -358,7 +358,7 @@ class SessionPage(Themed, QDialog):
         if record.trials:
             self.trials.selectRow(max(0, row))
         self.notes.setText("\n".join(record.notes) or "No notes.")
-        self.files.setText("\n".join(f"{name}  {_size(size)}" for name, size in record.files))
+        self.files.setText("\n".join(f"{name}  {_size_text(size)}" for name, size in record.files))
         left_out = (
             f"{'Whole session' if exclusion.trial is None else f'Trial {exclusion.trial}'}: "
             f"{exclusion.reason} ({exclusion.rule_or_person})"
@@ -378,10 +378,10 @@ class SessionPage(Themed, QDialog):
         if trial is None or self.record is None:
             self.trial.setText("No trials yet.")
             return
-        self.trial.setText(trial_words(trial))
+        self.trial.setText(trial_limits_text(trial))
         set_ink(self.trial, "warn" if trial.broken else "text2")
 
-    def _watch(self) -> None:
+    def _open_watch_window(self) -> None:
         from study_app.gui.watch.window import WatchWindow  # noqa: PLC0415 - pyqtgraph: only once it is needed
 
         if (trial := self.chosen) is not None:
@@ -392,5 +392,5 @@ class SessionPage(Themed, QDialog):
             made.open()
 
 
-def _size(size: int) -> str:
+def _size_text(size: int) -> str:
     return f"{size / 1e6:.1f} MB" if size >= 1_000_000 else f"{max(1, round(size / 1e3))} kB"

@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QWidget
 from study_app.gui.sessions.session_facts import (
     Column,
     SessionFacts,
-    answers_words,
-    incidents,
-    started_words,
+    answers_text,
+    incidents_text,
+    start_time_text,
     status_chip,
     validity_chip,
 )
@@ -31,9 +31,9 @@ def session_cell(facts: SessionFacts, name: str, now: datetime) -> dict[int, Any
     missing = facts.missing
     incident = missing.brief if missing else incident
     below = {"status": incident, "study": facts.kind}.get(name, "")
-    began = started_words(facts.started, now)
-    said = f"{facts.name}: began {began}, {answers_words(facts)} answers"
-    tip, face = ", ".join(filter(None, (said, str(missing or ""), incidents(facts)))), None
+    began = start_time_text(facts.started, now)
+    said = f"{facts.name}: began {began}, {answers_text(facts)} answers"
+    tip, face = ", ".join(filter(None, (said, str(missing or ""), incidents_text(facts)))), None
     match name:
         case "participant":
             text, face = facts.name, font("label", weight=600, scale=1.08)
@@ -46,7 +46,7 @@ def session_cell(facts: SessionFacts, name: str, now: datetime) -> dict[int, Any
             face.setUnderline(True)
             tip = f"Show what changed in the study since version {text}" if text else tip
         case _:
-            text = answers_words(facts) if chip is None else chip(facts)[2]
+            text = answers_text(facts) if chip is None else chip(facts)[2]
     if name == "validity" and facts.excluded is not None:
         tip = f"Excluded from the analysis: {facts.excluded}"
     return {
@@ -88,10 +88,10 @@ class SessionsTable(QWidget):
         self.none.setContentsMargins(MARGIN, MARGIN, MARGIN, MARGIN)
         vbox(self.none, (self.table, 1), spacing=0, margins=0, parent=self)
         self.table.opened.connect(lambda index: self.opened.emit(self.shown[index.row()]))
-        self.table.clicked.connect(self._click)
+        self.table.clicked.connect(self._open_version)
         self.table.selectionModel().selectionChanged.connect(lambda *_changes: self.chosen_changed.emit())
-        self.model.modelReset.connect(self._tell_rows)
-        self._tell_rows()
+        self.model.modelReset.connect(self._show_whether_empty)
+        self._show_whether_empty()
 
     @property
     def shown(self) -> tuple[SessionFacts, ...]:
@@ -124,10 +124,10 @@ class SessionsTable(QWidget):
         if self.chosen is not None and self.chosen.version:
             self.version_asked.emit(self.chosen)
 
-    def _click(self, index: Index) -> None:
+    def _open_version(self, index: Index) -> None:
         if self._names[index.column()] == "version":
             self.ask_for_version()
 
-    def _tell_rows(self) -> None:
+    def _show_whether_empty(self) -> None:
         self.none.setVisible(not self.shown)
         self.table.setVisible(bool(self.shown))

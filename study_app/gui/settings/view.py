@@ -35,7 +35,7 @@ from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QFileDialog, QLabel, QWi
 
 from study_app.devices.registry import list_devices, title_of
 from study_app.gui.display.screens import Frames, ScreenShown, screens_shown
-from study_app.gui.kit.fields import LEAST_WORDS, Editor, Field, choice, number
+from study_app.gui.kit.fields import LEAST_WORDS, Editor, Field, choice_field, number_field
 from study_app.gui.participant.tank.layers import paint_patch, patch_place
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, SHADOW, font
 from study_app.gui.theme.themed import apply_theme, remove_widget
@@ -78,13 +78,13 @@ class FrameTimes:
         self._least_ns = round(1e9 * least_s)
         self._times: deque[int] = deque()
 
-    def add(self, time_ns: int) -> None:
+    def add_frame(self, time_ns: int) -> None:
         """Add a frame's time [ns]; times older than ten seconds are dropped."""
         self._times.append(time_ns)
         while time_ns - self._times[0] > 1e9 * KEPT_S:
             self._times.popleft()
 
-    def words(self) -> tuple[str, ...]:
+    def figure_texts(self) -> tuple[str, ...]:
         """Return rate, median gap, 99th percentile of the gaps and missed refreshes; dashes until there are enough."""
         times = list(self._times)
         if len(times) < 3 or times[-1] - times[0] < self._least_ns:
@@ -118,9 +118,9 @@ class OffsetForm(QWidget):
     def __init__(self) -> None:
         super().__init__()
         fields = (
-            number("mean", "Mean", "ms", OFFSET_MS, DECIMALS, may_miss=False),
-            number("spread", "Spread", "ms", SPREAD_MS, DECIMALS),
-            choice("how", "Measured by", {way: way.capitalize() for way in HOWS}),
+            number_field("mean", "Mean", "ms", OFFSET_MS, DECIMALS, may_miss=False),
+            number_field("spread", "Spread", "ms", SPREAD_MS, DECIMALS),
+            choice_field("how", "Measured by", {way: way.capitalize() for way in HOWS}),
         )
         self.editors = {field.name: Editor(field) for field in fields}
         self.said = label("", "label", "text2", wraps=True, weight=400, tabular=True)
@@ -129,18 +129,18 @@ class OffsetForm(QWidget):
         self.forget = ActionButton("", "Forget", height=38)
         foot = hbox(self.keep, self.forget, STRETCH, spacing=12)
         vbox(self.said, *self.editors.values(), foot, spacing=8, margins=0, parent=self)
-        self.keep.clicked.connect(self._keep)
+        self.keep.clicked.connect(self._keep_offset)
         self.forget.clicked.connect(self.forgotten)
 
     def show_offset(self, offset: DisplayOffset | None, screen: str) -> None:
         """Show the measured offset, and whether it was measured on another screen than ``screen``."""
         self.forget.setEnabled(offset is not None)
-        self.said.setText(offset_words(offset, screen))
+        self.said.setText(offset_sentence(offset, screen))
         if offset is not None:
             for name, value in (("mean", offset.mean_ms), ("spread", offset.spread_ms), ("how", offset.how)):
                 self.editors[name].show_value(value)
 
-    def _keep(self) -> None:
+    def _keep_offset(self) -> None:
         values = []
         for editor in self.editors.values():
             try:
@@ -153,7 +153,7 @@ class OffsetForm(QWidget):
         self.kept.emit(mean_ms, spread_ms or 0.0, how)
 
 
-def offset_words(offset: DisplayOffset | None, screen: str) -> str:
+def offset_sentence(offset: DisplayOffset | None, screen: str) -> str:
     """Return a sentence on the offset of a screen."""
     if offset is None:
         return (
@@ -196,7 +196,7 @@ class DisplayTest(QWidget):
         self._toggled_ns = now_ns()
         self.interval_ms = FIRST_MS
         self._unpainted = False
-        self.interval = Editor(number("interval", "Interval", "ms", INTERVAL_MS))
+        self.interval = Editor(number_field("interval", "Interval", "ms", INTERVAL_MS))
         self.interval.setFixedWidth(FORM_PX)
         self.interval.show_value(FIRST_MS)
         self.values: list[QLabel] = [figures("–", "number") for _ in NAMES]
@@ -206,7 +206,7 @@ class DisplayTest(QWidget):
         self.interval.changed.connect(lambda _name, value: self._set_interval(value))
         apply_theme(self, PARTICIPANT)
         self.frames = Frames(self.times.refresh_hz, now_ns=now_ns, parent=self)
-        self.frames.due.connect(self.frame)
+        self.frames.due.connect(self.draw_frame)
         self.report_timer = QTimer(self, interval=REPORT_MS)
         self.report_timer.timeout.connect(self.show_figures)
 
@@ -228,14 +228,14 @@ class DisplayTest(QWidget):
         self.setGeometry(screen.geometry())
         self.showFullScreen()
         self.activateWindow()
-        self.begin()
+        self.start_frames()
 
-    def begin(self) -> None:
+    def start_frames(self) -> None:
         self._toggled_ns = self._now_ns()
         self.frames.start()
         self.report_timer.start()
 
-    def frame(self) -> None:
+    def draw_frame(self) -> None:
         """Request a frame, as a session does; toggle the patch when it is due."""
         now_ns = self._now_ns()
         if now_ns - self._toggled_ns >= 1e6 * self.interval_ms:
@@ -246,7 +246,7 @@ class DisplayTest(QWidget):
         self.update(self.patch_area())
 
     def show_figures(self) -> None:
-        for value, text in zip(self.values, self.times.words(), strict=True):
+        for value, text in zip(self.values, self.times.figure_texts(), strict=True):
             value.setText(text)
 
     def patch_area(self) -> QRect:
@@ -263,7 +263,7 @@ class DisplayTest(QWidget):
         painter.end()
         if self._unpainted:
             self._unpainted = False
-            self.times.add(self._now_ns())
+            self.times.add_frame(self._now_ns())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:
@@ -285,25 +285,25 @@ STAMPS = "Such as https://freetsa.org/tsr. Leave empty for none."
 PORTS = "One byte per event: serial:/dev/ttyUSB0, serial:COM3 or parallel:/dev/parport0. Leave empty for none."
 
 
-def _port(text: str) -> str:
+def _check_port(text: str) -> str:
     if text and not is_port(text):
         raise ValueError(f"This is not the address of a port. {PORTS}")
     return text
 
 
-def _server(text: str) -> str:
+def _check_server(text: str) -> str:
     if not re.fullmatch(r"(https?://\S+)?", text):
         raise ValueError(f"This is not the address of a server. {STAMPS}")
     return text
 
 
-def _there(text: str) -> str | None:
+def _check_path(text: str) -> str | None:
     if text and not Path(text).exists():
         raise ValueError(f"There is no {text}: choose another, or leave the field empty.")
     return text or None
 
 
-def _or_empty(value: str | None) -> str:
+def _text_or_empty(value: str | None) -> str:
     return value or ""
 
 
@@ -313,26 +313,27 @@ SAMPLES = {
     "always": "On, also in double-blind studies",
 }
 FIELDS = (
-    number("viewing_distance_mm", "Viewing distance, eye to screen", "mm", DISTANCE_MM),
-    number("screen_width_mm", "Width of the picture on the screen", "mm", WIDTH_MM),
+    number_field("viewing_distance_mm", "Viewing distance, eye to screen", "mm", DISTANCE_MM),
+    number_field("screen_width_mm", "Width of the picture on the screen", "mm", WIDTH_MM),
     Field("lsl_markers", "Markers over the Lab Streaming Layer (LSL)", "switch"),
-    choice("lsl_samples", "Samples of position and force over LSL", SAMPLES),
-    Field("triggers", "Trigger port", hint=PORTS, parse=_port),
+    choice_field("lsl_samples", "Samples of position and force over LSL", SAMPLES),
+    Field("triggers", "Trigger port", hint=PORTS, parse=_check_port),
     Field("photodiode", "Square for a photodiode in the tank's corner", "switch"),
-    choice("device", "Device", {name: title_of(name) for name in list_devices()}),
+    choice_field("device", "Device", {name: title_of(name) for name in list_devices()}),
     Field("camera", "Camera of conditions that show one", longest=CAMERA_LENGTH, placeholder=USUAL),
     Field(
         "proofs", "Folder for the study's proof, written when a session ends", "folder",
-        hint="Where people who can change results cannot write. Leave empty for none.", parse=_there, write=_or_empty,
+        hint="Where people who can change results cannot write. Leave empty for none.",
+        parse=_check_path, write=_text_or_empty,
     ),
-    Field("stamps", "Server that stamps proofs with the time (RFC 3161)", hint=STAMPS, parse=_server),
+    Field("stamps", "Server that stamps proofs with the time (RFC 3161)", hint=STAMPS, parse=_check_server),
     Field(
         "stamp_root", "Root certificate of the server (PEM), to verify its stamps", "file",
-        file_filter="Certificates (*.pem *.crt *.cer)", parse=_there, write=_or_empty,
+        file_filter="Certificates (*.pem *.crt *.cer)", parse=_check_path, write=_text_or_empty,
     ),
 )  # fmt: skip
 OF_PROGRAM = tuple(  # the fields of `MachineSettings` with a title: a choice or a switch
-    choice(name, setting.title, {word: word.capitalize() for word in words})
+    choice_field(name, setting.title, {word: word.capitalize() for word in words})
     if (words := get_args(setting.annotation))
     else Field(name, setting.title, "switch")
     for name, setting in MachineSettings.model_fields.items()
@@ -473,7 +474,7 @@ class MachinePlace(Place):
 
     def enter(self) -> None:
         """Read the screens again: one may have been plugged in."""
-        self._show()
+        self._show_all()
 
     def leave(self) -> None:
         if self.test is not None:
@@ -490,19 +491,19 @@ class MachinePlace(Place):
         self.undo.show_action("undo", f"Undo {undo}" if undo else "Undo")
         self.folder.show_text(folder)
         self.kept_in.show_text(f"Saved in {kept_in}")
-        self._show()
+        self._show_all()
 
-    def _show(self) -> None:
+    def _show_all(self) -> None:
         self._screens = screens_shown()
         settings, screen = self.settings, self.participants
         for name, editor in self.editors.items():
             editor.show_value(settings.device.partition(":")[0] if name == "device" else getattr(settings, name))
-        self.editors["screen_width_mm"].show_value(settings.screen_width_mm, width_words(settings, screen))
+        self.editors["screen_width_mm"].show_value(settings.screen_width_mm, width_sentence(settings, screen))
         missing = settings.screen if settings.screen not in {"", *(screen.name for screen in self._screens)} else ""
         self.screens.show_screens(self._screens, screen.number, missing)
         scale = settings.text_scale(screen.width_px, screen.width_mm)
         self.sample.setFont(font("statement", scale=min(scale, MOST_SAMPLE)))
-        self.said.setText(size_words(settings, screen, scale))
+        self.said.setText(text_size_sentence(settings, screen, scale))
         self.offset.show_offset(settings.display_offset, screen.name)
 
     def _choose_folder(self) -> None:
@@ -514,14 +515,14 @@ class MachinePlace(Place):
             return
         screen, screens = self.participants, QGuiApplication.screens()
         if screen.number > len(screens):  # it was unplugged
-            self._show()
+            self._show_all()
             return
         text = "  ·  ".join(filter(None, (f"Screen {screen.number}", screen.name, screen.words)))
         self.test = DisplayTest(text, screen.refresh_hz)
-        self.test.left.connect(self._test_left)
+        self.test.left.connect(self._forget_test)
         self.test.open_on(screens[screen.number - 1])
 
-    def _test_left(self) -> None:
+    def _forget_test(self) -> None:
         test, self.test = self.test, None
         if test is not None:
             test.deleteLater()
@@ -532,13 +533,13 @@ class MachinePlace(Place):
         self._body.setDirection(QBoxLayout.Direction.TopToBottom if stacked else QBoxLayout.Direction.LeftToRight)
 
 
-def width_words(settings: MachineSettings, screen: ScreenShown) -> str:
+def width_sentence(settings: MachineSettings, screen: ScreenShown) -> str:
     """Return a sentence on the screen width that the system reports."""
     known = f"The system reports {screen.width_mm:.0f} mm." if screen.width_mm > 0 else "The system does not report it."
     return known if settings.screen_width_mm is None else f"{known} The measured value is used."
 
 
-def size_words(settings: MachineSettings, screen: ScreenShown, scale: float) -> str:
+def text_size_sentence(settings: MachineSettings, screen: ScreenShown, scale: float) -> str:
     """Return a sentence on the text size for the viewing distance."""
     seen, least = settings.x_height_deg(screen.width_px, screen.width_mm), f"{LEAST_X_HEIGHT_DEG:g}°"
     if seen is None:

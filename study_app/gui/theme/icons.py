@@ -91,7 +91,7 @@ PATHS = {
 
 
 @cache
-def _parsed(name: str) -> tuple[QPainterPath, QPainterPath]:
+def _icon_paths(name: str) -> tuple[QPainterPath, QPainterPath]:
     """Return the stroked and the filled path of an icon on the grid."""
     stroked, filled = QPainterPath(), QPainterPath()
     path = stroked
@@ -127,7 +127,7 @@ def _parsed(name: str) -> tuple[QPainterPath, QPainterPath]:
 
 def draw_icon(painter: QPainter, name: str, rect: QRectF, colour: str | QColor, stroke: float = STROKE) -> None:
     """Paint an icon in the central square of ``rect``; ``stroke`` is its line width on the grid of 24."""
-    stroked, filled = _parsed(name)
+    stroked, filled = _icon_paths(name)
     side = min(rect.width(), rect.height())
     ink = QColor(colour)
     painter.save()

@@ -72,11 +72,13 @@ def font(role: TypeRole, *, scale: float = 1.0, weight: int | None = None, tabul
     """
     step = TYPE[role]
     chosen = step.weight if weight is None else weight
-    return QFont(_made(max(1, round(step.size * scale)), chosen, tabular=step.tabular if tabular is None else tabular))
+    return QFont(
+        _shared_font(max(1, round(step.size * scale)), chosen, tabular=step.tabular if tabular is None else tabular)
+    )
 
 
 @lru_cache(maxsize=256)
-def _made(size_px: int, weight: int, *, tabular: bool) -> QFont:
+def _shared_font(size_px: int, weight: int, *, tabular: bool) -> QFont:
     """Return a shared font; copy it before changing it."""
     load_fonts()
     made = QFont(FAMILIES)
@@ -229,16 +231,16 @@ def stylesheet(theme: Theme) -> str:
             f"QListWidget::item:selected {{ background: {t.selected}; }}",
             f"QListWidget[role='links']::item {{ border-radius: 6px; padding-left: 6px; color: {t.text}; }}",
             f"QListWidget[role='links']::item:selected {{ background: {t.selected}; color: {t.accent}; }}",
-            _buttons(t),
-            _fields(t),
-            _scrollbars(t),
+            _button_rules(t),
+            _field_rules(t),
+            _scroll_bar_rules(t),
             f"QProgressBar {{ background: {t.sunk}; border: none; border-radius: 4px; }}",
             f"QProgressBar::chunk {{ background: {t.accent}; border-radius: 4px; }}",
         )
     )
 
 
-def _buttons(t: Theme) -> str:
+def _button_rules(t: Theme) -> str:
     return f"""
 QPushButton {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl};
   border-radius: {RADIUS_CONTROL}px; padding: 8px 16px; min-height: 22px; outline: none; }}
@@ -271,7 +273,7 @@ QPushButton[role='stop']:focus {{ border: 3px solid {t.text}; }}
 """
 
 
-def _fields(t: Theme) -> str:
+def _field_rules(t: Theme) -> str:
     field = "QLineEdit, QComboBox, QSpinBox, QPlainTextEdit"
     focused, disabled = (", ".join(f"{name}:{state}" for name in field.split(", ")) for state in ("focus", "disabled"))
     refused = ", ".join(f"{name}[state='refused']:focus" for name in ("QLineEdit", "QPlainTextEdit"))
@@ -304,7 +306,7 @@ QToolTip {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl};
 """
 
 
-def _scrollbars(t: Theme) -> str:
+def _scroll_bar_rules(t: Theme) -> str:
     return f"""
 QTableView, QHeaderView, QHeaderView::section {{ background: transparent; border: none; outline: none; }}
 QTableView {{ selection-background-color: transparent; selection-color: {t.text}; }}

@@ -12,7 +12,7 @@ class Themed:
 
     @property
     def theme(self) -> Theme:
-        return _given(self) or LIGHT
+        return _theme_of(self) or LIGHT
 
 
 class Coloured(Themed):
@@ -25,12 +25,12 @@ class Coloured(Themed):
 
     def changeEvent(self, event: QEvent) -> None:
         super().changeEvent(event)  # type: ignore[misc]  # of the widget
-        if event.type() == QEvent.Type.StyleChange and (given := _given(self)) not in {None, self._applied}:
+        if event.type() == QEvent.Type.StyleChange and (given := _theme_of(self)) not in {None, self._applied}:
             self._applied = given
             self.apply_theme(self.theme)
 
 
-def _given(part: object) -> Theme | None:
+def _theme_of(part: object) -> Theme | None:
     """Return the theme of a part's window; parents in between may be objects that PySide must not wrap."""
     while isinstance(part, QWidget):
         window = part.window()
@@ -45,7 +45,7 @@ def apply_theme(window: QWidget, theme: Theme) -> None:
     window.given_theme = theme  # type: ignore[attr-defined]
     window.setPalette(_palette(theme))
     window.setStyleSheet(stylesheet(theme))
-    name_bars(window)
+    name_scroll_bars(window)
 
 
 def _palette(theme: Theme) -> QPalette:
@@ -77,7 +77,7 @@ def give_ground(part: QWidget, role: str) -> None:
     part.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
 
 
-def name_bars(whole: QWidget) -> None:
+def name_scroll_bars(whole: QWidget) -> None:
     """Give a part's scroll bars an accessible name, which Qt does not."""
     for bar in whole.findChildren(QScrollBar):
         bar.setAccessibleName("Scroll bar")

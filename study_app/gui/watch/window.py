@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QDialog, QSizePolicy, QStackedWidget, QWidget
 
 from study_app.errors import StudyError
 from study_app.gui.application import open_here
-from study_app.gui.kit.commands import Command, press
+from study_app.gui.kit.commands import Command, connect_button
 from study_app.gui.kit.dialogs import Work
 from study_app.gui.kit.fields import Field
 from study_app.gui.participant.tank.arrows import HEIGHTS, Arrow, arrows_place, paint_arrows
@@ -30,7 +30,7 @@ from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Chip, MaskedPanel, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Choice, Toggle
 from study_app.gui.widgets.labels import Elided, figures, label
-from study_app.gui.widgets.live_plots import STROKE, Floats, Plot, draw_quickly, number, step_for
+from study_app.gui.widgets.live_plots import STROKE, Floats, Plot, draw_quickly, tick_step, tick_text
 from study_app.gui.widgets.numbers import MARGIN, Range, Slider
 from study_app.protocol.wording.languages import words
 from study_app.session.tasks import TankView
@@ -57,15 +57,15 @@ class WatchedTank(TankWidget):
 
     def show_moment(self, view: TankView, arrows: tuple[Arrow, ...]) -> None:
         """Draw a view with arrows, whose vectors are in heights of the water."""
-        self._ready()
+        self._still_images()
         high = self._box.water - self._box.floor
         self.arrows = tuple(
             Arrow(name, start_m, (high * x, high * y, high * z), colour) for name, start_m, (x, y, z), colour in arrows
         )
         self.show_view(view)
 
-    def _frame(self) -> dict[str, Placed]:
-        things = super()._frame()
+    def _frame_parts(self) -> dict[str, Placed]:
+        things = super()._frame_parts()
         if self.camera is not None and self.arrows:
             things["arrows"] = Placed(self.arrows, arrows_place(self.camera, self.arrows))
         return things
@@ -82,19 +82,19 @@ class ForcePlot(Plot):
     def __init__(self, shown: Watched) -> None:
         super().__init__()
         sizes = [np.linalg.norm(np.nan_to_num(shown.samples[name]), axis=1) for name in ("force_n", "device_force_n")]
-        times_s, (low, high) = thinned(shown.times_s, sizes[0])
+        times_s, (low, high) = thin_out(shown.times_s, sizes[0])
         self.requested = pg.PlotCurveItem(times_s, high, fillLevel=0.0, antialias=True)
-        times_s, (low, high) = thinned(shown.times_s, sizes[1])
+        times_s, (low, high) = thin_out(shown.times_s, sizes[1])
         self.sent = pg.PlotCurveItem(np.repeat(times_s, 2), np.column_stack([low, high]).ravel(), antialias=True)
         draw_quickly(self.sent, solid=True)
         self.cursor = pg.InfiniteLine(angle=90)
         for item in (self.requested, self.sent, self.cursor):
             self.box.addItem(item)
         peak = max(LEAST_N, *(float(size.max()) for size in sizes))
-        up, along = step_for(peak, 3), step_for(shown.ends_s - shown.begins_s, 8)
-        self.show_ticks("left", [(up * k, number(up * k)) for k in range(int(peak / up + 1e-9) + 1)])
+        up, along = tick_step(peak, 3), tick_step(shown.ends_s - shown.begins_s, 8)
+        self.show_ticks("left", [(up * k, tick_text(up * k)) for k in range(int(peak / up + 1e-9) + 1)])
         first, last = np.ceil(shown.begins_s / along), np.floor(shown.ends_s / along)
-        self.show_ticks("bottom", [(along * k, f"{number(along * k)} s") for k in np.arange(first, last + 1)])
+        self.show_ticks("bottom", [(along * k, f"{tick_text(along * k)} s") for k in np.arange(first, last + 1)])
         self.box.setXRange(shown.begins_s, shown.ends_s, padding=0)
         self.box.setYRange(0.0, 1.12 * peak, padding=0)
         described = f"Size of the force sent and of the force requested over the trial, up to {peak:.2f} N."
@@ -111,7 +111,7 @@ class ForcePlot(Plot):
         self.cursor.setPen(self.stroke(theme.text, 1.4))
 
 
-def thinned(times_s: Floats, values: Floats) -> tuple[Floats, tuple[Floats, Floats]]:
+def thin_out(times_s: Floats, values: Floats) -> tuple[Floats, tuple[Floats, Floats]]:
     """Return times (k,) and the least and greatest values (k,) between them, at most `MOST_POINTS`."""
     starts = np.arange(0, len(values), max(1, len(values) // MOST_POINTS))
     return times_s[starts], (np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts))
@@ -135,7 +135,7 @@ class TimeLine(Slider):
         painter = smooth_painter(self)
         inks: dict[Kind, str] = {"target": self.theme.ok, "answer": self.theme.accent, "event": self.theme.text2}
         for mark in self._shown.marks:
-            at, ink = QPointF(self._x(mark.at_s), 6), QColor(inks[mark.kind])
+            at, ink = QPointF(self._position_of(mark.at_s), 6), QColor(inks[mark.kind])
             painter.setPen(QPen(ink, 2))
             painter.setBrush(ink)
             if mark.kind == "event":
@@ -173,7 +173,7 @@ class Stage(QWidget):
         self.at_s = at_s = min(max(at_s, shown.begins_s), shown.ends_s)
         view = shown.view(shown.drawn_s(at_s) if self.as_seen else at_s)
         sample = shown.samples[shown.index(at_s)]
-        self.tank.show_moment(view, self._arrows(view, sample))
+        self.tank.show_moment(view, self._make_arrows(view, sample))
         if self.forces is not None:
             self.forces.cursor.setValue(at_s)
         self.line.show_time(at_s)
@@ -184,11 +184,11 @@ class Stage(QWidget):
         before = [mark for mark in shown.marks if mark.at_s <= at_s]
         self.happened.show_text(f"{before[-1].at_s:.2f} s: {before[-1].text}" if before else "")
 
-    def describe(self) -> None:
+    def describe_moment(self) -> None:
         """Describe the shown moment to screen readers."""
         self.line.setAccessibleDescription(f"{self.numbers.text()}. {self.happened.whole}")
 
-    def _arrows(self, view: TankView, sample: Any) -> tuple[Arrow, ...]:
+    def _make_arrows(self, view: TankView, sample: Any) -> tuple[Arrow, ...]:
         start = tuple(float(part) for part in view.position_m)
         chosen = [("velocity", "velocity_mps", TANK.wake)]
         if not self.shown.blinded:
@@ -232,10 +232,10 @@ class WatchWindow(Themed, QDialog):
         self.stage: Stage | None = None
         self.export_dialog: Work | None = None
         self._reader = Background(self)
-        self._reader.done.connect(self._show)
-        self._reader.failed.connect(self._show)
+        self._reader.done.connect(self._show_recording)
+        self._reader.failed.connect(self._show_recording)
         self._timer = QTimer(self, interval=PAINT_MS, timerType=Qt.TimerType.PreciseTimer)
-        self._timer.timeout.connect(self._play_on)
+        self._timer.timeout.connect(self._show_next_moment)
         self._since = (0.0, 0.0)
         self._writing = QTimer(self, interval=0)
         self.sentence = label("Reading …", "body", "text2", wraps=True)
@@ -267,7 +267,7 @@ class WatchWindow(Themed, QDialog):
         apply_theme(self, theme)
         available = self.screen().availableSize()
         self.resize(min(SIZE[0], available.width() - 40), min(SIZE[1], available.height() - 60))
-        self._read(1)
+        self._read_interval(1)
 
     def _lay_out(self, heading: str) -> None:
         title = label(heading, "title_dense")
@@ -281,7 +281,7 @@ class WatchWindow(Themed, QDialog):
         for button in (self.play, self.export, self.close_button, *self.steps.values()):
             button.setAutoDefault(False)
             button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # after a click, keys still go to the time line
-        self._enable(False)
+        self._set_enabled(False)
 
     def _connect(self) -> None:
         actions = {PLAY.id: PLAY.action(self.room, self.toggle)}
@@ -291,23 +291,23 @@ class WatchWindow(Themed, QDialog):
             Qt.ShortcutContext.WidgetWithChildrenShortcut
         )  # else the key presses the button
         for name, button in {PLAY.id: self.play, **self.steps}.items():
-            press(button, actions[name])
-        self.interval.activated.connect(lambda at: self._read(at + 1))
+            connect_button(button, actions[name])
+        self.interval.activated.connect(lambda at: self._read_interval(at + 1))
         self.seen.toggled.connect(self._show_as_seen)
-        self.speed.activated.connect(lambda _at: self._set_off())
+        self.speed.activated.connect(lambda _at: self._start_clock())
         self.export.clicked.connect(self._ask_export)
         self.close_button.clicked.connect(self.accept)
-        self.finished.connect(self._end)
+        self.finished.connect(self._stop_timers)
 
-    def _read(self, interval: int) -> None:
+    def _read_interval(self, interval: int) -> None:
         self.pause()
         self._reader.run(partial(read_watched, self._folder, self._trial, self._attempt, interval))
 
-    def _show(self, shown: Watched | Exception) -> None:
+    def _show_recording(self, shown: Watched | Exception) -> None:
         if self.stage is not None:
             remove_widget(self.stage)
             self.stage = None
-        self._enable(isinstance(shown, Watched))
+        self._set_enabled(isinstance(shown, Watched))
         if not isinstance(shown, Watched):
             sentence = str(shown) or type(shown).__name__
             self.sentence.setText(f"{sentence[:1].upper()}{sentence[1:]}.")
@@ -329,7 +329,7 @@ class WatchWindow(Themed, QDialog):
         self.stage.line.setFocus()
         self._show_as_seen(self.seen.isChecked())
 
-    def _enable(self, able: bool) -> None:
+    def _set_enabled(self, able: bool) -> None:
         for part in (self.play, self.export, self.seen, self.interval, self.speed, *self.steps.values()):
             part.setEnabled(able)
         if not able:
@@ -342,7 +342,7 @@ class WatchWindow(Themed, QDialog):
         self.pause()
         if self.stage is not None:
             self.stage.show_moment(at_s)
-            self.stage.describe()
+            self.stage.describe_moment()
 
     def step(self, kind: Literal["sample", "frame"], way: int) -> None:
         """Go to the next or previous sample or frame."""
@@ -364,7 +364,7 @@ class WatchWindow(Themed, QDialog):
             return
         if self.stage.at_s >= self.stage.shown.ends_s:
             self.stage.show_moment(self.stage.shown.begins_s)
-        self._set_off()
+        self._start_clock()
         self._timer.start()
         self.play.show_action("pause", "Pause")
 
@@ -372,13 +372,13 @@ class WatchWindow(Themed, QDialog):
         self._timer.stop()
         self.play.show_action("play", "Play")
         if self.stage is not None:
-            self.stage.describe()
+            self.stage.describe_moment()
 
-    def _set_off(self) -> None:
+    def _start_clock(self) -> None:
         """Start the clock at the chosen speed."""
         self._since = (time.perf_counter(), 0.0 if self.stage is None else self.stage.at_s)
 
-    def _play_on(self) -> None:
+    def _show_next_moment(self) -> None:
         if self.stage is None:
             return
         began, at_s = self._since
@@ -421,10 +421,10 @@ class WatchWindow(Themed, QDialog):
         assert self.export_dialog is not None  # noqa: S101 - it has begun
         pictures = self._pictures(Path(self.export_dialog.value("to")).expanduser() / self._name)
         self._writing = QTimer(self, interval=0)
-        self._writing.timeout.connect(lambda: self._write_on(pictures))
+        self._writing.timeout.connect(lambda: self._write_next_picture(pictures))
         self._writing.start()
 
-    def _write_on(self, pictures: Iterator[float | Path]) -> None:
+    def _write_next_picture(self, pictures: Iterator[float | Path]) -> None:
         """Write one more picture; show the progress or the result."""
         dialog = self.export_dialog
         assert dialog is not None  # noqa: S101 - it has begun
@@ -449,7 +449,7 @@ class WatchWindow(Themed, QDialog):
         times_s = np.arange(stage.shown.begins_s, stage.shown.ends_s, self.speed.currentData() / VIDEO_HZ)
         for count, at_s in enumerate(times_s):
             stage.show_moment(float(at_s))
-            writer.add(_pixels(stage, size))
+            writer.add(_stage_pixels(stage, size))
             yield count / len(times_s)
         write_file(to, writer.finish())
         stage.show_moment(back)
@@ -458,14 +458,14 @@ class WatchWindow(Themed, QDialog):
     def _stop_export(self) -> None:
         self._writing.stop()
         if self.export_dialog is not None:
-            self.export_dialog.stopped()
+            self.export_dialog.close_stopped()
 
-    def _end(self) -> None:
+    def _stop_timers(self) -> None:
         self._timer.stop()
         self._writing.stop()
 
 
-def _pixels(stage: Stage, size: QSize) -> np.ndarray:
+def _stage_pixels(stage: Stage, size: QSize) -> np.ndarray:
     """Return the shown picture (height, width, 4): blue, green, red, unused."""
     image = stage.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
     if image.size() != size:  # the window was resized meanwhile

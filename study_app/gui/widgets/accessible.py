@@ -73,7 +73,7 @@ class HeadingLabel(PlainLabel):
         self.setAccessibleName(text)
 
 
-def say(widget: QWidget, sentence: str) -> None:
+def announce(widget: QWidget, sentence: str) -> None:
     """Announce a sentence about a widget to screen readers that listen."""
     if QAccessible.isActive():
         QAccessible.updateAccessibility(QAccessibleAnnouncementEvent(widget, sentence))

@@ -21,7 +21,7 @@ _telling, _program_ends = threading.Lock(), threading.Event()
 
 
 @atexit.register
-def _end() -> None:
+def _abandon_jobs() -> None:
     """Abandon running jobs before Python takes Qt down: a late signal would crash."""
     with _telling:
         _program_ends.set()
@@ -41,20 +41,20 @@ class _Ends(QObject):
 
     def __init__(self) -> None:
         super().__init__()
-        self.came.connect(self._pass_on, Qt.ConnectionType.QueuedConnection)
+        self.came.connect(self._deliver, Qt.ConnectionType.QueuedConnection)
 
-    def _pass_on(self, end: tuple["Background", Callable[[], Any], bool, Any]) -> None:
+    def _deliver(self, end: tuple["Background", Callable[[], Any], bool, Any]) -> None:
         background, *rest = end
         if isValid(background):
-            background.take(*rest)
+            background.take_outcome(*rest)
 
 
 @cache
-def _ends() -> _Ends:
+def _shared_ends() -> _Ends:
     return _Ends()
 
 
-def delayed(owner: QObject, milliseconds: int, run: Callable[[], Any]) -> QTimer:
+def delayed_call(owner: QObject, milliseconds: int, run: Callable[[], Any]) -> QTimer:
     """Return a timer that calls a function once, this time after it was last started."""
     made = QTimer(owner)
     made.setSingleShot(True)
@@ -77,7 +77,7 @@ class Background(QObject):
     def __init__(self, parent: QObject, refusals: type[Exception] = StudyError) -> None:
         super().__init__(parent)
         self._refusals = refusals
-        self._ends = _ends()  # made in the windows' thread
+        self._ends = _shared_ends()  # made in the windows' thread
         self._wanted: Callable[[], Any] | None = None
         self._thread: threading.Thread | None = None
 
@@ -89,7 +89,7 @@ class Background(QObject):
         """Run ``job`` in a thread; the result of an earlier job is dropped."""
         self._wanted = job
         if self._thread is None:
-            self._begin(job)
+            self._start_job(job)
 
     def wait(self, seconds: float | None = None) -> bool:
         """Wait until the running job has ended; return whether it has."""
@@ -98,7 +98,7 @@ class Background(QObject):
         self._thread.join(seconds)
         return not self._thread.is_alive()
 
-    def _begin(self, job: Callable[[], Any]) -> None:
+    def _start_job(self, job: Callable[[], Any]) -> None:
         def work() -> None:
             outcome, whole = None, False
             try:
@@ -117,11 +117,11 @@ class Background(QObject):
         _threads.add(self._thread)
         self._thread.start()
 
-    def take(self, job: Callable[[], Any], whole: bool, outcome: Any) -> None:
+    def take_outcome(self, job: Callable[[], Any], whole: bool, outcome: Any) -> None:
         """Emit a job's result, or its exception if it is not ``whole``; begin the job that replaced it."""
         self._thread = None
         if self._wanted is not job and self._wanted is not None:
-            self._begin(self._wanted)
+            self._start_job(self._wanted)
             return
         self._wanted = None
         refused = not whole and isinstance(outcome, self._refusals)

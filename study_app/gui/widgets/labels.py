@@ -62,7 +62,7 @@ class Elided(QLabel):
             self.whole = text
             self.setAccessibleName(text)
             self.updateGeometry()
-            self._elide()
+            self._show_elided()
 
     def sizeHint(self) -> QSize:
         metrics = QFontMetricsF(self.font())
@@ -73,9 +73,9 @@ class Elided(QLabel):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._elide()
+        self._show_elided()
 
-    def _elide(self) -> None:
+    def _show_elided(self) -> None:
         shown = self.fontMetrics().elidedText(self.whole, Qt.TextElideMode.ElideRight, self.width())
         self.setText(shown)
         self.setToolTip(plain_tip(self.whole if shown != self.whole else ""))
@@ -106,15 +106,15 @@ class Clamped(QLabel):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._cut()
+        self._show_clamped()
 
     def show_text(self, text: str) -> None:
         if text != self.whole:
             self.whole = text
             self.setAccessibleName(text)
-            self._cut()
+            self._show_clamped()
 
-    def _cut(self) -> None:
+    def _show_clamped(self) -> None:
         lines = clamped(self.whole, self._most, self.font(), self.width())
         self.setText("\n".join(lines))
         if not self._steady:

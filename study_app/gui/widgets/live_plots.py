@@ -36,7 +36,7 @@ LOWEST_US, LEAST_HIGHEST_US = 1.0, 1000.0
 NAMES = ("x right", "y up", "z near")
 
 
-def number(value: float) -> str:
+def tick_text(value: float) -> str:
     """Return a tick's number with a real minus and thin groups: "−20", "10 000"."""
     text = f"{abs(value):,.6g}".replace(",", THIN_SPACE)
     return f"{MINUS}{text}" if value < 0 else text
@@ -175,7 +175,7 @@ class TracePlot(Plot):
         """Keep room in px for the names at the right and half a line above and below the outer ticks."""
         height, width = max(60.0, self.box.height()), max(120.0, self.box.width())
         most = 3 if height > 130 else 2 if height > 84 else 1  # grid lines on either side of zero
-        step = step_for(self._asked, most)
+        step = tick_step(self._asked, most)
         rows = max(1, int(np.ceil(self._asked / step - 1e-9)))
         self.reach = rows * step
         self._name_height = 2 * self.reach * (LINE_PX + 1) / (height - LINE_PX)
@@ -187,7 +187,7 @@ class TracePlot(Plot):
         self.box.setXRange(-1.02 * self._span_s, 1.02 * self._span_s * share / (1 - share), padding=0)
         if (rows, step) != self._rows_and_step:
             self._rows_and_step = (rows, step)
-            self.show_ticks("left", [(k * step, number(k * step)) for k in range(-rows, rows + 1)])
+            self.show_ticks("left", [(k * step, tick_text(k * step)) for k in range(-rows, rows + 1)])
         self._place_names()
 
     def show_traces(self, times_s: Floats, values: Floats) -> None:
@@ -205,7 +205,7 @@ class TracePlot(Plot):
         """Put every name at its curve's newest end, or as near as the others and the plot's edges permit."""
         if not self._newest:
             return
-        for end, height in zip(self.ends, apart(self._newest, self._name_height, self.reach), strict=True):
+        for end, height in zip(self.ends, spread_apart(self._newest, self._name_height, self.reach), strict=True):
             end.setPos(QPointF(self._names_after_s, height))
 
     def apply_theme(self, theme: Theme) -> None:
@@ -227,7 +227,7 @@ class LatenessPlot(Plot):
         self.p99_line = pg.PlotCurveItem()
         self.limit_line = pg.InfiniteLine(self._limit, angle=90)
         self.p99_name = pg.TextItem("", anchor=(0.5, 1))
-        self.limit_name = pg.TextItem(f"limit {number(limit_us)}", anchor=(1, 0))
+        self.limit_name = pg.TextItem(f"limit {tick_text(limit_us)}", anchor=(1, 0))
         for item in (self.bars, self.p99_line, self.limit_line, self.p99_name, self.limit_name):
             self.box.addItem(item)
         for name in (self.p99_name, self.limit_name):
@@ -242,7 +242,7 @@ class LatenessPlot(Plot):
             return
         self._decades = (across, up)
         self._make_room()
-        self.show_ticks("left", [(k, number(10.0**k)) for k in range(up + 1)])
+        self.show_ticks("left", [(k, tick_text(10.0**k)) for k in range(up + 1)])
 
     def _make_room(self) -> None:
         """Keep two lines of text above the bars: the limit's name is above that of the 99th percentile."""
@@ -251,7 +251,7 @@ class LatenessPlot(Plot):
         last = across * (1 + share / (1 - share))
         self.box.setXRange(-0.02 * across, last, padding=0)
         apart = 1 if self.box.width() >= DIGIT_PX * (across + 1) * (last + 0.02 * across) else 2
-        self.show_ticks("bottom", [(k, number(10.0**k)) for k in range(0, across + 1, apart)])
+        self.show_ticks("bottom", [(k, tick_text(10.0**k)) for k in range(0, across + 1, apart)])
         line = self.limit_name.textItem.boundingRect().height() + NAME_MARGIN
         share = min(2 * line / max(1.0, self.box.height()), MOST_FOR_NAMES)
         top = (up + P99_ABOVE + 0.3 * share) / (1 - share)
@@ -275,7 +275,7 @@ class LatenessPlot(Plot):
             top = min(up + P99_ABOVE, float(np.log10(max(1, int(near.max(initial=1))))) + 0.3)
             self.p99_line.setData([at, at], [-0.3, top])
             self.p99_name.setPos(at, top)
-            self.p99_name.setText(f"p99 {number(round(p99_us))}")
+            self.p99_name.setText(f"p99 {tick_text(round(p99_us))}")
 
     def apply_theme(self, theme: Theme) -> None:
         super().apply_theme(theme)
@@ -300,7 +300,7 @@ def draw_quickly(curve: pg.PlotCurveItem, *, solid: bool) -> None:
     curve.setSegmentedLineMode("on" if solid else "off")
 
 
-def step_for(reach: float, most: int) -> float:
+def tick_step(reach: float, most: int) -> float:
     """Return the least even step between ticks (1, 2 or 5 times a power of ten) that ``reach`` holds ``most`` times."""
     least = max(reach, 1e-9) / (most + 0.01)
     power = 10.0 ** np.floor(np.log10(least))
@@ -312,7 +312,7 @@ def time_ticks(span_s: float) -> list[tuple[float, str]]:
     return [(-t, "0 s" if t == 0 else f"{MINUS}{t} s") for t in range(0, int(span_s) + 1, 2)]
 
 
-def apart(places: Sequence[float], least: float, reach: float) -> list[float]:
+def spread_apart(places: Sequence[float], least: float, reach: float) -> list[float]:
     """Return ``places`` moved as little as possible, in order, so that names there do not touch, within ±reach."""
     order = np.argsort(places, kind="stable")
     moved = np.asarray(places, float)[order]

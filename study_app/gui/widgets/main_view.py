@@ -21,7 +21,7 @@ class EscapeKey(QObject):
     anywhere
         Whether it listens by itself to the window of the program that has the keyboard, later ones too. A question
         closes when Esc goes down, and a page may take the keyboard while it is down: then only the release ends a hold,
-        in whatever window that is. A hold that began in the window it was left to (``leave_to``) is that window's, as
+        in whatever window that is. A hold that began in an ignored window (`ignore_window`) is that window's, as
         long as no other one of the program has got the keyboard since.
     """
 
@@ -34,42 +34,42 @@ class EscapeKey(QObject):
         self._began_aside = False
         self._pressed_at_ms = 0
         self._timer = QTimer(self, singleShot=True, interval=HOLD_MS, timerType=Qt.TimerType.PreciseTimer)
-        self._timer.timeout.connect(self._fire)
+        self._timer.timeout.connect(self._emit_held)
         presses = key_presses()  # also of a window's own filter: they decide what is a press
         if anywhere:
-            presses.changed.connect(self._follow)
+            presses.changed.connect(self._follow_escape)
 
-    def leave_to(self, window: QWidget) -> None:
+    def ignore_window(self, window: QWidget) -> None:
         self._aside = window
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.WindowDeactivate:
             self._timer.stop()
         elif isinstance(event, QKeyEvent):
-            self._follow(watched, event)
+            self._follow_escape(watched, event)
         return False
 
-    def _follow(self, window: QObject | None, event: QKeyEvent) -> None:
+    def _follow_escape(self, window: QObject | None, event: QKeyEvent) -> None:
         """Follow Esc by presses and releases, and by their time stamps if the program was busy."""
         if event.key() != Qt.Key.Key_Escape:
             return
         if event.type() == QEvent.Type.KeyPress and not self._timer.isActive():
-            self._began_aside = self._is_aside(window)
+            self._began_aside = self._is_ignored(window)
             self._pressed_at_ms = event.timestamp()
             self._timer.start()
         elif event.type() == QEvent.Type.KeyRelease and self._timer.isActive():
             self._timer.stop()
             if event.timestamp() - self._pressed_at_ms >= self._timer.interval():
-                self._fire()
+                self._emit_held()
             else:
                 self.tapped.emit()
 
-    def _is_aside(self, window: QObject | None) -> bool:
+    def _is_ignored(self, window: QObject | None) -> bool:
         return window is not None and self._aside is not None and window is self._aside.windowHandle()
 
-    def _fire(self) -> None:
+    def _emit_held(self) -> None:
         now = QGuiApplication.focusWindow()
-        if not (self._began_aside and (now is None or self._is_aside(now))):
+        if not (self._began_aside and (now is None or self._is_ignored(now))):
             self.held.emit()
 
 

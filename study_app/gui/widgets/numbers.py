@@ -50,7 +50,7 @@ class NumberField(QLineEdit):
         self.setProperty("dense", "true")
         self.setAlignment(Qt.AlignmentFlag.AlignRight)
         self.setFont(font("label", tabular=True))
-        self.returnPressed.connect(self._try)
+        self.returnPressed.connect(self._take_typed)
 
     @property
     def state(self) -> str:
@@ -71,7 +71,7 @@ class NumberField(QLineEdit):
         self.setFont(font("label", weight=600 if state else None, tabular=True))
         set_property(self, "state", state)
 
-    def put_back(self) -> None:
+    def restore_text(self) -> None:
         self.setText(self._shown)
         self.setModified(False)
 
@@ -81,7 +81,7 @@ class NumberField(QLineEdit):
             undoes = event.matches(QKeySequence.StandardKey.Undo) or event.matches(QKeySequence.StandardKey.Redo)
             plain = event.modifiers() in {Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ShiftModifier}
             if (undoes and not self.isModified()) or (
-                plain and event.text().isalpha() and not self._writes(event.text())
+                plain and event.text().isalpha() and not self._is_numeric(event.text())
             ):
                 event.ignore()
                 return True
@@ -93,9 +93,9 @@ class NumberField(QLineEdit):
         elif event.key() == Qt.Key.Key_Down:
             self.stepped.emit(-1)
         elif event.key() == Qt.Key.Key_Escape and (self.text() != self._shown or self._state == "refused"):
-            self.put_back()
+            self.restore_text()
             self.abandoned.emit()
-        elif event.text().isalpha() and not self._writes(event.text()):
+        elif event.text().isalpha() and not self._is_numeric(event.text()):
             event.ignore()
         else:
             super().keyPressEvent(event)
@@ -107,19 +107,19 @@ class NumberField(QLineEdit):
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
-        self.flush()
+        self.emit_typed()
 
     @staticmethod
-    def _writes(text: str) -> bool:
+    def _is_numeric(text: str) -> bool:
         return bool(text) and set(text) <= NUMERALS
 
-    def _try(self) -> None:
+    def _take_typed(self) -> None:
         """Take the typed text; retry a refused number, since the obstacle may be gone."""
         if self._state == "refused":
             self.setModified(True)
-        self.flush()
+        self.emit_typed()
 
-    def flush(self) -> None:
+    def emit_typed(self) -> None:
         """Emit the typed text, once; it stays if it is not one number."""
         if not self.isModified():
             return
@@ -154,7 +154,7 @@ class Range:
             return max(1, min(STEPS, round(self.most - self.least)))
         return STEPS
 
-    def share(self, value: float) -> float:
+    def fraction_of_range(self, value: float) -> float:
         """Return the position of a number on the track, 0 to 1; numbers beyond the ends are at the end."""
         if self.most <= self.least:
             return 0.0
@@ -163,7 +163,7 @@ class Range:
             return math.log(value / self.least) / math.log(self.most / self.least)
         return (value - self.least) / (self.most - self.least)
 
-    def value(self, share: float) -> float:
+    def value_at(self, share: float) -> float:
         """Return the number at a position, with as many digits as a slider can resolve."""
         if share <= 0.0 or self.most <= self.least:
             return self.least
@@ -202,7 +202,7 @@ class Slider(Themed, QSlider):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setRange(0, self._span.steps)
-        self.valueChanged.connect(self._set)
+        self.valueChanged.connect(self._follow_step)
 
     @property
     def number(self) -> float:
@@ -221,7 +221,7 @@ class Slider(Themed, QSlider):
         if (span, value, tick) == (self._span, self._value, self._tick):
             return
         self._span, self._value, self._tick = span, value, tick
-        self._tell()
+        self._update_accessible_value()
         self.update()
 
     def let_go(self) -> None:
@@ -230,7 +230,7 @@ class Slider(Themed, QSlider):
         self.update()
 
     def step(self, steps: int) -> None:
-        self._move(self._stepped(steps), held=False)
+        self._move_to(self._value_after(steps), held=False)
 
     def sizeHint(self) -> QSize:
         return QSize(110, 32)
@@ -248,22 +248,22 @@ class Slider(Themed, QSlider):
         if steps is not None:
             self.step(steps)
         elif event.key() == keys.Key_Home:
-            self._move(self._span.least, held=False)
+            self._move_to(self._span.least, held=False)
         elif event.key() == keys.Key_End:
-            self._move(self._span.most, held=False)
+            self._move_to(self._span.most, held=False)
         elif event.key() in {keys.Key_Delete, keys.Key_Backspace} and self._tick is not None:
-            self._move(self._tick, held=False)
+            self._move_to(self._tick, held=False)
         else:
             event.ignore()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
             self._dragged = True
-            self._move(self._at(event.position().x()), held=True)
+            self._move_to(self._value_at(event.position().x()), held=True)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self._dragged:
-            self._move(self._at(event.position().x()), held=True)
+            self._move_to(self._value_at(event.position().x()), held=True)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton and self._dragged:
@@ -273,7 +273,7 @@ class Slider(Themed, QSlider):
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton and self._tick is not None:
-            self._move(self._tick, held=False)
+            self._move_to(self._tick, held=False)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         event.ignore()
@@ -281,14 +281,14 @@ class Slider(Themed, QSlider):
     def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
         painter = smooth_painter(self)
-        middle, x = self.height() / 2, self._x(self._value)
+        middle, x = self.height() / 2, self._position_of(self._value)
         painter.setPen(Qt.PenStyle.NoPen)
         for colour, end in ((t.border, self.width() - MARGIN + KNOB), (t.accent if self.isEnabled() else t.ctl, x)):
             painter.setBrush(QColor(colour))
             track = QRectF(MARGIN - KNOB, middle - TRACK / 2, end - MARGIN + KNOB, TRACK)
             painter.drawRoundedRect(track, TRACK / 2, TRACK / 2)
         if self._tick is not None:
-            at = self._x(self._tick)
+            at = self._position_of(self._tick)
             painter.setPen(QPen(QColor(t.text3), 1.6))
             painter.drawLine(QPointF(at, middle - 8), QPointF(at, middle + 8))
         painter.setPen(QPen(QColor(t.accent if self.isEnabled() else t.ctl), 2))
@@ -298,33 +298,33 @@ class Slider(Themed, QSlider):
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawEllipse(QPointF(x, middle), KNOB + 2.5, KNOB + 2.5)
 
-    def _x(self, value: float) -> float:
-        return MARGIN + self._span.share(value) * (self.width() - 2 * MARGIN)
+    def _position_of(self, value: float) -> float:
+        return MARGIN + self._span.fraction_of_range(value) * (self.width() - 2 * MARGIN)
 
-    def _at(self, x: float) -> float:
-        return self._span.value((x - MARGIN) / max(1.0, self.width() - 2 * MARGIN))
+    def _value_at(self, x: float) -> float:
+        return self._span.value_at((x - MARGIN) / max(1.0, self.width() - 2 * MARGIN))
 
-    def _stepped(self, steps: int) -> float:
+    def _value_after(self, steps: int) -> float:
         """Return the number some steps on, always another one unless the end is reached."""
-        share = self._span.share(self._value)
-        value = self._span.value(share + steps / self._span.steps)
+        share = self._span.fraction_of_range(self._value)
+        value = self._span.value_at(share + steps / self._span.steps)
         if self._span.whole and value == self._value:
             value = min(max(self._value + math.copysign(1, steps), self._span.least), self._span.most)
         return value
 
-    def _move(self, value: float, *, held: bool) -> None:
+    def _move_to(self, value: float, *, held: bool) -> None:
         if value == self._value:
             return
         self._value = value
-        self._tell()
+        self._update_accessible_value()
         self.update()
         self.slid.emit(value, held)
 
-    def _set(self, step: int) -> None:
+    def _follow_step(self, step: int) -> None:
         """Follow a change that came neither from mouse nor keys, as from a screen reader."""
-        self._move(self._span.value(step / self._span.steps), held=False)
+        self._move_to(self._span.value_at(step / self._span.steps), held=False)
 
-    def _tell(self) -> None:
+    def _update_accessible_value(self) -> None:
         with QSignalBlocker(self):
             self.setRange(0, self._span.steps)
-            self.setValue(round(self._span.share(self._value) * self._span.steps))
+            self.setValue(round(self._span.fraction_of_range(self._value) * self._span.steps))

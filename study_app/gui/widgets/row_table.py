@@ -94,19 +94,19 @@ class _Cells(QStyledItemDelegate):
                 lower = QRectF(
                     place.left() + GAP, body.bottom(), place.width() - GAP, place.bottom() - 4 - body.bottom()
                 )
-                _write(painter, lower, font("small"), theme.text2, below)
+                _write_text(painter, lower, font("small"), theme.text2, below)
             painter.restore()
             return
         face = index.data(Qt.ItemDataRole.FontRole) or font("label", weight=400, tabular=True)
         upper = QRectF(place) if not below else QRectF(place.left(), place.top() + 3, place.width(), place.height() / 2)
-        _write(painter, upper, face, theme.text if index.column() == 0 else theme.text2, str(index.data() or ""))
+        _write_text(painter, upper, face, theme.text if index.column() == 0 else theme.text2, str(index.data() or ""))
         if below:
             lower = QRectF(upper).translated(0, upper.height() - 4)
-            _write(painter, lower, font("small"), theme.text2, below)
+            _write_text(painter, lower, font("small"), theme.text2, below)
         painter.restore()
 
 
-def _write(painter: QPainter, place: QRectF, face: QFont, ink: str, text: str) -> None:
+def _write_text(painter: QPainter, place: QRectF, face: QFont, ink: str, text: str) -> None:
     painter.setFont(face)
     painter.setPen(QColor(ink))
     shown = painter.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, int(place.width()))
@@ -179,7 +179,7 @@ class Table(Themed, QTableView):
         first, last = self.rowAt(0), self.rowAt(self.viewport().height() - 1)
         rows = self.model().rowCount()
         for row in range(max(0, first), (last if last >= 0 else rows - 1) + 1):
-            body = self._row(row)
+            body = self._row_rectangle(row)
             chosen = self.selectionModel().isRowSelected(row, QModelIndex())
             if chosen or self.model().index(row, 0).data(CARE_ROLE):
                 fill_rounded(painter, body, RADIUS_CONTROL, self.theme.selected if chosen else self.theme.window)
@@ -192,10 +192,10 @@ class Table(Themed, QTableView):
             painter = QPainter(self.viewport())
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             painter.setPen(QPen(QColor(self.theme.accent), 2))
-            ring = self._row(self.currentIndex().row()).adjusted(1, 1, -1, -1)
+            ring = self._row_rectangle(self.currentIndex().row()).adjusted(1, 1, -1, -1)
             painter.drawRoundedRect(ring, RADIUS_CONTROL, RADIUS_CONTROL)
             painter.end()
 
-    def _row(self, row: int) -> QRectF:
+    def _row_rectangle(self, row: int) -> QRectF:
         top = self.rowViewportPosition(row)
         return QRectF(0, top + 1, self.viewport().width(), ROW_HEIGHT - 3)

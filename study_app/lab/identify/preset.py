@@ -10,7 +10,7 @@ from study_app.lab.identify.estimates import CONFIDENCE, Estimates
 from study_app.lab.identify.fit import CurveFit, Fit
 from study_app.lab.identify.measured_force import FLOW_CURVE
 from study_app.lab.identify.parameters import Parameter
-from study_app.protocol.scene_file import for_new_file, scene_text
+from study_app.protocol.scene_file import scene_text, with_default_estimator
 from study_app.store.atomic import make_folder
 from study_app.store.csv_files import csv_text_of
 from study_app.store.output_files import write_files
@@ -72,7 +72,7 @@ def preset_file_text(estimates: Estimates, source: Path) -> str:
         *(f"Warning: {warning}." for warning in estimates.warnings),
     )
     notes = {_place(it, estimates): f"{100 * CONFIDENCE:g} %: {estimates.row(it)[1]}" for it in estimates.parameters}
-    return scene_text(for_new_file(estimates.scene), said=said, notes=notes)
+    return scene_text(with_default_estimator(estimates.scene), said=said, notes=notes)
 
 
 def _place(it: Parameter, estimates: Estimates) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.gate import Extremes, resolve
 from study_app.haptics.model.scene import MAX_LIQUIDS, Box, Everywhere, Liquid, MotionBox, Scene
 from study_app.protocol.checks import cross_references as named
-from study_app.protocol.checks.designs import kinds
+from study_app.protocol.checks.designs import check_kinds
 from study_app.protocol.model import (
     Block,
     Condition,
@@ -79,7 +79,7 @@ class Draft(BaseModel):
         return scene_with(self.scene, self.device, liquids, self.format)
 
 
-def draft(document: Mapping[str, Any], broken: Iterable[Path], valid: Protocol | None) -> Draft:
+def sound_draft(document: Mapping[str, Any], broken: Iterable[Path], valid: Protocol | None) -> Draft:
     """Return the valid entries of ``document``; ``broken`` are the paths of the problems already found."""
     differ = bool(document.keys() & {"groups", "sequences"})
     if valid is not None:
@@ -101,15 +101,37 @@ def check(document: Mapping[str, Any], broken: Iterable[Path], valid: Protocol |
 
     ``valid`` is the validated document if nothing is broken, so that its tables are not validated again.
     """
-    of_items = (named.items, named.alike, named.languages, named.questions, named.decisions)
-    for of_names in (named.references, kinds, named.sequence, named.groups, named.repeats, *of_items):
+    of_items = (
+        named.check_items,
+        named.check_statements_differ,
+        named.check_languages,
+        named.check_questions,
+        named.check_decisions,
+    )
+    for of_names in (
+        named.check_references,
+        check_kinds,
+        named.check_sequences,
+        named.check_groups,
+        named.check_repeats,
+        *of_items,
+    ):
         yield from of_names(document)
-    parts = draft(document, broken, valid)
-    for of_tables in (targets, liquids, too_weak, equal_liquids, equal_conditions, compares, blocks, counted_parts):
+    parts = sound_draft(document, broken, valid)
+    for of_tables in (
+        check_targets,
+        check_liquids,
+        check_forces,
+        check_liquids_differ,
+        check_conditions_differ,
+        check_comparisons,
+        check_blocks,
+        check_parts,
+    ):
         yield from of_tables(parts)
 
 
-def targets(parts: Draft) -> Iterator[Fault]:
+def check_targets(parts: Draft) -> Iterator[Fault]:
     """Check that every target lies inside the tank with its whole radius."""
     if parts.device is None:
         return
@@ -133,7 +155,7 @@ def targets(parts: Draft) -> Iterator[Fault]:
                     )
 
 
-def liquids(parts: Draft) -> Iterator[Fault]:
+def check_liquids(parts: Draft) -> Iterator[Fault]:
     """Check that a condition's liquids fit into a scene and have one ball, which meets each somewhere in the tank."""
     for name, condition in parts.conditions.items():
         place, known = (
@@ -148,12 +170,12 @@ def liquids(parts: Draft) -> Iterator[Fault]:
         for liquid in known:
             if parts.device is None or parts.scene is None:
                 continue
-            if not within_tank(parts.liquids[liquid], parts.scene, parts.device):
+            if not is_within_tank(parts.liquids[liquid], parts.scene, parts.device):
                 message = f'the region of "{liquid}" lies outside the tank, where no hand meets it'
                 yield Fault(place[:2], message, "move or enlarge the region, or scene.origin_m")
 
 
-def too_weak(parts: Draft) -> Iterator[Fault]:
+def check_forces(parts: Draft) -> Iterator[Fault]:
     """Check that every condition exerts a force in the fastest stroke of its block's task."""
     for name, block in parts.blocks.items():
         task = parts.tasks.get(block.task)
@@ -171,15 +193,15 @@ def too_weak(parts: Draft) -> Iterator[Fault]:
                 )
 
 
-def equal_liquids(parts: Draft) -> Iterator[Fault]:
+def check_liquids_differ(parts: Draft) -> Iterator[Fault]:
     """Check that no two liquids have the same numbers."""
     first: dict[str, str] = {}
     for name, liquid in parts.liquids.items():
-        if (earlier := first.setdefault(repr(numbers(liquid)), name)) != name:
+        if (earlier := first.setdefault(repr(felt_numbers(liquid)), name)) != name:
             yield Fault(("liquids", name), f'has the same numbers as "{earlier}"', "change it, or use that one twice")
 
 
-def equal_conditions(parts: Draft) -> Iterator[Fault]:
+def check_conditions_differ(parts: Draft) -> Iterator[Fault]:
     """Check that the conditions of a block differ, unless the block says that some are replicates."""
     for name, block in parts.blocks.items():
         presented = {
@@ -201,7 +223,7 @@ def equal_conditions(parts: Draft) -> Iterator[Fault]:
                 yield Fault(("blocks", name, "conditions", index), message, hint)
 
 
-def compares(parts: Draft) -> Iterator[Fault]:
+def check_comparisons(parts: Draft) -> Iterator[Fault]:
     """Check that a main block's conditions differ in one thing, the one that the block states.
 
     Where it says views, delays may differ as well: those that make the views equally late.
@@ -224,7 +246,7 @@ def compares(parts: Draft) -> Iterator[Fault]:
             yield Fault(("blocks", name, "compares"), message, "correct it, or leave it out")
 
 
-def blocks(parts: Draft) -> Iterator[Fault]:
+def check_blocks(parts: Draft) -> Iterator[Fault]:
     """Check that the codes of different blocks differ, and that a break is a page of that kind."""
     owners: dict[str, str] = {}
     for name, block in parts.blocks.items():
@@ -237,7 +259,7 @@ def blocks(parts: Draft) -> Iterator[Fault]:
             yield Fault(("blocks", name, "break_page"), message, 'a break needs a page with kind = "break"')
 
 
-def counted_parts(parts: Draft) -> Iterator[Fault]:
+def check_parts(parts: Draft) -> Iterator[Fault]:
     """Check that parts count 1, 2, … in the order of the sequence, and that at least one block is analysed.
 
     Where sessions differ each numbers its parts anew (`own_protocol`).
@@ -261,8 +283,8 @@ def counted_parts(parts: Draft) -> Iterator[Fault]:
 def force_n(scene: Scene, stroke: Stroke) -> float:
     """Return an upper estimate of a scene's force in a stroke [N]: the sum of its strongest liquid's effects."""
     motion = MotionBox(
-        speed_mps=_in_range(scene.scale * stroke.speed_mps),
-        acceleration_mps2=_in_range(scene.scale * stroke.acceleration_mps2),
+        speed_mps=_clamped(scene.scale * stroke.speed_mps),
+        acceleration_mps2=_clamped(scene.scale * stroke.acceleration_mps2),
         depth_m=scene.motion.depth_m,
     )
     moved = scene.model_copy(update={"motion": motion})
@@ -273,11 +295,11 @@ def force_n(scene: Scene, stroke: Stroke) -> float:
     return min(strongest_n, scene.force_limit_n)
 
 
-def _in_range(value: float) -> float:
+def _clamped(value: float) -> float:
     return min(max(value, 1e-3), 1000.0)
 
 
-def within_tank(liquid: Liquid, scene: SceneDefaults, device: DeviceNeeds) -> bool:
+def is_within_tank(liquid: Liquid, scene: SceneDefaults, device: DeviceNeeds) -> bool:
     """Return whether the ball's centre meets the liquid somewhere in the tank."""
     region = liquid.region
     if isinstance(region, Everywhere):
@@ -291,7 +313,7 @@ def within_tank(liquid: Liquid, scene: SceneDefaults, device: DeviceNeeds) -> bo
     return math.hypot(gaps_m[0], gaps_m[2]) <= region.radius_m and gaps_m[1] <= region.height_m / 2
 
 
-def numbers(liquid: Liquid) -> dict[str, Any]:
+def felt_numbers(liquid: Liquid) -> dict[str, Any]:
     """Return the values that decide how a liquid feels: all but its name and the tables of unused effects."""
     said = liquid.model_dump(exclude={"id"})
     if liquid.effects != "auto":

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from study_app.protocol.groups import ASSIGNMENT, SEQUENCES, sequences_in
 from study_app.protocol.questions import POINTS, Context, Question, Scale, ShowIf, Statement, question_of
 from study_app.protocol.source.document import Path, entries, names, value_at
-from study_app.protocol.source.problems import Fault, did_you_mean, unknown
+from study_app.protocol.source.problems import Fault, did_you_mean, unknown_name
 from study_app.protocol.wording.languages import LANGUAGES, missing_text
 
 REFERENCES = {
@@ -86,29 +86,29 @@ Document = Mapping[str, Any]
 T = TypeVar("T")
 
 
-def _unknown(path: Path, name: Any, kind: str, known: Collection[str]) -> Iterator[Fault]:
+def _unknown_name(path: Path, name: Any, kind: str, known: Collection[str]) -> Iterator[Fault]:
     if isinstance(name, str) and name not in known:
-        yield unknown(path, f'there is no {kind} "{name}"', name, known)
+        yield unknown_name(path, f'there is no {kind} "{name}"', name, known)
 
 
-def _twice(listed: Sequence[tuple[Path, Any]]) -> Iterator[Fault]:
+def _repeated_names(listed: Sequence[tuple[Path, Any]]) -> Iterator[Fault]:
     for at, (path, name) in enumerate(listed):
         if name in [earlier for _, earlier in listed[:at]]:
             yield Fault(path, f'"{name}" is listed twice', "remove one", kind="surplus")
 
 
-def references(document: Document) -> Iterator[Fault]:
+def check_references(document: Document) -> Iterator[Fault]:
     """Check that every reference to a table names an existing one."""
     for pattern, section in REFERENCES.items():
         known, kind = names(document, section), "stimulus" if section == "stimuli" else section.removesuffix("s")
         for path, name in entries(document, pattern):
-            yield from _unknown(path, name, kind, known)
+            yield from _unknown_name(path, name, kind, known)
 
 
-def sequence(document: Document) -> Iterator[Fault]:
+def check_sequences(document: Document) -> Iterator[Fault]:
     """Check that each sequence names pages, blocks and forms, and that only break pages are left out.
 
-    Blocks and forms come once in a sequence. `groups` checks that no block is left out of a study with groups.
+    Blocks and forms come once in a sequence. `check_groups` checks that no block is left out of a study with groups.
     """
     pages, blocks, forms = (names(document, section) for section in ("pages", "blocks", "questionnaires"))
     apart = "rename one: sequence could not tell them apart"
@@ -125,7 +125,7 @@ def sequence(document: Document) -> Iterator[Fault]:
         since: set[str] = set()  # the block before, or the start
         for index, name in enumerate(steps):
             path = (*place, index)
-            yield from _unknown(path, name, "page or block", {*pages, *blocks, *forms})
+            yield from _unknown_name(path, name, "page or block", {*pages, *blocks, *forms})
             if name in blocks and name in seen:
                 yield Fault(path, f'block "{name}" comes twice', "give the block repetitions")
             elif name in forms and (name in pages or name in blocks) and name not in used:
@@ -143,14 +143,14 @@ def sequence(document: Document) -> Iterator[Fault]:
             yield Fault(place, "comes nowhere in sequence", "add it there, or take it out", kind="not in sequence")
 
 
-def repeats(document: Document) -> Iterator[Fault]:
+def check_repeats(document: Document) -> Iterator[Fault]:
     """Check that no list contains a name twice."""
     for pattern in WITHOUT_REPEATS:
         for path, listed in entries(document, pattern):
-            yield from _twice([((*path, *at), entry) for at, entry in entries(listed, "*")])
+            yield from _repeated_names([((*path, *at), entry) for at, entry in entries(listed, "*")])
 
 
-def items(document: Document) -> Iterator[Fault]:
+def check_items(document: Document) -> Iterator[Fault]:
     """Check that item ids are unique within a questionnaire, and name the same statement in all questionnaires."""
     statements: dict[str, Any] = {}
     seen: set[tuple[Any, str]] = set()
@@ -165,19 +165,19 @@ def items(document: Document) -> Iterator[Fault]:
         seen.add((path[1], name))
 
 
-def alike(document: Document) -> Iterator[Fault]:
+def check_statements_differ(document: Document) -> Iterator[Fault]:
     """Check that a questionnaire's statements, their short names and a scale's points differ."""
     for name in names(document, "questionnaires"):
         for key in ("text", "short"):
-            yield from _alike(list(entries(document, f"questionnaires.{name}.items.*.{key}")), "item")
+            yield from _repeated_texts(list(entries(document, f"questionnaires.{name}.items.*.{key}")), "item")
     for path, labels in entries(document, "scales.*.labels.*"):
         points = [((*path, *at), label) for at, label in entries(labels, "*")]
         for _, off in entries(document, f"scales.{path[1]}.cannot_judge"):
             points.append(((*path[:2], "cannot_judge"), off.get(path[-1]) if isinstance(off, Mapping) else off))
-        yield from _alike(points, "label")
+        yield from _repeated_texts(points, "label")
 
 
-def _alike(located_texts: list[tuple[Path, Any]], kind: str) -> Iterator[Fault]:
+def _repeated_texts(located_texts: list[tuple[Path, Any]], kind: str) -> Iterator[Fault]:
     """Yield a fault for every text that reads like an earlier one; an entry may hold a text per language.
 
     People do not tell texts apart by case, width or white space, nor Latin letters from Cyrillic or Greek ones that
@@ -186,7 +186,7 @@ def _alike(located_texts: list[tuple[Path, Any]], kind: str) -> Iterator[Fault]:
     seen: set[tuple[str, str]] = set()
     for path, entry in located_texts:
         texts = entry if isinstance(entry, Mapping) else {"": entry}
-        read = {(language, as_read(text)) for language, text in texts.items() if isinstance(text, str)}
+        read = {(language, visible_text(text)) for language, text in texts.items() if isinstance(text, str)}
         if read & seen:
             hint = "people could not tell the two apart: change one"
             yield Fault(path, f"reads as an earlier {kind} does", hint, kind="alike")
@@ -197,13 +197,13 @@ LOOKALIKES = str.maketrans("аеіјорсухѕһοαρνικ", "aeijopcyxshoap
 """Small letters of the Cyrillic and the Greek alphabet, and the Latin ones that look the same."""
 
 
-def as_read(text: str) -> str:
+def visible_text(text: str) -> str:
     """Return the visible content of a text: without marks of format, case, width and alphabet."""
     visible = "".join(letter for letter in text if unicodedata.category(letter) != "Cf")
     return " ".join(unicodedata.normalize("NFKC", visible).casefold().translate(LOOKALIKES).split())
 
 
-def languages(document: Document) -> Iterator[Fault]:
+def check_languages(document: Document) -> Iterator[Fault]:
     """Check that every text exists in exactly the study's languages."""
     written = [(path, name) for path, name in entries(document, "study.languages.*") if isinstance(name, str)]
     for path, name in written:
@@ -230,7 +230,7 @@ def languages(document: Document) -> Iterator[Fault]:
 OWN = ("sequence", "sequences")
 
 
-def groups(document: Mapping[str, Any]) -> Iterator[Fault]:
+def check_groups(document: Mapping[str, Any]) -> Iterator[Fault]:
     """Check that there are several groups, that each block is in a sequence of one, and that no sequence is unused."""
     if all(key in document for key in OWN):
         yield Fault(("sequences",), "give either sequence or sequences, one of the two")
@@ -251,15 +251,15 @@ def groups(document: Mapping[str, Any]) -> Iterator[Fault]:
             yield Fault(("groups",), f'block "{block}" is in no group\'s sequence', "add it to one, or take it out")
 
 
-def decisions(document: Document) -> Iterator[Fault]:
+def check_decisions(document: Document) -> Iterator[Fault]:
     """Check that decisions name existing statements, each once, and that such items name the liquids."""
     questions = (item for _, item in entries(document, "questionnaires.*.items.*") if isinstance(item, Mapping))
     items = {item["id"] for item in questions if isinstance(item.get("id"), str) and "kind" not in item}
     decided = {key: list(entries(document, f"analysis.{key}.*")) for key in DECIDED_LISTS}
     for places in (*decided.values(), list(entries(document, "analysis.noticed"))):
         for path, name in places:
-            yield from _unknown(path, name, "item", items)
-        yield from _twice(places)
+            yield from _unknown_name(path, name, "item", items)
+        yield from _repeated_names(places)
     falling, named = ([name for _, name in decided[key]] for key in ("falling", "names"))
     for path, name in decided["rising"]:
         if name in falling:
@@ -269,12 +269,12 @@ def decisions(document: Document) -> Iterator[Fault]:
             yield Fault(path, f'"{name}" is not among analysis.names', "add it there, or leave the label out")
 
 
-def questions(document: Document) -> Iterator[Fault]:
+def check_questions(document: Document) -> Iterator[Fault]:
     """Check the items of every questionnaire: scales, display conditions and scores."""
     scales = {
         str(path[1]): scale
         for path, table in entries(document, "scales.*")
-        if (scale := _sound(Scale.model_validate, table)) is not None
+        if (scale := _valid_or_none(Scale.model_validate, table)) is not None
     }
     for name, scale in scales.items():
         if len(counts := {len(labels) for labels in scale.labels.values()}) > 1:
@@ -284,7 +284,7 @@ def questions(document: Document) -> Iterator[Fault]:
     for path, table in entries(document, "questionnaires.*"):
         if not isinstance(table, Mapping):
             continue
-        read = (((*path, *at), _sound(question_of, item)) for at, item in entries(table, "items.*"))
+        read = (((*path, *at), _valid_or_none(question_of, item)) for at, item in entries(table, "items.*"))
         sound = [(place, item) for place, item in read if item is not None]
         items = [item for _, item in sound]
         if any(isinstance(item, Statement) for item in items):
@@ -295,17 +295,17 @@ def questions(document: Document) -> Iterator[Fault]:
                 message = f"has {scale.points} points, and statements need {POINTS}"
                 hint = f'write kind = "rating" and scale = "{table["scale"]}" in the items'
                 yield Fault((*path, "scale"), message, hint)
-        yield from _show_ifs(table, sound, Context(scales, table.get("scale"), language))
+        yield from _check_show_if(table, sound, Context(scales, table.get("scale"), language))
         numbers = [item.id for item in items if item.value_type != "text"]
         choices = [item.id for item in items if item.value_type == "text"]
         for key, answered, known in (("items", "a number", numbers), ("weights_from", "a choice", choices)):
             for place, name in entries(table, f"scores.*.{key}.*"):
                 if isinstance(name, str) and name not in known:
                     message = f'there is no item "{name}" that is answered with {answered}'
-                    yield unknown((*path, *place), message, name, known)
+                    yield unknown_name((*path, *place), message, name, known)
 
 
-def _sound(read: Callable[[Any], T], table: Any) -> T | None:
+def _valid_or_none(read: Callable[[Any], T], table: Any) -> T | None:
     """Return a valid scale or question, None if it is invalid."""
     try:
         return read(table) if isinstance(table, Mapping) else None
@@ -313,7 +313,7 @@ def _sound(read: Callable[[Any], T], table: Any) -> T | None:
         return None
 
 
-def _show_ifs(table: Document, items: Sequence[tuple[Path, Question]], context: Context) -> Iterator[Fault]:
+def _check_show_if(table: Document, items: Sequence[tuple[Path, Question]], context: Context) -> Iterator[Fault]:
     earlier: dict[str, Question] = {}
     ids = [item.id for _, item in items]
     for path, item in items:
@@ -328,11 +328,11 @@ def _show_ifs(table: Document, items: Sequence[tuple[Path, Question]], context: 
                 hint = 'item_order = "fixed": an item comes after the one that it depends on'
                 yield Fault(place, "item_order is shuffled", hint)
             else:
-                yield from _answers(place, rule, earlier[rule.item], context)
+                yield from _check_permitted_answers(place, rule, earlier[rule.item], context)
         earlier[item.id] = item
 
 
-def _answers(place: Path, rule: ShowIf, earlier: Question, context: Context) -> Iterator[Fault]:
+def _check_permitted_answers(place: Path, rule: ShowIf, earlier: Question, context: Context) -> Iterator[Fault]:
     try:
         levels = list(earlier.levels(context))
     except KeyError:  # its scale, or a text in the language, is missing: another check says so

@@ -17,7 +17,7 @@ from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.presented.presentation import scene_of
 from study_app.protocol.quantities import can_vary
 from study_app.protocol.source.document import Path, entries, names
-from study_app.protocol.source.problems import Fault, unknown
+from study_app.protocol.source.problems import Fault, unknown_name
 from study_app.protocol.table import Table
 from study_app.protocol.tracks import (
     condition_of,
@@ -39,7 +39,7 @@ LEAST_SHARE: Final = 1e-6
 """The least difference between two other numbers, as a share of the standard. [choice]"""
 
 
-def kinds(document: Mapping[str, Any]) -> Iterator[Fault]:
+def check_kinds(document: Mapping[str, Any]) -> Iterator[Fault]:
     """Check that every block's design and method names a table, or a kind whose keys all have defaults."""
     sections: tuple[tuple[str, str, Mapping[str, type[Table]]], ...] = (
         ("design", "designs", DESIGN_KINDS),
@@ -51,28 +51,30 @@ def kinds(document: Mapping[str, Any]) -> Iterator[Fault]:
             if not isinstance(name, str) or name in tables:
                 continue
             if name not in known:
-                yield unknown(path, f'there is no {key} "{name}"', name, {*tables, *known})
+                yield unknown_name(path, f'there is no {key} "{name}"', name, {*tables, *known})
             elif needed := [of for of, field in known[name].model_fields.items() if field.is_required()]:
                 example = f'write [{section}.NAME] with kind = "{name}" and {", ".join(needed)}, and {key} = "NAME"'
                 yield Fault(path, f'the kind "{name}" has no default for {", ".join(needed)}', example)
 
 
-def designs(protocol: Protocol) -> Iterator[Fault]:
+def check_designs(protocol: Protocol) -> Iterator[Fault]:
     """Yield the faults of blocks with a design and of their stimuli."""
-    faults = [fault for name, stimulus in protocol.stimuli.items() for fault in _varied(protocol, name, stimulus)]
+    faults = [
+        fault for name, stimulus in protocol.stimuli.items() for fault in _check_varied_number(protocol, name, stimulus)
+    ]
     if faults:
         yield from faults
         return
     for block in protocol.blocks.values():
         if block.design is not None:
-            yield from _block(protocol, block)
+            yield from _check_block(protocol, block)
     for number, published in enumerate(protocol.analysis.published if protocol.analysis is not None else ()):
-        yield from _published(protocol, published, ("analysis", "published", number))
+        yield from _check_published(protocol, published, ("analysis", "published", number))
     for number, contrast in enumerate(protocol.analysis.contrasts if protocol.analysis is not None else ()):
-        yield from _contrast(protocol, contrast, ("analysis", "contrasts", number))
+        yield from _check_contrast(protocol, contrast, ("analysis", "contrasts", number))
 
 
-def _block(protocol: Protocol, block: Block) -> Iterator[Fault]:
+def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
     design, place = design_of(protocol, block), ("blocks", block.id)
     if block.questionnaire is not None:
         message = "a block with a design asks the design's question"
@@ -91,7 +93,7 @@ def _block(protocol: Protocol, block: Block) -> Iterator[Fault]:
     if block.break_every is not None and not (order := order_of(protocol, block)).breaks:
         message = f"is {block.break_every}, and the block has {order.trials} trials: no break would come"
         yield Fault((*place, "break_every"), message)
-    if fault := next(misfits(protocol, block), None):
+    if fault := next(check_design_and_method(protocol, block), None):
         yield fault
         return
     if block.stimulus is None:
@@ -120,14 +122,14 @@ def _block(protocol: Protocol, block: Block) -> Iterator[Fault]:
         yield Fault((*place, "standards"), f"the stimulus has no standard {unknown[0]:g}", f"these: {listed or 'none'}")
     if design.first is not None and len(tracks_of(protocol, block)) > 1:
         yield Fault((*place, "design"), "a modulus needs a single standard", "omit it, or use one block per standard")
-    yield from _levels(protocol, block)
+    yield from _check_levels(protocol, block)
 
 
-def _published(protocol: Protocol, published: Published, place: Path) -> Iterator[Fault]:
+def _check_published(protocol: Protocol, published: Published, place: Path) -> Iterator[Fault]:
     """Check that a published value belongs to a block of levels, and its standard to the block."""
     of_levels = [block.id for block in protocol.blocks.values() if block.stimulus is not None]
     if published.block not in of_levels:
-        fault = unknown(
+        fault = unknown_name(
             (*place, "block"), f'there is no block of levels "{published.block}"', published.block, of_levels
         )
         yield fault if of_levels else fault._replace(hint="omit it")
@@ -147,7 +149,7 @@ def _published(protocol: Protocol, published: Published, place: Path) -> Iterato
         yield Fault((*place, "low"), "low, value and high must ascend", "order them")
 
 
-def _contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iterator[Fault]:
+def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iterator[Fault]:
     """Check that the blocks of a contrast have its measure, and its conditions."""
     for name in contrast.blocks:
         block, asked = protocol.blocks[name], protocol.questionnaire_of(name)
@@ -157,15 +159,19 @@ def _contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iterator[F
         items = [item.id for item in asked.statements] if asked is not None else []
         known = OF_LEVELS if block.design is not None else items
         if contrast.measure not in known:
-            yield unknown((*place, "measure"), f'block "{name}" has no {contrast.measure}', contrast.measure, known)
+            yield unknown_name(
+                (*place, "measure"), f'block "{name}" has no {contrast.measure}', contrast.measure, known
+            )
         missing = [condition for condition in contrast.conditions or () if condition not in block.conditions]
         if missing:
-            yield unknown((*place, "conditions"), f"block {name} has no {missing[0]}", missing[0], block.conditions)
+            yield unknown_name(
+                (*place, "conditions"), f"block {name} has no {missing[0]}", missing[0], block.conditions
+            )
         if contrast.conditions is not None and block.design is not None:
             yield Fault((*place, "conditions"), f"the results of {name} are of all its levels", "compare two blocks")
 
 
-def _varied(protocol: Protocol, name: str, stimulus: Stimulus) -> Iterator[Fault]:
+def _check_varied_number(protocol: Protocol, name: str, stimulus: Stimulus) -> Iterator[Fault]:
     """Check that a stimulus varies one number of one condition."""
     place = ("stimuli", name)
     if stimulus.condition is None and len(protocol.conditions) > 1:
@@ -188,7 +194,7 @@ def _varied(protocol: Protocol, name: str, stimulus: Stimulus) -> Iterator[Fault
         except StudyError:
             known = {*OF_CONDITION, *filter(can_vary, number_names(protocol.scene_for(condition)))}
             message = f'there is no number "{stimulus.vary}" in condition "{condition}"'
-            yield unknown((*place, "vary"), message, stimulus.vary, known, cutoff=0.6)
+            yield unknown_name((*place, "vary"), message, stimulus.vary, known, cutoff=0.6)
         else:
             if not can_vary(stimulus.vary):
                 message = f"{stimulus.vary} does not belong to a liquid: it holds for the whole session"
@@ -196,7 +202,7 @@ def _varied(protocol: Protocol, name: str, stimulus: Stimulus) -> Iterator[Fault
                 yield Fault((*place, "vary"), message, hint, kind="surplus")
 
 
-def _levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
+def _check_levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
     """Check that a block can present every level with each of its standards."""
     stimulus = protocol.stimuli[str(block.stimulus)]
     method = method_of(protocol, block)
@@ -213,28 +219,30 @@ def _levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
         yield Fault(("methods", str(block.method), "levels"), message, f"from {least:g} to {most:g}")
         return
     for standard in standards_of(protocol, block):
-        if standard is not None and (fault := _standard(protocol, block, stimulus, standard, least)) is not None:
+        if standard is not None and (fault := _standard_fault(protocol, block, stimulus, standard, least)) is not None:
             yield fault
             return
         for level in (levels[-1], levels[0]):
             value = stimulus.comparison(standard, level)
             if stimulus.vary in OF_CONDITION and not 0 <= value <= OF_CONDITION[stimulus.vary]:
-                yield _beyond(block, stimulus, standard, level)
+                yield _out_of_range_fault(block, stimulus, standard, level)
                 return
-            if (why := _presented(protocol, stimulus, value)) is not None:
+            if (why := _presentation_problem(protocol, stimulus, value)) is not None:
                 what = f"standard {standard:g} at level {level:g} gives" if standard is not None else "the level"
                 yield Fault(("stimuli", str(block.stimulus), "levels"), f"{what} {value:g}: {why}")
                 return
-    yield from adjustable(protocol, block)
+    yield from check_adjustment(protocol, block)
 
 
-def _standard(protocol: Protocol, block: Block, stimulus: Stimulus, standard: float, level: float) -> Fault | None:
+def _standard_fault(
+    protocol: Protocol, block: Block, stimulus: Stimulus, standard: float, level: float
+) -> Fault | None:
     """Return a fault if a standard cannot be presented or equals the comparison at the smallest level."""
     place = ("stimuli", str(block.stimulus))
     if stimulus.vary in OF_CONDITION and not 0 <= standard <= OF_CONDITION[stimulus.vary]:
         permitted = f"from 0 to {OF_CONDITION[stimulus.vary]:g}"
         return Fault((*place, "standards"), f"{standard:g} is not possible for {stimulus.vary}", permitted)
-    if (why := _presented(protocol, stimulus, standard)) is not None:
+    if (why := _presentation_problem(protocol, stimulus, standard)) is not None:
         return Fault((*place, "standards"), f"{standard:g}: {why}")
     least = LEAST_MS if stimulus.vary.endswith("_ms") else LEAST_SHARE * (abs(standard) or 1.0)
     if level == 0 or stimulus.level_kind == "value" or abs(stimulus.comparison(standard, level) - standard) >= least:
@@ -243,7 +251,7 @@ def _standard(protocol: Protocol, block: Block, stimulus: Stimulus, standard: fl
     return Fault((*place, "levels"), message, f"the comparison must differ by at least {least:g}")
 
 
-def _beyond(block: Block, stimulus: Stimulus, standard: float | None, level: float) -> Fault:
+def _out_of_range_fault(block: Block, stimulus: Stimulus, standard: float | None, level: float) -> Fault:
     """Return a fault: a number of the condition, such as a visual delay, is out of range."""
     place, value = ("stimuli", str(block.stimulus), "levels"), stimulus.comparison(standard, level)
     name, limit = stimulus.vary, OF_CONDITION[stimulus.vary]
@@ -257,7 +265,7 @@ def _beyond(block: Block, stimulus: Stimulus, standard: float | None, level: flo
     return Fault(place, message, f"at most {most:g}")
 
 
-def _presented(protocol: Protocol, stimulus: Stimulus, value: float) -> str | None:
+def _presentation_problem(protocol: Protocol, stimulus: Stimulus, value: float) -> str | None:
     """Return why a value of the varied number cannot be presented; None if it can."""
     if stimulus.vary in OF_CONDITION:
         return None
@@ -268,7 +276,7 @@ def _presented(protocol: Protocol, stimulus: Stimulus, value: float) -> str | No
     return None
 
 
-def misfits(protocol: Protocol, block: Block) -> Iterator[Fault]:
+def check_design_and_method(protocol: Protocol, block: Block) -> Iterator[Fault]:
     """Yield faults for a design without a method or a method without a design."""
     design, place = design_of(protocol, block), ("blocks", block.id)
     if block.stimulus is None:
@@ -284,7 +292,7 @@ def misfits(protocol: Protocol, block: Block) -> Iterator[Fault]:
         yield Fault((*place, "method"), message, 'design = "adjustment", or method = "constant"')
 
 
-def adjustable(protocol: Protocol, block: Block) -> Iterator[Fault]:
+def check_adjustment(protocol: Protocol, block: Block) -> Iterator[Fault]:
     """Yield why a number cannot be adjusted while it is presented, or a standard not be matched."""
     design, stimulus = design_of(protocol, block), stimulus_of(protocol, block)
     if not design.adjusts:

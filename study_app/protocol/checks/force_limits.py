@@ -28,7 +28,7 @@ from study_app.protocol.presented.presented_levels import (
     UNPACED_MPS,
     Level,
     damping_of,
-    ends,
+    extreme_levels,
     hand_mps_of,
     level_limits,
     levels,
@@ -50,7 +50,7 @@ _GIVES: Final = ("gives", "give")
 _IS: Final = ("is", "are")
 
 
-def paced(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS) -> Iterator[Fault]:
+def check_paced(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS) -> Iterator[Fault]:
     """Yield the faults of tasks of kind "follow", and of hidden balls where the hand must aim.
 
     The study is sound but for this; a force acts ``delay_ticks`` ticks late.
@@ -60,16 +60,16 @@ def paced(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS) -> Iterator[Faul
             if protocol.conditions[name].ball == "hidden":
                 message = f'is hidden, but block "{block.id}" has a reaching task: it cannot be aimed'
                 yield Fault(("conditions", name, "ball"), message, 'a task of kind "follow" or "explore"')
-    yield from _lagging(protocol)
-    for blocks in by_stimulus(protocol):
-        yield from clipped(protocol, blocks, delay_ticks)
+    yield from _check_estimator_lag(protocol)
+    for blocks in blocks_by_stimulus(protocol):
+        yield from check_clipping(protocol, blocks, delay_ticks)
     for block in protocol.blocks.values():
         for index, name in enumerate(block.conditions if block.stimulus is None else ()):
             place = ("blocks", block.id, "conditions", index)
-            yield from clipped_at_pace(protocol, block, protocol.scene_for(name), f'"{name}" is', place)
+            yield from check_clipping_at_pace(protocol, block, protocol.scene_for(name), f'"{name}" is', place)
 
 
-def _lagging(protocol: Protocol) -> Iterator[Fault]:
+def _check_estimator_lag(protocol: Protocol) -> Iterator[Fault]:
     """Check that the velocity estimator passes a damper's force at the frequency of each target."""
     velocity, rate_hz = protocol.scene.velocity, protocol.device.rate_hz
     of_task: dict[str, list[Scene]] = {}
@@ -81,7 +81,7 @@ def _lagging(protocol: Protocol) -> Iterator[Fault]:
         if not isinstance(task, Follow) or "linear" not in laws:
             continue
         if (share := passed_share(velocity, rate_hz, task.frequency_hz)) < LEAST_SHARE:
-            most_hz = floored(fastest_hz(velocity, rate_hz, LEAST_SHARE), 1)
+            most_hz = rounded_down(fastest_hz(velocity, rate_hz, LEAST_SHARE), 1)
             yield Fault(
                 ("tasks", name, "frequency_hz"),
                 f"at {task.frequency_hz:g} Hz the velocity estimator passes {100 * share:.1f} % of a damper's force",
@@ -89,7 +89,7 @@ def _lagging(protocol: Protocol) -> Iterator[Fault]:
             )
 
 
-def by_stimulus(protocol: Protocol) -> list[list[Block]]:
+def blocks_by_stimulus(protocol: Protocol) -> list[list[Block]]:
     """Return the blocks with levels, grouped by stimulus."""
     blocks_of: dict[str, list[Block]] = {}
     for block in protocol.blocks.values():
@@ -98,65 +98,67 @@ def by_stimulus(protocol: Protocol) -> list[list[Block]]:
     return list(blocks_of.values())
 
 
-def beyond_slope_limit(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> Fault | None:
+def slope_limit_fault(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> Fault | None:
     """Return a fault if dampings of one stimulus exceed the slope limit for a delay [ticks], else None."""
     stimulus = stimulus_of(protocol, blocks[0])
-    extremes = [extreme for block in blocks for extreme in ends(protocol, block)]
+    extremes = [extreme for block in blocks for extreme in extreme_levels(protocol, block)]
     if not extremes:
         return None
     standard, level, scene = max(extremes, key=lambda extreme: damping_of(extreme[2]))
-    highest_nspm, (limit_nspm, loop) = damping_of(scene), _loop(scene, delay_ticks)
+    highest_nspm, (limit_nspm, loop) = damping_of(scene), _slope_limit(scene, delay_ticks)
     if highest_nspm <= limit_nspm:
         return None
     if stimulus.vary in OF_LINK:
         gives = f'"{condition_of(protocol, stimulus)}" gives'
-        hint = f"damping_nspm = {floored(limit_nspm, 1):g}"
+        hint = f"damping_nspm = {rounded_down(limit_nspm, 1):g}"
     else:
-        every = list(_every(protocol, blocks))
-        gives = _named(every, [level for level in every if level.damping_nspm > limit_nspm], _GIVES)
-        hint = _within_limit(stimulus, standard, level, limit_nspm)
+        every = list(_levels_at_strongest_force(protocol, blocks))
+        gives = _levels_with_verb(every, [level for level in every if level.damping_nspm > limit_nspm], _GIVES)
+        hint = _remedy(stimulus, standard, level, limit_nspm)
     message = f"{gives} {highest_nspm:g} N·s/m at the hand; {loop} is {limit_nspm:g}"
     return Fault(("stimuli", str(blocks[0].stimulus), "levels"), message, hint)
 
 
-def clipped(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> Iterator[Fault]:
+def check_clipping(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> Iterator[Fault]:
     """Yield the levels that each limit clips; a level that both clip counts for the slope limit.
 
-    The blocks have one stimulus; in those whose task sets no pace, only damping has a limit (`clipped_unpaced`).
+    The blocks have one stimulus; without a pace, only damping has a limit (`unpaced_clipping_warning`).
     A force acts ``delay_ticks`` ticks late.
     """
-    beyond = beyond_slope_limit(protocol, blocks, delay_ticks)
+    beyond = slope_limit_fault(protocol, blocks, delay_ticks)
     if beyond is not None:
         yield beyond
     place, stimulus = ("stimuli", str(blocks[0].stimulus), "levels"), stimulus_of(protocol, blocks[0])
     blocks = [block for block in blocks if isinstance(protocol.tasks[block.task], Follow)]
-    felt = [(block, scene) for block in blocks for *_, scene in ends(protocol, block) if len(scene.liquids) == 1]
+    felt = [
+        (block, scene) for block in blocks for *_, scene in extreme_levels(protocol, block) if len(scene.liquids) == 1
+    ]
     if all(steady_force(scene, hand_mps_of(protocol, block)).limit is None for block, scene in felt):
         return
     condition = condition_of(protocol, stimulus)
     if stimulus.vary in OF_LINK:
         block, scene = max(felt, key=lambda pair: hand_mps_of(protocol, pair[0]))
-        yield from clipped_at_pace(protocol, block, scene, f'"{condition}" is', place)
+        yield from check_clipping_at_pace(protocol, block, scene, f'"{condition}" is', place)
         return
-    every, scene = _every(protocol, blocks), protocol.scene_for(condition)
-    limit_nspm, loop = _loop(scene, delay_ticks)
+    every, scene = _levels_at_strongest_force(protocol, blocks), protocol.scene_for(condition)
+    limit_nspm, loop = _slope_limit(scene, delay_ticks)
     by_loop = [level for level in every if level.damping_nspm > limit_nspm or level.clipped_by == "slope"]
     if by_loop and beyond is None:
         most = max(by_loop, key=lambda level: level.asked_n or 0.0)
         message = (
-            f"{_named(list(every), by_loop, _IS)} {most.asked_n:.1f} N at {FASTER:g} times the paced "
+            f"{_levels_with_verb(list(every), by_loop, _IS)} {most.asked_n:.1f} N at {FASTER:g} times the paced "
             f"{hand_mps_of(protocol, every[most]) / FASTER:.3g} m/s; {loop} leaves {most.sent_n:.1f} N"
         )
-        yield Fault(place, message, _highest_in_full(protocol, every[most], most.standard))
+        yield Fault(place, message, _highest_unclipped_level(protocol, every[most], most.standard))
     by_force = [level for level in every if (level.asked_n or 0.0) > scene.force_limit_n and level not in by_loop]
     if by_force:
         most = max(by_force, key=lambda level: level.asked_n or 0.0)
         strongest = override_value(scene, stimulus.vary, most.comparison)
-        named = _named(list(every), by_force, _IS)
-        yield from clipped_at_pace(protocol, every[most], strongest, named, place)
+        named = _levels_with_verb(list(every), by_force, _IS)
+        yield from check_clipping_at_pace(protocol, every[most], strongest, named, place)
 
 
-def _every(protocol: Protocol, blocks: Sequence[Block]) -> dict[Level, Block]:
+def _levels_at_strongest_force(protocol: Protocol, blocks: Sequence[Block]) -> dict[Level, Block]:
     """Return each level of one stimulus once, with the block in which its force is the largest."""
     levels_by_value: dict[tuple[float, float], tuple[Level, Block]] = {}
     for block in blocks:
@@ -167,24 +169,26 @@ def _every(protocol: Protocol, blocks: Sequence[Block]) -> dict[Level, Block]:
     return dict(levels_by_value[key] for key in sorted(levels_by_value))
 
 
-def clipped_unpaced(protocol: Protocol, blocks: Sequence[Block]) -> str | None:
+def unpaced_clipping_warning(protocol: Protocol, blocks: Sequence[Block]) -> str | None:
     """Return a warning about levels clipped in fast motions of a task without a pace, or None.
 
     The blocks have one stimulus and one task.
     """
     task = blocks[0].task
-    scenes = [scene for one in blocks for *_, scene in ends(protocol, one) if len(scene.liquids) == 1]
-    if isinstance(protocol.tasks[task], Follow) or all(steady_force(one, UNPACED_MPS).limit is None for one in scenes):
+    scenes = [scene for block in blocks for *_, scene in extreme_levels(protocol, block) if len(scene.liquids) == 1]
+    if isinstance(protocol.tasks[task], Follow) or all(
+        steady_force(scene, UNPACED_MPS).limit is None for scene in scenes
+    ):
         return None
-    every = list(_every(protocol, blocks))
+    every = list(_levels_at_strongest_force(protocol, blocks))
     some = [level for level in every if level.clipped_by is not None]
-    of = f" of {_listed(every, some)}" if some else ""  # a number of the condition changes no force
+    of = f" of {_level_ranges(every, some)}" if some else ""  # a number of the condition changes no force
     by_loop = any(steady_force(scene, UNPACED_MPS).limit == "slope" for scene in scenes)
     limit = "by the slope limit" if by_loop else f"at {protocol.device.force_limit_n:g} N"
     return f"tasks.{task}: at {UNPACED_MPS:g} m/s the force{of} is clipped {limit}: such trials are repeated: {PACED}"
 
 
-def clipped_at_pace(protocol: Protocol, block: Block, scene: Scene, what: str, place: Path) -> Iterator[Fault]:
+def check_clipping_at_pace(protocol: Protocol, block: Block, scene: Scene, what: str, place: Path) -> Iterator[Fault]:
     """Yield a fault if the force limit clips a scene at a block's pace, with the share and the remedy.
 
     ``what`` is the subject of the sentence with its verb: "standard 32 at level 0.6 is".
@@ -204,54 +208,54 @@ def clipped_at_pace(protocol: Protocol, block: Block, scene: Scene, what: str, p
         place,
         f"{what} {drag_n:.1f} N at {FASTER:g} times the paced {pace_mps:.3g} m/s; device.force_limit_n is "
         f"{scene.force_limit_n:g}",
-        f"amplitude_mm = {floored(least * task.amplitude_mm, 1):g} or "
-        f"frequency_hz = {floored(least * task.frequency_hz, 2):g}",
+        f"amplitude_mm = {rounded_down(least * task.amplitude_mm, 1):g} or "
+        f"frequency_hz = {rounded_down(least * task.frequency_hz, 2):g}",
     )
 
 
-def floored(value: float, digits: int) -> float:
+def rounded_down(value: float, digits: int) -> float:
     """Return a value rounded down, with a margin for rounding errors of the value itself."""
     step = math.pow(10, digits)
     return math.floor(value * step + 1e-6) / step
 
 
-def _loop(scene: Scene, delay_ticks: int) -> tuple[float, str]:
+def _slope_limit(scene: Scene, delay_ticks: int) -> tuple[float, str]:
     """Return the slope limit of a scene's loop [N·s/m] and its name."""
     limit_nspm = slope_limit(1 / scene.rate_hz, delay_ticks, scene.velocity)
     ticks = counted(delay_ticks, "tick")
     return limit_nspm, f"the slope limit ({scene.rate_hz:g} Hz, {scene.velocity.kind}, {ticks})"
 
 
-def _within_limit(stimulus: Stimulus, standard: float | None, level: float, limit_nspm: float) -> str:
+def _remedy(stimulus: Stimulus, standard: float | None, level: float, limit_nspm: float) -> str:
     """Return the remedy that keeps a damping within its limit."""
     if standard is None or stimulus.level_kind == "value":
-        return f"levels to {floored(limit_nspm, 1):g}"
+        return f"levels to {rounded_down(limit_nspm, 1):g}"
     if standard >= limit_nspm:
         return f"the standard below {limit_nspm:g}"
     if stimulus.level_kind == "weber":
         most_level, most_standard = limit_nspm / standard - 1, limit_nspm / (1 + level)
     else:
         most_level, most_standard = limit_nspm - standard, limit_nspm - level
-    return f"levels to {floored(most_level, 3):g}, or the standard to {floored(most_standard, 1):g}"
+    return f"levels to {rounded_down(most_level, 3):g}, or the standard to {rounded_down(most_standard, 1):g}"
 
 
-def _highest_in_full(protocol: Protocol, block: Block, standard: float | None) -> str:
+def _highest_unclipped_level(protocol: Protocol, block: Block, standard: float | None) -> str:
     """Return the highest level of a standard that no limit clips; "" if all are clipped."""
     stimulus, limits = stimulus_of(protocol, block), level_limits(protocol, block)
     if limits is None or not limits.lowest:
         return ""
     highest = stimulus.level_between(standard, limits.lowest)
-    return f"levels to {floored(highest, 3):g}" if highest >= stimulus.levels[0] else ""
+    return f"levels to {rounded_down(highest, 3):g}" if highest >= stimulus.levels[0] else ""
 
 
-def _named(every: Sequence[Level], some: Sequence[Level], verbs: tuple[str, str]) -> str:
+def _levels_with_verb(every: Sequence[Level], some: Sequence[Level], verbs: tuple[str, str]) -> str:
     """Return levels as the subject of a sentence with its verb: "levels 40 and 60 give up to"."""
-    subject = _listed(every, some)
+    subject = _level_ranges(every, some)
     several = subject.startswith("levels") or len({level.standard for level in some}) > 1
     return f"{subject} {verbs[several]}{' up to' * (len(some) > 1)}"
 
 
-def _listed(every: Sequence[Level], some: Sequence[Level]) -> str:
+def _level_ranges(every: Sequence[Level], some: Sequence[Level]) -> str:
     """Return levels by standard; of many in a row only the first and the last."""
     phrases = []
     for standard in dict.fromkeys(level.standard for level in some):
@@ -289,17 +293,19 @@ def fastest_hz(velocity: Velocity, rate_hz: float, share: float) -> float:
     )
 
 
-def returned(protocol: Protocol) -> Iterator[Fault]:
+def check_returned_energy(protocol: Protocol) -> Iterator[Fault]:
     """Yield faults for blocks of levels in a paced motion whose delayed force returns too much energy."""
     strokes = (
         (block, task.fastest_stroke(protocol.device.workspace_m))
         for block in protocol.blocks.values()
         if block.stimulus is not None and isinstance(task := protocol.tasks[block.task], Follow)
     )
-    yield from dict.fromkeys(filter(None, (_returned(protocol, block, stroke) for block, stroke in strokes)))
+    yield from dict.fromkeys(
+        filter(None, (_returned_energy_fault(protocol, block, stroke) for block, stroke in strokes))
+    )
 
 
-def _returned(protocol: Protocol, block: Block, stroke: Stroke) -> Fault | None:
+def _returned_energy_fault(protocol: Protocol, block: Block, stroke: Stroke) -> Fault | None:
     """Return a fault if a block's force returns more energy than the limit, with the level that returns most."""
     stimulus = stimulus_of(protocol, block)
     condition = condition_of(protocol, stimulus)
@@ -317,7 +323,7 @@ def _returned(protocol: Protocol, block: Block, stroke: Stroke) -> Fault | None:
         ("stimuli", str(block.stimulus), "levels"),
         f"{damping:.3g} N·s/m delayed by {1000 * delay_s:.3g} ms returns {1000 * most_j:.1f} mJ per motion reversal; "
         "the passivity controller removes it",
-        f"at most {longest_ms(damping, stroke)} ms, which return {1000 * LIMIT_J:g} mJ",
+        f"at most {longest_delay_ms(damping, stroke)} ms, which return {1000 * LIMIT_J:g} mJ",
     )
 
 
@@ -333,7 +339,7 @@ def returned_j(damping: float, stroke: Stroke, delay_s: float) -> float:
     return damping * stroke.speed_mps**2 / (2 * omega) * (math.sin(angle) - angle * math.cos(angle))
 
 
-def longest_ms(damping: float, stroke: Stroke) -> float:
+def longest_delay_ms(damping: float, stroke: Stroke) -> float:
     """Return the longest delay at which a damper [N·s/m] returns no more energy than the limit [whole ms]."""
     beyond = (
         delay_ms for delay_ms in range(MOST_DELAY_MS + 1) if returned_j(damping, stroke, delay_ms / 1000) > LIMIT_J

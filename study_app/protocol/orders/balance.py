@@ -19,7 +19,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import CodeOrder, Orders, orders_of
 from study_app.protocol.orders.durations import variants
 from study_app.protocol.orders.schedule import blocks_in_order, codes_of
-from study_app.protocol.sequences import borders_even, enrolment, longest_run, row_count, shortest_distance
+from study_app.protocol.sequences import enrolment_number, has_even_borders, longest_run, row_count, shortest_distance
 from study_app.protocol.streams import draw_secret, group_of, stream
 
 Table: TypeAlias = tuple[tuple[int, ...], ...]
@@ -84,7 +84,7 @@ class Balance:
     blocks: tuple[BlockBalance, ...]
 
 
-def numbered(count: int, first: str = "P001") -> tuple[str, ...]:
+def numbered_participants(count: int, first: str = "P001") -> tuple[str, ...]:
     """Return so many participant ids from ``first`` on; StudyError if that does not end in a number."""
     match = re.fullmatch(r"([A-Za-z0-9]*?)([0-9]+)", first)
     if match is None:
@@ -125,7 +125,7 @@ def balance(
     if not participants:
         raise StudyError("no participants: a design is judged over at least one")
     orders = orders_of(protocol)
-    places = [place if in_group else enrolment(who) for place, who in enumerate(participants, start=1)]
+    places = [place if in_group else enrolment_number(who) for place, who in enumerate(participants, start=1)]
     unnumbered = tuple(who for who, place in zip(participants, places, strict=True) if place is None)
     placed = [*zip(participants, places, strict=True)]
     blocks = []
@@ -137,7 +137,7 @@ def balance(
             blocks.append(BlockBalance(block.id, title, block.order, block.repetitions, counted, unnumbered))
     if orders.block_order != "fixed" and sum(block.phase == "main" for block in orders.blocks) > 1:
         order: CodeOrder = "williams" if orders.block_order == "balanced" else "shuffled"
-        of_blocks = _of_blocks(orders, placed, seed)
+        of_blocks = _block_evenness(orders, placed, seed)
         blocks.append(BlockBalance("", "The main blocks", order, 1, of_blocks, unnumbered))
     return Balance(orders.study, session, len(participants), seed, tuple(blocks))
 
@@ -195,19 +195,19 @@ def block_order_words(protocol: Protocol, planned: int | None, *, in_group: bool
     if orders.block_order == "random":
         of = "" if planned is None else f": {planned / blocks:.3g} of {planned} participants have a block in a place"
         return f"random: drawn in each session, even on average only{of}"
-    order_evenness = _of_blocks(orders, [("", place) for place in range(1, planned + 1)], 1) if planned else None
+    order_evenness = _block_evenness(orders, [("", place) for place in range(1, planned + 1)], 1) if planned else None
     rows = row_count("williams", blocks)
     by, of = ("place in the group", " per group") if in_group else ("number in the participant's id", "")
     text = f"balanced: {rows} orders, by the {by}"
     if planned is None or order_evenness is None:
         return f"{text}; any multiple of {rows} participants{of} is even"
     counts = [count for line in order_evenness.positions for count in line]
-    even = _times(counts[0]) if order_evenness.positions_even else _range(counts)
+    even = _times_text(counts[0]) if order_evenness.positions_even else _range_text(counts)
     more = "" if order_evenness.balanced else f"; {planned + -planned % rows} would be even"
     return f"{text}; {planned} participants{of} have each block in each place {even}{more}"
 
 
-def _of_blocks(orders: Orders, placed: Iterable[tuple[str, int | None]], seed: int) -> Evenness:
+def _block_evenness(orders: Orders, placed: Iterable[tuple[str, int | None]], seed: int) -> Evenness:
     """Return the evenness of the main blocks' orders; ``placed`` are ids with the numbers that assign their rows."""
     names = [block.id for block in orders.blocks if block.phase == "main"]
     shown = (blocks_in_order(orders, who, seed, place) for who, place in placed)
@@ -221,10 +221,10 @@ def describe_balance(judged: Balance) -> str:
     head = f"{judged.study}{whose}: the orders of {people}, each with seed {judged.seed}"
     if not judged.blocks:
         return f"{head}\n\nNo block has more than one code: there is nothing to balance."
-    return "\n\n".join((head, *("\n".join(_section(block)) for block in judged.blocks)))
+    return "\n\n".join((head, *("\n".join(_block_lines(block)) for block in judged.blocks)))
 
 
-def _section(block: BlockBalance) -> Iterator[str]:
+def _block_lines(block: BlockBalance) -> Iterator[str]:
     counted = block.evenness
     times = "" if block.repetitions == 1 else f", each {block.repetitions} times"
     if block.id:
@@ -232,14 +232,14 @@ def _section(block: BlockBalance) -> Iterator[str]:
     else:
         yield f"{block.title}: {'balanced' if block.order == 'williams' else 'random'}"
     yield ""
-    yield from _table("position", range(1, len(counted.positions) + 1), counted.codes, counted.positions)
+    yield from _count_lines("position", range(1, len(counted.positions) + 1), counted.codes, counted.positions)
     yield ""
-    yield from _table("after", counted.codes, counted.codes, counted.follows)
+    yield from _count_lines("after", counted.codes, counted.codes, counted.follows)
     yield ""
-    yield from (f"  {sentence}" for sentence in (*_verdict(counted), *_advice(block)))
+    yield from (f"  {sentence}" for sentence in (*_verdict_lines(counted), *_advice(block)))
 
 
-def _table(corner: str, names: Sequence[object], codes: Sequence[str], counts: Table) -> Iterator[str]:
+def _count_lines(corner: str, names: Sequence[object], codes: Sequence[str], counts: Table) -> Iterator[str]:
     """Yield a table of counts with a row for each name and a column for each code."""
     width = max(len(str(cell)) for cell in (*codes, *(count for line in counts for count in line)))
     first = len("position")
@@ -248,17 +248,17 @@ def _table(corner: str, names: Sequence[object], codes: Sequence[str], counts: T
         yield f"  {name!s:<{first}}  {'  '.join(f'{count:>{width}}' for count in line)}"
 
 
-def _verdict(counted: Evenness) -> Iterator[str]:
+def _verdict_lines(counted: Evenness) -> Iterator[str]:
     cells = [count for line in counted.positions for count in line]
     if counted.positions_even:
-        yield f"Positions are balanced: each code comes in each position {_times(cells[0])}."
+        yield f"Positions are balanced: each code comes in each position {_times_text(cells[0])}."
     else:
-        yield f"Positions are uneven: a code comes in a position {_range(cells)}."
+        yield f"Positions are uneven: a code comes in a position {_range_text(cells)}."
     after = counted.after_another
     if counted.follows_even:
-        yield f"Carry-over is balanced: each code follows each other one {_times(after[0])}."
+        yield f"Carry-over is balanced: each code follows each other one {_times_text(after[0])}."
     else:
-        yield f"Carry-over is uneven: a code follows another one {_range(after)}."
+        yield f"Carry-over is uneven: a code follows another one {_range_text(after)}."
     if counted.shortest_distance is not None:
         least = f"the least distance from one to the next of its kind is {counted.shortest_distance}"
         yield f"At most {counted.longest_run} of a kind come in a row; {least}."
@@ -276,15 +276,15 @@ def _advice(block: BlockBalance) -> Iterator[str]:
                 rows = row_count("williams", codes)
                 yield f'order = "williams" would be even exactly, for every {rows} participants.'
         case "williams" | "latin" as square:
-            yield from _rounds(block, row_count(square, codes))
-            if square == "williams" and not borders_even(codes, repetitions):
-                enough = next(more for more in count(repetitions) if borders_even(codes, more))
+            yield from _round_lines(block, row_count(square, codes))
+            if square == "williams" and not has_even_borders(codes, repetitions):
+                enough = next(more for more in count(repetitions) if has_even_borders(codes, more))
                 yield f"From one repetition to the next carry-over cannot be even; with {enough} repetitions it can."
             if square == "latin" and codes > 2:
                 yield 'A Latin square evens out positions alone; order = "williams" evens out carry-over too.'
 
 
-def _rounds(block: BlockBalance, rows: int) -> Iterator[str]:
+def _round_lines(block: BlockBalance, rows: int) -> Iterator[str]:
     """Yield whether the participants complete rounds of rows, and how many would."""
     codes, people = len(block.evenness.codes), block.evenness.orders
     if block.unnumbered:
@@ -296,16 +296,16 @@ def _rounds(block: BlockBalance, rows: int) -> Iterator[str]:
         yield f"A full round is the numbers 1 to {rows}, {rows + 1} to {2 * rows} and so on: these ids miss some."
     else:
         enough = people + -people % rows
-        then = f"each code then comes in each position {_times(enough // codes)}"
-        if block.order == "williams" and borders_even(codes, block.repetitions):
+        then = f"each code then comes in each position {_times_text(enough // codes)}"
+        if block.order == "williams" and has_even_borders(codes, block.repetitions):
             follows = enough * (codes * block.repetitions - 1) // (codes * (codes - 1))
-            then += f" and follows each other one {_times(follows)}"
+            then += f" and follows each other one {_times_text(follows)}"
         yield f"A full round is {rows} participants, the next number that fills one is {enough}: {then}."
 
 
-def _times(number: int) -> str:
+def _times_text(number: int) -> str:
     return {1: "once", 2: "twice"}.get(number, f"{number} times")
 
 
-def _range(counts: Sequence[int]) -> str:
+def _range_text(counts: Sequence[int]) -> str:
     return f"{min(counts)} to {max(counts)} times, {sum(counts) / len(counts):.3g} on average"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from study_app.protocol.groups import numbered_parts, session_count, sessions_differ, steps_of
+from study_app.protocol.groups import parts_by_block, session_count, sessions_differ, steps_of
 from study_app.protocol.model import Block, Protocol, Questionnaire
 from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.tracks import design_of, method_of
@@ -22,7 +22,7 @@ def own_protocol(protocol: Protocol, group: str | None, session: int) -> Protoco
     if not sessions_differ(protocol):
         return protocol
     steps = steps_of(protocol, group, session)
-    parts = numbered_parts(steps, {name: block.part for name, block in protocol.blocks.items()})
+    parts = parts_by_block(steps, {name: block.part for name, block in protocol.blocks.items()})
     blocks = {
         name: block.model_copy(update={"part": parts[name]}) if name in parts else block
         for name, block in protocol.blocks.items()

@@ -32,7 +32,7 @@ from typing import TypeAlias
 from study_app.protocol.blocks import Phase
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import BlockOrder, FormOrder, Orders, block_codes, orders_of
-from study_app.protocol.sequences import Constraint, arrange, assigned_row, row, row_count
+from study_app.protocol.sequences import Constraint, assigned_row, draw_order, row, row_count
 from study_app.protocol.streams import Draw, shuffle, stream
 from study_app.protocol.tracks import tracks_of
 
@@ -120,7 +120,7 @@ def build_schedule(protocol: Protocol | Orders, participant: str, seed: int, pla
     orders = orders_of(protocol) if isinstance(protocol, Protocol) else protocol
     steps: list[Step] = []
     number, after, times = 1, None, Counter[str]()
-    for step in _placed(orders, participant, seed, place):
+    for step in _steps_in_order(orders, participant, seed, place):
         if isinstance(step, str):
             steps.append(PageStep(step))
             continue
@@ -152,7 +152,9 @@ def build_schedule(protocol: Protocol | Orders, participant: str, seed: int, pla
     return Schedule(participant, seed, tuple(steps))
 
 
-def _placed(orders: Orders, participant: str, seed: int, place: int | None) -> tuple[str | BlockOrder | FormOrder, ...]:
+def _steps_in_order(
+    orders: Orders, participant: str, seed: int, place: int | None
+) -> tuple[str | BlockOrder | FormOrder, ...]:
     """Return the steps with the main blocks in the participant's order; each takes the part number of its place."""
     places = [at for at, step in enumerate(orders.steps) if isinstance(step, BlockOrder) and step.phase == "main"]
     steps = list(orders.steps)
@@ -185,7 +187,7 @@ def codes_of(study: str, block: BlockOrder, participant: str, seed: int, place: 
             return tuple(code for drawn in streams for code in shuffle(codes, drawn.random))
         case "constrained":
             constraint = Constraint(block.max_repeats, block.min_distance)
-            return arrange(codes, times, constraint, stream(seed, f"order/{participant}/{block.id}").random)
+            return draw_order(codes, times, constraint, stream(seed, f"order/{participant}/{block.id}").random)
         case "interleaved":
             rounds = range(1, max(block.slots) + 1)
             left = [tuple(code for code, slots in zip(codes, block.slots, strict=True) if slots >= n) for n in rounds]
@@ -260,13 +262,13 @@ def reproduce(
     planned = {trial.number: trial for trial in build_schedule(protocol, participant, seed, place).trials}
     attempts = tuple(recorded)
     run = [trial for trial in attempts if isinstance(trial, RecordedTrial)]
-    differences = [sentence for trial in run for sentence in _against(planned.get(trial.number), trial)]
+    differences = [sentence for trial in run for sentence in _trial_differences(planned.get(trial.number), trial)]
     numbers = [trial if isinstance(trial, int) else trial.number for trial in attempts]
-    differences += _progress(numbers, planned, complete=complete, blocks=protocol.study.resume == "block")
+    differences += _progress_differences(numbers, planned, complete=complete, blocks=protocol.study.resume == "block")
     return tuple(dict.fromkeys(differences))
 
 
-def _against(planned: Trial | None, run: RecordedTrial) -> Iterator[str]:
+def _trial_differences(planned: Trial | None, run: RecordedTrial) -> Iterator[str]:
     """Yield the differences between a recorded trial and the planned one with its number."""
     if planned is None:
         yield f"trial {run.number}: recorded, but the seed gives no such trial"
@@ -284,7 +286,9 @@ def _against(planned: Trial | None, run: RecordedTrial) -> Iterator[str]:
         yield f"trial {run.number}: items {said} recorded, the seed gives {given}"
 
 
-def _progress(numbers: list[int], planned: dict[int, Trial], *, complete: bool, blocks: bool) -> Iterator[str]:
+def _progress_differences(
+    numbers: list[int], planned: dict[int, Trial], *, complete: bool, blocks: bool
+) -> Iterator[str]:
     """Yield breaks in the order of trials and attempts.
 
     With ``blocks`` a resumed session presents the block again that it was within, from its first trial.

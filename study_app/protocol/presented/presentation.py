@@ -45,7 +45,7 @@ def presented_condition(protocol: Protocol, presented: Stimulated) -> Condition:
     return condition.model_copy(update=varied)
 
 
-def link_words(delay_ms: float = 0.0, jitter_ms: float = 0.0, loss: float = 0.0) -> Iterator[str]:
+def link_descriptions(delay_ms: float = 0.0, jitter_ms: float = 0.0, loss: float = 0.0) -> Iterator[str]:
     """Yield what is unusual about a condition's force link: delay [ms], jitter [ms], losses."""
     if delay_ms:
         yield f"force {delay_ms:g} ms late"
@@ -55,7 +55,7 @@ def link_words(delay_ms: float = 0.0, jitter_ms: float = 0.0, loss: float = 0.0)
         yield f"{100 * loss:g} % of forces lost"
 
 
-def delays_force(protocol: Protocol) -> bool:
+def has_imperfect_link(protocol: Protocol) -> bool:
     """Return whether any force of a study is sent with delay, jitter or loss."""
     varied = any(stimulus.vary in OF_LINK for stimulus in protocol.stimuli.values())
     return varied or any(condition.link().acts for condition in protocol.conditions.values())
@@ -121,7 +121,7 @@ def next_level(
     block = protocol.blocks[trial.block]
     track = track_of(protocol, block, key.codes[block.id][trial.code])
     earlier = [result for result in heard if result.trial < trial.number]
-    if criterion_met(block, schedule, earlier):
+    if is_criterion_met(block, schedule, earlier):
         return None
     numbers = {other.number for other in schedule.trials if (other.block, other.code) == (trial.block, trial.code)}
     slot = sum(number < trial.number for number in numbers)
@@ -153,7 +153,7 @@ def next_level(
     return presentation_of(protocol, block, track, draws.arrangement(design, slot), level)
 
 
-def criterion_met(block: Block, schedule: Schedule, heard: Sequence[TrialResult]) -> bool:
+def is_criterion_met(block: Block, schedule: Schedule, heard: Sequence[TrialResult]) -> bool:
     """Return whether enough of a block's last answers among ``heard`` are correct to end it."""
     if block.until is None:
         return False
@@ -213,7 +213,7 @@ def _interval(protocol: Protocol, block: Block, track: Track, level: float | Non
     return Stimulated(condition, stimulus.vary, stimulus.comparison(track.standard, level))
 
 
-def presented_by(
+def recorded_presentation(
     protocol: Protocol, codes: Mapping[str, Mapping[str, str]], started: Mapping[str, Any]
 ) -> Presentation:
     """Return a recorded trial's presentation from its first journal line with opened sealed fields.

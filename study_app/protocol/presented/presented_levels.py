@@ -117,7 +117,7 @@ def levels(protocol: Protocol, block_id: str) -> tuple[Level, ...]:
     )
 
 
-def standard_of(protocol: Protocol, block_id: str, standard: float) -> Level:
+def standard_level(protocol: Protocol, block_id: str, standard: float) -> Level:
     """Return a standard of a block as its level 0."""
     block = protocol.blocks[block_id]
     stimulus = stimulus_of(protocol, block)
@@ -161,10 +161,14 @@ def level_limits(protocol: Protocol, block: Block) -> LevelLimits | None:
         unlimited = override_value(scene, stimulus.vary, value).model_copy(update={"force_limit_n": math.inf})
         return steady_force(unlimited, hand_mps).limit is not None
 
-    return LevelLimits(force=_last(beyond_force, most), loop=_last(beyond_loop, most), hand_mps=hand_mps)
+    return LevelLimits(
+        force=_highest_within_limit(beyond_force, most),
+        loop=_highest_within_limit(beyond_loop, most),
+        hand_mps=hand_mps,
+    )
 
 
-def _last(beyond: Callable[[float], bool], most: float) -> float | None:
+def _highest_within_limit(beyond: Callable[[float], bool], most: float) -> float | None:
     """Return the highest value up to a multiple of ``most`` that is within a limit; None if none is."""
 
     def holds(value: float) -> bool:
@@ -187,7 +191,7 @@ def clipping(protocol: Protocol, block: Block, limits: LevelLimits | None = None
     """
     if block.stimulus is None:
         return None
-    scenes = [scene for *_, scene in ends(protocol, block) if len(scene.liquids) == 1]
+    scenes = [scene for *_, scene in extreme_levels(protocol, block) if len(scene.liquids) == 1]
     hand_mps = hand_mps_of(protocol, block)
     if all(steady_force(scene, hand_mps).limit is None for scene in scenes):
         return None
@@ -204,7 +208,7 @@ def hand_mps_of(protocol: Protocol, block: Block) -> float:
     return FASTER * task.fastest_stroke((0.0, 0.0, 0.0)).speed_mps if isinstance(task, Follow) else UNPACED_MPS
 
 
-def ends(protocol: Protocol, block: Block) -> Iterator[tuple[float | None, float, Scene]]:
+def extreme_levels(protocol: Protocol, block: Block) -> Iterator[tuple[float | None, float, Scene]]:
     """Yield standard, level and scene at the strongest and the weakest level of each standard, except for delays."""
     stimulus = stimulus_of(protocol, block)
     if stimulus.vary == DELAY:
@@ -225,4 +229,4 @@ def damping_of(scene: Scene) -> float:
 
 def highest_damping(protocol: Protocol, block: Block) -> float:
     """Return the highest damping that a block of levels presents [N·s/m at the hand]; 0 without a linear law."""
-    return max((damping_of(scene) for _, _, scene in ends(protocol, block)), default=0.0)
+    return max((damping_of(scene) for _, _, scene in extreme_levels(protocol, block)), default=0.0)

@@ -42,12 +42,12 @@ def entries(document: Any, pattern: str) -> Iterator[tuple[Path, Any]]:
         nodes = [
             ((*path, key), value)
             for path, node in nodes
-            for key, value in (_inside(node) if step == "*" else ((step, node[step]),) if has(node, step) else ())
+            for key, value in (_children(node) if step == "*" else ((step, node[step]),) if has(node, step) else ())
         ]
     return iter(nodes)
 
 
-def _inside(node: Any) -> Iterable[tuple[str | int, Any]]:
+def _children(node: Any) -> Iterable[tuple[str | int, Any]]:
     """Return the entries of a table or array with their keys or indices."""
     return node.items() if isinstance(node, _TABLE) else enumerate(node) if isinstance(node, tuple) else ()
 
@@ -102,7 +102,7 @@ class Node(NamedTuple):
 
 
 @lru_cache(maxsize=2)
-def scan(text: str) -> tuple[Node, ...]:
+def scan_nodes(text: str) -> tuple[Node, ...]:
     """Return every header, key and array entry of a TOML text, in order of position."""
     nodes = _Scan(text).nodes
     return tuple(sorted(nodes, key=attrgetter("start")))
@@ -116,15 +116,15 @@ class _Scan:
         self._array_tables: dict[Path, int] = {}
         table: Path = ()
         while self._skip_blank():
-            table = self._header() if text.startswith("[", self._at) else self._assignment(table, "key")
+            table = self._read_header() if text.startswith("[", self._at) else self._read_assignment(table, "key")
 
-    def _header(self) -> Path:
+    def _read_header(self) -> Path:
         start = self._at
-        many = self._take("[[")
+        many = self._take_mark("[[")
         if not many:
-            self._take("[")
-        keys, parts = self._key()
-        self._take("]]" if many else "]")
+            self._take_mark("[")
+        keys, parts = self._read_key()
+        self._take_mark("]]" if many else "]")
         path = self._within_arrays(keys)
         if many:
             index = self._array_tables.get(path, 0)
@@ -151,7 +151,7 @@ class _Scan:
                 path = (*path, self._array_tables[path] - 1)
         return (*path, *keys[-1:])  # none while a header is typed
 
-    def _assignment(self, table: Path, kind: Kind) -> Path:
+    def _read_assignment(self, table: Path, kind: Kind) -> Path:
         """Read a key and its value; return the table that they belong to."""
         start = self._at
         keys: Path
@@ -159,36 +159,36 @@ class _Scan:
         if plain := _PLAIN_KEY.match(self._text, start):
             keys, parts, self._at = (plain[1],), (plain.span(1),), plain.end()
         else:
-            keys, parts = self._key()
+            keys, parts = self._read_key()
             self._skip_blank()
-            self._take("=")
+            self._take_mark("=")
             self._skip_blank()
         value, path = self._at, table + keys
-        self._value(path)
+        self._read_value(path)
         self.nodes.append(Node(kind=kind, path=path, parts=parts, start=start, value=value, end=self._at))
         return table
 
-    def _value(self, path: Path) -> None:
-        if self._take("["):
+    def _read_value(self, path: Path) -> None:
+        if self._take_mark("["):
             index = 0
-            while self._skip_blank() and not self._take("]"):
+            while self._skip_blank() and not self._take_mark("]"):
                 start, entry = self._at, (*path, index)
-                self._value(entry)
+                self._read_value(entry)
                 self.nodes.append(Node(kind="entry", path=entry, parts=(), start=start, value=start, end=self._at))
                 index += 1
                 self._skip_blank()
-                self._take(",")
-        elif self._take("{"):
-            while self._skip_blank() and not self._take("}"):
-                self._assignment(path, "pair")
+                self._take_mark(",")
+        elif self._take_mark("{"):
+            while self._skip_blank() and not self._take_mark("}"):
+                self._read_assignment(path, "pair")
                 self._skip_blank()
-                self._take(",")
+                self._take_mark(",")
         elif string := _STRING.match(self._text, self._at):
             self._at = string.end()
         elif scalar := _SCALAR.match(self._text, self._at):
             self._at += len(scalar.group().rstrip(" \t"))
 
-    def _key(self) -> tuple[Path, tuple[tuple[int, int], ...]]:
+    def _read_key(self) -> tuple[Path, tuple[tuple[int, int], ...]]:
         keys: list[str] = []
         parts: list[tuple[int, int]] = []
         while True:
@@ -202,7 +202,7 @@ class _Scan:
                 parts.append(quoted.span())
                 self._at = quoted.end()
             self._skip_blank()
-            if not self._take("."):
+            if not self._take_mark("."):
                 return tuple(keys), tuple(parts)
 
     def _skip_blank(self) -> bool:
@@ -211,7 +211,7 @@ class _Scan:
             self._at = blank.end()
         return self._at < len(self._text)
 
-    def _take(self, mark: str) -> bool:
+    def _take_mark(self, mark: str) -> bool:
         if self._text.startswith(mark, self._at):
             self._at += len(mark)
             return True
@@ -229,7 +229,7 @@ class Places:
         """The lines by path; only texts with problems are scanned for them."""
         line_starts = [0, *(match.end() for match in re.finditer("\n", self._source))]
         lines: dict[Path, int] = {}
-        for node in scan(self._source):
+        for node in scan_nodes(self._source):
             line = bisect_right(line_starts, node.start)
             for length in range(1, len(node.path)):
                 lines.setdefault(node.path[:length], line)

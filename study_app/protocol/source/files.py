@@ -33,7 +33,7 @@ DRAWN_OR_LIVE: Final = ("tank", "camera")
 """Views of a condition that are no file."""
 
 
-def without_mark(content: bytes) -> bytes:
+def without_byte_order_mark(content: bytes) -> bytes:
     """Return a file's content without the byte order mark that some editors write before UTF-8."""
     return content.removeprefix(codecs.BOM_UTF8)
 
@@ -48,25 +48,25 @@ def with_liquid_files(study: bytes, folder: Path) -> bytes:
 
     One that cannot be read is left out; `load.parse` reports it. A source is returned as it is.
     """
-    study = without_mark(study)
+    study = without_byte_order_mark(study)
     if _HEADER in study or _FOOTAGE_HEADER in study:
         return study
     hashes = {name: digest for name in footage_names(study) if (digest := file_hash(folder / name)) is not None}
-    return bundled(study, lambda name: _read(folder / name), hashes)
+    return bundle(study, lambda name: _text_of_file(folder / name), hashes)
 
 
-def bundled(
+def bundle(
     study: bytes, text_of: Callable[[str], str | None], hashes: Mapping[str, str] = MappingProxyType({})
 ) -> bytes:
     """Return a study's file followed by the files that it names.
 
     ``text_of`` gives the text of a liquid file, None if it is lost; ``hashes`` are the SHA-256 of its footage, by name.
     """
-    texts = {name: text for name in _values(study, "liquids", "file") if (text := text_of(name)) is not None}
-    return study + _table(_FOOTAGE_HEADER, hashes) + _table(_HEADER, texts)
+    texts = {name: text for name in _section_texts(study, "liquids", "file") if (text := text_of(name)) is not None}
+    return study + _table_bytes(_FOOTAGE_HEADER, hashes) + _table_bytes(_HEADER, texts)
 
 
-def unbundled(source: bytes) -> tuple[bytes, dict[str, str]]:
+def unbundle(source: bytes) -> tuple[bytes, dict[str, str]]:
     """Return the study's file in a source, and the texts of its liquid files by name."""
     rest, texts = _split(source, _HEADER)
     return _split(rest, _FOOTAGE_HEADER)[0], texts
@@ -83,7 +83,7 @@ def _split(source: bytes, header: bytes) -> tuple[bytes, dict[str, str]]:
     return (before, tomllib.loads(table.decode())) if separator else (source, {})
 
 
-def _table(header: bytes, texts: Mapping[str, str]) -> bytes:
+def _table_bytes(header: bytes, texts: Mapping[str, str]) -> bytes:
     def quoted(text: str) -> str:
         return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
@@ -91,14 +91,14 @@ def _table(header: bytes, texts: Mapping[str, str]) -> bytes:
     return header + rows.encode() if texts else b""
 
 
-def file_of(liquid: Any) -> Any:
+def liquid_file_name(liquid: Any) -> Any:
     """Return the file name in a liquid's table; None if it has none."""
     return liquid.get("file") if isinstance(liquid, Mapping) else None
 
 
 def footage_names(study: bytes) -> list[str]:
     """Return the sorted names of a study's footage; empty if it is not TOML (`load.parse` reports it)."""
-    return [name for name in _values(study, "conditions", "view") if is_footage(name)]
+    return [name for name in _section_texts(study, "conditions", "view") if is_footage(name)]
 
 
 def is_footage(view: object) -> bool:
@@ -110,19 +110,19 @@ def file_hash(path: Path) -> str | None:
     """Return the SHA-256 of a file in hexadecimal; None if it cannot be read."""
     try:
         held = path.stat()
-        return _hash(path, held.st_size, held.st_mtime_ns) if path.is_file() else None
+        return _hash_of_file(path, held.st_size, held.st_mtime_ns) if path.is_file() else None
     except (OSError, ValueError):
         return None
 
 
 @lru_cache(maxsize=64)
-def _hash(path: Path, size: int, changed_ns: int) -> str:
+def _hash_of_file(path: Path, size: int, changed_ns: int) -> str:
     """Return the hash; ``size`` and ``changed_ns`` make the cache miss after a change."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _values(study: bytes, section: str, key: str) -> list[str]:
+def _section_texts(study: bytes, section: str, key: str) -> list[str]:
     """Return the sorted texts under a key in a section's tables, each once; empty if the study is not TOML."""
     if not re.search(rf"""\b{key}["']?[ \t]*=""".encode(), study):
         return []
@@ -138,10 +138,10 @@ def _values(study: bytes, section: str, key: str) -> list[str]:
     return sorted({value for value in values if isinstance(value, str)})
 
 
-def _read(path: Path) -> str | None:
+def _text_of_file(path: Path) -> str | None:
     try:
         return (
-            without_mark(path.read_bytes()).decode() if path.is_file() else None
+            without_byte_order_mark(path.read_bytes()).decode() if path.is_file() else None
         )  # never a device or a pipe, which may not end
     except (OSError, ValueError):
         return None
@@ -185,12 +185,12 @@ def shipped_studies() -> tuple[Path, ...]:
     return (*(shipped_file(name) for name in shipped()), *sorted(templates))
 
 
-def at_hand() -> tuple[str, ...]:
+def known_protocols() -> tuple[str, ...]:
     """Return the names of the workspace's protocols, then of shipped ones."""
     return tuple(dict.fromkeys((*(path.stem for path in workspace().own_protocols()), *shipped())))
 
 
-def find(name_or_path: str | Path) -> Path:
+def protocol_file(name_or_path: str | Path) -> Path:
     """Return the file of a protocol (ProtocolError if there is none)."""
     path = Path(name_or_path)
     if path.is_file():
@@ -199,7 +199,7 @@ def find(name_or_path: str | Path) -> Path:
         for folder in (workspace().protocols, _shipped_folder()):
             if (file := folder / f"{path.name}.toml").is_file():
                 return file
-        raise _not_found(name_or_path, "no protocol of this name", did_you_mean(path.name, at_hand()))
+        raise _not_found(name_or_path, "no protocol of this name", did_you_mean(path.name, known_protocols()))
     if path.is_dir():
         raise _not_found(name_or_path, "is a folder, not a protocol file", "name one of the .toml files in it")
     if path.exists():
@@ -213,7 +213,7 @@ def _not_found(name_or_path: str | Path, message: str, hint: str) -> ProtocolErr
 
 def source_bytes(name_or_path: str | Path) -> bytes:
     """Return a protocol's file followed by its liquid files (`with_liquid_files`)."""
-    path = find(name_or_path)
+    path = protocol_file(name_or_path)
     try:
         source = path.read_bytes()
         check_size(source, str(name_or_path))

@@ -87,7 +87,7 @@ _LENGTHS = {
 }
 
 
-def shown(value: Any) -> str:
+def shown_value(value: Any) -> str:
     """Return a value as the file would write it, shortened."""
     if isinstance(value, bool):
         return str(value).lower()
@@ -112,7 +112,7 @@ def did_you_mean(word: str, permitted: Iterable[str]) -> str:
     return f"known: {', '.join(known)}" if known else ""
 
 
-def unknown(path: Path, message: str, word: str, permitted: Iterable[str], cutoff: float = 0.0) -> Fault:
+def unknown_name(path: Path, message: str, word: str, permitted: Iterable[str], cutoff: float = 0.0) -> Fault:
     """Return the fault about an unknown name, with the nearest permitted one or the list of them."""
     known = sorted(permitted)
     nearest = difflib.get_close_matches(word, known, n=1, cutoff=cutoff)
@@ -121,7 +121,7 @@ def unknown(path: Path, message: str, word: str, permitted: Iterable[str], cutof
     return Fault(path, message, did_you_mean(word, known), use=use, kind="unknown name", permitted=others)
 
 
-def _quoted(path: Path, value: Any, message: str, permitted: str) -> Fault:
+def _unknown_value(path: Path, value: Any, message: str, permitted: str) -> Fault:
     """Return the fault about a value that is not among quoted words, with the nearest one."""
     near = difflib.get_close_matches(str(value), re.findall('"([^"]*)"', permitted), n=1)
     return Fault(path, message, f'did you mean "{near[0]}"?', use=(path, near[0])) if near else Fault(path, message)
@@ -158,25 +158,25 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
         return Fault((*path, _tag_key(context)), "is missing", tags, kind="missing")
     if kind == "union_tag_invalid":
         tag, tags = context["tag"], str(context["expected_tags"]).replace("'", '"')
-        return _quoted((*path, _tag_key(context)), tag, f'"{tag}" is not one of {tags}', tags)
+        return _unknown_value((*path, _tag_key(context)), tag, f'"{tag}" is not one of {tags}', tags)
     if kind == "question_kind":
         tag = str(value["kind"])
-        return unknown(path, f"{shown(tag)} {details['msg']}", tag, context["permitted"].split(", "))
+        return unknown_name(path, f"{shown_value(tag)} {details['msg']}", tag, context["permitted"].split(", "))
     if kind == "literal_error":
         expected = str(context["expected"]).replace("'", '"')
-        return _quoted(path, value, f"{shown(value)} is not {expected}", expected)
+        return _unknown_value(path, value, f"{shown_value(value)} is not {expected}", expected)
     if kind in _BOUNDS:
         (key, expected), hints = _BOUNDS[kind], (node.get(REASON, "") for node in _nodes_at(document, path, schema))
         bound = int(context[key]) if float(context[key]).is_integer() else context[key]
-        sentence = f"is {shown(value)}, must be {expected} {shown(bound)}"
+        sentence = f"is {shown_value(value)}, must be {expected} {shown_value(bound)}"
         return Fault(path, sentence, next(filter(None, hints), ""), use=(path, bound) if key in {"ge", "le"} else None)
     if kind in _KINDS:
         number: FaultKind = "not a number" if "number" in _KINDS[kind] else ""
-        return Fault(path, f"must be {_KINDS[kind]}, not {shown(value)}", kind=number)
+        return Fault(path, f"must be {_KINDS[kind]}, not {shown_value(value)}", kind=number)
     if kind == "string_pattern_mismatch":
-        return Fault(path, f"{shown(value)} is not permitted: {rule_of(str(context['pattern']))}")
+        return Fault(path, f"{shown_value(value)} is not permitted: {rule_of(str(context['pattern']))}")
     if kind in _LENGTHS:
-        about = {**context, "shown": shown(value)}
+        about = {**context, "shown": shown_value(value)}
         return Fault(path, _LENGTHS[kind].format(**about), counts_entries=kind == "too_short")
     use = context.get("use")
     sentence = details["msg"].removeprefix("Value error, ")

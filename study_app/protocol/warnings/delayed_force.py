@@ -17,9 +17,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from study_app.haptics.model.slope_limits import steady_force
-from study_app.protocol.checks.consistency import numbers
+from study_app.protocol.checks.consistency import felt_numbers
 from study_app.protocol.checks.force_limits import LIMIT_J, damping_nspm, returned_j
-from study_app.protocol.checks.force_limits import longest_ms as longest_returned_ms
+from study_app.protocol.checks.force_limits import longest_delay_ms as longest_returned_ms
 from study_app.protocol.load import load
 from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.trials.tasks import Stroke
@@ -45,7 +45,7 @@ class Entry(NamedTuple):
 
 
 @cache
-def table() -> tuple[Entry, ...]:
+def stored_table() -> tuple[Entry, ...]:
     """Return the shipped table."""
     with (resources.files("study_app.protocol.warnings") / "delayed_force.csv").open(encoding="utf-8") as file:
         return tuple(
@@ -61,18 +61,20 @@ def table() -> tuple[Entry, ...]:
         )
 
 
-def longest_ms(liquid: str, estimator: str, hand: str = "light", withheld_percent: float = WITHHELD_PERCENT) -> float:
+def longest_delay_ms(
+    liquid: str, estimator: str, hand: str = "light", withheld_percent: float = WITHHELD_PERCENT
+) -> float:
     """Return the longest delay [ms] at which at most ``withheld_percent`` of the force is withheld; -1 if none."""
-    rows = _rows(liquid, estimator, hand)
+    rows = _table_rows(liquid, estimator, hand)
     if not rows:
         raise KeyError((liquid, estimator, hand))
     permitted = takewhile(lambda it: it.withheld_percent <= withheld_percent, rows)
     return max((it.delay_ms for it in permitted), default=-1.0)
 
 
-def _rows(liquid: str, estimator: str, hand: str) -> list[Entry]:
+def _table_rows(liquid: str, estimator: str, hand: str) -> list[Entry]:
     """Return the table's rows of a liquid, the shortest delay first."""
-    rows = (it for it in table() if (it.liquid, it.estimator, it.hand) == (liquid, estimator, hand))
+    rows = (it for it in stored_table() if (it.liquid, it.estimator, it.hand) == (liquid, estimator, hand))
     return sorted(rows, key=attrgetter("delay_ms"))
 
 
@@ -90,21 +92,23 @@ def delay_warnings(protocol: Protocol) -> Iterator[str]:
         delay_ms = 1000 * condition.link().mean_delay_s(protocol.device.rate_hz)
         if name not in presented or delay_ms == 0 or len(condition.liquid_ids) > 1:
             continue
-        listed = _in_table(protocol, condition.liquid_ids[0])
+        listed = _name_in_table(protocol, condition.liquid_ids[0])
         problem = (
-            _of_energy(protocol, name, delay_ms) if listed is None else _of_table(protocol, name, listed, delay_ms)
+            _energy_warning(protocol, name, delay_ms)
+            if listed is None
+            else _table_warning(protocol, name, listed, delay_ms)
         )
         if problem is not None:
             yield f"conditions.{name}.force_delay_ms: {problem}, or delay the picture"
 
 
-def _of_table(protocol: Protocol, name: str, liquid: str, delay_ms: float) -> str | None:
+def _table_warning(protocol: Protocol, name: str, liquid: str, delay_ms: float) -> str | None:
     """Return the warning of the stored table for a shipped liquid and a light hand; None if little is withheld."""
     estimator = protocol.scene.velocity.kind if protocol.scene.velocity.kind == "kalman" else "ewma"
-    most_ms = longest_ms(liquid, estimator)
+    most_ms = longest_delay_ms(liquid, estimator)
     if delay_ms <= most_ms:
         return None
-    rows = _rows(liquid, estimator, "light")
+    rows = _table_rows(liquid, estimator, "light")
     percent = float(np.interp(delay_ms, [it.delay_ms for it in rows], [it.withheld_percent for it in rows]))
     if percent <= WITHHELD_PERCENT:
         return None
@@ -116,7 +120,7 @@ def _of_table(protocol: Protocol, name: str, liquid: str, delay_ms: float) -> st
     )
 
 
-def _of_energy(protocol: Protocol, name: str, delay_ms: float) -> str | None:
+def _energy_warning(protocol: Protocol, name: str, delay_ms: float) -> str | None:
     """Return a warning if a liquid outside the table returns more energy than the limit in its tasks' motion."""
     scene, workspace_m = protocol.scene_for(name), protocol.device.workspace_m
     tasks = [
@@ -136,14 +140,14 @@ def _of_energy(protocol: Protocol, name: str, delay_ms: float) -> str | None:
     )
 
 
-def _in_table(protocol: Protocol, liquid: str) -> str | None:
+def _name_in_table(protocol: Protocol, liquid: str) -> str | None:
     """Return the table's name of a liquid; None if it has none with the same numbers and scale."""
     for study, prefix in SHIPPED:
         shipped = _load(study)
         if shipped.scene.scale != protocol.scene.scale:
             continue
         for name, known in shipped.liquids.items():
-            listed = any(entry.liquid == prefix + name for entry in table())
-            if listed and numbers(known) == numbers(protocol.liquids[liquid]):
+            listed = any(entry.liquid == prefix + name for entry in stored_table())
+            if listed and felt_numbers(known) == felt_numbers(protocol.liquids[liquid]):
                 return prefix + name
     return None

@@ -12,7 +12,7 @@ from study_app.haptics.model.gate import effective_speed_mps
 from study_app.haptics.model.slope_limits import HAND_MPS, Steady, steady_force
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.consistency import LEAST_N, force_n
-from study_app.protocol.checks.force_limits import PACED, clipped_unpaced, fastest_hz
+from study_app.protocol.checks.force_limits import PACED, fastest_hz, unpaced_clipping_warning
 from study_app.protocol.model import Follow, Protocol, Published, Reach
 from study_app.protocol.orders.durations import variants
 from study_app.protocol.presented.presented_levels import highest_damping
@@ -44,26 +44,26 @@ def warnings(protocol: Protocol, *, simulates: bool = True, without_force: str =
         *liquid_warnings(protocol),
         *level_warnings(protocol, simulates=simulates),
         *delay_warnings(protocol),
-        *dict.fromkeys(_unperceived(protocol, without_force)),
-        *_unanswerable(protocol),
-        *_incomplete(protocol),
-        *_from_memory(protocol),
+        *dict.fromkeys(_imperceptible_settings(protocol, without_force)),
+        *_analysis_warnings(protocol),
+        *_tasks_without_target(protocol),
+        *_recalled_instruments(protocol),
     )
 
 
 def liquid_warnings(protocol: Protocol) -> tuple[str, ...]:
-    """Return what may be a mistake of the liquids, a sentence each."""
+    """Return possible mistakes in the liquids, a sentence each."""
     felt = {name: steady_force(protocol.scene_of(name)) for name in protocol.liquids}
     return (
-        *_alike(protocol, felt),
-        *_clipped(felt),
+        *_similar_liquids(protocol, felt),
+        *_clipped_liquids(felt),
         *_ignoring_viscosity(protocol, felt),
-        *_practised(protocol),
-        *_of_different_sizes(protocol),
+        *_practised_liquids(protocol),
+        *_balls_of_different_sizes(protocol),
     )
 
 
-def _alike(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
+def _similar_liquids(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
     seen: set[frozenset[str]] = set()
     for block in protocol.main_blocks:
         for liquid, other in combinations(_liquids_of(protocol, block), 2):
@@ -85,7 +85,7 @@ def _liquids_of(protocol: Protocol, block: Block) -> dict[str, None]:
     return dict.fromkeys(name for condition in conditions for name in condition.liquid_ids)
 
 
-def _clipped(felt: dict[str, Steady]) -> Iterator[str]:
+def _clipped_liquids(felt: dict[str, Steady]) -> Iterator[str]:
     for name, it in felt.items():
         if it.limit is not None:
             limit = "the force limit" if it.limit == "norm" else "the slope limit, which keeps the servo stable,"
@@ -117,7 +117,7 @@ def _ignoring_viscosity(protocol: Protocol, felt: dict[str, Steady]) -> Iterator
             )
 
 
-def _practised(protocol: Protocol) -> Iterator[str]:
+def _practised_liquids(protocol: Protocol) -> Iterator[str]:
     """Yield liquids that are practised and judged in another block; levels are practised for their task."""
     used = {block.id: _liquids_of(protocol, block) for block in protocol.blocks_in_order}
     judged = {name: block.id for block in reversed(protocol.main_blocks) for name in used[block.id]}
@@ -132,7 +132,7 @@ def _practised(protocol: Protocol) -> Iterator[str]:
                 )
 
 
-def _of_different_sizes(protocol: Protocol) -> Iterator[str]:
+def _balls_of_different_sizes(protocol: Protocol) -> Iterator[str]:
     """Yield blocks whose conditions show balls of different sizes, which tells them apart."""
     for block in protocol.main_blocks:
         sizes = {1000 * protocol.scene_for(it).body.diameter_m for it in protocol.conditions_in(block.id)}
@@ -147,10 +147,10 @@ def _of_different_sizes(protocol: Protocol) -> Iterator[str]:
 def level_warnings(protocol: Protocol, *, simulates: bool = True) -> Iterator[str]:
     """Yield warnings about blocks with a design; ``simulates``: also those that need simulated observers."""
     blocks = (block for block in protocol.blocks_in_order if block.design is not None)
-    yield from dict.fromkeys(warning for block in blocks for warning in _of_block(protocol, block, simulates))
+    yield from dict.fromkeys(warning for block in blocks for warning in _design_warnings(protocol, block, simulates))
 
 
-def _of_block(protocol: Protocol, block: Block, simulates: bool) -> Iterator[str]:
+def _design_warnings(protocol: Protocol, block: Block, simulates: bool) -> Iterator[str]:
     design, track = design_of(protocol, block), tracks_of(protocol, block)[0]
     count, trials = len(design.arrangements), track.slots - len(track.catch)
     if not design.has_noise and trials % count:  # not every arrangement comes equally often
@@ -171,18 +171,18 @@ def _of_block(protocol: Protocol, block: Block, simulates: bool) -> Iterator[str
             f'designs.{block.design}.feedback: "always" in a double-blind study: anyone who sees the participant\'s '
             'screen sees which answers were correct: choose feedback = "practice"'
         )
-    yield from _unpaced(protocol, block)
+    yield from _unpaced_blocks(protocol, block)
     if simulates:
         yield from imprecise(protocol, block)
 
 
-def _unpaced(protocol: Protocol, block: Block) -> Iterator[str]:
+def _unpaced_blocks(protocol: Protocol, block: Block) -> Iterator[str]:
     if isinstance(protocol.tasks[block.task], Follow) or block.stimulus is None:
         return
     alike = [
         other for other in protocol.blocks.values() if (other.stimulus, other.task) == (block.stimulus, block.task)
     ]
-    if (said := clipped_unpaced(protocol, alike)) is not None:
+    if (said := unpaced_clipping_warning(protocol, alike)) is not None:
         yield said
     error_percent = protocol.limits.level_error_percent
     if highest_damping(protocol, block) > 0 and error_percent is not None:
@@ -193,7 +193,7 @@ def _unpaced(protocol: Protocol, block: Block) -> Iterator[str]:
         )
 
 
-def _unperceived(protocol: Protocol, without_force: str) -> Iterator[str]:
+def _imperceptible_settings(protocol: Protocol, without_force: str) -> Iterator[str]:
     """Yield settings that have no perceptible effect: a delay of an undrawn part, a missing force."""
     for block in protocol.blocks_in_order:
         conditions = {name: protocol.conditions[name] for name in protocol.conditions_in(block.id)}
@@ -220,7 +220,7 @@ def _unperceived(protocol: Protocol, without_force: str) -> Iterator[str]:
             yield f"blocks.{block.id}: {without_force} gives no force{seen}"
 
 
-def _unanswerable(protocol: Protocol) -> Iterator[str]:
+def _analysis_warnings(protocol: Protocol) -> Iterator[str]:
     """Yield why the study may not answer its question, regardless of the answers."""
     decided = protocol.analysis
     for block in protocol.main_blocks:
@@ -229,8 +229,8 @@ def _unanswerable(protocol: Protocol) -> Iterator[str]:
                 f"blocks.{block.id}.order: all participants meet the {protocol.compared_in(block.id)} in one order: "
                 'their effect cannot be told from practice and fatigue: choose "shuffled", "latin" or "williams"'
             )
-        yield from _choices(protocol, block)
-        yield from _of_conditions(protocol, block)
+        yield from _forced_choice_warnings(protocol, block)
+        yield from _condition_warnings(protocol, block)
     half = (POINTS - 1) / 2
     if decided is not None and (decided.equivalence_bound or 0.0) > half:
         yield (
@@ -242,14 +242,14 @@ def _unanswerable(protocol: Protocol) -> Iterator[str]:
             "analysis.participants: is missing: a study that ends at the first significant result has more false "
             "positives than alpha"
         )
-    yield from _attributes(protocol)
-    yield from _order_of_blocks(protocol)
-    yield from dict.fromkeys(_pages_again(protocol))
+    yield from _attribute_groups(protocol)
+    yield from _block_order_warnings(protocol)
+    yield from dict.fromkeys(_repeated_pages(protocol))
     for number, value in enumerate(() if decided is None else decided.published):
-        yield from _not_bracketed(protocol, number, value)
+        yield from _unbracketed_value(protocol, number, value)
 
 
-def _attributes(protocol: Protocol) -> Iterator[str]:
+def _attribute_groups(protocol: Protocol) -> Iterator[str]:
     """Yield randomised groups whose names suggest attributes of participants."""
     for name in protocol.groups if protocol.randomises else ():
         if suggests_attribute(name):
@@ -259,7 +259,7 @@ def _attributes(protocol: Protocol) -> Iterator[str]:
             )
 
 
-def _pages_again(protocol: Protocol) -> Iterator[str]:
+def _repeated_pages(protocol: Protocol) -> Iterator[str]:
     """Yield pages other than breaks that a session shows several times."""
     for steps in (variant.protocol.steps for variant in variants(protocol)):
         for name, page in protocol.pages.items():
@@ -267,7 +267,7 @@ def _pages_again(protocol: Protocol) -> Iterator[str]:
                 yield f"pages.{name}: this page of kind {page.kind} comes {times} times in a session"
 
 
-def _order_of_blocks(protocol: Protocol) -> Iterator[str]:
+def _block_order_warnings(protocol: Protocol) -> Iterator[str]:
     """Yield contrasts of blocks in a fixed order, and fixed blocks among changing ones."""
     for number, contrast in enumerate(() if protocol.analysis is None else protocol.analysis.contrasts):
         if len(contrast.blocks) == 2 and protocol.study.block_order == "fixed" and not protocol.groups:
@@ -285,7 +285,7 @@ def _order_of_blocks(protocol: Protocol) -> Iterator[str]:
             )
 
 
-def _of_conditions(protocol: Protocol, block: Block) -> Iterator[str]:
+def _condition_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
     """Yield conditions that cannot be told apart, or that a trial's name reveals."""
     conditions = [protocol.conditions[name] for name in block.conditions]
     alone = block.design is None and block.questionnaire is not None and len(conditions) == 1
@@ -306,7 +306,7 @@ def _of_conditions(protocol: Protocol, block: Block) -> Iterator[str]:
         yield f"blocks.{block.id}.setting_label: names the condition “{name}”, which participants then know"
 
 
-def _choices(protocol: Protocol, block: Block) -> Iterator[str]:
+def _forced_choice_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
     """Yield missing parts of a block of forced choices at levels."""
     if block.stimulus is None or block.design is None or block.method is None:
         return
@@ -324,7 +324,7 @@ def _choices(protocol: Protocol, block: Block) -> Iterator[str]:
         )
 
 
-def _not_bracketed(protocol: Protocol, number: int, published: Published) -> Iterator[str]:
+def _unbracketed_value(protocol: Protocol, number: int, published: Published) -> Iterator[str]:
     """Yield a published value outside the study's own levels."""
     block = protocol.blocks[published.block]
     if published.measure == "exponent" or block.stimulus is None or block.method is None:
@@ -337,7 +337,7 @@ def _not_bracketed(protocol: Protocol, number: int, published: Published) -> Ite
         )
 
 
-def _incomplete(protocol: Protocol) -> Iterator[str]:
+def _tasks_without_target(protocol: Protocol) -> Iterator[str]:
     """Yield reaching tasks whose trials are valid without a reached target; format 1 is frozen."""
     if protocol.format == 1 or protocol.limits.targets_percent is not None:
         return
@@ -349,7 +349,7 @@ def _incomplete(protocol: Protocol) -> Iterator[str]:
             )
 
 
-def _from_memory(protocol: Protocol) -> Iterator[str]:
+def _recalled_instruments(protocol: Protocol) -> Iterator[str]:
     for name, questionnaire in protocol.questionnaires.items():
         of = questionnaire.instrument
         if of is not None and (recalled := instrument(of).get("from_memory")) is not None:

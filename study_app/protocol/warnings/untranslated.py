@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 
 from study_app.errors import SessionError, StudyError
 from study_app.number_text import counted
-from study_app.protocol.checks.cross_references import TEXTS, as_read
+from study_app.protocol.checks.cross_references import TEXTS, visible_text
 from study_app.protocol.load import read_document
 from study_app.protocol.questionnaires import FOLDER as INSTRUMENTS
 from study_app.protocol.source.document import Path, entries, value_at
@@ -70,14 +70,14 @@ def untranslated_at(
     first = languages[0]
     texts = value if isinstance(value, Mapping) else {first: value}
     for code in languages:
-        parts = _parts(texts.get(code))
-        if (source := _source(parts, code, _shipped_texts())) is not None:
+        parts = _text_parts(texts.get(code))
+        if (source := _source_language(parts, code, _shipped_texts())) is not None:
             yield UntranslatedText(path, code, source, ships=True)
         elif parts and code != first and texts.get(code) == texts.get(first):
             yield UntranslatedText(path, code, first, ships=False)
         else:
             sentences = [part for part in parts if len(part.split()) >= SENTENCE_WORDS]
-            if (source := _source(sentences, code, _workspace_texts(document))) is not None:
+            if (source := _source_language(sentences, code, _workspace_texts(document))) is not None:
                 yield UntranslatedText(path, code, source, ships=False)
 
 
@@ -119,14 +119,14 @@ def listed_places(texts: Sequence[UntranslatedText]) -> str:
 
 
 @lru_cache(maxsize=4096)  # the texts of a study are compared after each edit: 1 to 2 ms instead of 10 to 40
-def _parts(text: Any) -> tuple[str, ...]:
+def _text_parts(text: Any) -> tuple[str, ...]:
     """Return a text's paragraphs or a scale's labels for comparison, without those that have no letter."""
     parts = text if isinstance(text, tuple) else _PARAGRAPHS.split(text) if isinstance(text, str) else ()
-    read = (as_read(part) for part in parts if isinstance(part, str))
+    read = (visible_text(part) for part in parts if isinstance(part, str))
     return tuple(part for part in read if any(map(str.isalpha, part)))
 
 
-def _source(parts: Sequence[str], code: str, known: Mapping[str, frozenset[str]]) -> str | None:
+def _source_language(parts: Sequence[str], code: str, known: Mapping[str, frozenset[str]]) -> str | None:
     """Return the language of the first part that is known only in another language; None if there is none."""
     for part in parts:
         if code != "en" and _PLACEHOLDER.fullmatch(part):
@@ -163,14 +163,14 @@ def _workspace_texts(document: Mapping[str, Any]) -> Mapping[str, frozenset[str]
 
 @lru_cache(maxsize=2)
 def _texts_of_files(files: tuple[tuple[File, int, int], ...], but: str) -> Mapping[str, frozenset[str]]:
-    tables = (_read_own(*file) for file in files)
+    tables = (_read_table_or_nothing(*file) for file in files)
     others = [(table, TEXTS) for table in tables if value_at(table, ("study", "name")) != but]
     shipped = _shipped_texts()
     return {text: codes for text, codes in _languages_by_text(others).items() if text not in shipped}
 
 
 @lru_cache(maxsize=256)
-def _read_own(file: File, _size: int, _changed_ns: int) -> Mapping[str, Any]:
+def _read_table_or_nothing(file: File, _size: int, _changed_ns: int) -> Mapping[str, Any]:
     try:
         return _read_table(file)
     except (StudyError, OSError):
@@ -189,6 +189,6 @@ def _languages_by_text(tables: Sequence[tuple[Mapping[str, Any], Sequence[str]]]
         for pattern in patterns:
             for _, value in entries(table, pattern):
                 for code, text in (value if isinstance(value, Mapping) else {first: value}).items():
-                    for part in _parts(text):
+                    for part in _text_parts(text):
                         languages.setdefault(part, set()).add(code)
     return {text: frozenset(codes) for text, codes in languages.items()}

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from study_app.devices.hand import HandOrders
 from study_app.protocol.orders.schedule import shuffle, stream
-from study_app.protocol.questions import ItemView, Value, shown
+from study_app.protocol.questions import ItemView, Value, shown_questions
 from study_app.protocol.simulated import Rater, TrialFeatures, judgements
 from study_app.protocol.trials.tasks import Reach, Task
 from study_app.psychophysics.delivery import lag
@@ -316,7 +316,7 @@ def fill_in_page(page: QuestionnairePage, features: TrialFeatures, person: Rater
     """Return the choices that answer a page, from the features of the trial."""
     judged = judgements([item.id for item in page.items], features, person, draw)
     answers = {item.id: item.simulated(judged[item.id], draw) for item in page.items}
-    visible = shown(page.items, answers)
+    visible = shown_questions(page.items, answers)
     return answer_choices([item for item in page.items if item.id in visible], answers, draw)
 
 
@@ -337,7 +337,7 @@ def newly_shown_questions(
     page: QuestionnairePage | DesignPage, answers: Mapping[str, Value], seen: Collection[str]
 ) -> tuple[str, ...]:
     """Return the questions of a page that appear because of the answers so far."""
-    return tuple(item for item in shown(page.items, answers) if item not in seen)
+    return tuple(item for item in shown_questions(page.items, answers) if item not in seen)
 
 
 def _mean(values: Any) -> float:

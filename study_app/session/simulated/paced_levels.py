@@ -13,7 +13,7 @@ from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.runtime.offline import samples_along
 from study_app.protocol.model import Follow, Protocol
-from study_app.protocol.presented.presented_levels import ends
+from study_app.protocol.presented.presented_levels import extreme_levels
 from study_app.protocol.tracks import condition_of, stimulus_of
 from study_app.protocol.trials.stimuli import OF_CONDITION, Stimulated
 from study_app.store.delivered import broken_interval_limits, delivered_values, judged_fields
@@ -32,7 +32,7 @@ def undelivered_levels(protocol: Protocol) -> Iterator[str]:
             continue
         t_s = np.arange(round(task.limit_s * protocol.device.rate_hz)) / protocol.device.rate_hz
         hand_m, missed = np.array([task.target_m(time_s) for time_s in t_s.tolist()]), list[str]()
-        for standard, level, scene in ends(protocol, block):
+        for standard, level, scene in extreme_levels(protocol, block):
             if not any(INERTIAL & set(liquid.effects) for liquid in resolve(scene).liquids):
                 continue
             presented = Stimulated(

@@ -21,7 +21,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import variants
 from study_app.protocol.orders.schedule import stream
-from study_app.protocol.presented.presented_levels import ends
+from study_app.protocol.presented.presented_levels import extreme_levels
 from study_app.protocol.tracks import design_of
 from study_app.protocol.trials.tasks import AnyTask
 from study_app.session.preflight import PredictedDelivery
@@ -156,5 +156,5 @@ def _lost_share(protocol: Protocol, block: Block, scenes: _FailingScenes) -> flo
 
 def _scenes(protocol: Protocol, block: Block) -> Iterator[Scene]:
     """Yield the scenes of the strongest and weakest level of each standard; for delays, that of the condition."""
-    scenes = [scene for _, _, scene in ends(protocol, block)]
+    scenes = [scene for _, _, scene in extreme_levels(protocol, block)]
     yield from scenes or map(protocol.scene_for, protocol.conditions_in(block.id))

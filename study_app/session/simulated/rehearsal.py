@@ -35,8 +35,8 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule, draw_key, stream
-from study_app.protocol.presented.presentation import delays_force, next_level
-from study_app.protocol.questions import Value, shown
+from study_app.protocol.presented.presentation import has_imperfect_link, next_level
+from study_app.protocol.questions import Value, shown_questions
 from study_app.protocol.simulated import NO_FEATURES, Comparison, Observer, TrialFeatures
 from study_app.protocol.streams import Key as LevelKey
 from study_app.session.pages import (
@@ -250,7 +250,7 @@ class RehearsedSession(SimulatedParticipant):
         self._features_of: dict[int, tuple[TrialFeatures, ...]] = {}
         self._touch = rig.servo.telemetry.reader()
         self._next_frame_ns = 0
-        self._period_s = 1 / study.device.rate_hz if delays_force(study) else None
+        self._period_s = 1 / study.device.rate_hz if has_imperfect_link(study) else None
         self._paint: Draw = self._stream("screen")
         ports = Ports(rig.servo, store, self._present, self._now_s, store.recorder)
         self._runner = Runner(study, schedule, store.key.codes, ports, study.study.languages[0], start, store.key.nonce)
@@ -403,7 +403,9 @@ class RehearsedSession(SimulatedParticipant):
         if unknown := answers.keys() - {item.id for item in page.items}:
             possible = ", ".join(item.id for item in page.items)
             raise SessionError(f"{', '.join(map(repr, sorted(unknown)))} is not asked on this page: answer {possible}")
-        visible = [item for item in page.items if item.id in shown(page.items, answers) and item.id in answers]
+        visible = [
+            item for item in page.items if item.id in shown_questions(page.items, answers) and item.id in answers
+        ]
         return answer_choices(visible, answers, self._stream(page.stream), changes_mind=False)
 
     def _features_felt(self, trial: int | None) -> TrialFeatures:

@@ -9,7 +9,7 @@ from study_app.errors import SessionError
 from study_app.protocol.model import Protocol, Questionnaire
 from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial
 from study_app.protocol.presented.presentation import Presentation, next_level
-from study_app.protocol.questions import Context, Question, shown
+from study_app.protocol.questions import Context, Question, shown_questions
 from study_app.protocol.streams import Key
 from study_app.protocol.tracks import adjusting_of, design_of, method_of
 from study_app.protocol.trials.designs import Design
@@ -205,7 +205,9 @@ class SessionState:
     @property
     def shown(self) -> tuple[str, ...]:
         """The ids of the questions that are visible with the answers so far."""
-        return shown(self.questions, {item: answer.value for item, answer in self.answers.items() if answer.given})
+        return shown_questions(
+            self.questions, {item: answer.value for item, answer in self.answers.items() if answer.given}
+        )
 
     @property
     def context(self) -> Context:

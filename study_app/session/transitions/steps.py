@@ -9,8 +9,8 @@ from study_app.protocol.orders.schedule import FormStep, PageStep, Step, Trial
 from study_app.protocol.presented.presentation import (
     Presentation,
     arrangement_text,
-    criterion_met,
     delay_s_of,
+    is_criterion_met,
     longest_delay_s,
     trial_result,
 )
@@ -220,7 +220,7 @@ def _has_presented_trial(state: SessionState, last: Trial) -> bool:
 
 
 def _undelivered_reason(state: SessionState, block: Block) -> str:
-    return "criterion_met" if criterion_met(block, state.plan.schedule, state.heard) else "track_ended"
+    return "criterion_met" if is_criterion_met(block, state.plan.schedule, state.heard) else "track_ended"
 
 
 def _missed_criterion(state: SessionState, before: Step | None, step: Step | None) -> Block | None:
@@ -232,7 +232,7 @@ def _missed_criterion(state: SessionState, before: Step | None, step: Step | Non
     goes_on = goes_on or (isinstance(step, PageStep) and step.page_id == block.break_page)
     if goes_on or block.until is None or block.until.missed != "end":
         return None
-    if criterion_met(block, state.plan.schedule, state.heard):
+    if is_criterion_met(block, state.plan.schedule, state.heard):
         return None
     return block
 

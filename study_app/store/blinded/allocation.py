@@ -23,10 +23,10 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from study_app.errors import StoreError, StudyError
-from study_app.protocol.groups import next_group, refuse_beyond_last
+from study_app.protocol.groups import check_session_number, next_group
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import own_protocol
-from study_app.protocol.sequences import enrolment
+from study_app.protocol.sequences import enrolment_number
 from study_app.protocol.streams import group_of
 from study_app.store.atomic import (
     cannot_write,
@@ -172,7 +172,7 @@ def check_session(
         No participant has it, or this one's group has fewer sessions; group or replaced participant are refused
         (`check_choice`); or the study's key cannot be read.
     """
-    refuse_beyond_last(protocol, session)
+    check_session_number(protocol, session)
     check_choice(protocol, claims(study), participant, group=group, row_of=row_of)
     if protocol.groups and is_there(study.key):
         known = allocation_of(study, read_key(study.path), participant)
@@ -209,7 +209,7 @@ def _check_replaced(
 ) -> None:
     replaced = _claim_of(held, row_of)
     if not has_counted_places(held):
-        if enrolment(row_of) is None:
+        if enrolment_number(row_of) is None:
             raise StudyError(
                 f"row of {row_of!r}: an earlier version began this folder, where the number in the ID assigns rows; "
                 "give an ID with a number, such as P007"

@@ -32,7 +32,7 @@ from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.gate import resolve
 from study_app.protocol.model import Protocol, SceneDefaults, StudyLiquid
 from study_app.protocol.orders.schedule import block_codes, draw_key
-from study_app.protocol.sequences import enrolment
+from study_app.protocol.sequences import enrolment_number
 from study_app.protocol.streams import draw_secret, group_of, own_code, place_in_group
 from study_app.protocol.table import RECORDED
 from study_app.store import receipt
@@ -429,7 +429,7 @@ def place_number(start: events.SessionStarted, key: Key) -> int | None:
     """
     if start.place_in_group and start.entry is not None:
         return place_in_group(key.groups, key.nonce, start.entry)[1] if key.groups else start.entry
-    return None if start.row_of is None else enrolment(start.row_of)
+    return None if start.row_of is None else enrolment_number(start.row_of)
 
 
 def opened_key(folder: StudyFolder) -> Key | None:

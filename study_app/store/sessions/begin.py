@@ -15,7 +15,7 @@ from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import stream
-from study_app.protocol.source.files import unbundled
+from study_app.protocol.source.files import unbundle
 from study_app.protocol.trials.stimuli import LEVEL_RULES
 from study_app.store import receipt
 from study_app.store.atomic import (
@@ -141,7 +141,7 @@ def begin_session(
     clock = clock if clock is not None else SessionClock()
     make_folder(study_folder.path)
     draw = stream(start.seed, "blinding").random if start.simulated else None
-    key = open_or_draw_key(study_folder.path, protocol, draw, unbundled(source)[1])
+    key = open_or_draw_key(study_folder.path, protocol, draw, unbundle(source)[1])
     place = Place(study_folder, study_folder.session(start.participant, start.session), protocol.study.name)
     sealed = not reveals(study_folder.path)
     opening = _claim(place)

@@ -20,7 +20,7 @@ from study_app.protocol.differences import CONDITIONS_DIFFER, differences
 from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
-from study_app.protocol.source.files import bundled, hashes_in, unbundled
+from study_app.protocol.source.files import bundle, hashes_in, unbundle
 from study_app.store import receipt
 from study_app.store.atomic import is_there, paths_in, read_own, remove_temporary_files, write_file
 from study_app.store.blinded.blinding import Key, has_same_conditions, open_or_draw_key, opened_key, read_key
@@ -181,7 +181,7 @@ def sealed_source(session_folder: Path, source: bytes) -> bytes:
         files = read_key(study_folder.path).files
     except StoreError:  # `reopen_store` reports the error
         return source
-    return bundled(unbundled(source)[0], files.get, hashes_in(source)) if files else source
+    return bundle(unbundle(source)[0], files.get, hashes_in(source)) if files else source
 
 
 def rebuild_session(session_folder: Path) -> Rebuilt:

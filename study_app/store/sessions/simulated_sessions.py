@@ -18,7 +18,7 @@ from typing import Any, Self
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import stream
-from study_app.protocol.source.files import unbundled
+from study_app.protocol.source.files import unbundle
 from study_app.store import receipt
 from study_app.store.atomic import create_folder, make_folder
 from study_app.store.blinded.allocation import allocate
@@ -80,7 +80,7 @@ class SimulatedStudy:
             if self.folder.data.exists():
                 used_ids(self.folder).check_unused(person, 1)
         make_folder(self.folder.path)
-        self.key = open_or_draw_key(self.folder.path, protocol, stream(seed, "blinding").random, unbundled(source)[1])
+        self.key = open_or_draw_key(self.folder.path, protocol, stream(seed, "blinding").random, unbundle(source)[1])
         self.protocol = protocol
         self._opening: Opening | None = None
         start = SessionStart(

@@ -19,7 +19,7 @@ from typing import Any, Final, TypeAlias
 from study_app.discovery import registry
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
-from study_app.protocol.source.files import without_mark
+from study_app.protocol.source.files import without_byte_order_mark
 from study_app.store import csv_files, exclusions, receipt
 from study_app.store.atomic import is_there, read_own, read_regular, temporary_files
 from study_app.store.blinded import blinding
@@ -358,7 +358,7 @@ def _check_exclusions(study: StudyFolder, sessions: Sessions, findings: Findings
         rows = exclusions.exclusions(study.path)
         if not is_there(study.exclusions):
             return
-        for problem in csv_files.table_problems(without_mark(read_regular(study.exclusions)), EXCLUSIONS):
+        for problem in csv_files.table_problems(without_byte_order_mark(read_regular(study.exclusions)), EXCLUSIONS):
             findings.error(study.exclusions, problem)
         trials = {
             (session.place.folder.participant, session.place.folder.number): session.trials for session in sessions

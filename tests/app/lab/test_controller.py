@@ -24,7 +24,7 @@ def test_entering_opens_and_feels_and_leaving_lets_go_of_everything(
 ) -> None:
     live = felt.live
     assert live is not None
-    assert sys.excepthook == felt.uncaught.hook
+    assert sys.excepthook == felt.uncaught.handle_exception
     qtbot.waitUntil(lambda: bool(prices.asked), timeout=SOON_MS)
     view = felt.view()
     assert (view.busy, view.trouble, view.force_on, view.path) == ("", "", True, "circle")
@@ -35,7 +35,7 @@ def test_entering_opens_and_feels_and_leaving_lets_go_of_everything(
     assert is_let_go(live)
     assert felt.live is None
     assert prices.closed
-    assert sys.excepthook != felt.uncaught.hook
+    assert sys.excepthook != felt.uncaught.handle_exception
     assert not felt.frames.isActive()
     felt.place.show()
     qtbot.waitUntil(lambda: felt.live is not None and felt.live.trace() is not None, timeout=OPENS_MS)
@@ -84,7 +84,7 @@ def test_a_painter_that_an_exception_leaves_at_work_is_ended(
         raise RuntimeError("in a paint event")
 
     with monkeypatch.context() as patched:
-        patched.setattr("study_app.gui.lab.lab_tank.sprites.draw", broken)
+        patched.setattr("study_app.gui.lab.lab_tank.sprites.draw_sprite", broken)
         qtbot.waitUntil(lambda: bool(told), timeout=SOON_MS)
     assert is_let_go(live)
     assert told[0][0] is RuntimeError
@@ -121,7 +121,7 @@ from study_app.protocol.load import load_scene
 application, writing = QCoreApplication(), threading.Event()
 lab_controller.save = lambda *_written: (writing.set(), threading.Event().wait())
 saving, scene = lab_controller.LabSaving(()), load_scene("rek2024", "water")
-saving.save(Path("never.toml"), Setting("Water", scene, scene))
+saving.save_preset(Path("never.toml"), Setting("Water", scene, scene))
 assert writing.wait(20)
 saving.wait(0.1)
 print("ends")
@@ -138,7 +138,7 @@ def test_while_blind_nothing_tells_one_from_the_other(felt: LabController, qtbot
     """Though nothing is exchanged, what is felt begins anew: a hand that felt no fade would know."""
     felt.chance = Stays()
     small = felt.bench.change("body.diameter_m", 0.02)
-    felt.feel(small)
+    felt.feel_workbench(small)
     assert felt.live is not None
     assert felt.view().body_radius_m == pytest.approx(0.001)
     qtbot.waitUntil(lambda: felt.live.due_in_s is None, timeout=SOON_MS)

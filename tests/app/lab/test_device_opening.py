@@ -32,10 +32,10 @@ def test_two_devices_are_never_opened_at_a_time_and_one_that_cannot_be_closed_ho
     opened: list[Any] = []
     opening.failed.connect(lambda error: failed.append(str(error)))
     opening.opened.connect(opened.append)
-    opening.want("falcon")
+    opening.request_device("falcon")
     qtbot.waitUntil(lambda: devices.asked == ["falcon"], timeout=SOON_MS)
-    opening.want("spacemouse")
-    opening.want("mouse")
+    opening.request_device("spacemouse")
+    opening.request_device("mouse")
     devices.gate.set()
     qtbot.waitUntil(lambda: bool(opened), timeout=SOON_MS)
     assert devices.asked == ["falcon", "mouse"]

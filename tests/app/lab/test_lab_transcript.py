@@ -139,7 +139,7 @@ STEPS: dict[str, Any] = {
     "save nowhere": files("save", "nowhere", "mine.toml"),
     "open": files("preset", "syrup.toml"),
     "open none": files("preset", "broken.toml"),
-    "of a study": lambda lab, *_: lab.feel_of_study(lab.bench.b, lab.bench.a, "demo"),
+    "of a study": lambda lab, *_: lab.feel_study_liquids(lab.bench.b, lab.bench.a, "demo"),
     "fault": lambda _lab, live, _folder: setattr(live.servo, "fault", ServoFault("no samples for 50 ms")),
     "fade in after a fault": ask("fade in"),
     "known error": lambda lab, *_: lab.fail(ServoFault("the loop ended")),
@@ -198,7 +198,7 @@ def test_every_signal(qtbot: Any, tmp_path: Path, monkeypatch: Any, caplog: Any,
         if name in OPENING:
             qtbot.waitUntil(lambda: lab._opening.busy_with is None, timeout=SOON_MS)
         timers = [lab.frames.isActive(), lab._due.isActive(), lab._cost_due.isActive()]
-        lab._frame()
+        lab._draw_frame()
         view = lab.view()
         shown = value_lines(
             replace(view, liquids=(), paths=(), workbench=None, device=replace(view.device, choices=())), "view"

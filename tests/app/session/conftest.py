@@ -35,7 +35,7 @@ def make(qapp, world):
     yield build
     for bridge in made_bridges:
         if isValid(bridge):
-            bridge.leave_now()
+            bridge.leave_without_asking()
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     assert sys.excepthook is hook
 

@@ -79,7 +79,7 @@ def test_a_participants_window_that_comes_to_cover_the_operators_pauses_the_sess
         bridge.participant.showFullScreen()
     bridge.watch_screens()
     begin_trial(bridge, world)
-    bridge.participant.come_forward()
+    bridge.participant.bring_forward()
     handle = bridge.participant.windowHandle()
     handle.screenChanged.emit(handle.screen())  # as Qt does for a window of a screen that is removed
     QApplication.processEvents()
@@ -180,7 +180,7 @@ def test_the_operator_sees_forces_in_a_single_blind_study_alone_and_the_particip
         assert bridge.participant.widget.geometry().top() == 0, "without a strip"
         assert bridge.operator.header.page.isHidden()
         seen.append((repr(bridge.participant.page), bridge.participant.grab().toImage()))
-        bridge.leave_now()
+        bridge.leave_without_asking()
         world.samples = records(SAMPLE, 0)
     assert told == {
         "Single-blind": ["50\u2009%, most 50\u2009%", "force 7", "6.2\u2009%"],

@@ -118,7 +118,7 @@ STEPS: dict[str, Any] = {
     "bug": fail(RuntimeError("out of ideas")),
     "no clip": fail(VideoError("the clip ended")),
     "reconnect": ask("reconnect"),
-    "line": lambda bridge, _: bridge.tell_of_device("press the button"),
+    "line": lambda bridge, _: bridge.show_device_line("press the button"),
     "reconnected": reconnected,
     "not reconnected": lambda bridge, _: bridge.reconnecting.failed.emit(DeviceNotFound("still none")),
     "late": let(overruns=3, rate_hz=900.0, worst_gap_s=0.004),
@@ -126,7 +126,7 @@ STEPS: dict[str, Any] = {
     "abort": ask("end", "aborted", "broken"),
     "close": ask("close"),
     "accept": lambda bridge, _: bridge.operator.question.accept(),
-    "leave": lambda bridge, _: bridge.leave_now(),
+    "leave": lambda bridge, _: bridge.leave_without_asking(),
 }
 BEGUN = "wait, go on, shown, push"
 PLAYS = {
@@ -173,8 +173,8 @@ def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, ca
     )  # fmt: skip
     for signal in ("done", "diagnose_asked"):
         getattr(bridge, signal).connect(world.call(signal))
-    monkeypatch.setattr(bridge.operator, "come_forward", world.call("operator.come_forward"))
-    monkeypatch.setattr(bridge.participant, "come_forward", world.call("participant.come_forward"))
+    monkeypatch.setattr(bridge.operator, "bring_forward", world.call("operator.bring_forward"))
+    monkeypatch.setattr(bridge.participant, "bring_forward", world.call("participant.bring_forward"))
     monkeypatch.setattr(bridge.operator, "show_message", world.call("show_message"))
     lines, before = [], list[str]()
     for step in PLAYS[name].split(", "):

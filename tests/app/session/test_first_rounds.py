@@ -30,8 +30,8 @@ class Disturbed(LiveSession):
         super().__init__(replace(CHOSEN, results=results), LIGHT)
         self.window, self.act, self.acted = window, act, False
 
-    def _step(self) -> None:
-        super()._step()
+    def _run_next_step(self) -> None:
+        super()._run_next_step()
         if self.bridge is not None and not self.acted and getattr(self.bridge, self.window).isVisible():
             self.acted = True
             self.act(self.bridge)
@@ -75,8 +75,8 @@ def test_it_pauses_a_session_that_can_be_resumed(
 class ScreensDeleted(LiveSession):
     """A session in which PySide deletes its objects of the screens with a window, between any two steps."""
 
-    def _step(self) -> None:
-        super()._step()
+    def _run_next_step(self) -> None:
+        super()._run_next_step()
         asked = QWidget()
         asked.screen()
         shiboken6.delete(asked)
@@ -100,10 +100,10 @@ def test_windows_deleted_while_a_session_opens_take_no_screen_from_it(
 class ScreenRemoved(LiveSession):
     """A session whose windows were made for two screens, of which one is left before they are shown."""
 
-    def _step(self) -> None:
+    def _run_next_step(self) -> None:
         if self.bridge is not None:
             self.bridge.strip = None
-        super()._step()
+        super()._run_next_step()
 
 
 def test_a_page_without_a_force_stop_does_not_cover_that_of_the_operator(

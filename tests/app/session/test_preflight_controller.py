@@ -170,8 +170,8 @@ def test_a_screen_that_is_removed_meanwhile_ends_the_question(asked: Preflight, 
 def test_a_session_on_two_screens_asks_about_the_participants(machine: Any, monkeypatch: Any, qapp: Any) -> None:
     live = LiveSession(CHOSEN, LIGHT)
     participants = SimpleNamespace(refreshRate=lambda: 75.0, devicePixelRatio=lambda: 1.5)
-    monkeypatch.setattr(live, "screens", lambda: (participants, QGuiApplication.primaryScreen()))
-    live._ask(Ready(machine, FACTS))
+    monkeypatch.setattr(live, "chosen_screens", lambda: (participants, QGuiApplication.primaryScreen()))
+    live._show_preflight(Ready(machine, FACTS))
     assert live.preflight is not None
     said = [one.text() for one in live.preflight.window.findChildren(QLabel)]
     assert "75.0 Hz, 150 %" in said
@@ -260,8 +260,8 @@ def test_an_error_that_is_not_known_is_not_called_none(monkeypatch: Any, told: A
     protocol = load("demo")
     asked = preflight_controller.study_scenes(protocol)[0]
     appraisal = Appraisal([asked, asked], UNKNOWN)
-    while not appraisal.over:
-        appraisal.look()
+    while not appraisal.is_over:
+        appraisal.read_answers()
     assert appraisal.error_n == largest
     assert appraisal.tick_s == pytest.approx(146e-9)
 
@@ -281,8 +281,8 @@ def test_the_share_withheld_is_asked_of_each_liquid_in_the_fastest_stroke_of_its
     )
     appraisal = Appraisal(asked, UNKNOWN)
     assert appraisal.withheld is None
-    while not appraisal.over:
-        appraisal.look()
+    while not appraisal.is_over:
+        appraisal.read_answers()
     assert appraisal.withheld == {
         name: pytest.approx(0.01 * (1 + max(n for n, one in enumerate(asked) if one.liquid == name)))
         for name in protocol.liquids
@@ -298,7 +298,7 @@ def test_the_trials_that_would_not_be_delivered_are_asked_last(monkeypatch: Any,
     protocol = load("demo")
     asked = preflight_controller.study_scenes(protocol)[:1]
     appraisal = Appraisal(asked, UNKNOWN, DeliveryQuestion(protocol, 1))
-    while not appraisal.over:
-        appraisal.look()
+    while not appraisal.is_over:
+        appraisal.read_answers()
     assert appraisal.error_n == 0.02
     assert appraisal.delivery == (answer if isinstance(answer, PredictedDelivery) else None)

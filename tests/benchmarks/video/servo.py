@@ -54,7 +54,7 @@ class Segment:
         self._begun = False
         self.painting_s = 0.0
         self.frames = 0
-        widget.turn_to(replace(widget.page, video=footage is not None))
+        widget.show_interval(replace(widget.page, video=footage is not None))
         if footage is not None:
             footage.fit(*widget.video.size(1.0))
             footage.rewind()

@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[3]))
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QPlainTextEdit
 
-from study_app.designer.document.study import read
+from study_app.designer.document.study import read_study
 from study_app.designer.header import DesignerHeader
 from study_app.designer.problems import ProblemsCard
 from study_app.gui.widgets.controls import ActionButton
@@ -58,7 +58,7 @@ class Tasks:
         """Return the draft or the file of a study."""
         draft = draft_of(self.protocols / f"{name}.toml")
         text = self.protocols.joinpath(f"{name}.toml").read_bytes() if draft is None else draft.text.encode()
-        return dict(read(text, self.protocols).document)
+        return dict(read_study(text, self.protocols).document)
 
     def template(self) -> None:
         """A study from "Compare liquids" with its own title and a second language, saved."""
@@ -152,7 +152,7 @@ class Tasks:
             user.press("Next step")
         user.shortcut("F5", "Play from here")
         wait_until(participant, "the participant's window", 300_000)
-        user.hand.come_forward(user.window)
+        user.hand.bring_forward(user.window)
         user.press("Stop")
         wait_until(lambda: user.sees("Delete"), "the end of the pilot")
 

@@ -54,7 +54,7 @@ if kind == "run":
     sys.argv[1:] = ["run", "demo", "--participant", "P001", "--windowed", "--results", results]
     main()
 from pathlib import Path
-sys.exit(main_controller.home(Path(results), then=visit))
+sys.exit(main_controller.run_home_window(Path(results), then=visit))
 """
 KINDS: Final = {"home": 0, "places": 0, "run": 128 + signal.SIGTERM}  # the exit code that each ends with
 LATEST_MS: Final = 1000  # a session is ended at any time of its first second

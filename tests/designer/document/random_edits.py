@@ -9,8 +9,18 @@ from collections import Counter
 from random import Random
 from typing import Any
 
-from study_app.designer.document.toml_edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset, meaning, same
-from study_app.protocol.source.document import Node, Path, scan
+from study_app.designer.document.toml_edits import (
+    Duplicate,
+    Edit,
+    Insert,
+    Move,
+    Rename,
+    Set,
+    Unset,
+    is_same_value,
+    meant_document,
+)
+from study_app.protocol.source.document import Node, Path, scan_nodes
 
 _TOKENS = re.compile(
     r'"""(?:\\.|[^\\])*?"""(?!")'
@@ -25,7 +35,7 @@ FREE: Path = ("(free)",)
 
 def owners(text: str) -> Counter[tuple[Path, str]]:
     """Return the comments of a text with the path that each belongs to, `FREE` where it belongs to nothing."""
-    nodes = scan(text)
+    nodes = scan_nodes(text)
     found: Counter[tuple[Path, str]] = Counter()
     for match in _TOKENS.finditer(text):
         if match["comment"]:
@@ -160,7 +170,7 @@ def check_comments(before: str, after: str, edit: Edit) -> None:
 
 def values_of(text: str) -> dict[Path, str]:
     """Return how each value that holds no other one is written."""
-    nodes = [node for node in scan(text) if node.kind in {"key", "pair", "entry"}]
+    nodes = [node for node in scan_nodes(text) if node.kind in {"key", "pair", "entry"}]
     inner = {node.path[:length] for node in nodes for length in range(len(node.path))}
     return {node.path: text[node.value : node.end] for node in nodes if node.path not in inner}
 
@@ -181,7 +191,7 @@ def holds_nothing(edit: Edit) -> bool:
 
 def check_edit(before: str, after: str, edit: Edit) -> None:
     """Check the text after an edit against the one before."""
-    meant = meaning(tomllib.loads(before), edit)
-    assert same(tomllib.loads(after), meant) or holds_nothing(edit)
+    meant = meant_document(tomllib.loads(before), edit)
+    assert is_same_value(tomllib.loads(after), meant) or holds_nothing(edit)
     check_comments(before, after, edit)
     assert not unmeant_changes(before, after, edit)

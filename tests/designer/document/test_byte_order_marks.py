@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from study_app.designer.document.study import read
+from study_app.designer.document.study import read_study
 from study_app.designer.document.toml_edits import Set
 from study_app.errors import ProtocolError, StudyError
 from study_app.protocol.load import is_scene_file, load, load_scenes, protocol_hash, source_bytes
@@ -34,10 +34,10 @@ def test_a_mark_changes_neither_study_nor_hash(tmp_path: Path) -> None:
 
 def test_the_designer_reads_and_edits_a_file_with_a_mark(tmp_path: Path) -> None:
     marked, plain = studies(tmp_path / "marked", MARK), studies(tmp_path / "plain", "")
-    study, same = read(marked.read_bytes(), marked.parent), read(plain.read_bytes(), plain.parent)
+    study, same = read_study(marked.read_bytes(), marked.parent), read_study(plain.read_bytes(), plain.parent)
     assert (study.text, study.faults) == (same.text, ())
     edit = Set(("study", "title"), "Dick?")
-    assert study.edited(edit)[0].text == same.edited(edit)[0].text
+    assert study.with_edits(edit)[0].text == same.with_edits(edit)[0].text
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
@@ -47,4 +47,4 @@ def test_utf_16_is_named_in_one_line(encoding: str, tmp_path: Path) -> None:
         load(tmp_path / "wide.toml")
     assert [str(problem) for problem in refused.value.problems] == ["file: is UTF-16 text (save it as UTF-8)"]
     with pytest.raises(StudyError, match="UTF-16"):
-        read((tmp_path / "wide.toml").read_bytes())
+        read_study((tmp_path / "wide.toml").read_bytes())

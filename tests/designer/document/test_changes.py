@@ -6,12 +6,12 @@ from typing import Any
 import pytest
 
 from study_app.designer.document.additions import (
-    added,
     check_values,
-    filled_in,
-    followed,
-    moved,
+    edits_to_add,
+    edits_to_fill_in,
+    edits_to_move,
     number_row,
+    short_text_edits,
     texts_of,
     with_language,
 )
@@ -19,15 +19,15 @@ from study_app.designer.document.document import template
 from study_app.designer.document.fields import (
     check_id,
     choices_at,
-    deletions,
-    initial,
-    left_without,
+    edits_to_delete,
+    edits_to_rename,
+    initial_value,
     named_at,
+    orphaned_keys,
     references_to,
-    renamed,
     with_references,
 )
-from study_app.designer.document.study import Study, read
+from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.measures.study_facts import copied_texts, facts, missing_texts
 from study_app.designer.templates import FOLDER
@@ -43,7 +43,7 @@ NAMES = sorted(path.stem for path in PROTOCOLS.glob("*.toml"))
 
 
 def study_of(name: str) -> Study:
-    return read((PROTOCOLS / f"{name}.toml").read_bytes(), PROTOCOLS)
+    return read_study((PROTOCOLS / f"{name}.toml").read_bytes(), PROTOCOLS)
 
 
 def things(document: Any) -> list[Path]:
@@ -59,7 +59,7 @@ def test_renamed_leaves_no_reference_and_no_session_changed(name: str) -> None:
     for thing in things(study.document)[::4]:
         if thing[0] in {"designs", "methods"} or (len(thing) == 4 and "instrument" in str(study.document[thing[0]])):
             continue
-        changed, _ = study.edited(*renamed(study.document, thing, "quite_other"))
+        changed, _ = study.with_edits(*edits_to_rename(study.document, thing, "quite_other"))
         assert changed.protocol is not None, (thing, changed.problems)
         assert study.protocol is not None
         before, after = (build_schedule(one.protocol, "P001", 1).steps for one in (study, changed))
@@ -67,7 +67,9 @@ def test_renamed_leaves_no_reference_and_no_session_changed(name: str) -> None:
         if thing[0] in {"liquids", "conditions", "tasks", "scales", "pages"}:  # other names are those of random streams
             named = repr(before).replace(f"'{thing[1]}'", "'quite_other'")
             assert repr(after) in {repr(before), named}, thing
-        back, _ = changed.edited(*renamed(changed.document, _renamed(thing), str(_name(study.document, thing))))
+        back, _ = changed.with_edits(
+            *edits_to_rename(changed.document, _renamed(thing), str(_name(study.document, thing)))
+        )
         assert back.text == study.text
 
 
@@ -87,34 +89,34 @@ def _name(document: Any, thing: Path) -> Any:
 )  # fmt: skip
 def test_what_leaves_the_name_of_the_only_one_out_goes_with_it(thing: Path, place: Path) -> None:
     study = study_of("delayjnd")
-    assert left_without(study.document, [thing]) == (place,)
+    assert orphaned_keys(study.document, [thing]) == (place,)
     assert place[:2] in with_references(study.document, thing, study.needs)
 
 
 def test_the_only_condition_leaves_its_liquid_to_what_leaves_its_name_out() -> None:
     study = study_of("delaydetect")
     condition, liquid = ("conditions", "water"), ("liquids", "water")
-    assert left_without(study.document, [condition]) == ()
+    assert orphaned_keys(study.document, [condition]) == ()
     assert with_references(study.document, condition, study.needs) == (condition,)
-    changed, _ = study.edited(*deletions([condition]))
+    changed, _ = study.with_edits(*edits_to_delete([condition]))
     assert not changed.faults
-    assert left_without(study.document, [condition, liquid]) == (("stimuli", "delay", "condition"),)
+    assert orphaned_keys(study.document, [condition, liquid]) == (("stimuli", "delay", "condition"),)
     assert {condition, ("stimuli", "delay")} <= {*with_references(study.document, liquid, study.needs)}
 
 
 def test_liquids_are_named_as_conditions_where_a_study_has_none() -> None:
     text = re.sub(r"\[conditions\.\w+\]\n(?:\w+ = .*\n)+", "", (FOLDER / "compare-liquids.toml").read_text())
-    study = read(text.replace('conditions = ["practice"]', 'conditions = ["syrup"]').encode(), FOLDER)
+    study = read_study(text.replace('conditions = ["practice"]', 'conditions = ["syrup"]').encode(), FOLDER)
     assert not study.problems
     place = ("blocks", "liquids", "conditions", 1)
     assert named_at(study.document, place) == ("liquids", "oil")
     assert references_to(study.document, ("liquids", "oil")) == (place,)
     assert choices_at(study.document, place) == ("water", "oil", "honey", "syrup")
     for edits in (
-        renamed(study.document, ("liquids", "oil"), "butter"),
-        deletions(with_references(study.document, ("liquids", "oil"), study.needs)),
+        edits_to_rename(study.document, ("liquids", "oil"), "butter"),
+        edits_to_delete(with_references(study.document, ("liquids", "oil"), study.needs)),
     ):
-        changed, _ = study.edited(*edits)
+        changed, _ = study.with_edits(*edits)
         assert not changed.problems
 
 
@@ -126,11 +128,11 @@ def test_check_id_refuses_what_is_no_id(name: str) -> None:
 
 def test_a_new_liquid_exerts_a_force_and_a_new_ball_fits_the_tank() -> None:
     study = template("empty")
-    edits, path = added(study, ("liquids",))
-    study, _ = study.edited(*edits)
+    edits, path = edits_to_add(study, ("liquids",))
+    study, _ = study.with_edits(*edits)
     assert study.faults == ()
     assert study.document["liquids"][path[1]] == {"density_kg_m3": 1200}
-    assert initial(study.document, (*path, "body", "diameter_m")) == 0.068
+    assert initial_value(study.document, (*path, "body", "diameter_m")) == 0.068
 
 
 REK = (PROTOCOLS / "rek2024.toml").read_text(encoding="utf-8")
@@ -139,7 +141,7 @@ NO_DELAY = ("conditions", "delay_0")
 
 @pytest.fixture(scope="module")
 def study() -> Study:
-    return read(REK.encode(), PROTOCOLS)
+    return read_study(REK.encode(), PROTOCOLS)
 
 
 @pytest.mark.parametrize(
@@ -170,8 +172,8 @@ def test_an_entry_comes_to_its_place(name: str) -> None:
     for place, listed in lists:
         count = len(listed)
         for index, to in ((0, count), (count - 1, 0), (0, count // 2)):
-            edits, path = moved(study, (*place, index), to)
-            after, _ = study.edited(*edits)
+            edits, path = edits_to_move(study, (*place, index), to)
+            after, _ = study.with_edits(*edits)
             wanted = [*listed[:index], *listed[index + 1 :]]
             wanted.insert(to - (index < to), listed[index])
             assert list(at(after.document, place)) == wanted
@@ -179,7 +181,7 @@ def test_an_entry_comes_to_its_place(name: str) -> None:
 
 
 TITLE = ("pages", "welcome", "title")
-DEMO = read((PROTOCOLS / "demo.toml").read_bytes(), PROTOCOLS)
+DEMO = read_study((PROTOCOLS / "demo.toml").read_bytes(), PROTOCOLS)
 
 
 @pytest.fixture(scope="module")
@@ -187,9 +189,9 @@ def translated() -> Study:
     """The demo with two languages that are copies of the first one, as one step."""
     study = DEMO
     for code in ("nl", "de"):
-        study, _ = study.edited(*with_language(study, code))
+        study, _ = study.with_edits(*with_language(study, code))
     for code in ("nl", "de"):
-        study, _ = study.edited(*filled_in(study, code))
+        study, _ = study.with_edits(*edits_to_fill_in(study, code))
     return study
 
 
@@ -205,10 +207,10 @@ def test_copies_in_two_languages_are_counted_until_each_is_edited_and_a_missing_
     ]
     assert (copied_texts(DEMO), words(DEMO)) == ({}, [])
     for edit in (Set((*TITLE, "nl"), "Een eerste blik"), Unset((*TITLE, "nl"))):
-        edited, _ = translated.edited(edit)
+        edited, _ = translated.with_edits(edit)
         assert copied_texts(edited) == {"nl": count - 1, "de": count}
         assert missing_texts(edited) == ({"nl": 1} if isinstance(edit, Unset) else {})
-    plain, _ = translated.edited(*(Set((*TITLE, code), "7") for code in ("en", "nl")))
+    plain, _ = translated.with_edits(*(Set((*TITLE, code), "7") for code in ("en", "nl")))
     assert copied_texts(plain) == {"nl": count - 1, "de": count}, "7 is the same in all; the German is English"
 
 
@@ -220,7 +222,7 @@ def with_question(text: str, short: str) -> Study:
     start = source.index("[[questionnaires.liquid.items]]")
     end = source.index("[[questionnaires.liquid.items]]", start + 1)
     table = f'[[questionnaires.liquid.items]]\nid = "feels_liquid"\ntext = {text}\nshort = {short}\n\n'
-    return read((source[:start] + table + source[end:]).encode(), PROTOCOLS)
+    return read_study((source[:start] + table + source[end:]).encode(), PROTOCOLS)
 
 
 @pytest.mark.parametrize(
@@ -235,5 +237,5 @@ def with_question(text: str, short: str) -> Study:
     ],
 )
 def test_a_short_text_that_says_what_the_text_says_follows_it(text: str, short: str, found: dict[Any, str]) -> None:
-    edits = followed(with_question(text, short), (*ITEM, "text"), "en", "Was it cold?")
+    edits = short_text_edits(with_question(text, short), (*ITEM, "text"), "en", "Was it cold?")
     assert {edit.path[len(ITEM) :]: edit.value for edit in edits} == found  # type: ignore[union-attr]

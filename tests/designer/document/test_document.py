@@ -13,7 +13,7 @@ import pytest
 
 from study_app.designer.document.document import Document, check_version, next_version, standing
 from study_app.designer.document.fields import rows
-from study_app.designer.document.study import read
+from study_app.designer.document.study import read_study
 from study_app.designer.document.toml_edits import Set
 from study_app.errors import ProtocolError, StoreError, StudyError
 from study_app.protocol.load import load, parse
@@ -25,12 +25,12 @@ from study_app.store.study_versions import ChangedOutsideError, content_hash, ke
 from study_app.user_folder import data_folder
 from tests.designer.document.grown import PROTOCOLS
 
-DEMO = read((PROTOCOLS / "demo.toml").read_bytes())
+DEMO = read_study((PROTOCOLS / "demo.toml").read_bytes())
 
 
 @pytest.mark.parametrize("name", shipped())
 def test_a_study_is_what_check_reads(name: str) -> None:
-    study = read((PROTOCOLS / f"{name}.toml").read_bytes(), PROTOCOLS)
+    study = read_study((PROTOCOLS / f"{name}.toml").read_bytes(), PROTOCOLS)
     assert study.protocol == load(name)
     assert study.problems == ()
 
@@ -40,7 +40,7 @@ def test_problems_are_those_of_check(old: str, new: str) -> None:
     source = DEMO.text.replace(old, new).encode()
     with pytest.raises(ProtocolError) as raised:
         parse(source, "demo")
-    assert read(source).problems == raised.value.problems
+    assert read_study(source).problems == raised.value.problems
 
 
 def test_steps_of_one_key_join_until_the_keyboard_rests(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -65,7 +65,7 @@ def test_a_study_with_a_liquid_file_shows_its_own_text_alone(tmp_path: Path) -> 
     (tmp_path / "thick.toml").write_text("[liquids.any]\ndensity_kg_m3 = 1400\n")
     own = '[liquids.thick]\ndensity_kg_m3 = 1400\neffects = ["drag"]'
     text = DEMO.text.replace(own, '[liquids.thick]\nfile = "thick.toml"')
-    study = read(text.encode(), tmp_path)
+    study = read_study(text.encode(), tmp_path)
     assert study.protocol is not None
     assert set(study.document) == set(DEMO.document)
     assert study.document["liquids"]["thick"] == {"file": "thick.toml"}
@@ -74,7 +74,7 @@ def test_a_study_with_a_liquid_file_shows_its_own_text_alone(tmp_path: Path) -> 
 
 def test_typed_refuses_half_a_character() -> None:
     with pytest.raises(StudyError, match="half a character"):
-        DEMO.typed(DEMO.text + "# \ud800")
+        DEMO.with_text(DEMO.text + "# \ud800")
 
 
 def test_files_with_a_draft_are_listed(tmp_path: Path) -> None:

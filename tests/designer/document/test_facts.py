@@ -9,17 +9,17 @@ import pytest
 from study_app.analysis.planning import threshold_studies
 from study_app.designer.document.additions import repairs
 from study_app.designer.document.document import template
-from study_app.designer.document.study import Study, read
+from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.measures import simulation
-from study_app.designer.measures.simulation import balance_of, focus_of, measurable, observe
-from study_app.designer.measures.study_facts import facts, revealing, text_keys, texts_by_language, valid_part
+from study_app.designer.measures.simulation import balance_of, focus_of, measurable_thresholds, simulate_observers
+from study_app.designer.measures.study_facts import facts, revealing_texts, text_keys, texts_by_language, valid_part
 from study_app.haptics.model.slope_limits import slope_limit
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s
 from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule
-from study_app.protocol.presented.presented_levels import LevelLimits, clipping, level_limits, levels, standard_of
+from study_app.protocol.presented.presented_levels import LevelLimits, clipping, level_limits, levels, standard_level
 from study_app.protocol.source.files import shipped, shipped_file
 from study_app.protocol.warnings.expected_precision import ThresholdPlan, expected, threshold_plan
 from tests.designer.document.grown import PROTOCOLS
@@ -31,7 +31,7 @@ def study_of(name: str, *changes: tuple[str, str]) -> Study:
     for old, new in changes:
         assert text.count(old) == 1, old
         text = text.replace(old, new)
-    return read(text.encode(), PROTOCOLS)
+    return read_study(text.encode(), PROTOCOLS)
 
 
 @pytest.mark.slow
@@ -41,11 +41,11 @@ def test_each_repair_of_the_known_faults_removes_its_fault() -> None:
 
 
 def _repaired(case: Case) -> int:
-    study = read(case.text.encode())
+    study = read_study(case.text.encode())
     count = 0
     for fault in study.faults:
         for repair in repairs(study, fault):
-            after, _ = study.edited(*repair.edits)
+            after, _ = study.with_edits(*repair.edits)
             assert (fault.path, fault.message) not in {(one.path, one.message) for one in after.faults}
             count += 1
     return count
@@ -60,19 +60,19 @@ def test_the_highest_level_is_that_of_fixed_levels_too(
     standard: float, frequency_hz: float, limit: str, most: float
 ) -> None:
     edits = Set(("stimuli", "damping", "standards"), [standard]), Set(("tasks", "stir", "frequency_hz"), frequency_hz)
-    study, _ = template("viscosity-jnd").edited(*edits)
+    study, _ = template("viscosity-jnd").with_edits(*edits)
     (fault,) = study.faults  # one for both blocks
     assert limit in fault.message
     (repair,) = repairs(study, fault)
     assert repair.words == f"Highest level {most:g}"
-    after, _ = study.edited(*repair.edits)
+    after, _ = study.with_edits(*repair.edits)
     assert after.document["stimuli"]["damping"]["levels"] == (0.02, most)
     assert after.document["methods"]["easy"]["levels"] == (most,)
 
 
 def test_a_fault_of_a_table_that_two_blocks_name_counts_once() -> None:
     changes = Set(("stimuli", "damping", "level"), "value"), Set(("stimuli", "damping", "levels"), [9, 40])
-    study, _ = template("viscosity-jnd").edited(*changes, Set(("methods", "easy", "levels"), [12]))
+    study, _ = template("viscosity-jnd").with_edits(*changes, Set(("methods", "easy", "levels"), [12]))
     assert [fault.path for fault in study.faults].count(("designs", "pair", "feedback")) == 1
 
 
@@ -116,9 +116,9 @@ def test_a_limit_begins_where_levels_begin_to_be_clipped(name: str, block: str) 
     assert limits.force is not None
     assert limits.loop is not None
     first = min(limits.force, limits.loop)
-    assert standard_of(protocol, block, 0.999 * first).clipped_by is None
-    assert standard_of(protocol, block, 1.001 * first).clipped_by is not None
-    force = standard_of(protocol, block, limits.force).asked_n
+    assert standard_level(protocol, block, 0.999 * first).clipped_by is None
+    assert standard_level(protocol, block, 1.001 * first).clipped_by is not None
+    force = standard_level(protocol, block, limits.force).asked_n
     assert force == pytest.approx(protocol.device.force_limit_n, rel=1e-3)
     if name == "viscosityjnd":
         loop = slope_limit(1 / protocol.device.rate_hz, 1, protocol.scene.velocity)
@@ -126,12 +126,12 @@ def test_a_limit_begins_where_levels_begin_to_be_clipped(name: str, block: str) 
 
 
 def test_a_study_with_clipped_levels_still_has_its_numbers() -> None:
-    clipped, _ = study_of("viscosityjnd").edited(Set(("stimuli", "damping", "levels"), [0.02, 3]))
+    clipped, _ = study_of("viscosityjnd").with_edits(Set(("stimuli", "damping", "levels"), [0.02, 3]))
     assert clipped.protocol is None
     assert clipped.formed is not None
     assert facts(clipped).trials
     assert any(one.clipped_by for one in levels(clipped.formed, "viscosity"))
-    broken, _ = clipped.edited(Set(("study", "version"), 3))
+    broken, _ = clipped.with_edits(Set(("study", "version"), 3))
     assert broken.formed is None
 
 
@@ -147,10 +147,10 @@ def test_texts_are_counted_by_language() -> None:
     (there, wanted), dutch = texts_by_language(study)["en"], texts_by_language(study)["nl"]
     assert there == wanted > 50
     assert dutch == (there, wanted)
-    lacking, _ = study.edited(Unset(("blocks", "liquids", "title", "nl")))
+    lacking, _ = study.with_edits(Unset(("blocks", "liquids", "title", "nl")))
     assert texts_by_language(lacking)["nl"] == (wanted - 1, wanted)
     (labels, _), plain = texts_by_language(study)["nl"], Set(("blocks", "liquids", "title"), "Hi")
-    without, _ = study.edited(Unset(("scales", "agreement", "labels", "nl")), plain)
+    without, _ = study.with_edits(Unset(("scales", "agreement", "labels", "nl")), plain)
     assert texts_by_language(without) == {"en": (wanted, wanted), "nl": (labels - 2, wanted)}
     assert facts(without).missing == {"nl": 2}
     assert {"title", "body", "setting_label", "instruction"} <= text_keys()
@@ -160,10 +160,10 @@ def test_texts_are_counted_by_language() -> None:
 def test_a_text_that_names_what_is_compared_is_found(text: str, word: str) -> None:
     study = study_of("rek2024")
     assert study.protocol is not None
-    assert revealing(study, study.protocol) == ()
-    changed, _ = study.edited(Set(("blocks", "liquids", "setting_label", "en"), text))
+    assert revealing_texts(study, study.protocol) == ()
+    changed, _ = study.with_edits(Set(("blocks", "liquids", "setting_label", "en"), text))
     assert changed.protocol is not None
-    (found,) = revealing(changed, changed.protocol)
+    (found,) = revealing_texts(changed, changed.protocol)
     assert (found.path, found.word) == (("blocks", "liquids", "setting_label"), word)
 
 
@@ -180,7 +180,7 @@ def test_an_order_is_even_at_full_rounds_of_its_square() -> None:
 
 def test_numbers_continue_while_a_text_is_missing() -> None:
     study = study_of("rek2024")
-    lacking, _ = study.edited(Unset(("blocks", "liquids", "title", "nl")), Set(("study", "version"), 3))
+    lacking, _ = study.with_edits(Unset(("blocks", "liquids", "title", "nl")), Set(("study", "version"), 3))
     assert lacking.formed is None
     before, after = facts(study), facts(lacking)
     assert (after.trials, after.answers, after.expected_s) == (before.trials, before.answers, before.expected_s)
@@ -191,18 +191,18 @@ def test_numbers_continue_while_a_text_is_missing() -> None:
 def test_numbers_that_depend_on_a_broken_element_are_not_known() -> None:
     study = study_of("rek2024")
     before = facts(study)
-    broken, _ = study.edited(Set(("blocks", "liquids", "repetitions"), -1))
+    broken, _ = study.with_edits(Set(("blocks", "liquids", "repetitions"), -1))
     after = facts(broken)
     assert (after.trials, after.expected_s) == (None, None)
     assert "liquids" not in after.steps_s
     assert after.steps_s["delays"] == before.steps_s["delays"]
     assert after.forces_n == before.forces_n
-    drowned, _ = study.edited(Set(("liquids", "honey", "density_kg_m3"), -5))
+    drowned, _ = study.with_edits(Set(("liquids", "honey", "density_kg_m3"), -5))
     left = facts(drowned)
     assert set(left.forces_n) == set(before.forces_n) - {"honey"}
     assert left.forces_n["water"] == before.forces_n["water"]
     assert "delays" in left.steps_s
-    unlimited, _ = study.edited(Set(("device", "force_limit_n"), 60))
+    unlimited, _ = study.with_edits(Set(("device", "force_limit_n"), 60))
     assert facts(unlimited).forces_n == {}
     assert facts(unlimited).warnings == ()  # those of forces are not known
     assert facts(unlimited).expected_s == before.expected_s
@@ -211,9 +211,9 @@ def test_numbers_that_depend_on_a_broken_element_are_not_known() -> None:
 def test_a_question_without_a_sound_id_counts_and_another_fault_leaves_the_question_out() -> None:
     study = study_of("rek2024")
     items = ("questionnaires", "liquid", "items")
-    unnamed, _ = study.edited(Unset((*items, 2, "id")))
+    unnamed, _ = study.with_edits(Unset((*items, 2, "id")))
     assert facts(unnamed).answers == facts(study).answers
-    unknown, _ = study.edited(Set((*items, 2, "kind"), "nothing"))
+    unknown, _ = study.with_edits(Set((*items, 2, "kind"), "nothing"))
     assert facts(unknown).answers is None
     protocol = valid_part(unknown).protocol
     assert protocol is not None
@@ -224,7 +224,7 @@ def test_a_question_without_a_sound_id_counts_and_another_fault_leaves_the_quest
 
 @pytest.mark.slow
 def test_something_can_be_measured_of_every_known_fault() -> None:
-    whole = sum(valid_part(read(case.text.encode())).protocol is not None for case in FAULTY)
+    whole = sum(valid_part(read_study(case.text.encode())).protocol is not None for case in FAULTY)
     assert whole > 0.95 * len(FAULTY)
 
 
@@ -234,7 +234,7 @@ FULL = 53 / 32 - 1
 
 
 def plan_of(trials: int = 40, *changes: Set) -> ThresholdPlan:
-    protocol = template("viscosity-jnd").edited(*changes)[0].formed
+    protocol = template("viscosity-jnd").with_edits(*changes)[0].formed
     assert protocol is not None
     plan = threshold_plan(protocol, protocol.blocks["viscosity"])
     assert plan is not None
@@ -244,7 +244,7 @@ def plan_of(trials: int = 40, *changes: Set) -> ThresholdPlan:
 @pytest.mark.slow
 def test_planted_observers_are_found_as_precisely_as_check_expects() -> None:
     plan = plan_of()
-    found = observe(plan, 0.2, 0.02)
+    found = simulate_observers(plan, 0.2, 0.02)
     assert found is not None
     low, middle, high = (found.course[-1][1][at] for at in (0, 2, 4))
     assert low < 0.2 < high
@@ -266,7 +266,7 @@ def test_planted_observers_are_found_as_precisely_as_check_expects() -> None:
 
 def test_observers_show_the_same_again(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(simulation, "OBSERVERS", 200)
-    found = observe(plan_of(4), 0.2, 0.02)
+    found = simulate_observers(plan_of(4), 0.2, 0.02)
     assert found is not None
     assert (found.observers, found.trials) == (200, 4)
     assert (found.error, found.at_threshold) == pytest.approx((0.769064, 0.74), abs=1e-6)
@@ -309,7 +309,7 @@ def test_no_clipped_level_is_a_threshold_that_can_be_measured() -> None:
     free = {"kind": "explore", "min_s": 2, "max_s": 4, "instruction": "Feel."}
     unpaced = CLIPPED[1], Set(("tasks", "stir"), free), Set(("stimuli", "damping", "standards"), [12])
     for changes, most in ((CLIPPED, FULL), (unpaced, 8 / 0.3 / 12 - 1)):
-        protocol = template("viscosity-jnd").edited(*changes)[0].formed
+        protocol = template("viscosity-jnd").with_edits(*changes)[0].formed
         assert protocol is not None
         focus = focus_of(protocol, ("blocks", "viscosity"))
         assert focus.plan is not None
@@ -323,13 +323,15 @@ def test_no_clipped_level_is_a_threshold_that_can_be_measured() -> None:
     assert known.limit == 40.0  # limits that are known are not looked for again
     down = Set(("stimuli", "damping", "standards"), [60]), Set(("stimuli", "damping", "direction"), "down")
     assert not plan_of(4, *down).measures(np.array(-1.0))  # the standard itself is clipped
-    found = measurable(plan_of(4, *CLIPPED), 0.02, 0.02, most=0.03)
+    found = measurable_thresholds(plan_of(4, *CLIPPED), 0.02, 0.02, most=0.03)
     assert found is not None
     assert [one.threshold for one in found.planted] == pytest.approx([0.02], rel=0.01)
 
 
 def test_no_level_of_a_late_force_is_clipped_though_a_limit_clips_the_force() -> None:
-    protocol = read(shipped_file("forcedelay").read_bytes()).edited(Set(("device", "force_limit_n"), 0.1))[0].formed
+    protocol = (
+        read_study(shipped_file("forcedelay").read_bytes()).with_edits(Set(("device", "force_limit_n"), 0.1))[0].formed
+    )
     assert protocol is not None
     assert clipping(protocol, protocol.blocks["delay"]) is None
 
@@ -337,7 +339,7 @@ def test_no_level_of_a_late_force_is_clipped_though_a_limit_clips_the_force() ->
 @pytest.mark.slow
 def test_clipped_levels_make_the_error_larger() -> None:
     clipped, full = plan_of(24, *CLIPPED), plan_of(24, *CLIPPED)
-    found = [observe(one, 0.6, 0.02) for one in (clipped, replace(full, clipping=None))]
+    found = [simulate_observers(one, 0.6, 0.02) for one in (clipped, replace(full, clipping=None))]
     assert found[0] is not None
     assert found[1] is not None
     assert found[0].error > 1.2 * found[1].error
@@ -348,7 +350,7 @@ def test_clipped_levels_make_the_error_larger() -> None:
 @pytest.mark.parametrize("standard", [52, 60])
 def test_a_threshold_whose_levels_are_clipped_has_no_error_and_no_precision(standard: float) -> None:
     plan = plan_of(24, Set(("stimuli", "damping", "standards"), [standard]))
-    observed, known = observe(plan, 0.19, 0.02), expected(plan)
+    observed, known = simulate_observers(plan, 0.19, 0.02), expected(plan)
     assert observed is not None
     assert known is not None
     assert math.isinf(observed.error)
@@ -385,7 +387,7 @@ def test_each_standard_is_simulated_as_limits_clip_it() -> None:
 @pytest.mark.slow
 def test_more_lapses_lower_the_function_and_raise_the_error() -> None:
     plan = plan_of(24)
-    few, many = observe(plan, 0.2, 0.0), observe(plan, 0.2, 0.15)
+    few, many = simulate_observers(plan, 0.2, 0.0), simulate_observers(plan, 0.2, 0.15)
     assert few is not None
     assert many is not None
     assert few.planted[-1] > many.planted[-1] + 0.1
@@ -395,7 +397,7 @@ def test_more_lapses_lower_the_function_and_raise_the_error() -> None:
 @pytest.mark.nightly
 @pytest.mark.slow
 def test_thresholds_beyond_the_levels_are_not_measurable_and_none_below_the_error_of_a_trial() -> None:
-    found = measurable(plan_of(60), 0.02, least=0.1)
+    found = measurable_thresholds(plan_of(60), 0.02, least=0.1)
     assert found is not None
     assert found.ends is not None
     assert min(one.threshold for one in found.planted) >= 0.1 == pytest.approx(found.ends[0], rel=0.5)
@@ -412,7 +414,7 @@ def test_a_simulation_is_given_up_when_asked() -> None:
             raise InterruptedError
 
     with pytest.raises(InterruptedError):
-        observe(plan_of(4), 0.2, 0.02, check)
+        simulate_observers(plan_of(4), 0.2, 0.02, check)
     with pytest.raises(InterruptedError):
-        measurable(plan_of(4), 0.02, 0.0, check)
+        measurable_thresholds(plan_of(4), 0.02, 0.0, check)
     assert asked == 5

@@ -8,11 +8,11 @@ import pytest
 
 from study_app.designer.document.elements import element_of
 from study_app.designer.document.fields import Row, rows, unit_of
-from study_app.designer.document.study import Study, read
-from study_app.designer.form.form import form
+from study_app.designer.document.study import Study, read_study
+from study_app.designer.form.form import form_of
 from study_app.protocol.json_schema import schema
 from study_app.protocol.source.document import Path
-from study_app.protocol.source.problems import Fault, shown
+from study_app.protocol.source.problems import Fault, shown_value
 from tests.protocol.edited_studies import FAULTY, Case
 
 DEFS = schema()["$defs"]
@@ -55,7 +55,7 @@ def described(node: Any) -> Iterator[tuple[str, str, tuple[str, ...]]]:
                 one[name] for one in (part, *part.get("anyOf", ())) for name in ("minimum", "maximum") if name in one
             ]
             if "description" in part:
-                yield key, part["description"], tuple(map(shown, bounds))
+                yield key, part["description"], tuple(map(shown_value, bounds))
 
 
 def test_every_key_of_every_model_reaches_a_form_with_its_words_and_bounds() -> None:
@@ -97,7 +97,7 @@ OF_THE_ELEMENT = {
 
 def shown_at(study: Study, fault: Fault) -> str:
     """Return where the form shows a fault: "row", "section", "id", "element", or "" for nowhere."""
-    found = form(study, element_of(study, fault.path))
+    found = form_of(study, element_of(study, fault.path))
     sentence = f"{fault.message[:1].upper()}{fault.message[1:]}"
     places = (
         ("row", [words for row in found.rows if fault.path[: len(row.path)] == row.path for words in row.faults]),
@@ -110,7 +110,7 @@ def shown_at(study: Study, fault: Fault) -> str:
 
 @pytest.mark.parametrize("case", FAULTY, ids=lambda case: case.name)
 def test_every_fault_is_shown_at_a_field(case: Case) -> None:
-    study = read(case.text.encode())
+    study = read_study(case.text.encode())
     if study.is_toml:
         places = [shown_at(study, fault) for fault in study.faults]
         assert "" not in places

@@ -29,8 +29,8 @@ from study_app.designer.document.steps import (
     SwitchKey,
     SwitchKind,
 )
-from study_app.designer.document.study import Study, read
-from study_app.designer.outline import addable
+from study_app.designer.document.study import Study, read_study
+from study_app.designer.outline import addable_elements
 from study_app.errors import StudyError
 from study_app.protocol.source.document import Path, entries
 from tests.designer.document.grown import PROTOCOLS
@@ -48,7 +48,7 @@ SMALL = ("rows", "sound", "mixed", "every_design", "grouped")
 
 
 def studies(names: Iterable[str]) -> Iterator[tuple[str, Study]]:
-    return ((name, read(text_of(name).encode(), PROTOCOLS)) for name in names)
+    return ((name, read_study(text_of(name).encode(), PROTOCOLS)) for name in names)
 
 
 def elements(document: Mapping[str, Any]) -> Iterator[Path]:
@@ -136,7 +136,7 @@ def asked(study: Study) -> Iterator[tuple[Path, Request, Any]]:
         if generic(path) in offered:
             continue
         offered.add(generic(path))
-        for one in addable(study, path):
+        for one in addable_elements(study, path):
             place = (*generic(path)[:1], one.words.partition(" of ")[0])
             if isinstance(one.asks, AddElement | AddInstrument) and not added.issuperset(place):
                 added.update(place)
@@ -156,8 +156,8 @@ def said(study: Study, selected: Path, request: Request) -> Iterator[str]:
     """Yield what a step says and changes, or why it is refused."""
     try:
         step = request.step(Situation(study, selected))
-        before = study.typed(step.text)[0] if step.text else study
-        after, _ = before.edited(*step.edits)
+        before = study.with_text(step.text)[0] if step.text else study
+        after, _ = before.with_edits(*step.edits)
     except StudyError as refusal:
         yield f"refused: {refusal}"
         return

@@ -8,9 +8,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from study_app.cli import commands
-from study_app.designer.document.document import Answers, answered, copy_of, template
+from study_app.designer.document.document import Answers, copy_of, template, with_answers
 from study_app.designer.document.fields import row_at
-from study_app.designer.document.study import read
+from study_app.designer.document.study import read_study
 from study_app.designer.new_study_page import KnownAnswer, known_answers
 from study_app.designer.templates import FOLDER, QUESTIONS, templates
 from study_app.errors import StudyError
@@ -65,7 +65,7 @@ def test_the_answers_are_edits_of_the_template() -> None:
     before = template("viscosity-jnd")
     references, trials = (path for _, path in QUESTIONS["viscosity-jnd"])
     given = Answers("Which is thicker?", ("en", "de"), ((references, [4, 8]), (trials, 60)))
-    after = answered(before, given)
+    after = with_answers(before, given)
     document = after.document
     assert document["study"]["title"] == {"en": "Which is thicker?"}
     assert document["study"]["languages"] == ("en", "de")
@@ -73,9 +73,9 @@ def test_the_answers_are_edits_of_the_template() -> None:
     assert document["methods"]["adaptive"]["trials"] == 60
     assert {fault.message for fault in after.faults} == {"is missing in German"}
     assert after.text.count("#") == before.text.count("#")
-    assert answered(before, Answers(languages=("en",))).text == before.text
+    assert with_answers(before, Answers(languages=("en",))).text == before.text
     with pytest.raises(StudyError, match="must be at least"):
-        answered(before, Answers(values=((trials, 0),)))
+        with_answers(before, Answers(values=((trials, 0),)))
 
 
 STUDIES, SEED = 100, 1
@@ -160,7 +160,7 @@ def test_new_refuses_what_it_cannot_make(words: tuple[str, ...], sentence: str, 
 def test_copy_of_a_shipped_study_keeps_its_comments() -> None:
     original = load("rek2024")
     text = (FOLDER.parents[2] / "protocols" / "rek2024.toml").read_text(encoding="utf-8")
-    copied = copy_of(read(text.encode()), "ours")
+    copied = copy_of(read_study(text.encode()), "ours")
     assert copied.protocol is not None
     assert copied.protocol.liquids == original.liquids
     lines = [pair for pair in zip(text.splitlines(), copied.text.splitlines(), strict=True) if pair[0] != pair[1]]
@@ -169,7 +169,7 @@ def test_copy_of_a_shipped_study_keeps_its_comments() -> None:
 
 @pytest.mark.parametrize("name", templates())
 def test_a_study_in_another_language_begins_with_the_texts_of_the_template(name: str) -> None:
-    study = answered(template(name), Answers("Wie zäh?", ("de",)))
+    study = with_answers(template(name), Answers("Wie zäh?", ("de",)))
     assert study.faults == ()
     assert study.protocol is not None
     assert study.document["study"]["title"] == {"de": "Wie zäh?"}

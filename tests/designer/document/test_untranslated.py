@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from study_app.designer.document.additions import filled_in, texts_of, with_language, without_language
-from study_app.designer.document.document import Answers, answered, copy_of, template
-from study_app.designer.document.study import Study, read
+from study_app.designer.document.additions import edits_to_fill_in, texts_of, with_language, without_language
+from study_app.designer.document.document import Answers, copy_of, template, with_answers
+from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Set
 from study_app.designer.measures.study_facts import copied_texts, facts
 from study_app.designer.templates import templates
@@ -28,7 +28,11 @@ def lines_of(study: Study) -> list[str]:
 
 
 def study_named(name: str) -> Study:
-    return template(name) if name in templates() else read(shipped_file(name).read_bytes(), shipped_file(name).parent)
+    return (
+        template(name)
+        if name in templates()
+        else read_study(shipped_file(name).read_bytes(), shipped_file(name).parent)
+    )
 
 
 def translated(study: Study, code: str) -> Study:
@@ -37,7 +41,7 @@ def translated(study: Study, code: str) -> Study:
         place = (*path, code) if not isinstance(value, str) else path
         text = value if isinstance(value, str) else value[code]
         several = isinstance(text, tuple)
-        study, _ = study.edited(
+        study, _ = study.with_edits(
             Set(place, [f"Wort {number} {at}" for at in range(len(text))] if several else f"Wort {number}")
         )
     return study
@@ -49,25 +53,25 @@ def test_every_english_text_of_a_study_in_another_language_alone_is_to_be_transl
     english = study_named(name)
     texts = [text for _, text in texts_of(english) if words_in(text)]
     same = sum(isinstance(text, str) and text.casefold() in SAME_WORDS.get(code, ()) for text in texts)
-    study = answered(english, Answers(languages=(code,)))
+    study = with_answers(english, Answers(languages=(code,)))
     assert (study.faults, copied_texts(study)) == ((), {code: len(texts) - same})
-    assert copied_texts(read(study.text.encode())) == copied_texts(study), "after saving and opening"
+    assert copied_texts(read_study(study.text.encode())) == copied_texts(study), "after saving and opening"
     assert [line for line in facts(study).warnings if "still in English" in line] == lines_of(study)
     with pytest.raises(SessionError, match="still in English"):
         check_translated(study.document)
 
 
 def test_the_count_goes_down_with_each_text_and_ends_at_none() -> None:
-    study = answered(template("rate-realism"), Answers("Ça fait vrai ?", ("fr",)))
+    study = with_answers(template("rate-realism"), Answers("Ça fait vrai ?", ("fr",)))
     assert lines_of(study) == [
         "study.languages: 16 texts are still in English although the study's only language is French"
     ]
-    study, _ = study.edited(Set(("pages", "welcome", "title", "fr"), "Bienvenue"))
+    study, _ = study.with_edits(Set(("pages", "welcome", "title", "fr"), "Bienvenue"))
     assert copied_texts(study) == {"fr": 15}
     done = translated(study, "fr")
     assert (copied_texts(done), lines_of(done)) == ({}, [])
     check_translated(done.document)
-    almost, _ = done.edited(Set(("pages", "thanks", "button", "fr"), "Finish"))
+    almost, _ = done.with_edits(Set(("pages", "thanks", "button", "fr"), "Finish"))
     told = (
         "study.languages: 1 text is still in English although the study's only language is French: pages.thanks.button"
     )
@@ -81,37 +85,39 @@ def test_the_count_goes_down_with_each_text_and_ends_at_none() -> None:
 def test_a_shipped_study_in_its_own_languages_has_nothing_to_translate(name: str, codes: tuple[str, ...]) -> None:
     original = study_named(name)
     if set(codes) <= set(original.document["study"].get("languages", ("en",))):
-        assert copied_texts(answered(original, Answers(languages=codes))) == {}
+        assert copied_texts(with_answers(original, Answers(languages=codes))) == {}
 
 
 def test_dutch_texts_in_a_study_that_states_english_are_recognised_too() -> None:
-    dutch = read(study_named("slime").text.replace('"en", "nl"', '"nl", "en"').encode(), shipped_file("slime").parent)
-    swapped = answered(answered(dutch, Answers(languages=("nl",))), Answers(languages=("fr",)))
+    dutch = read_study(
+        study_named("slime").text.replace('"en", "nl"', '"nl", "en"').encode(), shipped_file("slime").parent
+    )
+    swapped = with_answers(with_answers(dutch, Answers(languages=("nl",))), Answers(languages=("fr",)))
     assert lines_of(swapped)[0].endswith("texts are still in Dutch although the study's only language is French")
 
 
 def test_texts_typed_by_hand_without_a_language_are_compared_too() -> None:
     text = template("empty").text.replace('languages = ["en"]', 'languages = ["fr"]')
-    assert copied_texts(read(text.encode())) == {"fr": 10}
+    assert copied_texts(read_study(text.encode())) == {"fr": 10}
     wrapped = text.replace("You will move a ball\nthrough", "You will  move a ball through").replace(
         "Welcome", "WELCOME"
     )
-    assert copied_texts(read(wrapped.encode())) == {"fr": 10}, "case and line breaks do not matter"
+    assert copied_texts(read_study(wrapped.encode())) == {"fr": 10}, "case and line breaks do not matter"
 
 
 def test_one_paragraph_that_is_left_in_english_is_enough() -> None:
-    study = translated(answered(template("empty"), Answers(languages=("de",))), "de")
+    study = translated(with_answers(template("empty"), Answers(languages=("de",))), "de")
     body = "Sie bewegen eine Kugel.\n\nHold Esc to switch the force off."
-    study, _ = study.edited(Set(("pages", "welcome", "body", "de"), body))
+    study, _ = study.with_edits(Set(("pages", "welcome", "body", "de"), body))
     assert copied_texts(study) == {}, "a text of one's own is not judged"
     theirs = template("empty").document["pages"]["welcome"]["body"].split("\n\n")[1]
-    study, _ = study.edited(Set(("pages", "welcome", "body", "de"), f"Sie bewegen eine Kugel.\n\n{theirs}"))
+    study, _ = study.with_edits(Set(("pages", "welcome", "body", "de"), f"Sie bewegen eine Kugel.\n\n{theirs}"))
     assert copied_texts(study) == {"de": 1}
 
 
 def test_both_languages_of_a_french_and_dutch_study_are_counted() -> None:
-    study = answered(template("empty"), Answers(languages=("fr", "nl")))
-    study, _ = study.edited(*filled_in(study, "nl"))
+    study = with_answers(template("empty"), Answers(languages=("fr", "nl")))
+    study, _ = study.with_edits(*edits_to_fill_in(study, "nl"))
     assert (study.faults, copied_texts(study)) == ((), {"fr": 10, "nl": 10})
     with pytest.raises(SessionError, match="9 texts on French pages"):
         check_translated(study.document)
@@ -119,10 +125,10 @@ def test_both_languages_of_a_french_and_dutch_study_are_counted() -> None:
 
 def test_a_copy_of_an_own_study_is_recognised_and_warned_of(tmp_path: Path) -> None:
     own = copy_of(translated(template("empty"), "en"), "own")
-    own, _ = own.edited(Set(("pages", "thanks", "body"), "Many thanks for your patience."))
+    own, _ = own.with_edits(Set(("pages", "thanks", "body"), "Many thanks for your patience."))
     workspace().protocols.mkdir(parents=True, exist_ok=True)
     (workspace().protocols / "own.toml").write_text(own.text, encoding="utf-8")
-    french = copy_of(answered(own, Answers(languages=("fr",))), "notre")
+    french = copy_of(with_answers(own, Answers(languages=("fr",))), "notre")
     assert copied_texts(french) == {"fr": 1}, "two words may be the same in two languages"
     check_translated(french.document)
     (workspace().protocols / "own.toml").unlink()
@@ -130,16 +136,16 @@ def test_a_copy_of_an_own_study_is_recognised_and_warned_of(tmp_path: Path) -> N
 
 
 def test_a_language_that_was_added_and_then_left_alone_keeps_its_copies() -> None:
-    study, _ = template("empty").edited(*with_language(template("empty"), "ar"))
-    study, _ = study.edited(*filled_in(study, "ar"))
-    study, _ = study.edited(*without_language(study, "en"))
+    study, _ = template("empty").with_edits(*with_language(template("empty"), "ar"))
+    study, _ = study.with_edits(*edits_to_fill_in(study, "ar"))
+    study, _ = study.with_edits(*without_language(study, "en"))
     assert copied_texts(study) == {"ar": 10}
 
 
 @pytest.mark.parametrize("pilot", [False, True])
 def test_a_session_is_refused_before_anything_is_made_and_a_pilot_is_warned(tmp_path: Path, pilot: bool) -> None:
     file = tmp_path / "etude.toml"
-    study = copy_of(answered(template("empty"), Answers(languages=("fr",))), "etude")
+    study = copy_of(with_answers(template("empty"), Answers(languages=("fr",))), "etude")
     file.write_text(study.text, encoding="utf-8")
     chosen = NewSession(
         source=str(file),

@@ -12,7 +12,17 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition,
 
 from study_app.designer.document.document import Document
 from study_app.designer.document.study import Study
-from study_app.designer.document.toml_edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset, WriterError, apply
+from study_app.designer.document.toml_edits import (
+    Duplicate,
+    Edit,
+    Insert,
+    Move,
+    Rename,
+    Set,
+    Unset,
+    WriterError,
+    apply_edit,
+)
 from study_app.errors import StudyError
 from study_app.protocol.source.document import value_at
 from tests.designer.document.grown import texts
@@ -101,7 +111,7 @@ VALUES = st.recursive(
 @given(VALUES, st.sampled_from(["", "'a'", '"""\n"""', "[\n  1,\n]"]), st.sampled_from(["\n", "\r\n"]))
 def test_written_is_read_back_as_the_same_value(value: Any, like: str, newline: str) -> None:
     for before, path in ((f"key = {like or 0}{newline}", ("key",)), (newline, ("a b", "c"))):
-        after = apply(before, Set(path, value))[0]
+        after = apply_edit(before, Set(path, value))[0]
         assert value_at(tomllib.loads(after), path) == value
 
 
@@ -171,7 +181,7 @@ liquid = "water"
     ],
 )
 def test_apply_writes_as_the_neighbours_do(before: str, edit: Edit, after: str) -> None:
-    assert apply(before, edit)[0] == after
+    assert apply_edit(before, edit)[0] == after
 
 
 @pytest.mark.parametrize(
@@ -190,10 +200,10 @@ def test_apply_writes_as_the_neighbours_do(before: str, edit: Edit, after: str) 
 )
 def test_apply_refuses_what_makes_no_sense(edit: Edit, sentence: str) -> None:
     with pytest.raises(StudyError, match=sentence):
-        apply("a = 1\nl = [1, 2]\n", edit)
+        apply_edit("a = 1\nl = [1, 2]\n", edit)
 
 
 def test_apply_refuses_its_own_mistakes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("study_app.designer.document.toml_edits.written", lambda *_: "7")
+    monkeypatch.setattr("study_app.designer.document.toml_edits.toml_value", lambda *_: "7")
     with pytest.raises(WriterError, match="another document than the one meant"):
-        apply("a = 1\n", Set(("a",), 2))
+        apply_edit("a = 1\n", Set(("a",), 2))

@@ -9,17 +9,17 @@ from hypothesis import strategies as st
 
 from study_app.designer.document.additions import repairs
 from study_app.designer.document.document import template
-from study_app.designer.document.elements import outline, used_by
+from study_app.designer.document.elements import outline, usage_text
 from study_app.designer.document.steps import RetypeFile, Situation
-from study_app.designer.document.study import Study, read
+from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Edit, Set, Unset
 from study_app.designer.file import file_text
-from study_app.designer.form.form import form
+from study_app.designer.form.form import form_of
 from study_app.designer.measures.measures_view import measures_view
 from study_app.designer.measures.simulation import Controls, Simulated
 from study_app.designer.measures.study_facts import facts, restored_part
 from study_app.designer.outline import outline_rows
-from study_app.designer.participant.playable import NotPlayableError, playable, showing
+from study_app.designer.participant.playable import NotPlayableError, first_showing, part_to_play
 from study_app.designer.problems import problem_rows
 from study_app.designer.templates import FOLDER, templates
 from study_app.protocol.source.document import Path, entries, value_at
@@ -28,7 +28,7 @@ from tests.designer.document.grown import PROTOCOLS
 
 
 def study_of(file: pathlib.Path) -> Study:
-    return read(file.read_bytes(), file.parent)
+    return read_study(file.read_bytes(), file.parent)
 
 
 @pytest.mark.parametrize(
@@ -40,20 +40,20 @@ def study_of(file: pathlib.Path) -> Study:
     ],
 )
 def test_what_is_the_only_one_is_used_where_its_name_is_left_out(name: str, path: Path, words: str) -> None:
-    assert used_by(study_of(PROTOCOLS / f"{name}.toml").document, path) == words
+    assert usage_text(study_of(PROTOCOLS / f"{name}.toml").document, path) == words
 
 
 def test_liquids_are_used_as_conditions_where_a_study_has_none() -> None:
     document = {"liquids": {"water": {}, "oil": {}}, "blocks": {"one": {"conditions": ("water",)}}}
-    assert [used_by(document, ("liquids", name)) for name in ("water", "oil")] == ["used by 1 block", "not used"]
+    assert [usage_text(document, ("liquids", name)) for name in ("water", "oil")] == ["used by 1 block", "not used"]
 
 
 @pytest.mark.parametrize("file", [*PROTOCOLS.glob("*.toml"), *FOLDER.glob("*.toml")], ids=lambda file: file.stem)
 def test_what_is_not_used_can_be_deleted(file: pathlib.Path) -> None:
     study = study_of(file)
     elements = (path for path, _ in entries(study.document, "*.*"))
-    for path in [one for one in elements if used_by(study.document, one) == "not used"]:
-        assert study.edited(Unset(path))[0].faults == study.faults, path
+    for path in [one for one in elements if usage_text(study.document, one) == "not used"]:
+        assert study.with_edits(Unset(path))[0].faults == study.faults, path
 
 
 ITEM = ("questionnaires", "remarks", "items", 0)
@@ -76,7 +76,7 @@ WRONG: tuple[tuple[str, Path, tuple[Any, ...]], ...] = (
 def test_a_value_of_a_wrong_type_is_a_fault_that_every_view_shows(name: str, path: Path, value: Any) -> None:
     sound = template(name)
     edit: Edit = Unset(path) if value is None else Set(path, value)
-    study, _ = sound.edited(edit)
+    study, _ = sound.with_edits(edit)
     assert study.faults
     known = facts(study)
     outline_rows(study, known.steps_s, "")
@@ -88,17 +88,17 @@ def test_a_value_of_a_wrong_type_is_a_fault_that_every_view_shows(name: str, pat
     for selected in {("study",), path[:2], path[:4]}:
         if not isinstance(value_at(study.document, selected), dict):
             continue
-        form(study, selected)
+        form_of(study, selected)
         measures_view(study, known, selected, Controls(), Simulated(), dict.fromkeys(problems, ()))
         if protocol is not None:
-            showing(protocol, selected)
+            first_showing(protocol, selected)
         with pytest.raises(NotPlayableError):
-            playable(study, selected)
+            part_to_play(study, selected)
 
 
 @pytest.fixture(scope="module")
 def study() -> Study:
-    return read(shipped_file("rek2024").read_bytes(), shipped_file("rek2024").parent)
+    return read_study(shipped_file("rek2024").read_bytes(), shipped_file("rek2024").parent)
 
 
 def shown(text: str) -> str:
@@ -133,7 +133,7 @@ def test_typing_changes_no_end_of_line_elsewhere(lines: list[tuple[str, str]], d
 def test_the_selected_element_and_faulty_lines_are_marked(newline: str) -> None:
     text = shipped_file("rek2024").read_text(encoding="utf-8").replace("\n", newline)
     text = text.replace('order = "shuffled"', 'order = "shufled"', 1)
-    found = file_text(read(text.encode()), "x.toml", ("blocks", "liquids"))
+    found = file_text(read_study(text.encode()), "x.toml", ("blocks", "liquids"))
     lines = found.text.split("\n")
     (first, last), *others = found.selected
     assert not others
@@ -155,14 +155,14 @@ def leaves(value: Any, path: tuple[Any, ...] = ()) -> set[tuple[Any, ...]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_every_key_of_every_element_is_in_its_form_with_its_value(file: pathlib.Path) -> None:
-    study = read(file.read_bytes(), file.parent)
+    study = read_study(file.read_bytes(), file.parent)
     listed = outline(study)
     for element in {one.path for one in (*listed.session, *listed.parts, *listed.study)}:
         if len(element) == 1 and element[0] not in {"study", "device", "scene", "limits", "analysis"}:
             continue
         if value_at(study.document, element) is None:
             continue
-        made = form(study, element)
+        made = form_of(study, element)
         rows = {row.path: row.value for row in made.rows}
         for leaf in leaves(value_at(study.document, element), element):
             if leaf[-1] == "id" and len(leaf) > 3:

@@ -8,11 +8,11 @@ import pytest
 
 from study_app.designer.document.additions import additions_for, repairs
 from study_app.designer.document.document import template
-from study_app.designer.document.elements import brief, found_fields, outline, position_of, used_by
-from study_app.designer.document.study import Study, read
+from study_app.designer.document.elements import found_fields, outline, position_of, short_note, usage_text
+from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Set
 from study_app.designer.file import file_text
-from study_app.designer.form.form import form
+from study_app.designer.form.form import form_of
 from study_app.designer.measures.measures_page import clipped_sentence
 from study_app.designer.measures.measures_view import MeasuresView, measures_view
 from study_app.designer.measures.plots import forces_sentence, function_sentence, track_sentence
@@ -28,7 +28,7 @@ from study_app.designer.measures.simulation import (
     Simulated,
 )
 from study_app.designer.measures.study_facts import facts
-from study_app.designer.outline import addable, outline_rows
+from study_app.designer.outline import addable_elements, outline_rows
 from study_app.designer.problems import problem_rows
 from study_app.protocol.source.document import Path
 from tests.designer.document.test_study_transcripts import elements, generic, studies
@@ -81,12 +81,12 @@ class Shown:
     def of_element(self, study: Study, path: Path) -> Iterator[str]:
         document = study.document
         marked = file_text(study, "study.toml", path)
-        yield f"brief: {brief(document, path)} | {used_by(document, path)} | {position_of(document, path)}"
+        yield f"brief: {short_note(document, path)} | {usage_text(document, path)} | {position_of(document, path)}"
         yield f"lines: {marked.selected} {marked.faulty}"
-        yield from value_lines(form(study, path), "form")
+        yield from value_lines(form_of(study, path), "form")
         view = measures_view(study, facts(study), path, Controls(participants=12), Simulated(), {})
         yield from self.note("measures", measures(view))
-        yield from self.note("to add", tuple(addable(study, path)))
+        yield from self.note("to add", tuple(addable_elements(study, path)))
 
 
 def transcript(before: Iterable[str], names: Iterable[str]) -> Iterator[str]:
@@ -109,7 +109,9 @@ def of_faults(study: Study) -> Iterator[str]:
     for fault in study.faults:
         for repair in (*repairs(study, fault), *additions_for(study, fault)):
             yield f"repair {one_line(fault.path)}: {repair.words}"
-            yield from changed(study.text.split("\n"), study.edited(*repair.edits)[0].text.split("\n"), numbered=True)
+            yield from changed(
+                study.text.split("\n"), study.with_edits(*repair.edits)[0].text.split("\n"), numbered=True
+            )
 
 
 OBSERVED = Observed(
@@ -195,7 +197,7 @@ def of_limits() -> Iterator[str]:
     """Yield what is said where limits clip levels, before and after observers were simulated, and of weak forces."""
     shown = Shown()
     for name, edits in {"as it is": (), **LIMITED}.items():
-        study, _ = template("viscosity-jnd").edited(*edits)
+        study, _ = template("viscosity-jnd").with_edits(*edits)
         for threshold in (0.019, 0.19):
             observed = Observed(
                 threshold=threshold,
@@ -231,7 +233,7 @@ def of_limits() -> Iterator[str]:
                     yield from shown.note(block, {"numbers": view.numbers, "clipped": clipped})
     (_, study), (_, late) = studies(("rek2024", "forcedelay"))
     for edit in (Set(("device", "force_limit_n"), 0.5), Set(("blocks", "liquids", "repetitions"), -1)):
-        edited, _ = study.edited(edit)
+        edited, _ = study.with_edits(edit)
         yield f"== {edit.path[-1]} {edit.value}"
         yield from shown.note(
             "study", measures_view(edited, facts(edited), ("study",), Controls(), Simulated(), {}).cards
@@ -253,5 +255,5 @@ FAULTS = ("designs", "formats", "adjustment", "groups", "impossible", "methods",
 def test_repairs_of_faults(name: str, pytestconfig: pytest.Config) -> None:
     found = list[str]()
     for case in cases_of(CASES / f"{name}.txt"):
-        found += [f"== {case.study}, {case.name}", *of_faults(read(case.text.encode(), File()))]
+        found += [f"== {case.study}, {case.name}", *of_faults(read_study(case.text.encode(), File()))]
     compare(GOLDEN / f"repairs_in_{name}.txt", found, pytestconfig)

@@ -100,7 +100,7 @@ def worker(designer: Any) -> Worker:
 
 
 def jnd(designer: Any) -> None:
-    designer.controller.begin("template:viscosity-jnd", "thicker")
+    designer.controller.begin_study("template:viscosity-jnd", "thicker")
     designer.editing.select(("blocks", "viscosity"))
     designer.place.pane.show_tab("measures")
 

@@ -9,7 +9,7 @@ import pytest
 from study_app.analysis.planning.threshold_studies import Precisions, plans, sweep, threshold_markdown
 from study_app.designer.document.document import template
 from study_app.designer.document.steps import DuplicateElement, RetypeFile, Situation
-from study_app.designer.document.study import read
+from study_app.designer.document.study import read_study
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.measures.simulation import (
     ENOUGH,
@@ -17,9 +17,9 @@ from study_app.designer.measures.simulation import (
     Controls,
     Focus,
     Simulation,
-    carry_out,
     focus_of,
-    observe,
+    run_simulation,
+    simulate_observers,
     simulation_of,
     start_measure_worker,
 )
@@ -50,12 +50,12 @@ def test_slow_numbers_come_are_given_up_and_are_kept(qtbot: Any, designer: Any, 
     assert page.forces.plot.accessibleDescription().startswith("Force at 31 levels")
     assert not page.grid.isVisible()  # its cards stay below other tabs
 
-    designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 60))
+    designer.editing.make_step("Change", Set(("methods", "adaptive", "trials"), 60))
     qtbot.waitUntil(lambda: len(worker.orders) == 2)
     assert page.numbers.parts[1].note.text() == ANEW  # grey, with the number of before
     assert page.numbers.parts[1].number.text() == "± 26"
     assert page.function.plot.grey
-    designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 100))
+    designer.editing.make_step("Change", Set(("methods", "adaptive", "trials"), 100))
     qtbot.waitUntil(lambda: worker.stops == 1)  # what was under way is given up
     qtbot.waitUntil(lambda: len(worker.orders) == 3)
     assert worker.orders[2].protocol.methods["adaptive"].trials == 100
@@ -64,7 +64,7 @@ def test_slow_numbers_come_are_given_up_and_are_kept(qtbot: Any, designer: Any, 
     qtbot.waitUntil(lambda: not page.function.plot.grey)  # kept by what it depends on
     qtbot.wait(120)
     assert len(worker.orders) == 3
-    designer.editing.make("Change", Set(("pages", "welcome", "title"), "Hello"))
+    designer.editing.make_step("Change", Set(("pages", "welcome", "title"), "Hello"))
     qtbot.wait(120)
     assert len(worker.orders) == 3  # nothing depends on a text
 
@@ -84,7 +84,7 @@ def test_numbers_say_that_their_simulation_crashed(qtbot: Any, designer: Any, wo
     qtbot.waitUntil(lambda: people.note.text() == FAILED)
     assert {part.number.text() for part in (jnds, one, people)} == {UNKNOWN}
     assert people.more.text() == "The process ended with exit code 1; the terminal may show why."
-    designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 60))
+    designer.editing.make_step("Change", Set(("methods", "adaptive", "trials"), 60))
     qtbot.waitUntil(lambda: len(worker.orders) == 2)
     assert people.note.text() == ANEW  # another study, another try
 
@@ -106,7 +106,7 @@ NO_BREAKS = Unset((*BLOCK, "break_every")), Unset((*BLOCK, "break_page")), Unset
 
 def order(trials: int, **controls: float) -> Simulation:
     """Return the simulation of the block of a template with so many trials."""
-    study, _ = template("viscosity-jnd").edited(Set(("methods", "adaptive", "trials"), trials), *NO_BREAKS)
+    study, _ = template("viscosity-jnd").with_edits(Set(("methods", "adaptive", "trials"), trials), *NO_BREAKS)
     assert study.protocol is not None
     focus = focus_of(study.protocol, BLOCK)
     found = simulation_of(study.protocol, focus, Controls(**controls))  # type: ignore[arg-type]
@@ -142,7 +142,7 @@ def test_numbers_of_what_is_broken_stay_in_grey(qtbot: Any, designer: Any, worke
     before = [part.number.text() for part in page.numbers.parts]
     grey = page.grid.theme.text3
     ink = lambda part: part.number.palette().color(part.number.foregroundRole()).name().upper()  # noqa: E731
-    designer.editing.make("Break", Set(("tasks", "stir", "frequency_hz"), -1))
+    designer.editing.make_step("Break", Set(("tasks", "stir", "frequency_hz"), -1))
     qtbot.waitUntil(page.earlier.isVisible)
     assert [part.number.text() for part in page.numbers.parts] == before
     assert {ink(part) for part in page.numbers.parts} == {grey}
@@ -150,7 +150,7 @@ def test_numbers_of_what_is_broken_stay_in_grey(qtbot: Any, designer: Any, worke
     assert "last valid state" in page.earlier.text()
     designer.editing.undo()
     qtbot.waitUntil(lambda: not page.earlier.isVisible())
-    designer.editing.ask(RetypeFile(designer.text.replace("[study]", "[study")))
+    designer.editing.handle_request(RetypeFile(designer.text.replace("[study]", "[study")))
     qtbot.waitUntil(page.earlier.isVisible)
     assert [part.number.text() for part in page.numbers.parts] == before
     designer.editing.undo()
@@ -175,7 +175,7 @@ def test_the_share_of_studies_is_that_of_the_command_power() -> None:
     assert protocol is not None
     planned = plans(protocol, (20,))
     ((done, found),) = list(sweep(planned, (6,), THRESHOLD_STUDIES, 1, Serial()))[-1:]
-    group = carry_out(order(20, participants=6, precision=0.5), print, lambda: False).group
+    group = run_simulation(order(20, participants=6, precision=0.5), print, lambda: False).group
     assert group is not None
     assert done == group.studies
     assert group.share == found["viscosity", 20].within(0, 0.5)
@@ -191,16 +191,16 @@ def test_the_share_of_studies_is_that_of_the_command_power() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("bound", [None, 1.25])
 def test_what_studies_show_of_a_contrast_is_that_of_the_command_power(bound: float | None) -> None:
-    study, _ = template("viscosity-jnd").edited(*NO_BREAKS, Set(("methods", "adaptive", "trials"), 20))
+    study, _ = template("viscosity-jnd").with_edits(*NO_BREAKS, Set(("methods", "adaptive", "trials"), 20))
     step = DuplicateElement(("blocks", "viscosity")).step(Situation(study))
     contrast = {"measure": "threshold", "blocks": ["viscosity", "viscosity_2"]} | ({"bound": bound} if bound else {})
-    protocol = study.edited(*step.edits, Set(("analysis", "contrasts"), [contrast]))[0].protocol
+    protocol = study.with_edits(*step.edits, Set(("analysis", "contrasts"), [contrast]))[0].protocol
     assert protocol is not None
     focus = focus_of(protocol, ("sequence",))
     wanted = simulation_of(protocol, focus, Controls(participants=30))
     assert wanted is not None
     assert wanted.block == "viscosity"
-    ((_, said),) = carry_out(wanted, print, lambda: False).hypotheses
+    ((_, said),) = run_simulation(wanted, print, lambda: False).hypotheses
     ((done, found),) = list(sweep(plans(protocol, ()), (30,), 10, 1, Serial()))[-1:]
     (row,) = [
         line
@@ -215,21 +215,21 @@ def test_what_studies_show_of_a_contrast_is_that_of_the_command_power(bound: flo
 
 @pytest.mark.slow
 def test_warnings_that_take_simulated_observers_are_those_of_check() -> None:
-    protocol = template("viscosity-jnd").edited(Set(("analysis", "participants"), 4))[0].protocol
+    protocol = template("viscosity-jnd").with_edits(Set(("analysis", "participants"), 4))[0].protocol
     assert protocol is not None
     wanted = simulation_of(protocol, Focus(), Controls())
     assert wanted is not None
-    warnings = carry_out(wanted, print, lambda: False).warnings
+    warnings = run_simulation(wanted, print, lambda: False).warnings
     assert warnings == tuple(imprecise(protocol, protocol.blocks["viscosity"]))
     assert warnings
 
 
 def test_what_is_wanted_depends_on_forces_and_tasks_and_on_no_text() -> None:
-    study = read(shipped_file("rek2024").read_bytes(), shipped_file("rek2024").parent)
+    study = read_study(shipped_file("rek2024").read_bytes(), shipped_file("rek2024").parent)
     path = ("blocks", "liquids")
 
     def wanted(*changes: Set) -> Simulation:
-        changed, _ = study.edited(*changes)
+        changed, _ = study.with_edits(*changes)
         assert changed.formed is not None
         one = simulation_of(changed.formed, focus_of(changed.formed, path), Controls())
         assert one is not None
@@ -243,7 +243,7 @@ def test_what_is_wanted_depends_on_forces_and_tasks_and_on_no_text() -> None:
 
 def test_an_order_is_given_up_before_its_first_number() -> None:
     with pytest.raises(Stopped):
-        carry_out(order(20), print, lambda: True)
+        run_simulation(order(20), print, lambda: True)
 
 
 def test_observers_of_evenly_spaced_levels_are_shown() -> None:
@@ -251,6 +251,6 @@ def test_observers_of_evenly_spaced_levels_are_shown() -> None:
     plan = threshold_plan(protocol, protocol.main_blocks[0])
     assert plan is not None
     even = replace(plan, stimulus=plan.stimulus.model_copy(update={"spacing": "linear"}))
-    found = observe(even, 0.3, 0.02)
+    found = simulate_observers(even, 0.3, 0.02)
     assert 0.5 < found.planted[0] < found.at_threshold < found.planted[-1]
     assert found.observers > 0

@@ -14,7 +14,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from study_app.designer.document.steps import DuplicateElement, SetText
-from study_app.designer.document.study import read
+from study_app.designer.document.study import read_study
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.gui.key_presses import ignores_clicks
 from study_app.gui.participant.window import ParticipantWindow
@@ -47,7 +47,7 @@ def place_of(live: Any, part: Any) -> QPoint:
 
 
 def test_a_trial_is_stepped_to_and_played(designer: Any) -> None:
-    designer.controller.begin("template:viscosity-jnd", "thicker")
+    designer.controller.begin_study("template:viscosity-jnd", "thicker")
     designer.go_to("blocks", "viscosity")
     preview = designer.controller.preview
     words = preview.step.text()
@@ -105,7 +105,7 @@ def test_an_edit_repaints_the_page_and_keeps_answers_and_focus_where_they_were(d
     line = designer.place.form
     line.setFocus()
     typing = designer.keyboard
-    designer.editing.ask(SetText((*ITEM, "text"), "en", "This is like honey."))
+    designer.editing.handle_request(SetText((*ITEM, "text"), "en", "This is like honey."))
     shown = next(one for one in live.page_window.widget.fields if one.view.id == "like_honey")
     assert shown.statement.text == "This is like honey."
     assert answers(live) == {"like_honey": 2}
@@ -130,12 +130,12 @@ def test_an_edit_repaints_the_page_and_keeps_answers_and_focus_where_they_were(d
 @pytest.mark.parametrize("opened", ["sound", "faulty, saved before"])
 def test_no_fault_blanks_the_page(designer: Any, broken: Any, opened: str) -> None:
     designer.open("kitchen", "pages", "welcome")
-    designer.editing.make("Another version", Set(("study", "version"), "2"))
+    designer.editing.make_step("Another version", Set(("study", "version"), "2"))
     designer.saving.save()
     if opened == "sound":
-        designer.editing.make("Break it", broken)
+        designer.editing.make_step("Break it", broken)
     else:
-        designer.file.write_text(read(designer.file.read_bytes()).edited(broken)[0].text)
+        designer.file.write_text(read_study(designer.file.read_bytes()).with_edits(broken)[0].text)
         designer.open("demo")
         designer.open("kitchen", "pages", "welcome")
     assert designer.study.faults
@@ -257,18 +257,18 @@ def statements(tab: Any) -> list[tuple[str, str]]:
 
 def test_a_copied_question_has_the_text_of_its_original_and_the_others_keep_theirs(designer: Any, tab: Any) -> None:
     before = statements(tab)
-    designer.editing.ask(DuplicateElement(ITEM))
+    designer.editing.handle_request(DuplicateElement(ITEM))
     designer.go_to(*COPY)
     copied = dict(before)["like_honey"]
     assert sorted(statements(tab)) == sorted([*before, ("like_honey_2", copied)])
     assert tab.view.note.endswith("(reads as an earlier item does): the text as it is written is shown.")
-    designer.editing.ask(SetText((*COPY, "text"), "en", "Another statement"))
+    designer.editing.handle_request(SetText((*COPY, "text"), "en", "Another statement"))
     assert dict(statements(tab))["like_honey_2"] == "Another statement"
 
 
 def test_an_answer_that_was_emptied_does_not_come_back_when_the_page_is_repainted(designer: Any, live: Any) -> None:
     field = live.page_window.widget.fields[0]
-    field.give(3)
-    field.take_back()
-    designer.editing.ask(SetText((*ITEM, "text"), "en", "Was it like honey?"))
+    field.give_answer(3)
+    field.retract_answer()
+    designer.editing.handle_request(SetText((*ITEM, "text"), "en", "Was it like honey?"))
     assert answers(live) == {}

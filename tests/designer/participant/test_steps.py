@@ -9,10 +9,10 @@ from study_app.designer.participant.playable import (
     STANDALONE,
     NotPlayableError,
     StepPosition,
+    first_showing,
     first_step,
-    playable,
+    part_to_play,
     same_step,
-    showing,
     step_name,
 )
 from study_app.protocol.load import load
@@ -24,7 +24,9 @@ from tests.protocol.groups.grouped import grouped
 
 def test_an_element_of_another_group_is_shown_in_a_session_of_that_group() -> None:
     study = grouped()
-    found = {name: showing(study, ("questionnaires" if name == "end" else "blocks", name)) for name in ("thin", "end")}
+    found = {
+        name: first_showing(study, ("questionnaires" if name == "end" else "blocks", name)) for name in ("thin", "end")
+    }
     assert all(one is not None for one in found.values())
     thin, end = found["thin"], found["end"]
     assert thin is not None
@@ -48,13 +50,13 @@ def test_a_step_that_is_gone_is_not_found_and_a_shorter_block_keeps_its_last_tri
 
 @pytest.mark.parametrize("path", [("study",), ("device", "force_limit_n"), ("sequence", 0), ("sequences", "thin")])
 def test_an_element_that_no_step_is_about_is_shown_nowhere(path: tuple[str | int, ...]) -> None:
-    assert showing(grouped(), path) is None
+    assert first_showing(grouped(), path) is None
 
 
 def test_a_page_that_is_in_no_session_is_shown_on_its_own() -> None:
     study = grouped()
     page = study.pages["hello"].model_copy()
-    found = showing(study.model_copy(update={"pages": {**study.pages, "unused": page}}), ("pages", "unused"))
+    found = first_showing(study.model_copy(update={"pages": {**study.pages, "unused": page}}), ("pages", "unused"))
     assert found is not None
     assert found.session == STANDALONE
     assert step_name(found.shown.schedule.steps[found.index]) == "unused"
@@ -85,7 +87,7 @@ def test_every_table_leads_to_the_first_step_that_shows_it(name: str, seed: int)
 
 
 def edited(name: str, *edits: Edit) -> Study:
-    return Study(source_bytes(name).decode()).edited(*edits)[0]
+    return Study(source_bytes(name).decode()).with_edits(*edits)[0]
 
 
 def test_an_element_that_is_gone_while_it_is_named_is_shown_as_it_was() -> None:
@@ -101,7 +103,7 @@ def test_an_element_that_is_gone_while_it_is_named_is_shown_as_it_was() -> None:
 @pytest.mark.slow
 def test_a_sound_draft_is_played_as_it_is() -> None:
     study = Study(source_bytes("rek2024").decode())
-    found = playable(study, ("study",), StepPosition("liquids", trial=3, language="nl", seed=7))
+    found = part_to_play(study, ("study",), StepPosition("liquids", trial=3, language="nl", seed=7))
     step = preview(load("rek2024"), 7).schedule.steps[found.step]
     assert isinstance(step, Trial)
     assert (step.block, step.index) == ("liquids", 3)
@@ -113,12 +115,12 @@ def test_a_sound_draft_is_played_as_it_is() -> None:
 def test_a_missing_text_of_another_language_prevents_nothing() -> None:
     study = edited("rek2024", Unset(("pages", "debrief", "title", "nl")))
     assert study.protocol is None
-    found = playable(study, ("blocks", "liquids"), StepPosition("liquids", language="en"))
+    found = part_to_play(study, ("blocks", "liquids"), StepPosition("liquids", language="en"))
     title = found.protocol.pages["debrief"].title
     assert isinstance(title, dict)
     assert title["nl"] == title["en"]
     with pytest.raises(NotPlayableError) as refused:
-        playable(study, ("blocks", "liquids"), StepPosition("liquids", language="nl"))
+        part_to_play(study, ("blocks", "liquids"), StepPosition("liquids", language="nl"))
     (problem,) = refused.value.problems
     assert problem.place == "pages.debrief.title"
     assert problem.line is not None

@@ -99,8 +99,8 @@ def lines_of(study: Path) -> list[dict[str, Any]]:
 def play_to_the_end(qtbot: Any, designer: Any) -> Player:
     player, pilots = Player(), designer.playing
     press_f5(qtbot, designer)
-    assert pilots.under_way, (designer.messages, designer.place.header.strip.notice)
-    qtbot.waitUntil(lambda: not pilots.under_way, timeout=SESSION_MS)
+    assert pilots.is_under_way, (designer.messages, designer.place.header.strip.notice)
+    qtbot.waitUntil(lambda: not pilots.is_under_way, timeout=SESSION_MS)
     assert not designer.messages
     return player
 
@@ -143,7 +143,7 @@ def test_a_likert_study_is_played_from_its_third_trial(qtbot: Any, likert: Any, 
     assert [line["trial"] for line in lines[resumed:] if line["event"] == "responses"] == [3, 4]
     assert lines[-1]["status"] == "completed"
     assert not list(folders.iterdir())
-    assert not likert.playing.under_way
+    assert not likert.playing.is_under_way
     qtbot.waitUntil(lambda: {thread.name for thread in threading.enumerate()} <= threads | {"background"})
 
 
@@ -156,7 +156,7 @@ def test_holding_escape_ends_at_zero_force_and_the_data_are_deleted(qtbot: Any, 
     qtbot.waitUntil(lambda: isinstance(participant.page, TaskPage))
     servo = pilots.pilot.session.rig.servo
     QTest.keyPress(participant, Qt.Key.Key_Escape)
-    qtbot.waitUntil(lambda: not pilots.under_way, timeout=10_000)
+    qtbot.waitUntil(lambda: not pilots.is_under_way, timeout=10_000)
     assert window(ParticipantWindow) is None
     assert not any(servo.telemetry.latest()["device_force_n"])
     assert not any(thread.name.startswith("servo") for thread in threading.enumerate())
@@ -191,7 +191,7 @@ def test_stop_above_the_page_closing_the_window_a_failure_and_leaving_the_place_
         press_f5(qtbot, likert)
         qtbot.waitUntil(lambda: window(ParticipantWindow) is not None, timeout=SESSION_MS)
         leave()
-        qtbot.waitUntil(lambda: not pilots.under_way, timeout=10_000)
+        qtbot.waitUntil(lambda: not pilots.is_under_way, timeout=10_000)
         assert window(ParticipantWindow) is None
     ((title, sentence),) = likert.messages
     assert title == "Playing was stopped"
@@ -200,7 +200,7 @@ def test_stop_above_the_page_closing_the_window_a_failure_and_leaving_the_place_
     likert.window.go("designer")
     press_f5(qtbot, likert)
     pilots.end(PATIENCE)  # while it is prepared
-    assert not pilots.under_way
+    assert not pilots.is_under_way
     assert not list(folders.iterdir())
 
 
@@ -210,7 +210,7 @@ def test_a_pilot_that_is_stopped_before_its_window_is_shown_has_not_begun(
     strip, start, stopped = likert.place.header.strip, SessionBridge.start, []
 
     def stop() -> None:
-        stopped.append((window(ParticipantWindow), likert.playing.under_way))
+        stopped.append((window(ParticipantWindow), likert.playing.is_under_way))
         qtbot.mouseClick(strip.buttons["stop"], Qt.MouseButton.LeftButton)
 
     def start_and_stop(bridge: SessionBridge) -> None:

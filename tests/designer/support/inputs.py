@@ -59,7 +59,7 @@ class Hand(Protocol):
 
     def turn_wheel(self, at: QPoint, down: bool) -> None: ...
 
-    def come_forward(self, window: QWidget) -> None: ...
+    def bring_forward(self, window: QWidget) -> None: ...
 
 
 class QtInput:
@@ -94,7 +94,7 @@ class QtInput:
         place = QPointF(window.mapFromGlobal(at))
         QTest.wheelEvent(window.windowHandle(), place, QPoint(0, -120 if down else 120))
 
-    def come_forward(self, window: QWidget) -> None:
+    def bring_forward(self, window: QWidget) -> None:
         """Give the keyboard to a window."""
         window.activateWindow()
 
@@ -139,9 +139,9 @@ class XInput:
         if shown is None:
             shown = next((one for one in reversed(QApplication.topLevelWidgets()) if one.isVisible()), None)
             if shown is not None:
-                self.come_forward(shown)
+                self.bring_forward(shown)
 
-    def come_forward(self, window: QWidget) -> None:
+    def bring_forward(self, window: QWidget) -> None:
         """Give the keyboard to a window, and put it above the others, as a window manager would."""
         number = str(int(window.winId()))
         subprocess.run(["xdotool", "windowraise", number, "windowfocus", number], check=False)

@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from study_app.designer.document.study import Study, read
+from study_app.designer.document.study import Study, read_study
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import EndPage, FeedbackPage, Page, TaskPage
 from tests.designer.support.inputs import wait_until
@@ -111,7 +111,7 @@ def play(user: User) -> None:
         elif page is not answered:
             answered = page
             user.answer(window)
-    user.hand.come_forward(user.window)
+    user.hand.bring_forward(user.window)
     user.press("Keep as pilot")
     wait_until(lambda: not user.sees("Keep as pilot"), "the kept pilot")
 
@@ -160,7 +160,7 @@ CHECKS: dict[str, Callable[[Study], None]] = {"twoliquids": check_likert, "which
 
 def check_file(file: Path, study: str) -> None:
     """Check that the file holds the study as it was meant."""
-    made = read(file.read_bytes(), file.parent)
+    made = read_study(file.read_bytes(), file.parent)
     assert made.faults == ()
     assert made.document["tasks"]["explore"]["max_s"] == 2
     CHECKS[study](made)

@@ -12,7 +12,7 @@ from pathlib import Path
 from PySide6.QtCore import QSize
 from PySide6.QtTest import QTest
 
-from study_app.app.main_controller import home
+from study_app.app.main_controller import run_home_window
 from study_app.gui.application import application_here
 from tests.designer.support.inputs import XInput
 from tests.designer.support.made_studies import STUDIES, play, save
@@ -39,7 +39,7 @@ def use(kind: str, act: Callable[[User], None]) -> User:
         window.move(0, 0)
         QTest.qWaitForWindowExposed(window)
         hand = XInput()
-        hand.come_forward(window)
+        hand.bring_forward(window)
         used.append(USERS[kind](window, hand))
         try:
             act(used[0])
@@ -49,7 +49,7 @@ def use(kind: str, act: Callable[[User], None]) -> User:
         visit.loop.quit()  # type: ignore[attr-defined]
         visit.loop.exec = lambda: 0  # type: ignore[attr-defined]  # it is over
 
-    home(then=begin)
+    run_home_window(then=begin)
     if errors:
         raise errors[0]
     return used[0]

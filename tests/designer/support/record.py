@@ -65,7 +65,7 @@ class Record:
                 case "selected", path:
                     self.select(*_path(path))
                 case "entered", path:
-                    self.note(f"enter {path}", lambda path=path: self.designer.place.form.focus(_path(path)))
+                    self.note(f"enter {path}", lambda path=path: self.designer.place.form.focus_row(_path(path)))
                 case _, keys:
                     self.note(f"key {keys}", lambda keys=keys: self.designer.key(keys))
 
@@ -143,7 +143,7 @@ class Record:
 
     def ask(self, request: Request) -> None:
         """Ask for a step, as a part of the window would."""
-        self.note(f"ask {one_line(request)}", lambda: self.designer.editing.ask(request))
+        self.note(f"ask {one_line(request)}", lambda: self.designer.editing.handle_request(request))
 
     def select(self, *path: str | int, paints: bool = False) -> None:
         self.note(f"select {path}", lambda: self.designer.go_to(*path), paints=paints)

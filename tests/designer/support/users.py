@@ -284,7 +284,7 @@ class KeyUser(User):
         self.key(keys)
 
     def answer(self, window: ParticipantWindow) -> None:
-        self.hand.come_forward(window)
+        self.hand.bring_forward(window)
         if isinstance(window.page, QuestionnairePage):
             for _ in window.page.items:
                 self.key("3")

@@ -6,7 +6,7 @@ import pytest
 from study_app.evidence.stability.bench import Bench
 from study_app.evidence.stability.force_delay import delayed_trace, measure
 from study_app.evidence.stability.stability_cases import Case, parse
-from study_app.protocol.warnings.delayed_force import table
+from study_app.protocol.warnings.delayed_force import stored_table
 from tests.haptics.scenes import COMPILED
 
 compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
@@ -68,7 +68,7 @@ def test_a_delayed_force_gives_energy_that_the_controller_withholds():
     [("water", "ewma", "light"), ("honey", "kalman", "middle"), ("physical2_honey", "ewma", "light")],
 )
 def test_the_shipped_table_is_the_one_that_is_measured(liquid, estimator, hand):
-    shipped = [it for it in table() if it[:3] == (liquid, estimator, hand)]
+    shipped = [it for it in stored_table() if it[:3] == (liquid, estimator, hand)]
     for one, again in zip(shipped, measure([liquid], [estimator], [hand]), strict=True):
         assert one[:4] == again[:4]
         within = 0.3 if one.withheld_percent == 0 else 10.0  # beyond, it hangs on micrometres

@@ -81,7 +81,7 @@ class Scene:
     def try_while_unplugged(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
         if isinstance(participant.page, TroublePage) and operator.banner.reconnect.isVisible():
             if not operator.isActiveWindow():  # then it hears no keys
-                operator.come_forward()
+                operator.bring_forward()
                 return True
             self.told["lost"] = {
                 "force": self.rig.servo.force_is_on,
@@ -141,14 +141,14 @@ class Scene:
             self.told["panels"] = sorted(failed)
             self.told["force with failed panels"] = self.rig.servo.force_is_on
             self.told["trouble with failed panels"] = operator.banner.isVisible()
-            operator.come_forward()
+            operator.bring_forward()
             self.step = self.see_lines_in_front
         return len(failed) < 2
 
     def see_lines_in_front(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
         QGuiApplication.processEvents()
         self.picture("panels")
-        participant.come_forward()
+        participant.bring_forward()
         session_panels.smooth_painter, TracePlot.show_traces = self.painter, self.drawn
         self.samples_file, recordings.SamplesFile = recordings.SamplesFile, _ends
         self.trial = participant.page.trial if isinstance(participant.page, TaskPage) else None
@@ -166,7 +166,7 @@ class Scene:
             self.told["page at the loss"] = type(participant.page).__name__
             self.told["force without a recording"] = self.rig.servo.force_is_on
             self.told["notices"] = notices
-            operator.come_forward()
+            operator.bring_forward()
             self.step = self.see_loss
         return False
 
@@ -175,7 +175,7 @@ class Scene:
         self.picture("recorder")
         for notice in operator.findChildren(Question):
             notice.accept()
-        participant.come_forward()
+        participant.bring_forward()
         self.step = self.go_on
         return False
 

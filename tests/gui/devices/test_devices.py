@@ -7,7 +7,7 @@ import pytest
 
 from study_app.devices.descriptor import DRIVER_READY, NONE, NOT_AVAILABLE, READY, Backend
 from study_app.devices.registry import backends, list_devices
-from study_app.gui.kit.devices import device_named, devices_shown, looking
+from study_app.gui.kit.devices import device_before_look, device_named, devices_shown
 from tests.golden import compare
 from tests.golden_values import value_lines
 
@@ -39,8 +39,8 @@ def told() -> Iterator[str]:
     shown = devices_shown([MOUSE, falcon("connected: FT1"), EMULATED])
     for name in ("falcon:FT1", "falcon-emulated", "hammer"):
         yield from value_lines(device_named(name, shown), f"preferred {name}")
-    assert device_named("falcon", ()) == looking("falcon")
-    yield from value_lines(looking("falcon"), "before anybody looked")
+    assert device_named("falcon", ()) == device_before_look("falcon")
+    yield from value_lines(device_before_look("falcon"), "before anybody looked")
 
 
 def test_devices_are_told_as_reviewed(pytestconfig: pytest.Config) -> None:

@@ -73,15 +73,15 @@ def test_a_slow_frame_costs_its_own_refreshes_and_no_more(screen):
 
 def test_frames_follow_the_swaps_of_a_surface(screen):
     screen.run(1.0)
-    assert not screen.frames.locked
+    assert not screen.frames.is_locked
     period_ns = screen.frames.period_ns
     swap_ns = screen.now_ns + period_ns // 3
     for _ in range(30):
         screen.run((swap_ns - screen.now_ns) * 1e-9)
         screen.now_ns = swap_ns
-        screen.frames.swapped()
+        screen.frames.note_swap()
         swap_ns += period_ns
-    assert (screen.frames.locked, screen.frames.paced) == (True, "locked to the screen's swaps")
+    assert (screen.frames.is_locked, screen.frames.pacing) == (True, "locked to the screen's swaps")
     lead_ns = min(LEAD_NS, period_ns // 2)
     ahead_ns = [(swap_ns - drawn_ns) % period_ns for drawn_ns in screen.drawn_ns[-20:]]
     assert ahead_ns == pytest.approx([lead_ns] * 20, abs=2)
@@ -89,10 +89,10 @@ def test_frames_follow_the_swaps_of_a_surface(screen):
 
 
 def test_without_swaps_the_clock_goes_on(screen):
-    screen.frames.swapped()
-    assert screen.frames.locked
+    screen.frames.note_swap()
+    assert screen.frames.is_locked
     screen.run(2 * STALE_REFRESHES * screen.frames.period_ns * 1e-9)
-    assert (screen.frames.locked, screen.frames.paced) == (False, "by the clock")
+    assert (screen.frames.is_locked, screen.frames.pacing) == (False, "by the clock")
     assert len(screen.drawn_ns) >= 2 * STALE_REFRESHES - 1
 
 

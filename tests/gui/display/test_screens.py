@@ -5,7 +5,7 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QWidget
 
-from study_app.gui.display.screens import place
+from study_app.gui.display.screens import place_window
 
 pytestmark = pytest.mark.slow
 
@@ -15,7 +15,7 @@ def test_window_as_large_as_the_screen_makes_room_for_a_frame_that_comes_late(qt
     window = QWidget()
     qtbot.addWidget(window)
     window.resize(room.size())
-    place(window, window.screen(), corner=False)
+    place_window(window, window.screen(), corner=False)
     qtbot.wait(600)  # until then it has no frame
     window.show()
     qtbot.waitExposed(window)
@@ -29,7 +29,7 @@ def test_window_that_fits_or_fills_the_screen_keeps_size_and_least_size(qtbot) -
     qtbot.addWidget(window)
     window.setMinimumSize(QSize(300, 200))
     window.resize(500, 400)
-    place(window, window.screen(), corner=True)
+    place_window(window, window.screen(), corner=True)
     window.show()
     qtbot.waitExposed(window)
     qtbot.wait(400)

@@ -99,7 +99,7 @@ def test_home_follows_what_happens(qtbot, tmp_path, monkeypatch, pytestconfig, a
         for _ in range(2):  # a folder that was looked at may be read
             wait_for_jobs(60)
             QApplication.processEvents()
-        qtbot.waitUntil(lambda: not home.reading)
+        qtbot.waitUntil(lambda: not home.is_reading)
 
     lines = (
         re.sub(r"\d\d:\d\d", "HH:MM", line.replace(str(tmp_path), "FOLDER"))
@@ -118,7 +118,7 @@ def test_studies_that_cannot_be_read_are_named_and_the_sessions_stay(qtbot, resu
     home.main.notice.accept()
     monkeypatch.undo()
     QApplication.sendEvent(home, QEvent(QEvent.Type.WindowActivate))
-    assert not home.reading, "each activation would say it again"
+    assert not home.is_reading, "each activation would say it again"
     home.enter()
     qtbot.waitUntil(lambda: len(home.grid.cards) > 1)
 

@@ -43,9 +43,9 @@ def test_one_begins_at_the_first_place_goes_by_the_rail_and_a_session_and_the_en
     qtbot.mouseClick(main.rail.buttons["lab"], Qt.MouseButton.LeftButton)
     assert (main.here, log[1:]) == ("lab", ["leave home", "enter lab"])
     assert [name for name, button in main.rail.buttons.items() if button.here] == ["lab"]
-    main.rest()
+    main.hide_for_session()
     assert (main.isVisible(), log[-1]) == (False, "leave lab")
-    main.come_back()
+    main.return_from_session()
     assert (main.isVisible(), log[-1]) == (True, "enter lab")
     main.close()
     assert log[-1].startswith("leave")
@@ -63,10 +63,10 @@ def test_what_a_place_says_is_shown_until_one_leaves_it_and_after_a_session(main
     main.go("devices")
     assert main.notice.isVisible(), "it is said before one goes there, too"
     main.go("home")
-    main.rest()
+    main.hide_for_session()
     main.show_message("The studies could not be read", "The folder is gone.")
     assert not main.notice.isVisible()
-    main.come_back()
+    main.return_from_session()
     assert main.notice.isVisible()
     main.notice.accept()
 
@@ -108,8 +108,8 @@ def test_keyboard_is_after_a_session_where_it_was_before(main, qtbot):
     qtbot.waitUntil(main.isActiveWindow)
     began = main.place("home").findChild(QPushButton)
     began.setFocus()
-    main.rest()
+    main.hide_for_session()
     main.focusNextChild()  # Qt does so where a hidden window becomes the active one
     assert main.focusWidget() is not began
-    main.come_back()
+    main.return_from_session()
     assert main.focusWidget() is began

@@ -11,19 +11,19 @@ import pytest
 from study_app.designer import version_rows
 from study_app.gui.home.study_facts import (
     BrokenFacts,
-    held,
     holds_liquids_alone,
-    interrupted,
+    interrupted_session,
+    known_sources,
     read_studies,
-    sources,
+    session_counts_text,
     study_facts,
 )
 from study_app.gui.sessions.session_facts import (
-    incidents,
-    matching,
+    incidents_text,
+    occurring_states,
+    session_filter,
     sessions,
-    started_words,
-    states_of,
+    start_time_text,
     status_chip,
     validity_chip,
 )
@@ -83,17 +83,17 @@ def told(folder: Path) -> Iterator[str]:
     """Yield what is said of each session in a folder of results, of all together, and which ones each filter shows."""
     found, now = sessions(folder, {"demo": 8}), datetime.now().astimezone()
     for row in found:
-        chips = f"{status_chip(row)[2]}, {validity_chip(row)[2]}; {incidents(row)}"
+        chips = f"{status_chip(row)[2]}, {validity_chip(row)[2]}; {incidents_text(row)}"
         yield f"{row.participant} {row.kind} {row.status}: {chips}; {row.answers} of {row.answers_of}; {row.excluded}"
     for study in ("demo", "rek2024"):
-        yield f"{study}: {held(found, study)}"
-    yield from (f"{words}: {[one.participant for one in found if matching('', state)(one)]}" for state, words in
-                states_of(found))  # fmt: skip
-    offered = interrupted(found, [study_facts("rek2024"), study_facts("demo")], now)
+        yield f"{study}: {session_counts_text(found, study)}"
+    yield from (f"{words}: {[one.participant for one in found if session_filter('', state)(one)]}" for state, words in
+                occurring_states(found))  # fmt: skip
+    offered = interrupted_session(found, [study_facts("rek2024"), study_facts("demo")], now)
     if offered is not None:
         yield f"go on with {offered.source}: {offered.heading}; {offered.line}"
         assert offered.folder == folder / "demo" / "data" / f"sub-{offered.participant}" / "ses-01"
-    assert interrupted(found, [], now) is None
+    assert interrupted_session(found, [], now) is None
 
 
 def test_sessions_are_told_as_they_were_held(tmp_path, pytestconfig):
@@ -137,7 +137,7 @@ def test_studies_state_extent_languages_needs_and_the_first_problem(tmp_path, py
     lines = []
     for name, text in {"grouped": STUDY + GROUPS, "cut": "format = 1\nsequence = [", "bare": "format = 1\n"}.items():
         (tmp_path / f"{name}.toml").write_text(text)
-    assert sources()[-1] == "demo"
+    assert known_sources()[-1] == "demo"
     for source in ("rek2024", "viscosityjnd", *(str(tmp_path / f"{name}.toml") for name in ("grouped", "cut", "bare"))):
         facts = study_facts(source)
         names = ("problem",) if isinstance(facts, BrokenFacts) else ("extent", "duration", "languages", "needs")
@@ -155,20 +155,20 @@ def test_a_session_of_a_study_whose_liquid_file_is_lost_is_offered(tmp_path):
     liquid.write_text(f"format = 1\n{table}", encoding="utf-8")
     results, now = tmp_path / "results", datetime.now().astimezone()
     stop_at(results, "P001", 2, source=source)
-    whole = interrupted(sessions(results, {}), [study_facts("demo"), study_facts(str(source))], now)
+    whole = interrupted_session(sessions(results, {}), [study_facts("demo"), study_facts(str(source))], now)
     liquid.unlink()
     broken = study_facts(str(source))
     assert isinstance(broken, BrokenFacts)
     assert whole.source == str(source)
-    assert interrupted(sessions(results, {}), [broken, study_facts("demo")], now) == whole
+    assert interrupted_session(sessions(results, {}), [broken, study_facts("demo")], now) == whole
 
 
 def test_times_are_said_as_people_say_them():
     now = datetime(2024, 11, 20, 15, 0).astimezone()
-    assert started_words(now, now) == "Today 15:00"
-    assert started_words(now - timedelta(hours=20), now) == "Yesterday 19:00"
-    assert started_words(datetime(2024, 11, 18, 9, 5).astimezone(), now) == "18 Nov 09:05"
-    assert started_words(datetime(2023, 3, 1, 9, 5).astimezone(), now) == "1 Mar 2023 09:05"
+    assert start_time_text(now, now) == "Today 15:00"
+    assert start_time_text(now - timedelta(hours=20), now) == "Yesterday 19:00"
+    assert start_time_text(datetime(2024, 11, 18, 9, 5).astimezone(), now) == "18 Nov 09:05"
+    assert start_time_text(datetime(2023, 3, 1, 9, 5).astimezone(), now) == "1 Mar 2023 09:05"
 
 
 def test_drafts_come_first_the_newest_of_all_and_a_copy_names_its_original(tmp_path, monkeypatch):

@@ -68,20 +68,20 @@ def test_the_mouse_moves_the_ball_from_a_click_to_the_next_and_only_while_it_lea
     place.show_view(still)
     middle = place.tank.rect().center()
     QTest.mouseClick(place.tank, Qt.MouseButton.LeftButton, pos=middle)
-    assert place.tank.pointer.held
+    assert place.tank.pointer.is_held
     QTest.mouseMove(place.tank, middle + QPoint(40, 10))
     assert moves[-1] != moves[0]
     QTest.mousePress(place.tank, Qt.MouseButton.LeftButton, pos=middle)
-    assert not place.tank.pointer.held
+    assert not place.tank.pointer.is_held
     assert bits[-1] == (0,)
     for fields in ({"path": "zigzag"}, {"busy": "Opening"}):
         place.show_view(still)
         QTest.mousePress(place.tank, Qt.MouseButton.LeftButton, pos=middle)
-        assert place.tank.pointer.held
+        assert place.tank.pointer.is_held
         place.show_view(dataclasses.replace(still, **fields))  # type: ignore[arg-type]
-        assert not place.tank.pointer.held
+        assert not place.tank.pointer.is_held
         QTest.mousePress(place.tank, Qt.MouseButton.LeftButton, pos=middle)
-        assert not place.tank.pointer.held
+        assert not place.tank.pointer.is_held
 
 
 def test_a_device_that_failed_is_tried_again_or_examined(place: Any, still: LabView) -> None:
@@ -102,10 +102,10 @@ def test_escape_and_leaving_give_the_pointer_back(place: Any, still: LabView) ->
     place.show_view(still)
     place.tank.setFocus()
     QTest.keyClick(place.tank, Qt.Key.Key_Return)
-    assert place.tank.pointer.held
+    assert place.tank.pointer.is_held
     QTest.keyClick(place.tank, Qt.Key.Key_Escape)
-    assert not place.tank.pointer.held
+    assert not place.tank.pointer.is_held
     QTest.keyClick(place.tank, Qt.Key.Key_Space)
-    assert place.tank.pointer.held
+    assert place.tank.pointer.is_held
     place.hide()
-    assert not place.tank.pointer.held
+    assert not place.tank.pointer.is_held

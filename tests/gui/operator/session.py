@@ -89,10 +89,10 @@ def ticks(count: int, *, first: int = 0, lateness_ns: int = 15_000) -> Any:
 def measured_health() -> ServoHealth:
     """Return three seconds of a servo with frames and a moving hand."""
     measured = ServoHealth(1000.0)
-    measured.take(ticks(3000))
+    measured.add_samples(ticks(3000))
     for frame in range(120):
-        measured.frame(1 + frame * 16_666_667)
+        measured.add_frame(1 + frame * 16_666_667)
     for step in range(200):
         at = step * 0.02
-        measured.hand(at, (0.02 * np.sin(at), 0.01 * np.cos(at), 0.005))
+        measured.add_hand_position(at, (0.02 * np.sin(at), 0.01 * np.cos(at), 0.005))
     return measured

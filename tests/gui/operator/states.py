@@ -35,7 +35,7 @@ def operator(qtbot: Any, **more: Any) -> OperatorWindow:
     made.force_limited = "force_limit_n" in more
     if made.force_limited:
         made.told.make_single_blind()
-        made.forces.take(pushes(LIMITER_NORM))
+        made.forces.add_samples(pushes(LIMITER_NORM))
     shown(qtbot, made, (1366, 768))
     told()(made)
     return made  # type: ignore[no-any-return]
@@ -79,10 +79,10 @@ def slowed(window: Any) -> None:
     samples.tick = np.arange(3000, 6000)
     samples.time_ns = samples.tick * 1_250_000
     samples.lateness_ns, samples.delay_ticks = 9_000_000, 4
-    window.health.take(samples)
+    window.health.add_samples(samples)
     window.health.overruns = 17
-    window.health.frame(4_000_000_000)
-    window.health.hand(100.0, (0.09, 0.0, 0.0))
+    window.health.add_frame(4_000_000_000)
+    window.health.add_hand_position(100.0, (0.09, 0.0, 0.0))
     told(("note", {"kind": "mark", "text": ""}), dropped=1200, outlets_lost={"Serial port": "it was unplugged"})(window)
     window.show_traces(window.health, 100.0)
 
@@ -94,7 +94,7 @@ def pushed(peak_n: float) -> Callable[[Any], None]:
         window.forces = Forces(6.0)
         samples = pushes(0)
         samples.device_force_n = samples.device_force_n * (peak_n / 2)
-        window.forces.take(samples)
+        window.forces.add_samples(samples)
         told()(window)
 
     return act
@@ -129,7 +129,7 @@ RUNNING: Actions = {
     ),
     "reconnecting": in_turn(clicked("banner.reconnect"), told(beyond=RECONNECTS, force_on=False)),
     "in the dark theme": lambda window: window.header.theme_button.click(),
-    "a part failed": lambda window: window.draw(lambda: 1 / 0),
+    "a part failed": lambda window: window.show_guarded(lambda: 1 / 0),
 }
 DISK: Actions = {
     "a form": told(lambda it: it.welcome()),

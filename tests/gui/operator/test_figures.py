@@ -69,20 +69,20 @@ def healths() -> Iterator[str]:
     ):
         health = ServoHealth(rate_hz)
         for batch in batches:
-            health.take(batch)
+            health.add_samples(batch)
         yield from (f"== {name}", *of_health(health))
     for name, gaps_ms in (("frames missed", (16, 17, 24, 26, 51, 2)), ("a page between", (0, 16))):
         health, at_ns = ServoHealth(1000.0, refresh_hz=60.0), 1
         for gap_ms in gaps_ms:
-            health.frame(at_ns)
+            health.add_frame(at_ns)
             at_ns += gap_ms * MS
             if gap_ms == 0:
-                health.frames_rest()
+                health.pause_frames()
                 at_ns = 60_000_000_000
-        health.frame(at_ns)
+        health.add_frame(at_ns)
         yield from (f"== {name}", *of_health(health))
     for step in range(1600):
-        health.hand(step * 0.0213, (step, 0.0, 0.0))
+        health.add_hand_position(step * 0.0213, (step, 0.0, 0.0))
     yield from ("== a hand", *of_health(health, 1600 * 0.0213))
 
 
@@ -107,7 +107,7 @@ def forces() -> Iterator[str]:
         yield f"== {name}"
         for batch in batches if len(batches) < 9 else [batches]:
             for part in batch if isinstance(batch, list) else [batch]:
-                it.take(part)
+                it.add_samples(part)
                 end = int(part.time_ns[-1]) + MS
             yield from value_lines(it.figures())
         yield from (ends(*one) for one in zip(("times", "forces"), it.trace(end), strict=True))
@@ -126,8 +126,8 @@ def frame_times() -> Iterator[str]:
     ):
         frames = FrameTimes(60.0)
         for time_ns in times_ns:
-            frames.add(int(time_ns))
-        yield from (f"== {name}", *value_lines(frames.words()))
+            frames.add_frame(int(time_ns))
+        yield from (f"== {name}", *value_lines(frames.figure_texts()))
 
 
 @pytest.mark.parametrize("of", [healths, forces, frame_times], ids=lambda of: of.__name__)
@@ -142,7 +142,7 @@ def test_a_peak_of_one_tick_is_not_missed_however_it_came_in() -> None:
     for batch in (4000, 17, 16, 1):
         forces = Forces(8.0)
         for first in range(0, 4000, batch):
-            forces.take(pushed[first : first + batch])
+            forces.add_samples(pushed[first : first + batch])
         traces.append(np.column_stack(forces.trace(4000 * MS)))
     assert all(np.array_equal(one, other) for one, other in pairwise(traces))
     (peak,) = traces[0][traces[0][:, 4] == 7.5]

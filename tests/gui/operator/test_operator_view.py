@@ -83,7 +83,7 @@ def late():
     for delay_ticks in (1, 3):
         samples = ticks(600, first=600 * (delay_ticks // 2), lateness_ns=4_000_000)
         samples.delay_ticks = delay_ticks
-        measured.take(samples)
+        measured.add_samples(samples)
     measured.overruns = 9
     return measured
 

@@ -75,7 +75,7 @@ def filled(window: OperatorWindow, told: Any, health: Any, state: str) -> None:
     for event, fields in happened.items():
         told.tell(event, **fields)
     forces = Forces(6.0)
-    forces.take(pushes())
+    forces.add_samples(pushes())
     if single := hasattr(window.force, "plot"):
         told.make_single_blind()
     view = told.view(health, forces=forces.figures() if single else None, **said)

@@ -45,7 +45,7 @@ def captured(opening: Callable[..., Participant]) -> Iterator[Participant]:
     made = opening(captures_pointer=True)
     yield made
     made.close()
-    assert not made.window.findChild(PointerCapture).held
+    assert not made.window.findChild(PointerCapture).is_held
 
 
 @pytest.fixture(scope="module")

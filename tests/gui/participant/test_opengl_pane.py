@@ -2,7 +2,7 @@
 
 import pytest
 
-from study_app.gui.display.screens import IN_SOFTWARE, has_card, renderer
+from study_app.gui.display.screens import IN_SOFTWARE, has_graphics_card, opengl_renderer
 from tests.end_to_end.real_windows import needs_display
 from tests.gui.participant.driver import on_a_display
 
@@ -17,7 +17,7 @@ import numpy as np
 from PySide6.QtCore import QEventLoop, QTimer
 from PySide6.QtWidgets import QApplication
 from study_app.gui.display.screens import Frames
-from study_app.gui.display.screens import has_card, renderer
+from study_app.gui.display.screens import has_graphics_card, opengl_renderer
 from study_app.gui.participant.tank_widget import TankWidget
 from study_app.protocol.wording.languages import words
 from tests.gui.small import task_page, view
@@ -25,7 +25,7 @@ from tests.gui.drawn import pixels
 
 sys.excepthook = lambda *error: (sys.__excepthook__(*error), os._exit(1))
 app = QApplication([])
-told = {{"renderer": renderer(), "card": has_card(), "painted": [], "swaps": 0}}
+told = {{"renderer": opengl_renderer(), "card": has_graphics_card(), "painted": [], "swaps": 0}}
 if told["renderer"] is None:
     print(json.dumps(told)); sys.exit()
 tanks = [TankWidget(task_page(), words("en"), on_card=on_card) for on_card in (False, True)]
@@ -36,13 +36,13 @@ for one in tanks:
 frames = Frames(60.0)
 loop = QEventLoop()
 tank.painted.connect(told["painted"].append)
-tank.swapped.connect(frames.swapped)
+tank.swapped.connect(frames.note_swap)
 def swapped():
     told["swaps"] += 1
 tank.swapped.connect(swapped)
 shown = []
 def due():
-    told["locked"] = frames.locked
+    told["locked"] = frames.is_locked
     if len(told["painted"]) == {FRAMES}:
         frames.stop(); loop.quit(); return
     place = (0.001 * len(told["painted"]), 0.0, 0.0)
@@ -79,5 +79,5 @@ def test_the_picture_on_a_surface_is_the_same_and_every_view_is_told_of_once_aft
 
 
 def test_without_a_screen_there_is_no_card(qapp):
-    assert renderer() is None
-    assert not has_card()
+    assert opengl_renderer() is None
+    assert not has_graphics_card()

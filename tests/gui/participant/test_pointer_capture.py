@@ -29,7 +29,7 @@ turn(0.5)
 capture = PointerCapture()
 places = []
 capture.moved.connect(lambda x, y, z: places.append(x))
-capture.take(window, (10_000.0, 100.0, 100.0))
+capture.capture(window, (10_000.0, 100.0, 100.0))
 turn(0.3)
 for _ in range({STEPS}):
     subprocess.run(["xdotool", "mousemove_relative", "--", "{STEP_PX}", "0"], check=True)

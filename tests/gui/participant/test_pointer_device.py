@@ -20,7 +20,7 @@ def test_pointer_is_hidden_in_the_tank_alone_and_held_there_if_it_is_the_device(
     window = request.getfixturevalue(device)
     for page, in_tank in ((text_page(), False), (task_page(), True), (questionnaire(), False)):
         window.show(page)
-        assert window.window.findChild(PointerCapture).held is (in_tank and device == "captured")
+        assert window.window.findChild(PointerCapture).is_held is (in_tank and device == "captured")
         assert (window.page.cursor().shape() == Qt.CursorShape.BlankCursor) is in_tank
 
 
@@ -39,11 +39,11 @@ def test_the_operators_window_lets_the_pointer_go_and_the_trial_goes_on(captured
     captured.show(task_page())
     with qtbot.waitSignal(captured.window.settling.timeout):
         other = other_window(captured, qtbot)
-        assert not captured.window.findChild(PointerCapture).held
+        assert not captured.window.findChild(PointerCapture).is_held
     assert other.isActiveWindow()
     assert captured.events == []
     captured.window.activateWindow()
-    qtbot.waitUntil(lambda: captured.window.findChild(PointerCapture).held)
+    qtbot.waitUntil(lambda: captured.window.findChild(PointerCapture).is_held)
     assert captured.page.cursor().shape() == Qt.CursorShape.BlankCursor
 
 
@@ -57,7 +57,7 @@ def test_a_window_that_is_active_again_holds_the_pointer_in_the_tank_alone(
     other.hide()
     captured.window.activateWindow()
     qtbot.waitUntil(captured.window.isActiveWindow)
-    assert not captured.window.findChild(PointerCapture).held
+    assert not captured.window.findChild(PointerCapture).is_held
 
 
 def test_another_program_that_takes_the_keyboard_pauses(captured: Participant, qtbot: Any) -> None:
@@ -81,7 +81,7 @@ class Hand:
         self.bits: list[int] = []
         self.capture.moved.connect(lambda *place: self.places.append(place))
         self.capture.pressed.connect(self.bits.append)
-        self.capture.take(self.widget, (0.1, 0.06, 0.08))
+        self.capture.capture(self.widget, (0.1, 0.06, 0.08))
         QApplication.processEvents()
         self.places.clear()
         self.middle = self.widget.mapToGlobal(self.widget.rect().center())
@@ -144,7 +144,7 @@ def test_buttons_are_bits_and_are_let_go_with_the_pointer(hand: Hand) -> None:
     assert hand.bits == [1, 3, 2]
     hand.capture.release()
     assert hand.bits[-1] == 0
-    assert not hand.capture.held
+    assert not hand.capture.is_held
 
 
 def test_hand_stays_where_it_was_from_one_capture_to_the_next(hand: Hand) -> None:
@@ -153,5 +153,5 @@ def test_hand_stays_where_it_was_from_one_capture_to_the_next(hand: Hand) -> Non
     hand.capture.release()
     hand.move(hand.middle + QPoint(200, 0))
     assert hand.places[-1] == place
-    hand.capture.take(hand.widget, (0.1, 0.06, 0.08))
+    hand.capture.capture(hand.widget, (0.1, 0.06, 0.08))
     assert hand.places[-1] == pytest.approx(place)

@@ -134,10 +134,10 @@ def test_a_view_that_nobody_can_see_is_told_of_when_it_is_seen(tank: TankWidget,
 
 def onsets(make: Make, speeds_mps: list[float], step_ns: int = 10_000_000) -> list[bool]:
     patch, place, lit = make().patch, 0.0, []
-    patch.follow((0, 0, 0), 0)
+    patch.follow_motion((0, 0, 0), 0)
     for index, speed in enumerate(speeds_mps, 1):
         place += speed * step_ns / 1e9
-        lit.append(patch.follow((place, 0, 0), index * step_ns))
+        lit.append(patch.follow_motion((place, 0, 0), index * step_ns))
     return lit
 
 

@@ -58,7 +58,7 @@ def test_every_page_fills_the_window_names_itself_and_leaves_no_widget_behind(op
 
 def test_the_window_stays_one_to_a_screen_reader_whatever_is_connected_to_it(opened: Participant) -> None:
     button = QPushButton()
-    button.clicked.connect(opened.window.come_forward)
+    button.clicked.connect(opened.window.bring_forward)
     opened.window.open_on()
     assert (told_of(opened.window).role(), name_of(opened.window)) == (
         QAccessible.Role.Window,

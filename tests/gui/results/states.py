@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QWidget
 
 from study_app.analysis.worker_messages import FigureDrawn, Progress
 from study_app.errors import StoreError
-from study_app.gui.results.figures import Trouble, unblinded_words
+from study_app.gui.results.figures import Trouble, unblinding_text
 from study_app.gui.sessions.session_page import SessionPage, SessionRecord, TrialRecord
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import apply_theme
@@ -33,7 +33,7 @@ def then(button: str, **changes: Any) -> Callable[[Any], None]:
 
 
 FIGURES = view().figures
-OPENED = unblinded_words({"at": STARTED.isoformat(), "by": "AK", "reason": "closed, " + "and so on " * 20})
+OPENED = unblinding_text({"at": STARTED.isoformat(), "by": "AK", "reason": "closed, " + "and so on " * 20})
 PEOPLE = (
     facts("P001", status="damaged", validity=None),
     facts("P002", status="withdrawn", validity="invalid", answers=3, answers_of=62),
@@ -158,7 +158,7 @@ def page(qtbot: Any) -> SessionPage:
 def read_again(**changed: Any) -> Callable[[Any], None]:
     def act(made: Any) -> None:
         READ.update(changed)
-        made.read()
+        made.read_folder()
 
     return act
 

@@ -77,9 +77,9 @@ class Opened:
         self.wait()
 
     def wait(self) -> None:
-        self.qtbot.waitUntil(lambda: not self.place.busy, timeout=SOON_MS)
+        self.qtbot.waitUntil(lambda: not self.place.is_busy, timeout=SOON_MS)
         cards = self.place.figures.cards
-        self.qtbot.waitUntil(lambda: all(card.drawing is None or card.drawing.settled for card in cards))
+        self.qtbot.waitUntil(lambda: all(card.drawing is None or card.drawing.is_settled for card in cards))
 
     def click(self, button: Any) -> None:
         self.qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
@@ -229,7 +229,7 @@ def test_a_process_that_is_killed_is_told_and_begun_again(qtbot: QtBot, results:
     opened = Opened(qtbot, results, start_analysis_worker)
     reader: Any = opened.place.reader
     psutil.Process(reader.process.pid).suspend()  # or it may answer before it is killed
-    opened.place.look()
+    opened.place.read_studies()
     reader.process.kill()
     qtbot.waitUntil(lambda: "bug in the program" in opened.place.figures.trouble.title.text(), timeout=SOON_MS)
     opened.click(opened.place.figures.trouble.button)

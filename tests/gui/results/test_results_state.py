@@ -3,28 +3,28 @@
 import pytest
 from PySide6.QtCore import QSize
 
-from study_app.gui.results.figures import drawn, in_figures, themed_svg
-from study_app.gui.sessions.session_facts import matching, states_of
+from study_app.gui.results.figures import drawn_svg, figure_counts, themed_svg
+from study_app.gui.sessions.session_facts import occurring_states, session_filter
 from study_app.gui.theme.theme import DARK, LIGHT
 from tests.gui.results.sample import COLOURS, SVG, facts
 
 
 def test_who_is_in_the_figures_and_why_the_others_are_not():
     held = [facts(f"P{number:03d}") for number in range(1, 13)]
-    assert in_figures(held) == ("12 of 12 sessions in the figures", "")
+    assert figure_counts(held) == ("12 of 12 sessions in the figures", "")
     held += [facts("P013", status="unfinished"), facts("P014", excluded="asleep")]
-    assert in_figures(held) == ("12 of 14 sessions in the figures", "P013 is not complete; P014 is excluded.")
-    assert in_figures([]) == ("", "")
-    assert in_figures(held[:1])[0] == "1 of 1 session in the figures"
+    assert figure_counts(held) == ("12 of 14 sessions in the figures", "P013 is not complete; P014 is excluded.")
+    assert figure_counts([]) == ("", "")
+    assert figure_counts(held[:1])[0] == "1 of 1 session in the figures"
 
 
 def test_many_that_are_not_are_counted():
     held = [facts(f"P{number:03d}", status="withdrawn") for number in range(1, 10)]
-    assert in_figures(held)[1] == "P001, P002, P003, P004 and 5 others are not complete."
+    assert figure_counts(held)[1] == "P001, P002, P003, P004 and 5 others are not complete."
 
 
 def test_an_excluded_session_that_was_not_complete_is_told_once():
-    assert in_figures([facts("P001", status="withdrawn", excluded="left")])[1] == "P001 is excluded."
+    assert figure_counts([facts("P001", status="withdrawn", excluded="left")])[1] == "P001 is excluded."
 
 
 @pytest.mark.parametrize(
@@ -40,8 +40,8 @@ def test_an_excluded_session_that_was_not_complete_is_told_once():
 )
 def test_sessions_are_found_by_participant_and_state(words, status, found):
     held = [facts("P001", validity="invalid"), facts("P002", status="unfinished"), facts("Q003", excluded="x")]
-    assert [one.participant for one in held if matching(words, status)(one)] == found
-    assert [state for state, _ in states_of(held)] == ["completed", "unfinished", "invalid", "excluded"]
+    assert [one.participant for one in held if session_filter(words, status)(one)] == found
+    assert [state for state, _ in occurring_states(held)] == ["completed", "unfinished", "invalid", "excluded"]
 
 
 def test_in_the_light_theme_a_figure_looks_as_in_print():
@@ -64,7 +64,7 @@ def test_in_the_dark_theme_paper_and_letters_change_and_levels_do_not():
 
 
 def test_a_figure_is_drawn_at_the_screens_resolution(qapp):
-    image = drawn(themed_svg(SVG, COLOURS, DARK), QSize(200, 100), 2.0)
+    image = drawn_svg(themed_svg(SVG, COLOURS, DARK), QSize(200, 100), 2.0)
     assert (image.width(), image.height(), image.devicePixelRatio()) == (400, 200, 2.0)
     assert image.pixelColor(2, 2).name() == DARK.surface.lower()
     assert image.pixelColor(200, 100).name() == "#02256d"

@@ -147,6 +147,6 @@ def test_text_of_figures_is_at_least_11_px_high(place, qtbot, tmp_path):
             view(figures=(FigureDrawn(name=block.id, title="Title", caption="Caption", svg=svg), *view().figures[1:]))
         )
         drawing = place.figures.cards[0].drawing
-        qtbot.waitUntil(lambda shown=drawing: shown.settled)
+        qtbot.waitUntil(lambda shown=drawing: shown.is_settled)
         sizes_pt = [float(size) for size in re.findall(rb"font(?:-size)?: (?:bold )?([0-9.]+)px", svg)]
         assert min(sizes_pt) * drawing.width() / style.PAGE_WIDTH_PT >= 11

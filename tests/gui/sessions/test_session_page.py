@@ -101,7 +101,7 @@ def test_a_page_says_what_each_trial_has_and_why_a_session_cannot_be_read(qtbot,
     page.folder.click()
     assert page.opened == [page.facts.folder]
     (folder / "journal.jsonl").unlink()
-    page.read()
+    page.read_folder()
     qtbot.waitUntil(lambda: "journal" in page.limits.text())
     lines += ["== without its journal", page.limits.text().replace(str(study), "STUDY")]
     compare(Path(__file__).parent / "golden" / "page.txt", lines, pytestconfig, mask=re.compile(r"\d\d:\d\d|\d+ kB"))

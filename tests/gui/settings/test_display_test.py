@@ -37,8 +37,8 @@ def test_the_patch_is_where_and_as_large_as_in_the_tank(test_page, qtbot):
 @pytest.mark.slow
 def test_frames_are_asked_for_while_it_is_shown_and_no_longer(qtbot):
     made = display_test(qtbot)
-    made.begin()
-    qtbot.waitUntil(lambda: made.times.words()[0] != "–")
+    made.start_frames()
+    qtbot.waitUntil(lambda: made.times.figure_texts()[0] != "–")
     with qtbot.waitSignal(made.left):
         qtbot.keyClick(made, Qt.Key.Key_Escape)
     assert not made.frames.findChild(QTimer).isActive()

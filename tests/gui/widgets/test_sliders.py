@@ -27,24 +27,24 @@ SPANS = [
 @pytest.mark.parametrize("span", SPANS)
 @given(share=st.floats(0, 1))
 def test_a_number_is_found_where_it_was_put(span: Range, share: float) -> None:
-    value = span.value(share)
+    value = span.value_at(share)
     assert span.least <= value <= span.most
     coarse = 0.51 / (span.most - span.least) if span.whole and not span.logarithmic else 0.0
     if span.logarithmic and span.whole and value < 100:
         coarse = 0.07
-    assert span.share(value) == pytest.approx(share, abs=max(coarse, 0.002))
+    assert span.fraction_of_range(value) == pytest.approx(share, abs=max(coarse, 0.002))
 
 
 @pytest.mark.parametrize("span", SPANS)
 def test_ends_and_order(span: Range) -> None:
-    values = [span.value(step / 50) for step in range(51)]
+    values = [span.value_at(step / 50) for step in range(51)]
     assert (values[0], values[-1]) == (span.least, span.most)
     assert values == sorted(values)
     assert all(value == round(value) for value in values) or not span.whole
-    assert (span.share(span.least - 1), span.share(span.most + 1)) == (0.0, 1.0)
+    assert (span.fraction_of_range(span.least - 1), span.fraction_of_range(span.most + 1)) == (0.0, 1.0)
     decades = Range(1.0, 1000.0, logarithmic=True)
-    assert [decades.share(value) for value in (1, 10, 100, 1000)] == pytest.approx([0, 1 / 3, 2 / 3, 1])
-    assert (Range(3.0, 3.0).value(0.5), Range(3.0, 3.0).share(3.0)) == (3.0, 0.0)
+    assert [decades.fraction_of_range(value) for value in (1, 10, 100, 1000)] == pytest.approx([0, 1 / 3, 2 / 3, 1])
+    assert (Range(3.0, 3.0).value_at(0.5), Range(3.0, 3.0).fraction_of_range(3.0)) == (3.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -134,7 +134,7 @@ def test_up_and_down_step_and_what_is_being_typed_is_not_overwritten(field: Any,
     type_over(field, "6")
     field.show_text("45.5")
     assert field.text() == "6"
-    field.put_back()
+    field.restore_text()
     assert field.text() == "45.5"
 
 

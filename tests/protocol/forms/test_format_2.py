@@ -9,12 +9,12 @@ from study_app.protocol.load import parse
 from study_app.protocol.questionnaires import (
     Questionnaire,
     instrument,
+    instrument_tables,
     instruments,
     scale_name,
     with_instruments,
-    written_out,
 )
-from study_app.protocol.questions import Context, NumberView, Scale, ShowIf, shown
+from study_app.protocol.questions import Context, NumberView, Scale, ShowIf, shown_questions
 from study_app.protocol.source.document import frozen
 from study_app.protocol.source.problems import Fault
 from tests.protocol.forms.mixed import MIXED
@@ -56,7 +56,7 @@ def bare(name: str, languages: tuple[str, ...]) -> tuple[dict[str, Any], dict[st
     return {"instrument": name, "items": items}, {}
 
 
-@pytest.mark.parametrize("begin", [bare, written_out])
+@pytest.mark.parametrize("begin", [bare, instrument_tables])
 @pytest.mark.parametrize("other", ["en", "nl", "de", "fr", "ar"])
 @pytest.mark.parametrize("name", instruments())
 def test_a_study_inherits_what_is_known_of_an_instrument_and_is_asked_for_the_rest(
@@ -116,14 +116,14 @@ def view(name: str, condition: ShowIf | None = None) -> NumberView:
 
 def test_question_is_shown_by_the_answer_to_an_earlier_one() -> None:
     items = [view("a"), view("b", ShowIf(item="a", values=("x", "y"))), view("c", ShowIf(item="a", at_least=3))]
-    assert shown(items, {}) == ("a",)
-    assert shown(items, {"a": "y"}) == ("a", "b")
-    assert shown(items, {"a": 3}) == ("a", "c")
-    assert shown(items, {"a": ("z", "x")}) == ("a", "b")
-    assert shown(items, {"a": None}) == ("a",)
+    assert shown_questions(items, {}) == ("a",)
+    assert shown_questions(items, {"a": "y"}) == ("a", "b")
+    assert shown_questions(items, {"a": 3}) == ("a", "c")
+    assert shown_questions(items, {"a": ("z", "x")}) == ("a", "b")
+    assert shown_questions(items, {"a": None}) == ("a",)
 
 
 def test_answer_to_a_hidden_question_shows_nothing() -> None:
     items = [view("a"), view("b", ShowIf(item="a", at_most=1)), view("c", ShowIf(item="b", values=5))]
-    assert shown(items, {"a": 2, "b": 5}) == ("a",)
-    assert shown(items, {"a": 1, "b": 5}) == ("a", "b", "c")
+    assert shown_questions(items, {"a": 2, "b": 5}) == ("a",)
+    assert shown_questions(items, {"a": 1, "b": 5}) == ("a", "b", "c")

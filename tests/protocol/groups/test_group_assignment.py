@@ -7,7 +7,7 @@ from study_app.errors import ProtocolError
 from study_app.protocol.describe import describe
 from study_app.protocol.groups import next_group
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.balance import balances, numbered
+from study_app.protocol.orders.balance import balances, numbered_participants
 from study_app.protocol.warnings.study_warnings import warnings
 from tests.protocol.groups.grouped import grouped
 
@@ -77,7 +77,7 @@ def test_check_states_the_balance_of_each_group() -> None:
 
 @pytest.mark.parametrize("assignment", ["", PREEXISTING])
 def test_design_counts_orders_within_each_group(assignment: str) -> None:
-    judged = list(balances(experts(assignment), numbered(16, "P005"), 1))
+    judged = list(balances(experts(assignment), numbered_participants(16, "P005"), 1))
     assert [one.participants for one in judged] == [8, 8]
     assert [one.blocks[-1].evenness.positions for one in judged] == [((4, 4), (4, 4))] * 2
 

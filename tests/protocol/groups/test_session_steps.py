@@ -5,10 +5,10 @@ from collections import Counter
 import pytest
 
 from study_app.errors import StudyError
-from study_app.protocol.groups import every_step, refuse_beyond_last, steps_of
+from study_app.protocol.groups import check_session_number, every_step, steps_of
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.balance import balances, numbered
+from study_app.protocol.orders.balance import balances, numbered_participants
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s, own_protocol, variants
 from study_app.protocol.orders.schedule import build_schedule, draw_key
@@ -30,7 +30,7 @@ def test_a_group_has_its_own_sequence_in_every_session() -> None:
         assert steps_of(study, "first_thin", session) == ("hello", "thin", "thick", "end")
         assert steps_of(study, "first_thick", session) == ("hello", "thick", "thin")
     assert every_step(study) == study.steps == ("hello", "thin", "thick", "end")
-    refuse_beyond_last(study, 99)
+    check_session_number(study, 99)
 
 
 def test_a_group_without_a_sequence_has_that_of_the_study() -> None:
@@ -38,17 +38,17 @@ def test_a_group_without_a_sequence_has_that_of_the_study() -> None:
     study = grouped((HEAD, f'{HEAD}sequence = ["hello", "thin", "end"]\n'), groups=groups)
     assert steps_of(study, "other", 3) == ("hello", "thin", "end")
     assert steps_of(study, "own", 2) == ("thin",)
-    refuse_beyond_last(study, 3)
+    check_session_number(study, 3)
     assert study.steps == ("thick", "thin", "hello", "end")
 
 
 def test_a_session_beyond_the_last_is_refused() -> None:
     study = sessions()
     assert steps_of(study, None, 2) == ("thick", "thin", "end")
-    for refused in (lambda: steps_of(study, None, 3), lambda: refuse_beyond_last(study, 3)):
+    for refused in (lambda: steps_of(study, None, 3), lambda: check_session_number(study, 3)):
         with pytest.raises(StudyError, match=r"^session 3: .* has 2 \(sequences\); permitted: 1 to 2$"):
             refused()
-    refuse_beyond_last(study, 2)
+    check_session_number(study, 2)
 
 
 def test_a_session_has_its_own_blocks_forms_parts_and_duration() -> None:
@@ -82,10 +82,10 @@ def test_a_study_of_one_sequence_is_as_it_was() -> None:
 
 
 def test_design_judges_each_group_over_its_own_participants() -> None:
-    judged = list(balances(grouped(), numbered(7), 1))
+    judged = list(balances(grouped(), numbered_participants(7), 1))
     assert [one.session for one in judged] == ["group first_thin", "group first_thick"]
     assert sorted(one.participants for one in judged) == [3, 4]
-    (alone,) = balances(grouped(), numbered(1), 1)
+    (alone,) = balances(grouped(), numbered_participants(1), 1)
     assert alone.participants == 1
 
 

@@ -5,7 +5,7 @@ import pytest
 from study_app.errors import StudyError
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.balance import balance, describe_balance, evenness, numbered
+from study_app.protocol.orders.balance import balance, describe_balance, evenness, numbered_participants
 from tests.protocol.sound import ORDER, SOUND
 
 REK = load("rek2024")
@@ -41,7 +41,7 @@ def test_a_williams_design_balances_every_full_round_and_no_other_number(conditi
     rows = conditions * (1 + conditions % 2)
     protocol = ordered('order = "williams"', conditions)
     for participants in (1, rows - 1, rows, rows + 1, 2 * rows):
-        counted = balance(protocol, numbered(participants), 1).blocks[0].evenness
+        counted = balance(protocol, numbered_participants(participants), 1).blocks[0].evenness
         full = participants % rows == 0
         assert counted.positions_even == full
         assert counted.follows_even == full
@@ -50,16 +50,19 @@ def test_a_williams_design_balances_every_full_round_and_no_other_number(conditi
 
 
 def test_a_range_of_ids_is_judged_from_its_first_one():
-    assert numbered(3, "A099") == ("A099", "A100", "A101")
+    assert numbered_participants(3, "A099") == ("A099", "A100", "A101")
     protocol = ordered(WILLIAMS, 3)
-    even = {first: balance(protocol, numbered(6, first), 1).blocks[0].evenness.balanced for first in ("P004", "P061")}
+    even = {
+        first: balance(protocol, numbered_participants(6, first), 1).blocks[0].evenness.balanced
+        for first in ("P004", "P061")
+    }
     assert even == {"P004": False, "P061": True}
     with pytest.raises(StudyError, match="end in a number"):
-        numbered(6, "anna")
+        numbered_participants(6, "anna")
 
 
 def test_blocks_with_one_code_are_left_out():
-    judged = balance(REK, numbered(5), 3)
+    judged = balance(REK, numbered_participants(5), 3)
     assert [block.id for block in judged.blocks] == ["liquids", "delays"]
     assert (judged.study, judged.participants, judged.seed) == ("rek2024", 5, 3)
     assert sum(map(sum, judged.blocks[1].evenness.positions)) == 5 * 7
@@ -71,7 +74,7 @@ def test_a_design_needs_participants():
 
 
 def test_a_design_names_no_condition():
-    text = describe_balance(balance(REK, numbered(12), 1))
+    text = describe_balance(balance(REK, numbered_participants(12), 1))
     for name in ("honey", "light_oil", "delay_125"):
         assert name not in text
     assert text.splitlines() == [line.rstrip() for line in text.splitlines()]
@@ -80,23 +83,23 @@ def test_a_design_names_no_condition():
 CONSTRAINED = 'order = "constrained"\nmax_repeats = 1'
 WILLIAMS, LATIN, SHUFFLED, FIXED = (f'order = "{order}"' for order in ("williams", "latin", "shuffled", "fixed"))
 DESIGNS = (  # order, conditions, repetitions, participants
-    (WILLIAMS, 3, 1, numbered(6)),
-    (WILLIAMS, 3, 1, numbered(7)),
-    (WILLIAMS, 4, 1, numbered(1)),
-    (WILLIAMS, 7, 1, numbered(15)),
-    (WILLIAMS, 7, 1, numbered(28)),
-    (WILLIAMS, 5, 2, numbered(10)),
-    (WILLIAMS, 5, 3, numbered(10)),
-    (WILLIAMS, 5, 3, numbered(9)),
+    (WILLIAMS, 3, 1, numbered_participants(6)),
+    (WILLIAMS, 3, 1, numbered_participants(7)),
+    (WILLIAMS, 4, 1, numbered_participants(1)),
+    (WILLIAMS, 7, 1, numbered_participants(15)),
+    (WILLIAMS, 7, 1, numbered_participants(28)),
+    (WILLIAMS, 5, 2, numbered_participants(10)),
+    (WILLIAMS, 5, 3, numbered_participants(10)),
+    (WILLIAMS, 5, 3, numbered_participants(9)),
     (WILLIAMS, 3, 1, ("P001", "A1", "B1", "C1", "D1", "E1")),
     (WILLIAMS, 3, 1, ("P001", "anna", "bob")),
-    (LATIN, 2, 1, numbered(2)),
-    (LATIN, 4, 1, numbered(4)),
-    (LATIN, 4, 1, numbered(5)),
-    (SHUFFLED, 3, 2, numbered(20)),
-    (SHUFFLED, 3, 1, numbered(20)),
-    (CONSTRAINED, 3, 2, numbered(20)),
-    (FIXED, 3, 1, numbered(20)),
+    (LATIN, 2, 1, numbered_participants(2)),
+    (LATIN, 4, 1, numbered_participants(4)),
+    (LATIN, 4, 1, numbered_participants(5)),
+    (SHUFFLED, 3, 2, numbered_participants(20)),
+    (SHUFFLED, 3, 1, numbered_participants(20)),
+    (CONSTRAINED, 3, 2, numbered_participants(20)),
+    (FIXED, 3, 1, numbered_participants(20)),
 )
 
 
@@ -108,7 +111,7 @@ def test_designs_in_words(pytestconfig: pytest.Config) -> None:
         judged = describe_balance(balance(ordered(order, conditions, repetitions), ids, 1))
         told.append(f"{order!r}, {conditions} conditions {repetitions} times\n{judged.split('Looking (block')[0]}")
     physical = load("physical_liquids")
-    told += [describe_balance(balance(physical, numbered(participants), 1)) for participants in (1, 6, 12)]
+    told += [describe_balance(balance(physical, numbered_participants(participants), 1)) for participants in (1, 6, 12)]
     file = Path(__file__).parents[1] / "orders" / "designs.txt"
     if pytestconfig.getoption("regenerate"):
         file.write_text("\n=====\n".join(told), encoding="utf-8")

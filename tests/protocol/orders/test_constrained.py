@@ -6,7 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.protocol.sequences import PROPOSALS, Constraint, arrange, longest_run, propose, shortest_distance
+from study_app.protocol.sequences import (
+    PROPOSALS,
+    Constraint,
+    draw_order,
+    longest_run,
+    propose_order,
+    shortest_distance,
+)
 from study_app.protocol.streams import stream
 
 Order = tuple[int, ...]
@@ -47,7 +54,7 @@ def every_order(codes: int, repetitions: int, constraint: Constraint) -> Iterato
             yield order
             return
         for code in range(codes):
-            if order.count(code) < repetitions and constraint.holds((*order, code)):
+            if order.count(code) < repetitions and constraint.permits((*order, code)):
                 yield from longer((*order, code))
 
     return longer(())
@@ -79,13 +86,13 @@ def test_runs_and_distances_are_measured(order: Order):
 def test_an_order_keeps_its_constraint_or_is_impossible(size: tuple[int, int], constraint: Constraint, seed: int):
     codes, repetitions = size
     draw = Counting(seed)
-    if constraint.impossible(codes, repetitions) is not None:
+    if constraint.impossible_key(codes, repetitions) is not None:
         with pytest.raises(ValueError, match="is possible"):
-            arrange(range(codes), repetitions, constraint, draw)
+            draw_order(range(codes), repetitions, constraint, draw)
         assert draw.draws == 0
         return
-    order = arrange(range(codes), repetitions, constraint, draw)
-    assert constraint.holds(order)
+    order = draw_order(range(codes), repetitions, constraint, draw)
+    assert constraint.permits(order)
     assert Counter(order) == dict.fromkeys(range(codes), repetitions)
     assert draw.draws <= (codes * repetitions + 1) * PROPOSALS + codes
 
@@ -96,7 +103,7 @@ def test_impossible_is_exactly_what_no_order_keeps(codes: int, repetitions: int)
     for runs in (None, 1, 2, 3, 4):
         for distance in (None, 1, 2, 3, 4, 5, 6):
             constraint = Constraint(runs, distance)
-            told = constraint.impossible(codes, repetitions)
+            told = constraint.impossible_key(codes, repetitions)
             assert (told is None) == any(map(bool, every_order(codes, repetitions, constraint))), constraint
 
 
@@ -106,7 +113,7 @@ def proposals(codes: int, repetitions: int, constraint: Constraint) -> dict[Orde
     draw = stream(1, "proposals").random
     found: dict[Order, Fraction] = {}
     for _ in range(100 * len(wanted) + 1000):
-        proposal = propose(codes, repetitions, constraint, draw)
+        proposal = propose_order(codes, repetitions, constraint, draw)
         assert proposal is not None
         order, weight = proposal
         assert found.setdefault(order, 1 / weight) == 1 / weight
@@ -157,7 +164,7 @@ def test_orders_of_many_participants_are_even(codes: int, repetitions: int, cons
     orders = set(every_order(codes, repetitions, constraint))
     each = 40
     draws = (stream(7, f"order/P{number}").random for number in range(each * len(orders)))
-    counts = Counter(arrange(range(codes), repetitions, constraint, draw) for draw in draws)
+    counts = Counter(draw_order(range(codes), repetitions, constraint, draw) for draw in draws)
     assert counts.keys() == orders
     assert sum((count - each) ** 2 / each for count in counts.values()) < bound
 
@@ -176,20 +183,20 @@ def test_orders_of_many_participants_are_even(codes: int, repetitions: int, cons
 def test_large_and_tight_blocks_meet_no_dead_end(codes: int, repetitions: int, constraint: Constraint):
     draw = stream(1, "large").random
     for _ in range(10):
-        proposal = propose(codes, repetitions, constraint, draw)
+        proposal = propose_order(codes, repetitions, constraint, draw)
         assert proposal is not None
-        assert constraint.holds(proposal[0])
+        assert constraint.permits(proposal[0])
         assert Counter(proposal[0]) == dict.fromkeys(range(codes), repetitions)
 
 
 def test_a_dead_end_is_told_and_costs_no_more_than_the_rest():
     draw = Counting(1)
-    assert propose(2, 2, Constraint(min_distance=3), draw) is None
+    assert propose_order(2, 2, Constraint(min_distance=3), draw) is None
     assert draw.draws <= 4
 
 
 def test_the_same_draws_give_the_same_order_on_every_machine():
-    order = arrange(["L1", "L2", "L3"], 4, Constraint(max_repeats=1), stream(1, "order/P001/liquids").random)
+    order = draw_order(["L1", "L2", "L3"], 4, Constraint(max_repeats=1), stream(1, "order/P001/liquids").random)
     assert " ".join(order) == "L1 L3 L2 L1 L2 L3 L1 L3 L1 L2 L3 L2"
-    order = arrange("abcde", 3, Constraint(min_distance=4), stream(1, "order/P001/liquids").random)
+    order = draw_order("abcde", 3, Constraint(min_distance=4), stream(1, "order/P001/liquids").random)
     assert "".join(order) == "cdebadceabdeacb"

@@ -10,7 +10,15 @@ from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
 from study_app.protocol.orders.schedule import PageStep, Schedule, Trial, build_schedule, draw_key, stream
-from study_app.protocol.sequences import Constraint, Square, assigned_row, borders_even, enrolment, row, row_count
+from study_app.protocol.sequences import (
+    Constraint,
+    Square,
+    assigned_row,
+    enrolment_number,
+    has_even_borders,
+    row,
+    row_count,
+)
 from study_app.protocol.streams import shuffle
 from tests.protocol.sound import ORDER, SOUND
 
@@ -155,7 +163,7 @@ def test_constrained_orders_keep_their_constraint_over_all_repetitions(seed: int
     protocol = of_six("constrained", "repetitions = 3\nmin_distance = 4")
     order = codes(build_schedule(protocol, participant, seed), "feel")
     assert Counter(order) == dict.fromkeys(("L1", "L2", "L3", "L4", "L5", "L6"), 3)
-    assert Constraint(min_distance=4).holds(order)
+    assert Constraint(min_distance=4).permits(order)
 
 
 BREAKS = """
@@ -255,7 +263,7 @@ def test_repetitions_are_as_even_as_the_first_and_no_code_follows_itself(square:
 
 @pytest.mark.parametrize("codes", SIZES)
 def test_the_borders_of_repetitions_are_even_exactly_where_it_is_said(codes: int):
-    told = [repetitions for repetitions in range(1, 2 * codes) if borders_even(codes, repetitions)]
+    told = [repetitions for repetitions in range(1, 2 * codes) if has_even_borders(codes, repetitions)]
     found = [
         repetitions for repetitions in range(1, 2 * codes) if len(follows(rows("williams", codes, repetitions))) == 1
     ]
@@ -266,7 +274,7 @@ def test_the_borders_of_repetitions_are_even_exactly_where_it_is_said(codes: int
 def test_a_single_code_has_a_single_row():
     assert row_count("williams", 1) == row_count("latin", 1) == 1
     assert row("williams", 1, 0, 3) == (0, 0, 0)
-    assert borders_even(1, 3)
+    assert has_even_borders(1, 3)
 
 
 @pytest.mark.parametrize(
@@ -274,7 +282,7 @@ def test_a_single_code_has_a_single_row():
     [("P007", 7), ("P120", 120), ("7", 7), ("S2P07", 7), ("A1B", 1), ("anna", None), ("P000", 0)],
 )
 def test_the_number_in_an_id(participant: str, number: int | None):
-    assert enrolment(participant) == number
+    assert enrolment_number(participant) == number
 
 
 @given(st.integers(1, 30), st.integers(0, 40), st.text("abcxyz", min_size=1, max_size=5))

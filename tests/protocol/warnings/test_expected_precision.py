@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from study_app.protocol.load import examined, parse, read_document
+from study_app.protocol.load import parse, read_document, validate_document
 from study_app.protocol.trials.stimuli import SESSION_SD
 from study_app.protocol.warnings.expected_precision import (
     ThresholdPlan,
@@ -94,7 +94,7 @@ def test_where_limits_clip_the_levels_no_precision_is_expected():
     ):
         text = TEXT.replace("0.6]", f"0.6], standards = [{damping}]").replace("BLOCK", "")
         text = text.replace("METHOD", 'kind = "questplus", trials = 20').replace("DESIGN", "2ifc") + PLANNED
-        clipped, faults = examined(read_document(text.encode(), "clipped.toml")[0])
+        clipped, faults = validate_document(read_document(text.encode(), "clipped.toml")[0])
         assert faults
         assert list(imprecise(clipped, clipped.blocks["thicker"])) == [
             f"stimuli.damping.levels: ±15 % cannot be measured at a threshold of 0.11: {what} clipped"

@@ -3,11 +3,11 @@
 import pytest
 
 from study_app.haptics.model.scene import PROMPT_LINK, ForceLink
-from study_app.protocol.checks.force_limits import longest_ms, returned_j
+from study_app.protocol.checks.force_limits import longest_delay_ms, returned_j
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.presented.presentation import delays_force, link_seed, scene_of
+from study_app.protocol.presented.presentation import has_imperfect_link, link_seed, scene_of
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tasks import Stroke
 from study_app.protocol.warnings.delayed_force import STIRRED, delay_warnings
@@ -29,15 +29,15 @@ def study(*edits: tuple[str, str]) -> Protocol:
 def test_the_returned_energy_is_that_of_a_late_damper() -> None:
     for delay_ms, energy_mj in ((80, 0.21), (100, 0.40), (150, 1.28)):
         assert 1e3 * returned_j(4, PACED, delay_ms / 1000) == pytest.approx(energy_mj, abs=0.005)
-    assert longest_ms(4, PACED) == 108
-    assert longest_ms(0.1, PACED) == 200
+    assert longest_delay_ms(4, PACED) == 108
+    assert longest_delay_ms(0.1, PACED) == 200
     assert STIRRED.speed_mps == pytest.approx(0.2, rel=1e-3)
 
 
 def test_an_interval_presents_its_link() -> None:
     one = study()
-    assert delays_force(one)
-    assert not delays_force(load("rek2024"))
+    assert has_imperfect_link(one)
+    assert not has_imperfect_link(load("rek2024"))
     assert scene_of(one, Stimulated("water"), 7).link == ForceLink(delay_s=0.01, seed=7)
     assert scene_of(one, Stimulated("damper"), 7).link == PROMPT_LINK
     varied = scene_of(one, Stimulated("damper", "force_delay_ms", 80.0), 7)

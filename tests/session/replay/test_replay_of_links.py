@@ -10,7 +10,7 @@ from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.levels.evaluate import level_results, level_section
 from study_app.analysis.levels.tracks import tracks
 from study_app.protocol.load import parse
-from study_app.protocol.presented.presentation import presented_by
+from study_app.protocol.presented.presentation import recorded_presentation
 from study_app.session import replay as replay_module
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
@@ -58,7 +58,7 @@ def test_the_session_measures_the_delays_that_were_requested(rehearsed: Path) ->
     assert len(ended) == 6
     errors_ms = []
     for line in ended:
-        interval = presented_by(protocol, key.codes, started[line["trial"]]).intervals[line["interval"] - 1]
+        interval = recorded_presentation(protocol, key.codes, started[line["trial"]]).intervals[line["interval"] - 1]
         assert "invalid" not in line
         if interval.vary == "force_delay_ms":
             errors_ms.append(line["value_delivered"] - interval.value)

@@ -100,7 +100,7 @@ def test_every_surface_says_that_no_trial_was_delivered(
     assert [str(one) for one in verify_study(rehearsed).warnings] == [f"data/sub-P001/ses-01: {SENTENCE}"]
     assert verify_study(rehearsed).is_sound
     (facts,) = sessions(rehearsed.parent, {})
-    assert (status_chip(facts)[2], str(facts.missing), facts.counts) == ("Incomplete", SENTENCE, False)
+    assert (status_chip(facts)[2], str(facts.missing), facts.is_counted) == ("Incomplete", SENTENCE, False)
     record = read_record(facts.folder)
     assert record.limits.startswith(f"{SENTENCE}. Nobody answered them. The study permits 5 % of the trials to be")
     assert "answers are kept" not in record.limits
@@ -118,7 +118,7 @@ def test_an_incomplete_session_is_not_analysed_until_a_person_includes_it(rehear
     include(rehearsed, "P001", 1, by="AB", reason="the other trials are enough")
     assert load_study(rehearsed).n == 1
     (facts,) = sessions(rehearsed.parent, {})
-    assert (status_chip(facts)[2], facts.counts) == ("Incomplete", True)
+    assert (status_chip(facts)[2], facts.is_counted) == ("Incomplete", True)
 
 
 @pytest.mark.usefixtures("quick_pdf")

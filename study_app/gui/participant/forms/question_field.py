@@ -26,10 +26,10 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QButtonGroup, QCheckBox, QRadioButton, QSizePolicy, QStyle, QWidget
 
 from study_app.gui.key_presses import digit_of
-from study_app.gui.participant.pages.page_widget import Button, beginning, page_painter, point_at
+from study_app.gui.participant.pages.page_widget import Button, line_start, page_painter, point_screen_reader_at
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
-from study_app.gui.widgets.accessible import give_role, say
+from study_app.gui.widgets.accessible import announce, give_role
 from study_app.gui.widgets.boxes import grid
 from study_app.protocol.questions import ItemView, Value
 from study_app.protocol.wording.languages import Words
@@ -69,7 +69,7 @@ class QuestionWords(QWidget):
         """Show the small note, or none; a missing answer gets its sign and colour."""
         if (note, missing) != (self.note, self.missing):
             self.note, self.missing = note, missing
-            self._changed()
+            self._forget_sizes()
 
     def set_fonts(self, text: QFont, note: QFont, number: QFont, sign_gap: float) -> None:
         """Set the fonts, and the gap after the sign [px]."""
@@ -77,13 +77,13 @@ class QuestionWords(QWidget):
             return
         self._faces, self._sign_gap = (text, note, number), sign_gap
         self._sign = QFontMetricsF(note).height() - 1
-        self._changed()
+        self._forget_sizes()
 
     def set_number_width(self, width: int) -> None:
         """Set the width of the number's column [px]."""
         if width != self._number_width:
             self._number_width = width
-            self._changed()
+            self._forget_sizes()
 
     def sizeHint(self) -> QSize:
         """Return the minimum size: the width is a share of the row, the height follows from it."""
@@ -127,7 +127,7 @@ class QuestionWords(QWidget):
 
     @property
     def _flags(self) -> int:
-        return int(beginning(self) | Qt.AlignmentFlag.AlignTop) | int(Qt.TextFlag.TextWordWrap)
+        return int(line_start(self) | Qt.AlignmentFlag.AlignTop) | int(Qt.TextFlag.TextWordWrap)
 
     @property
     def _note_left(self) -> int:
@@ -143,10 +143,10 @@ class QuestionWords(QWidget):
     def _heights(self, width: int) -> tuple[int, int]:
         """Return the heights [px] of number and text, and of the note."""
         if width not in self._known:
-            self._known[width] = self._measured(width)
+            self._known[width] = self._measured_heights(width)
         return self._known[width]
 
-    def _measured(self, width: int) -> tuple[int, int]:
+    def _measured_heights(self, width: int) -> tuple[int, int]:
         text, note, number = self._faces
         room = width - self._number_width
         high = max(self._bounds(text, self.text, room).height(), QFontMetrics(number).height())
@@ -155,7 +155,7 @@ class QuestionWords(QWidget):
         note_high = self._bounds(note, self.note, room - self._note_left).height()
         return high, max(note_high, round(self._sign)) if self.missing else note_high
 
-    def _changed(self) -> None:
+    def _forget_sizes(self) -> None:
         self._known.clear()
         self.updateGeometry()
         self.update()
@@ -210,7 +210,7 @@ class QuestionField(QWidget):
         self.grid.setColumnStretch(0, WORDS_SHARE)
         self.grid.setColumnStretch(self.ANSWER, ANSWER_SHARE)
         self.setAccessibleName(f"{view.number}. {view.text}")
-        self._tell()
+        self._update_state()
 
     @property
     def note(self) -> str:
@@ -222,15 +222,15 @@ class QuestionField(QWidget):
     def answer_keys(self) -> str:
         return self.view.keys
 
-    def put(self, answer: QWidget) -> None:
+    def put_answer_part(self, answer: QWidget) -> None:
         """Put the part that answers the question after its text."""
         self._answer = answer
         self.grid.addWidget(answer, 0, self.ANSWER, Qt.AlignmentFlag.AlignVCenter)
 
     def show_answer(self, value: Value) -> None:
-        self.kept(value)
+        self.keep_answer(value)
 
-    def spoken(self) -> str:
+    def spoken_answer(self) -> str:
         return str(self.value)
 
     def finish(self) -> bool:
@@ -266,44 +266,44 @@ class QuestionField(QWidget):
             self._answer.updateGeometry()  # the layout keeps what it asked for before
         self.grid.invalidate()
         height = self.grid.totalHeightForWidth(width)
-        self._tell()
+        self._update_state()
         return height
 
-    def point(self, place: int) -> None:
+    def point_at(self, place: int) -> None:
         """Point at an answer, at none with -1; typed answers have nothing to point at."""
 
-    def ask(self, *, missing: bool) -> None:
+    def set_missing(self, *, missing: bool) -> None:
         self.missing = missing and not self.is_answered
-        self._tell()
+        self._update_state()
 
-    def give(self, value: Value) -> None:
+    def give_answer(self, value: Value) -> None:
         """Take an answer, and emit it if it is new."""
         changed = not self.is_answered or value != self.value
         self.value, self.is_answered, self.missing = value, True, False
-        self._tell()
+        self._update_state()
         if changed:
-            say(self, self.accessibleDescription())
+            announce(self, self.accessibleDescription())
             self.answered.emit(value)
 
-    def take_back(self) -> None:
+    def retract_answer(self) -> None:
         if self.is_answered:
             self.value, self.is_answered = None, False
-            self._tell()
+            self._update_state()
             self.retracted.emit()
 
-    def forget(self) -> None:
+    def forget_answer(self) -> None:
         """Discard the answer without a signal: another answer hid the question."""
         self.value, self.is_answered, self.missing = None, False, False
-        self.clear()
-        self._tell()
+        self.clear_answer()
+        self._update_state()
 
-    def clear(self) -> None:
+    def clear_answer(self) -> None:
         """Show no answer; painting follows `value`."""
 
-    def kept(self, value: Value) -> None:
+    def keep_answer(self, value: Value) -> None:
         """Set the answer without a signal."""
         self.value, self.is_answered, self.missing = value, True, False
-        self._tell()
+        self._update_state()
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
@@ -345,11 +345,11 @@ class QuestionField(QWidget):
             bar = QRectF(left, self.height() * 0.19, 4 * scale, self.height() * 0.62)
             painter.drawRoundedRect(bar, 2 * scale, 2 * scale)
 
-    def _tell(self) -> None:
+    def _update_state(self) -> None:
         wording = self._words
         self.statement.show_note(self.note, missing=self.missing)
         if self.is_answered:
-            state = f"{wording.chosen}: {self.spoken()}"
+            state = f"{wording.chosen}: {self.spoken_answer()}"
         else:
             state = (self.note or wording.please_answer) if self.missing else wording.no_answer_yet
         if self.note and not self.missing:
@@ -425,7 +425,7 @@ class OpenLook(NamedTuple):
 
 
 @lru_cache(maxsize=256)
-def picture_of(look: OpenLook, ground: str) -> QImage:
+def answer_picture(look: OpenLook, ground: str) -> QImage:
     """Return the picture of an answer on a plain ground."""
     made = QImage(look.width, look.height, QImage.Format.Format_RGB32)
     made.fill(QColor(ground))
@@ -463,7 +463,7 @@ class OptionLook(Button):
         self.updateGeometry()
         self.update()
 
-    def point(self, pointed: bool) -> None:
+    def show_pointed(self, pointed: bool) -> None:
         """Show the mouse pointer, or the keyboard's own pointer, on this answer."""
         if pointed != self.pointed:
             self.pointed = pointed
@@ -501,12 +501,12 @@ class OptionLook(Button):
 
     def _tell_pointed(self, place: int) -> None:
         if (question := question_of(self)) is not None:
-            question.point(place)
+            question.point_at(place)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         """Draw the answer; points look the same in all questions and are drawn once for all."""
         painter = page_painter(self)
-        in_focus = self._in_focus()
+        in_focus = self._has_focus()
         strong = self._look == "words" or self.pointed or in_focus
         look = OpenLook(self._words, self._look, self._scale, self.width(), self.height(), self.pointed, strong)
         if self.isChecked():
@@ -514,12 +514,12 @@ class OptionLook(Button):
         elif self._look == "point" and self.devicePixelRatioF() == 1 and self.window().graphicsProxyWidget() is None:
             question = question_of(self)
             lit = in_focus or (question is not None and question.missing)
-            painter.drawImage(0, 0, picture_of(look, PARTICIPANT.selected if lit else PARTICIPANT.window))
+            painter.drawImage(0, 0, answer_picture(look, PARTICIPANT.selected if lit else PARTICIPANT.window))
         else:
             look.paint(painter)
         painter.end()
 
-    def _in_focus(self) -> bool:
+    def _has_focus(self) -> bool:
         focused = self.window().focusWidget()
         return focused is not None and focused.isAncestorOf(self)
 
@@ -568,11 +568,11 @@ class OptionsField(QuestionField):
 
     pointed_at = Signal(int)
 
-    def hold(self, options: Sequence[OptionLook]) -> None:
+    def set_options(self, options: Sequence[OptionLook]) -> None:
         self.options = options
         self._group = QButtonGroup(self, exclusive=not self.several)
         # Not the methods themselves: Qt would forget the role of this widget (`give_role`).
-        self._group.idClicked.connect(lambda place: self._click(place))  # noqa: PLW0108
+        self._group.idClicked.connect(lambda place: self._choose_by_click(place))  # noqa: PLW0108
         self._group.idToggled.connect(lambda place, on: self._toggle(place, on))  # noqa: PLW0108
         for place, option in enumerate(options):
             self._group.addButton(option, place)
@@ -596,10 +596,10 @@ class OptionsField(QuestionField):
         raise NotImplementedError
 
     def show_answer(self, value: Value) -> None:
-        self.kept(value)
+        self.keep_answer(value)
         self._check()
 
-    def clear(self) -> None:
+    def clear_answer(self) -> None:
         self._group.setExclusive(False)
         self._check()
         self._group.setExclusive(not self.several)
@@ -609,20 +609,20 @@ class OptionsField(QuestionField):
         for option in self.options:
             option.set_scale(scale)
 
-    def point(self, place: int) -> None:
+    def point_at(self, place: int) -> None:
         """Point at an option, at none with -1."""
         if place == self.pointed:
             return
         self.pointed = place
         for number, option in enumerate(self.options):
-            option.point(number == place)
+            option.show_pointed(number == place)
         self.pointed_at.emit(place)
 
     def choose(self, place: int, *, by_key: bool) -> None:
         """Answer with an option; an answer by key leads to the next question."""
-        self.give(self.value_at(place))
+        self.give_answer(self.value_at(place))
         self._check()
-        point_at(self.options[place])
+        point_screen_reader_at(self.options[place])
         if by_key:
             self.left.emit()
 
@@ -633,7 +633,7 @@ class OptionsField(QuestionField):
         if number is not None and 1 <= number <= self.digits and plain:
             self.choose(number - 1, by_key=True)
         elif event.key() in (Qt.Key.Key_Left, Qt.Key.Key_Right):
-            self._step(self.forward if event.key() == Qt.Key.Key_Right else -self.forward)
+            self._point_by(self.forward if event.key() == Qt.Key.Key_Right else -self.forward)
         elif event.key() == Qt.Key.Key_Space:
             if self.pointed >= 0:
                 self.choose(self.pointed, by_key=True)
@@ -642,7 +642,7 @@ class OptionsField(QuestionField):
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
-        self.point(-1)
+        self.point_at(-1)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         self.setFocus(Qt.FocusReason.MouseFocusReason)
@@ -653,7 +653,7 @@ class OptionsField(QuestionField):
             for place, option in enumerate(self.options):
                 option.setChecked(place in self.chosen)
 
-    def _click(self, place: int) -> None:
+    def _choose_by_click(self, place: int) -> None:
         self.setFocus(Qt.FocusReason.MouseFocusReason)
         if not self.several:
             self.choose(place, by_key=False)
@@ -663,12 +663,12 @@ class OptionsField(QuestionField):
         if on != (place in self.chosen) and (on or self.several):
             self.choose(place, by_key=False)
 
-    def _step(self, by: int) -> None:
+    def _point_by(self, by: int) -> None:
         start = self.pointed
         if start < 0:
             start = self.chosen[0] if self.chosen else (-1 if by > 0 else len(self.options))
-        self.point(min(max(start + by, 0), len(self.options) - 1))
-        say(self.options[self.pointed], self.options[self.pointed].accessibleName())
+        self.point_at(min(max(start + by, 0), len(self.options) - 1))
+        announce(self.options[self.pointed], self.options[self.pointed].accessibleName())
 
 
 class ScaleField(OptionsField):
@@ -676,7 +676,7 @@ class ScaleField(OptionsField):
 
     labels: tuple[str, ...] = ()
 
-    def build(self, labels: tuple[str, ...], judge_name: str | None, judge_text: str | None) -> None:
+    def build_options(self, labels: tuple[str, ...], judge_name: str | None, judge_text: str | None) -> None:
         """Make the options: the points of the scale, and the off-scale answer if there is one."""
         self.labels = labels
         names = [f"{point} {label}" for point, label in enumerate(labels, start=1)]
@@ -685,7 +685,7 @@ class ScaleField(OptionsField):
         self.judge = None
         if judge_name is not None:
             self.judge = RadioOption(judge_text or "", judge_name, text, self, look="off scale")
-        self.hold([*self.points, *([] if self.judge is None else [self.judge])])
+        self.set_options([*self.points, *([] if self.judge is None else [self.judge])])
 
     @property
     def digits(self) -> int:
@@ -707,7 +707,7 @@ class ScaleField(OptionsField):
         """Return the point, None off the scale."""
         return place + 1 if place < len(self.points) else None
 
-    def spoken(self) -> str:
+    def spoken_answer(self) -> str:
         return self.options[self.chosen[0]].accessibleName()
 
 
@@ -746,17 +746,17 @@ class EntryKeys(Widget):
 class TypedField(QuestionField):
     """What is typed is taken when typing pauses, and at the latest when the question is left."""
 
-    def type_into(self, entry: QWidget, wait_ms: int, take: Callable[[], object]) -> None:
+    def give_keyboard_to(self, entry: QWidget, wait_ms: int, take: Callable[[], object]) -> None:
         """Give ``entry`` the keyboard focus; call ``take`` this time after the last key press."""
         self.setFocusProxy(entry)
         self._timer = QTimer(self, singleShot=True, interval=wait_ms)
         self._timer.timeout.connect(take)
 
-    def typed(self) -> str:
+    def typed_text(self) -> str:
         raise NotImplementedError
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() in ENTER and self.typed():
+        if event.key() in ENTER and self.typed_text():
             if self.finish():
                 self.left.emit()
         else:

@@ -70,7 +70,7 @@ class Grid:
         return min(self.pitch - (4 if self.tight else 7) * self.scale, 50 * max(self.scale, 0.8 * self.text))
 
     @property
-    def holds(self) -> bool:
+    def can_be_hit(self) -> bool:
         return min(self.cell_height, self.cell_width) >= LEAST_CELL * self.scale - 0.01
 
     def with_rows(self, room: float, per_page: int) -> Grid:
@@ -78,7 +78,7 @@ class Grid:
         return replace(self, pitch=math.floor(min(room / per_page, 68 * self.text)))
 
 
-def parts(items: int, width: float) -> Iterator[int]:
+def part_sizes(items: int, width: float) -> Iterator[int]:
     """Yield the possible numbers of statements per page, the largest first: all, then even parts."""
     if width >= NARROW:
         yield items
@@ -90,7 +90,7 @@ def grid(width: float, height: float, asked: Asked, margin: float, *, text_scale
     """Return the widths of a row in a window; ``margin`` is between its edges and the text [logical px].
 
     Words are drawn ``text_scale`` times as large as designed at least. Rows may turn out too low for their words or
-    their cells: see `Grid.holds`.
+    their cells: see `Grid.can_be_hit`.
     """
     scale = page_scale(width, height)
     text = words_scale(width, height, text_scale)
@@ -137,7 +137,7 @@ class StatementField(ScaleField):
     ) -> None:
         self.sizes: Grid | None = None
         super().__init__(view, wording, parent)
-        self.build(labels, judge, NO_WORDS)
+        self.build_options(labels, judge, NO_WORDS)
         self.statement.fill_row()
         self.cells, self.row = QHBoxLayout(), QHBoxLayout()
         mirrored = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
@@ -186,13 +186,13 @@ class StatementField(ScaleField):
             self.judge.setFixedSize(math.floor(sizes.judge_width), height)
         self.row.setSpacing(round(sizes.judge_gap))
         self.setFixedHeight(math.floor(sizes.pitch))
-        self._tell()
+        self._update_state()
 
     def fits(self, sizes: Grid, note: str) -> bool:
         """Return whether statement and ``note`` are legible in a row of these sizes."""
-        return self.fitted(sizes, note) is not None
+        return self.fitted_fonts(sizes, note) is not None
 
-    def fitted(self, sizes: Grid, note: str) -> Fitted | None:
+    def fitted_fonts(self, sizes: Grid, note: str) -> Fitted | None:
         """Return the largest fonts with which statement and note fit the row, and their heights [px]; None if none.
 
         Words that must be so large (``sizes.text`` beyond ``sizes.scale``) are not made smaller; a note may be.
@@ -200,38 +200,40 @@ class StatementField(ScaleField):
         must = sizes.text > sizes.scale
         shrunk = ((1.0, 1.0), (1.0, sizes.scale / sizes.text)) if must else ((s, max(s, 0.88)) for s in SHRINKING)
         for shrink, note_shrink in shrunk:
-            fitted = self._measured(sizes, note, shrink, note_shrink)
+            fitted = self._measured_fonts(sizes, note, shrink, note_shrink)
             if fitted[2] + fitted[3] <= sizes.pitch - 3 * sizes.scale:
                 return fitted
         return None
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
-        self._tell()
+        self._update_state()
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
-        self._tell()
+        self._update_state()
 
-    def _smallest(self, sizes: Grid, note: str) -> Fitted:
+    def _smallest_fonts(self, sizes: Grid, note: str) -> Fitted:
         """Return the fonts of a row that is alone on its page and still too low."""
         for percent in range(95, 30, -5):
-            fitted = self._measured(sizes, note, percent / 100, percent / 100)
+            fitted = self._measured_fonts(sizes, note, percent / 100, percent / 100)
             if fitted[2] + fitted[3] <= sizes.pitch - 3 * sizes.scale:
                 break
         return fitted
 
-    def _measured(self, sizes: Grid, note: str, shrink: float, note_shrink: float) -> Fitted:
+    def _measured_fonts(self, sizes: Grid, note: str, shrink: float, note_shrink: float) -> Fitted:
         weight = 500 if self.missing or self.hasFocus() else 400
         face = font("statement", scale=sizes.text * shrink, weight=weight)
         note_face = font("label", scale=sizes.text * note_shrink, weight=600)
         height = statement_height(self.view.text, sizes.text * shrink, weight, math.floor(sizes.statement_width))
         return face, note_face, height, QFontMetricsF(note_face).height() if note else 0.0
 
-    def _tell(self) -> None:
-        super()._tell()
+    def _update_state(self) -> None:
+        super()._update_state()
         if self.sizes is not None:
-            face, note_face, *_ = self.fitted(self.sizes, self.note) or self._smallest(self.sizes, self.note)
+            face, note_face, *_ = self.fitted_fonts(self.sizes, self.note) or self._smallest_fonts(
+                self.sizes, self.note
+            )
             self.set_fonts(face, note_face, self.sizes.text)
 
     def _paint_ground(self, painter: QPainter) -> None:
@@ -285,7 +287,7 @@ class Heading(QWidget):
         self._sizes = sizes
         self.update()
 
-    def point(self, column: int) -> None:
+    def show_pointed(self, column: int) -> None:
         """Show the label of ``column`` as well, -1 for none."""
         if column != self._pointed:
             self._pointed = column
@@ -356,9 +358,9 @@ class QuestionnaireWidget(QuestionsPage):
         self._heading = Heading(page.labels, page.cannot_judge, self._row_shown, self)
         self.questions.insertWidget(0, self._heading)
         for field in self.fields:
-            field.pointed_at.connect(self._heading.point)
+            field.pointed_at.connect(self._heading.show_pointed)
 
-    def made_field(self, item: ItemView) -> QuestionField:
+    def make_field(self, item: ItemView) -> QuestionField:
         return StatementField(item, self._page.labels, self._page.cannot_judge, self._words, self)
 
     def missing_words(self, numbers: Sequence[int]) -> str:
@@ -368,7 +370,7 @@ class QuestionnaireWidget(QuestionsPage):
     def heading(self) -> tuple[str, ...]:
         return self._heading.shown
 
-    def arranged(self, asked: Sequence[QuestionField]) -> list[list[QuestionField]]:
+    def arrange_parts(self, asked: Sequence[QuestionField]) -> list[list[QuestionField]]:
         """Set the rows' sizes, with as many legible and clickable statements per part as possible."""
         sizes, per_page = self._sizes()
         self._heading.set_sizes(sizes)
@@ -376,9 +378,12 @@ class QuestionnaireWidget(QuestionsPage):
             field.set_sizes(sizes)
         return [list(asked[first : first + per_page]) for first in range(0, len(asked), per_page)]
 
-    def lead(self) -> int:
+    def lead_height(self) -> int:
         """Return the height above the statements [px]: few statements begin a third down the page."""
-        room, needed = self.room(tabs=False), self._heading.height() + sum(it.minimumHeight() for it in self.fields)
+        room, needed = (
+            self.room_height(tabs=False),
+            self._heading.height() + sum(it.minimumHeight() for it in self.fields),
+        )
         few = len(self.parts) == 1 and 2 * needed <= room
         return max(0, self.foot.height() + room - 2 * self.height() // 3) if few else 0
 
@@ -402,9 +407,9 @@ class QuestionnaireWidget(QuestionsPage):
         labels = max(label_height(page.labels, named), label_height(off, judged)) * text * 1.03
         self._heading.setFixedHeight(round(labels + (2 if tight else 10) * scale))
         note = self._words.please_answer
-        for per_page in parts(many, self.width()):
-            room = self.room(tabs=per_page < many) - self._heading.height()
+        for per_page in part_sizes(many, self.width()):
+            room = self.room_height(tabs=per_page < many) - self._heading.height()
             sizes = across.with_rows(room - (2 if tight else 8) * scale, per_page)
-            if sizes.holds and all(field.fits(sizes, note) for field in self.fields):
+            if sizes.can_be_hit and all(field.fits(sizes, note) for field in self.fields):
                 break
         return sizes, per_page

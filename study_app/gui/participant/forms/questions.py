@@ -21,9 +21,9 @@ from study_app.gui.participant.forms.question_field import (
     question_of,
     target_px,
 )
-from study_app.gui.participant.pages.page_widget import DigitPad, page_painter, point_at
+from study_app.gui.participant.pages.page_widget import DigitPad, page_painter, point_screen_reader_at
 from study_app.gui.theme.theme import PARTICIPANT, font
-from study_app.gui.widgets.accessible import PlainLabel, say
+from study_app.gui.widgets.accessible import PlainLabel, announce
 from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
 from study_app.gui.widgets.labels import set_property
 from study_app.gui.widgets.numbers import read_number, write_number
@@ -57,13 +57,13 @@ class ChoiceField(OptionsField):
         self._texts = dict(view.options)
         super().__init__(view, wording, parent)
         kind = CheckOption if view.several else RadioOption
-        self.hold([kind(text, text, view.text, self) for _, text in view.options])
+        self.set_options([kind(text, text, view.text, self) for _, text in view.options])
         longest = max(len(text) for _, text in view.options)
         self._across = min(len(self.options), 3 if longest <= SHORT else 2 if longest <= MEDIUM else 1)
         area = QWidget(self)
         self._cells = grid(margins=0, parent=area)
-        self._arrange(self._across)
-        self.put(area)
+        self._arrange_options(self._across)
+        self.put_answer_part(area)
 
     @property
     def note(self) -> str:
@@ -82,18 +82,18 @@ class ChoiceField(OptionsField):
     def value_at(self, place: int) -> Value:
         return self._ids[place]
 
-    def spoken(self) -> str:
+    def spoken_answer(self) -> str:
         return self._words.joined([self._texts[self._ids[place]] for place in self.chosen])
 
     def height_in(self, width: int, room: int) -> int:
         """Return the height at a width [px], with more options side by side if there is too little room."""
         for across in range(self._across, min(MOST_ACROSS, len(self.options)) + 1):
-            self._arrange(across)
+            self._arrange_options(across)
             if (height := super().height_in(width, room)) <= room:
                 return height
         return height
 
-    def _arrange(self, across: int) -> None:
+    def _arrange_options(self, across: int) -> None:
         for number, option in enumerate(self.options):
             self._cells.addWidget(option, number // across, number % across)
         for column in range(MOST_ACROSS):
@@ -110,11 +110,11 @@ class ChoiceField(OptionsField):
             return
         before = self.chosen
         if now := tuple(option for number, option in enumerate(self._ids) if (number in before) != (number == place)):
-            self.give(now)
+            self.give_answer(now)
         else:
-            self.take_back()
+            self.retract_answer()
         self._check()
-        point_at(self.options[place])
+        point_screen_reader_at(self.options[place])
 
 
 ACROSS = 6
@@ -138,7 +138,7 @@ class NumberField(TypedField):
         self.entry = Entry(self)
         self.entry.setAccessibleName(" ".join(filter(None, (view.text, view.unit))))
         self.entry.setMaxLength(20)
-        self.entry.textChanged.connect(self._edit)
+        self.entry.textChanged.connect(self._note_edit)
         self._unit = PlainLabel(view.unit)
         self._unit.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
         more = (*(() if view.whole else (wording.decimal_sign,)), *self._signs())
@@ -149,8 +149,8 @@ class NumberField(TypedField):
         self._row = hbox(self.entry, self._unit, (STRETCH, 1), self._pad)
         area = QWidget(self)
         vbox(self._row, self._wrong, margins=0, parent=area)
-        self.put(area)
-        self.type_into(self.entry, WAIT_MS, self._take)
+        self.put_answer_part(area)
+        self.give_keyboard_to(self.entry, WAIT_MS, self._take_number)
 
     @property
     def keys(self) -> list[QPushButton]:
@@ -162,14 +162,14 @@ class NumberField(TypedField):
         return self._wrong.text()
 
     def show_answer(self, value: Value) -> None:
-        self.kept(value)
+        self.keep_answer(value)
         if isinstance(value, int | float):
-            self._write(write_number(value, 9, self._words.decimal_sign))
+            self._write_text(write_number(value, 9, self._words.decimal_sign))
 
-    def clear(self) -> None:
+    def clear_answer(self) -> None:
         self._timer.stop()
-        self._write("")
-        self._say("")
+        self._write_text("")
+        self._show_problem("")
 
     def set_scale(self, scale: float) -> None:
         super().set_scale(scale)
@@ -185,14 +185,14 @@ class NumberField(TypedField):
         """Return the height that the question needs with a reported problem [px]."""
         problem = self._wrong.text()
         unclear = self._words.unclear_number("888,888") or self._words.unclear_number("888.888")
-        self._wrong.setText(problem or max(unclear, self._expected(), key=len))
+        self._wrong.setText(problem or max(unclear, self._expected_sentence(), key=len))
         self._wrong.show()
         height = super().height_in(width, room)
         self._wrong.setText(problem)
         self._wrong.setVisible(bool(problem))
         return height
 
-    def typed(self) -> str:
+    def typed_text(self) -> str:
         return self.entry.text()
 
     def finish(self) -> bool:
@@ -200,39 +200,39 @@ class NumberField(TypedField):
         self._timer.stop()
         text = self.entry.text().strip()
         if not text:
-            self._say("")
-            self.take_back()
+            self._show_problem("")
+            self.retract_answer()
             return True
         number = read_number(text, self._words.decimal_sign)
         if number is None or not self._number.permits(number):
-            self._say(self._words.unclear_number(text) or self._expected())
-            self.take_back()
+            self._show_problem(self._words.unclear_number(text) or self._expected_sentence())
+            self.retract_answer()
             return False
-        self._say("")
-        self.give(plain_number(number))
+        self._show_problem("")
+        self.give_answer(plain_number(number))
         return True
 
     def _signs(self) -> tuple[str, ...]:
         below = self._number.least is None or self._number.least < 0
         return ("-",) if below else ()
 
-    def _write(self, text: str) -> None:
+    def _write_text(self, text: str) -> None:
         with QSignalBlocker(self.entry):
             self.entry.setText(text)
 
-    def _edit(self) -> None:
-        self._say("")
+    def _note_edit(self) -> None:
+        self._show_problem("")
         self._timer.start()
 
-    def _take(self) -> None:
+    def _take_number(self) -> None:
         """Take the text typed so far if it is a number; nothing is reported while typing."""
         number = read_number(self.entry.text(), self._words.decimal_sign)
         if number is not None and self._number.permits(number):
-            self.give(plain_number(number))
+            self.give_answer(plain_number(number))
         else:
-            self.take_back()
+            self.retract_answer()
 
-    def _expected(self) -> str:
+    def _expected_sentence(self) -> str:
         wording, view = self._words, self._number
         kind = wording.whole_number if view.whole else wording.any_number
         least, most = (
@@ -246,13 +246,13 @@ class NumberField(TypedField):
             return wording.number_to.format(kind=kind, most=most)
         return wording.number_needed.format(kind=kind)
 
-    def _say(self, problem: str) -> None:
+    def _show_problem(self, problem: str) -> None:
         self._wrong.setText(problem)
         self._wrong.setVisible(bool(problem))
         set_property(self.entry, "state", "refused" if problem else "")
         self.entry.setAccessibleDescription(problem)
         if problem:
-            say(self.entry, problem)
+            announce(self.entry, problem)
 
 
 JUDGE_SHARE = 2  # of the row, where every point has one
@@ -267,16 +267,16 @@ class RatingField(ScaleField):
     def __init__(self, view: ItemView, wording: Words, parent: QWidget) -> None:
         assert isinstance(view, RatingView)  # noqa: S101 - the registry names this widget
         super().__init__(view, wording, parent)
-        self.build(view.labels, view.cannot_judge, view.cannot_judge)
+        self.build_options(view.labels, view.cannot_judge, view.cannot_judge)
         scale, area = QWidget(self), QWidget(self)
         scale.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
         self.cells = grid(margins=0, parent=scale)
         self.row = hbox((scale, len(self.points)), margins=0, parent=area)
         if self.judge is not None:
             self.row.addWidget(self.judge, JUDGE_SHARE, Qt.AlignmentFlag.AlignBottom)
-        self.put(area)
-        self._names = [PlainLabel() for _ in self._columns()]
-        for (first, last), label, side in zip(self._columns(), self._names, self._sides(), strict=True):
+        self.put_answer_part(area)
+        self._names = [PlainLabel() for _ in self._name_columns()]
+        for (first, last), label, side in zip(self._name_columns(), self._names, self._name_alignments(), strict=True):
             label.setWordWrap(True)
             label.setAlignment(side | Qt.AlignmentFlag.AlignAbsolute | Qt.AlignmentFlag.AlignBottom)
             self.cells.addWidget(label, 0, first, 1, last - first + 1)
@@ -296,7 +296,7 @@ class RatingField(ScaleField):
         for label in self._names:
             label.setFont(font("label", scale=scale, weight=600))
 
-    def _columns(self) -> list[tuple[int, int]]:
+    def _name_columns(self) -> list[tuple[int, int]]:
         """Return the first and last column below each name."""
         points = len(self.labels)
         if points <= ALL_NAMED:
@@ -304,7 +304,7 @@ class RatingField(ScaleField):
         end = points // 3
         return [(0, end - 1), (end, points - end - 1), (points - end, points - 1)]
 
-    def _sides(self) -> list[Qt.AlignmentFlag]:
+    def _name_alignments(self) -> list[Qt.AlignmentFlag]:
         centre = Qt.AlignmentFlag.AlignHCenter
         if len(self.labels) <= ALL_NAMED:
             return [centre] * len(self.labels)
@@ -346,7 +346,7 @@ class Line(QSlider):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.valueChanged.connect(self._hear)
+        self.valueChanged.connect(self._take_step)
 
     def set_scale(self, scale: float) -> None:
         self._scale = scale
@@ -434,7 +434,7 @@ class Line(QSlider):
         self.update()
         self.set_to.emit(self.value())
 
-    def _hear(self, step: int) -> None:
+    def _take_step(self, step: int) -> None:
         if not self.isSliderDown():
             self.touched = True
             self.update()
@@ -458,7 +458,7 @@ class SliderField(QuestionField):
         area.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # a scale has the same order in every language
         self.line = Line(view.steps, area)
         self.line.setAccessibleName(view.text)
-        self.line.set_to.connect(lambda step: self.give(view.at(step)))
+        self.line.set_to.connect(lambda step: self.give_answer(view.at(step)))
         self._ends = (PlainLabel(view.low), PlainLabel(wording.no_answer_yet), PlainLabel(view.high))
         for end, side in zip(self._ends, (Qt.AlignmentFlag.AlignLeft, None, Qt.AlignmentFlag.AlignRight), strict=True):
             end.setWordWrap(side is not None)
@@ -466,23 +466,23 @@ class SliderField(QuestionField):
             end.setStyleSheet(f"color: {PARTICIPANT.text2 if side else PARTICIPANT.text3}; background: transparent;")
         names = hbox(*((end, 1) for end in self._ends))
         vbox(self.line, names, spacing=0, margins=0, parent=area)
-        self.put(area)
+        self.put_answer_part(area)
         self.setFocusProxy(self.line)
         self._tell_line()
 
     def show_answer(self, value: Value) -> None:
-        self.kept(value)
+        self.keep_answer(value)
         if isinstance(value, int | float):
             self.line.show_step(round((value - self._slider.least) / self._slider.step))
         self._tell_line()
 
-    def clear(self) -> None:
+    def clear_answer(self) -> None:
         self.line.touched = False
         self.line.update()
         self._tell_line()
 
-    def give(self, value: Value) -> None:
-        super().give(value)
+    def give_answer(self, value: Value) -> None:
+        super().give_answer(value)
         self._tell_line()
 
     def set_scale(self, scale: float) -> None:
@@ -531,15 +531,15 @@ class TextField(TypedField):
         self.entry = TextEntry(view.lines, self)
         self.entry.setAccessibleName(view.text)
         self.entry.textChanged.connect(self._edit)
-        self.put(self.entry)
-        self.type_into(self.entry, TEXT_WAIT_MS, self.finish)
+        self.put_answer_part(self.entry)
+        self.give_keyboard_to(self.entry, TEXT_WAIT_MS, self.finish)
 
     def show_answer(self, value: Value) -> None:
-        self.kept(value)
+        self.keep_answer(value)
         with QSignalBlocker(self.entry):
             self.entry.setPlainText(str(value))
 
-    def clear(self) -> None:
+    def clear_answer(self) -> None:
         with QSignalBlocker(self.entry):
             self.entry.clear()
         self._timer.stop()
@@ -556,12 +556,12 @@ class TextField(TypedField):
         self._timer.stop()
         text = self.entry.toPlainText().strip()
         if text:
-            self.give(text)
+            self.give_answer(text)
         else:
-            self.take_back()
+            self.retract_answer()
         return True
 
-    def typed(self) -> str:
+    def typed_text(self) -> str:
         return self.entry.toPlainText()
 
     def _edit(self) -> None:

@@ -18,17 +18,17 @@ from study_app.gui.participant.pages.page_widget import (
     PageContext,
     PageWidget,
     ProgressLine,
-    beginning,
     draw_key,
     key_size,
+    line_start,
     page_painter,
 )
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.theme.themed import remove_widget
-from study_app.gui.widgets.accessible import HeadingLabel, PlainLabel, give_role, say
+from study_app.gui.widgets.accessible import HeadingLabel, PlainLabel, announce, give_role
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
-from study_app.protocol.questions import ItemView, shown
+from study_app.protocol.questions import ItemView, shown_questions
 from study_app.protocol.wording.languages import Words
 from study_app.session.pages import QuestionnairePage
 from study_app.session.transitions.events import Chosen, ItemShown, Retracted, Submitted
@@ -142,7 +142,7 @@ class Foot(QWidget):
     def _write(self, painter: QPainter, place: QRect, text: str, face: QFont, ink: str) -> None:
         painter.setFont(face)
         painter.setPen(QColor(ink))
-        flags = int(beginning(self) | Qt.AlignmentFlag.AlignVCenter) | WRAPPED
+        flags = int(line_start(self) | Qt.AlignmentFlag.AlignVCenter) | WRAPPED
         painter.drawText(QRectF(place), flags, text)
 
     def _placed(self, left: int, width: int) -> QRect:
@@ -155,7 +155,7 @@ class Foot(QWidget):
         return self._bounds(face, text, HIGHEST).width()
 
     def _bounds(self, face: QFont, text: str, width: int) -> QRect:
-        return QFontMetrics(face).boundingRect(0, 0, width, HIGHEST, int(beginning(self)) | WRAPPED, text)
+        return QFontMetrics(face).boundingRect(0, 0, width, HIGHEST, int(line_start(self)) | WRAPPED, text)
 
 
 ANSWERING = 0.8  # share of the present trial's bar that is full
@@ -190,8 +190,8 @@ class QuestionsPage(PageWidget):
         self._intro.setVisible(bool(page.intro))
         for label, ink in ((self._title, PARTICIPANT.text), (self._intro, PARTICIPANT.text2)):
             label.setStyleSheet(f"color: {ink}; background: transparent;")
-            label.setAlignment(beginning(self) | Qt.AlignmentFlag.AlignVCenter)
-        self.fields = tuple(self.made_field(item) for item in page.items)
+            label.setAlignment(line_start(self) | Qt.AlignmentFlag.AlignVCenter)
+        self.fields = tuple(self.make_field(item) for item in page.items)
         self.foot = Foot(context.words, self)
         self.foot.button.clicked.connect(self.submit)
         self.tabs: list[QPushButton] = []
@@ -202,15 +202,15 @@ class QuestionsPage(PageWidget):
         for field in self.fields:
             if field.view.id in chosen:
                 field.show_answer(chosen[field.view.id])
-            field.answered.connect(lambda value, field=field: self._answered(field, value))
-            field.retracted.connect(lambda field=field: self._retracted(field))
-            field.left.connect(lambda field=field: self._leave(field))
-            field.seen.connect(lambda field=field: self._saw(field))
+            field.answered.connect(lambda value, field=field: self._emit_answer(field, value))
+            field.retracted.connect(lambda field=field: self._emit_retraction(field))
+            field.left.connect(lambda field=field: self._go_on_from(field))
+            field.seen.connect(lambda field=field: self._note_shown(field))
 
-    def made_field(self, item: ItemView) -> QuestionField:
+    def make_field(self, item: ItemView) -> QuestionField:
         raise NotImplementedError
 
-    def arranged(self, asked: Sequence[QuestionField]) -> list[list[QuestionField]]:
+    def arrange_parts(self, asked: Sequence[QuestionField]) -> list[list[QuestionField]]:
         """Set the sizes of the asked questions and return the parts that contain them."""
         raise NotImplementedError
 
@@ -230,7 +230,7 @@ class QuestionsPage(PageWidget):
     @property
     def asked(self) -> tuple[QuestionField, ...]:
         answers = {field.view.id: field.value for field in self.fields if field.is_answered}
-        names = shown(self._page.items, answers)
+        names = shown_questions(self._page.items, answers)
         return tuple(field for field in self.fields if field.view.id in names)
 
     @property
@@ -261,7 +261,7 @@ class QuestionsPage(PageWidget):
         """The margin between the window's edges and the text [px]."""
         return (40 if self.width() >= 1100 else 24) * self.space_scale
 
-    def room(self, *, tabs: bool) -> int:
+    def room_height(self, *, tabs: bool) -> int:
         """Return the height available for questions, with or without the parts' tabs [px]."""
         self._head.invalidate()
         title = self._title.sizeHint().height()
@@ -292,11 +292,11 @@ class QuestionsPage(PageWidget):
             waiting = [field for field in self.asked if field.view.required and not field.is_answered]
         if waiting:
             for field in waiting:
-                field.ask(missing=True)
+                field.set_missing(missing=True)
             self.go_to(waiting[0])
             self.button.setAccessibleDescription(self.message)
-            say(self, self.message)
-            self._tell()
+            announce(self, self.message)
+            self._update_foot()
         elif not self._submitted:
             self._submitted = True
             self._send_seen()
@@ -306,7 +306,7 @@ class QuestionsPage(PageWidget):
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self.submit()
         elif event.key() in (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Backspace):
-            self._move(1 if event.key() == Qt.Key.Key_Down else -1)
+            self._move_keyboard(1 if event.key() == Qt.Key.Key_Down else -1)
         else:
             super().keyPressEvent(event)
 
@@ -322,22 +322,22 @@ class QuestionsPage(PageWidget):
         self._intro.setFont(font("statement", scale=text))
         self._tab_row.setSpacing(round(8 * scale))
         self.foot.set_scale(text, margin, tight=self.tight)
-        self._arrange()
-        self.questions.setContentsMargins(side, self.lead(), side, 0)
+        self._show_parts()
+        self.questions.setContentsMargins(side, self.lead_height(), side, 0)
 
-    def lead(self) -> int:
+    def lead_height(self) -> int:
         """Return the height [px] above the questions."""
         return 0
 
-    def _arrange(self) -> None:
+    def _show_parts(self) -> None:
         """Divide the questions into parts that fit, and show the focused one."""
         here = self.focusWidget()
         kept = question_of(here) if here is not None else None
-        self.parts = self.arranged(self.asked)
+        self.parts = self.arrange_parts(self.asked)
         index = next((n for n, part in enumerate(self.parts) if kept in part), min(self._part, len(self.parts) - 1))
-        self._show(index)
+        self._show_part(index)
 
-    def _show(self, index: int) -> None:
+    def _show_part(self, index: int) -> None:
         self._part = index
         part = self.part
         for field in self.fields:
@@ -345,10 +345,10 @@ class QuestionsPage(PageWidget):
             field.last = field is part[-1]
         for before, after in zip(part, (*part[1:], self.button), strict=True):
             QWidget.setTabOrder(before.focusProxy() or before, after.focusProxy() or after)
-        self._tab_parts()
-        self._tell()
+        self._make_tabs()
+        self._update_foot()
 
-    def _tab_parts(self) -> None:
+    def _make_tabs(self) -> None:
         wanted = self.parts if len(self.parts) > 1 else []
         while len(self.tabs) > len(wanted):
             remove_widget(self.tabs.pop())
@@ -373,7 +373,7 @@ class QuestionsPage(PageWidget):
         self._tab_row.addWidget(tab)
         return tab
 
-    def _tell(self) -> None:
+    def _update_foot(self) -> None:
         asked = self.asked
         here = self.focusWidget()
         question = question_of(here) if here is not None else self._first  # the part that will get the focus
@@ -383,12 +383,12 @@ class QuestionsPage(PageWidget):
     def go_to(self, field: QuestionField) -> None:
         index = next((n for n, part in enumerate(self.parts) if field in part), self._part)
         if index != self._part:
-            self._show(index)
+            self._show_part(index)
             key_presses().begin_page(self)
         field.setFocus(Qt.FocusReason.OtherFocusReason)
-        self._tell()
+        self._update_foot()
 
-    def _move(self, by: int) -> None:
+    def _move_keyboard(self, by: int) -> None:
         """Focus the next or previous question; after the last comes the button."""
         here = self.focusWidget()
         question = question_of(here) if here is not None else None
@@ -399,7 +399,7 @@ class QuestionsPage(PageWidget):
         elif target >= 0:
             self.go_to(asked[target])
 
-    def _leave(self, field: QuestionField) -> None:
+    def _go_on_from(self, field: QuestionField) -> None:
         """Go on after an answer by key, within the part; after its last question comes the button."""
         part = self.part
         following = part.index(field) + 1 if field in part else len(part)
@@ -407,29 +407,29 @@ class QuestionsPage(PageWidget):
             self.go_to(part[following])
         else:
             self.button.setFocus(Qt.FocusReason.TabFocusReason)
-            self._tell()
+            self._update_foot()
 
-    def _answered(self, field: QuestionField, value: object) -> None:
+    def _emit_answer(self, field: QuestionField, value: object) -> None:
         self._send_seen()
         self.event_made.emit(Chosen(self._clock(), field.view.id, value))  # type: ignore[arg-type]
-        self._follow_up()
+        self._update_shown_questions()
 
-    def _retracted(self, field: QuestionField) -> None:
+    def _emit_retraction(self, field: QuestionField) -> None:
         self._send_seen()
         self.event_made.emit(Retracted(self._clock(), field.view.id))
-        self._follow_up()
+        self._update_shown_questions()
 
-    def _follow_up(self) -> None:
+    def _update_shown_questions(self) -> None:
         """Show the questions that depend on an answer, and clear those that it hides."""
         asked = self.asked
         for field in self.fields:
             if field not in asked and field.is_answered:
-                field.forget()
+                field.forget_answer()
         if asked != tuple(field for part in self.parts for field in part):
-            self._arrange()
-        self._tell()
+            self._show_parts()
+        self._update_foot()
 
-    def _saw(self, field: QuestionField) -> None:
+    def _note_shown(self, field: QuestionField) -> None:
         """Note the time of showing; the event is emitted after painting."""
         self._unsent.append(ItemShown(self._clock(), field.view.id))
         self._sender.start()
@@ -449,41 +449,41 @@ Parts = list[list[QuestionField]]
 class FormWidget(QuestionsPage):
     """Questions of any kind, each as high as it needs."""
 
-    def made_field(self, item: ItemView) -> QuestionField:
+    def make_field(self, item: ItemView) -> QuestionField:
         return by_name(FIELDS, item.widget)(item, self._words, self)
 
     def missing_words(self, numbers: Sequence[int]) -> str:
         return self._words.questions_missing(numbers)
 
-    def arranged(self, asked: Sequence[QuestionField]) -> Parts:
+    def arrange_parts(self, asked: Sequence[QuestionField]) -> Parts:
         """Return the questions in parts that fit; smaller text avoids a second part if that is enough."""
         must = self.words_scale > 1.0 and self._text_scale > 1.0
-        parts = self._packed(asked, self.words_scale)
+        parts = self._packed_parts(asked, self.words_scale)
         if len(parts) == 2 and not must:
-            return self._on_one_part(asked) or self._packed(asked, self.words_scale)
+            return self._single_part(asked) or self._packed_parts(asked, self.words_scale)
         return parts
 
-    def _on_one_part(self, asked: Sequence[QuestionField]) -> Parts | None:
+    def _single_part(self, asked: Sequence[QuestionField]) -> Parts | None:
         """Return all questions in one part with slightly smaller text, None if they do not fit."""
         for shrink in SHRINKING:
-            parts = self._packed(asked, self.words_scale * shrink)
+            parts = self._packed_parts(asked, self.words_scale * shrink)
             if len(parts) == 1:
                 return parts
             if sum(field.minimumHeight() for field in parts[1]) > MOST_OVER * self.height():
                 return None
         return None
 
-    def _packed(self, asked: Sequence[QuestionField], scale: float) -> Parts:
+    def _packed_parts(self, asked: Sequence[QuestionField], scale: float) -> Parts:
         """Return the questions at a text size in parts as high as the room."""
         margins = self.questions.contentsMargins()
         width = self.width() - margins.left() - margins.right()
-        whole, divided = self.room(tabs=False), self.room(tabs=True)
-        heights = [_fitted(field, scale, width, divided if len(asked) > 1 else whole) for field in asked]
-        parts = _parts(asked, heights, whole)
-        return parts if len(parts) == 1 else _parts(asked, heights, divided)
+        whole, divided = self.room_height(tabs=False), self.room_height(tabs=True)
+        heights = [_fit_words(field, scale, width, divided if len(asked) > 1 else whole) for field in asked]
+        parts = _divide_into_parts(asked, heights, whole)
+        return parts if len(parts) == 1 else _divide_into_parts(asked, heights, divided)
 
 
-def _fitted(field: QuestionField, scale: float, width: int, room: int) -> int:
+def _fit_words(field: QuestionField, scale: float, width: int, room: int) -> int:
     """Set a question's text size, smaller if it is too high for a part of its own; return its height [px]."""
     for percent in range(100, 45, -5):
         field.set_scale(scale * percent / 100)
@@ -493,7 +493,7 @@ def _fitted(field: QuestionField, scale: float, width: int, room: int) -> int:
     return height
 
 
-def _parts(asked: Sequence[QuestionField], heights: Sequence[int], room: int) -> Parts:
+def _divide_into_parts(asked: Sequence[QuestionField], heights: Sequence[int], room: int) -> Parts:
     """Return the questions in parts no higher than the room [px], as many in each as fit."""
     parts: Parts = []
     taken = 0

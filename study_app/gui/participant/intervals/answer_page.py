@@ -20,7 +20,7 @@ from study_app.gui.participant.pages.page_widget import (
 )
 from study_app.gui.participant.pages.text_page import Badge
 from study_app.gui.theme.theme import PARTICIPANT, font
-from study_app.gui.widgets.accessible import HeadingLabel, PlainLabel, button_text, say
+from study_app.gui.widgets.accessible import HeadingLabel, PlainLabel, announce, button_text
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.numbers import read_number
 from study_app.protocol.questions import Value, plain_number
@@ -49,7 +49,7 @@ class AnswerPage(PageWidget):
         margin = round((40 if self.width() >= 1100 else 24) * scale)
         self._column.setContentsMargins(margin, round(20 * scale), margin, margin)
         self._progress.set_scale(self.words_scale)
-        self.question.setFont(sized(QUESTION_PX * self.words_scale))
+        self.question.setFont(font_of_height(QUESTION_PX * self.words_scale))
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
@@ -64,7 +64,7 @@ class AnswerPage(PageWidget):
         self.event_made.emit(Submitted(self._clock()))
 
 
-def sized(pixels: float) -> QFont:
+def font_of_height(pixels: float) -> QFont:
     """Return the font of a text height [logical px]."""
     made = font("body")
     made.setPixelSize(round(pixels))
@@ -104,20 +104,20 @@ class ChoiceWidget(AnswerPage):
         super().lay_out(scale)
         for button in self.buttons:
             button.setMinimumSize(*(round(side * scale) for side in CHOICE_BUTTON_PX))
-            button.setFont(sized(CHOICE_TEXT_PX * self.words_scale))
+            button.setFont(font_of_height(CHOICE_TEXT_PX * self.words_scale))
         self._cap.show_key(self.page.item.keys, self.words_scale)
         self._hint.setFont(font("body", scale=self.words_scale))
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress and self._take(event):
+        if isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress and self._take_key(event):
             return True
         return super().eventFilter(watched, event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if not self._take(event):
+        if not self._take_key(event):
             super().keyPressEvent(event)
 
-    def _take(self, event: QKeyEvent) -> bool:
+    def _take_key(self, event: QKeyEvent) -> bool:
         """Handle a key of the page; a repeated arrow does nothing."""
         number = digit_of(event)
         away = ARROWS.get(Qt.Key(event.key()))
@@ -126,7 +126,7 @@ class ChoiceWidget(AnswerPage):
         if number is not None and 1 <= number <= len(self.buttons):
             self.answer(self._values[number - 1])
         elif away is not None:
-            self._go(-away if self.mirrored else away)
+            self._move_choice(-away if self.mirrored else away)
         elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             focused = [button for button in self.buttons if button.hasFocus()]
             if focused:
@@ -135,7 +135,7 @@ class ChoiceWidget(AnswerPage):
             return False
         return True
 
-    def _go(self, step: int) -> None:
+    def _move_choice(self, step: int) -> None:
         """Choose the first or last of two answers; with more, focus the next button."""
         if len(self.buttons) == 2:
             self.answer(self._values[0 if step < 0 else 1])
@@ -168,7 +168,7 @@ class FeedbackWidget(PageWidget):
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
-        say(self, self._text)
+        announce(self, self._text)
 
 
 SQUARE = 16.0
@@ -245,11 +245,11 @@ class NumberWidget(AnswerPage):
         super().lay_out(scale)
         words_scale = self.words_scale
         self.field.setFixedSize(*(round(side * scale) for side in FIELD_PX))
-        self.field.setFont(sized(NUMBER_TEXT_PX * scale))
-        self.wrong.setFont(sized(18 * words_scale))
+        self.field.setFont(font_of_height(NUMBER_TEXT_PX * scale))
+        self.wrong.setFont(font_of_height(18 * words_scale))
         self.button.set_scale(words_scale)
         width, height = (round(side * scale) for side in KEY_PX)
-        self._pad.set_size(width, height, round(KEY_GAP_PX * scale), sized(20 * scale))
+        self._pad.set_size(width, height, round(KEY_GAP_PX * scale), font_of_height(20 * scale))
 
     def focus_first(self) -> None:
         self.field.setFocus()
@@ -269,7 +269,7 @@ class NumberWidget(AnswerPage):
             return
         problem = self._words.unclear_number(text) or self._words.number_wanted
         self.wrong.setText(problem)
-        say(self.field, problem)
+        announce(self.field, problem)
         self.field.setFocus()
         self.field.selectAll()
 
@@ -303,7 +303,7 @@ class SettingControls(QWidget):
         self._held = 0
         self._turned = 0
         self._timer = QTimer(self, interval=STEP_MS)
-        self._timer.timeout.connect(lambda: self._step(self._held))
+        self._timer.timeout.connect(lambda: self._emit_steps(self._held))
         self.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
         self.setCursor(Qt.CursorShape.ArrowCursor)
         self.less, self.more = (QPushButton(text, self) for text in (f"← {wording.less}", f"{wording.more} →"))
@@ -315,23 +315,23 @@ class SettingControls(QWidget):
             button.setAutoRepeat(True)
             button.setAutoRepeatDelay(STEP_MS)
             button.setAutoRepeatInterval(STEP_MS)
-            button.clicked.connect(lambda _=False, way=way: self._step(way))
+            button.clicked.connect(lambda _=False, way=way: self._emit_steps(way))
         self.done.clicked.connect(self._confirm)
         for control in (self.less, self.more, self.done):
             control.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setVisible(self._adjusts and buttons)
 
-    def turn_to(self, page: TaskPage) -> None:
+    def show_interval(self, page: TaskPage) -> None:
         """Show the controls in intervals whose level is set."""
         self._adjusts = page.adjusts
-        self.let_go()
+        self.stop_stepping()
         self.setVisible(self._adjusts and self._buttons)
 
-    def place(self, scale: float, middle: float) -> None:
+    def place_at_foot(self, scale: float, middle: float) -> None:
         """Place the controls at the tank's foot, above the pause hint if both do not fit side by side."""
         width, height = (round(side * scale) for side in BUTTON_PX)
         for button in (self.less, self.more):
-            button.setFont(sized(TEXT_PX * scale))
+            button.setFont(font_of_height(TEXT_PX * scale))
             button.setStyleSheet("padding: 0 12px; min-height: 0;")
             button.setFixedHeight(max(height, LEAST_PX))
             button.setMinimumWidth(width)
@@ -341,7 +341,7 @@ class SettingControls(QWidget):
         self.move(round(x), round(min(y, self._room.height() - self.height() - 4)))
         self.raise_()
 
-    def press(self, event: QKeyEvent) -> bool:
+    def press_key(self, event: QKeyEvent) -> bool:
         """Handle a key press; return whether the key is one of these controls."""
         way = KEYS.get(Qt.Key(event.key()), 0)
         if not self._adjusts or (not way and event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter)):
@@ -349,33 +349,33 @@ class SettingControls(QWidget):
         if not event.isAutoRepeat():
             if way:
                 self._held = way
-                self._step(way)
+                self._emit_steps(way)
                 self._timer.start()
             else:
                 self._confirm()
         return True
 
-    def release(self, event: QKeyEvent) -> None:
+    def release_key(self, event: QKeyEvent) -> None:
         if KEYS.get(Qt.Key(event.key()), 0) == self._held:
-            self.let_go()
+            self.stop_stepping()
 
     def turn_wheel(self, event: QWheelEvent) -> None:
         """Step with each notch of the wheel; forwards increases."""
         self._turned += event.angleDelta().y()
         steps = int(self._turned / NOTCH)
         self._turned -= steps * NOTCH
-        self._step(steps)
+        self._emit_steps(steps)
 
-    def let_go(self) -> None:
+    def stop_stepping(self) -> None:
         """Stop stepping: a deactivated window never receives the key's release."""
         self._held = self._turned = 0
         self._timer.stop()
 
-    def _step(self, steps: int) -> None:
+    def _emit_steps(self, steps: int) -> None:
         if self._adjusts and steps:
             self.event_made.emit(Stepped(self._clock(), steps))
 
     def _confirm(self) -> None:
-        self.let_go()
+        self.stop_stepping()
         if self._adjusts:
             self.event_made.emit(Submitted(self._clock()))

@@ -56,12 +56,12 @@ def words_scale(width: float, height: float, text_scale: float) -> float:
     return max(page_scale(width, height), min(text_scale, most))
 
 
-def direction(wording: Words) -> Qt.LayoutDirection:
+def layout_direction(wording: Words) -> Qt.LayoutDirection:
     """Return the layout direction of a language."""
     return Qt.LayoutDirection.RightToLeft if wording.right_to_left else Qt.LayoutDirection.LeftToRight
 
 
-def beginning(widget: QWidget) -> Qt.AlignmentFlag:
+def line_start(widget: QWidget) -> Qt.AlignmentFlag:
     """Return the alignment of the start of lines in a widget's language."""
     right = widget.layoutDirection() == Qt.LayoutDirection.RightToLeft
     return Qt.AlignmentFlag.AlignAbsolute | (Qt.AlignmentFlag.AlignRight if right else Qt.AlignmentFlag.AlignLeft)
@@ -111,7 +111,7 @@ class PageWidget(QWidget):
         self._words = context.words
         self._clock = context.clock
         self._text_scale = context.text_scale
-        self.setLayoutDirection(direction(context.words))
+        self.setLayoutDirection(layout_direction(context.words))
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
 
     @property
@@ -142,7 +142,7 @@ BEGINNING = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)  # Q
 BAR = (40.0, 6.0, 8.0)  # width, height, gap [logical px at scale 1]
 
 
-def progress_words(progress: Progress, wording: Words) -> tuple[str, str]:
+def progress_texts(progress: Progress, wording: Words) -> tuple[str, str]:
     """Return "Part 2 of 2" and "Delay setting 3 of 7"; an only part or setting is not counted."""
     counted = progress.part is not None and progress.parts > 1
     part = wording.part.format(part=progress.part, parts=progress.parts) if counted else ""
@@ -161,7 +161,7 @@ def draw_progress(
     that find no room are left out; the words say the same.
     """
     flip = wording.right_to_left
-    part, setting = progress_words(progress, wording)
+    part, setting = progress_texts(progress, wording)
     x = 0.0
     painter.save()
     painter.setLayoutDirection(Qt.LayoutDirection.RightToLeft if flip else Qt.LayoutDirection.LeftToRight)
@@ -171,7 +171,7 @@ def draw_progress(
         painter.setFont(font("statement", scale=scale, weight=weight))
         painter.setPen(QColor(colour))
         wide = QFontMetricsF(painter.font()).horizontalAdvance(text)
-        painter.drawText(_from(room, x, wide + 2, room.height(), flip=flip), BEGINNING, text)
+        painter.drawText(_rectangle_from_start(room, x, wide + 2, room.height(), flip=flip), BEGINNING, text)
         x += wide + 14 * scale
     x += 10 * scale
     if progress.of > 1 and x + _bars_width(progress.of, scale) <= room.width():
@@ -187,12 +187,12 @@ def _draw_bars(
     width, height, gap = (size * scale for size in BAR)
     painter.setPen(Qt.PenStyle.NoPen)
     for index in range(1, progress.of + 1):
-        bar = _from(room, x, width, height, flip=flip)
+        bar = _rectangle_from_start(room, x, width, height, flip=flip)
         painter.setBrush(QColor(PARTICIPANT.text if index < progress.index else PARTICIPANT.sunk))
         painter.drawRoundedRect(bar, height / 2, height / 2)
         if index == progress.index and share > 0:
             painter.setBrush(QColor(PARTICIPANT.accent))
-            full = _from(room, x, max(height, width * share), height, flip=flip)
+            full = _rectangle_from_start(room, x, max(height, width * share), height, flip=flip)
             painter.drawRoundedRect(full, height / 2, height / 2)
         x += width + gap
     return x - gap
@@ -203,7 +203,7 @@ def _bars_width(count: int, scale: float) -> float:
     return count * (width + gap) - gap
 
 
-def _from(room: QRectF, x: float, width: float, height: float, *, flip: bool) -> QRectF:
+def _rectangle_from_start(room: QRectF, x: float, width: float, height: float, *, flip: bool) -> QRectF:
     """Return a rectangle at ``x`` from the start of the line, centred vertically."""
     left = room.right() - x - width if flip else room.left() + x
     return QRectF(left, room.center().y() - height / 2, width, height)
@@ -220,7 +220,7 @@ class ProgressLine(QWidget):
         self._scale = 1.0
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         if progress is not None:
-            self.setAccessibleName(" · ".join(filter(None, progress_words(progress, wording))))
+            self.setAccessibleName(" · ".join(filter(None, progress_texts(progress, wording))))
         self.set_scale(1.0)
 
     def set_scale(self, scale: float) -> None:
@@ -489,7 +489,7 @@ class DigitPad(QWidget):
         for place, key in enumerate(self.keys):
             key.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             key.setAccessibleName(delete_name if key.text() == DELETE else key.text())
-            key.clicked.connect(lambda _=False, key=key: self._press(key.text()))
+            key.clicked.connect(lambda _=False, key=key: self._type_digit(key.text()))
             self._grid.addWidget(key, place // across, place % across)
 
     def set_size(self, width: int, height: int, gap: int, face: QFont) -> None:
@@ -508,7 +508,7 @@ class DigitPad(QWidget):
                 return True
         return super().eventFilter(watched, event)
 
-    def _press(self, text: str) -> None:
+    def _type_digit(self, text: str) -> None:
         self._field.setFocus(Qt.FocusReason.MouseFocusReason)
         if text == DELETE:
             self._field.backspace()
@@ -516,7 +516,7 @@ class DigitPad(QWidget):
             self._field.insert(text)
 
 
-def point_at(widget: QWidget) -> None:
+def point_screen_reader_at(widget: QWidget) -> None:
     """Let screen readers announce ``widget``, which lacks keyboard focus: its name and whether it is checked."""
     if QAccessible.isActive():
         QAccessible.updateAccessibility(QAccessibleEvent(widget, QAccessible.Event.Focus))

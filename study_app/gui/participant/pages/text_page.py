@@ -20,7 +20,7 @@ from study_app.gui.participant.pages.page_widget import (
 )
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, font
-from study_app.gui.widgets.accessible import HeadingLabel, PlainLabel, say
+from study_app.gui.widgets.accessible import HeadingLabel, PlainLabel, announce
 from study_app.gui.widgets.boxes import STRETCH, vbox
 from study_app.session.pages import EndPage, PausePage, TextPage, TroublePage
 from study_app.session.transitions.events import Continue, EndRequested, LanguageChosen, ResumeRequested
@@ -95,7 +95,7 @@ class Column(QWidget):
         self._body.setText(paragraphs_html(self._paragraphs, 10 * scale, right_to_left=flip))
         self._layout.setSpacing(round(14 * scale))
 
-    def needed(self, width: int) -> int:
+    def needed_height(self, width: int) -> int:
         """Return the height of the texts in a column of ``width`` [px]."""
         return self._layout.heightForWidth(width)
 
@@ -165,7 +165,7 @@ class ReadingPage(PageWidget):
         room = self.height() - top - round((28 if least else 48) * scale) - foot
         for text, badge in MUST_BE_READ if least else GIVING_WAY:
             self._column.set_scale(scale, text=text, badge=badge)
-            needed = self._column.needed(width)
+            needed = self._column.needed_height(width)
             if needed <= room:
                 break
         height = min(needed, room)
@@ -279,7 +279,7 @@ class TextWidget(ReadingPage):
             self.button.show()
             if self.isVisible():
                 self.focus_first()
-                say(self.button, self.button.text())
+                announce(self.button, self.button.text())
 
     def focus_first(self) -> None:
         """Do not focus the consent's button: Space must not agree by itself."""

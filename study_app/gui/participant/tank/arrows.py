@@ -55,7 +55,7 @@ def paint_arrows(painter: QPainter, camera: Camera, arrows: Sequence[Arrow]) -> 
         draw_head(painter, tip, math.atan2(along.y(), along.x()), ink, 13.0)
     for arrow, tip, along, length in shown:
         ratio = painter.device().devicePixelRatio()
-        letters = _name(arrow.name, arrow.colour, ratio)
+        letters = _name_image(arrow.name, arrow.colour, ratio)
         wide = letters.width() / ratio
         middle = tip + along * ((12.0 + wide / 2) / length)
         place = QRectF(middle.x() - wide / 2, middle.y() - NAME_PX / 2, wide, NAME_PX)
@@ -78,7 +78,7 @@ def draw_head(painter: QPainter, tip: QPointF, turn: float, ink: QColor, size: f
 
 
 @lru_cache(maxsize=16)
-def _name(word: str, colour: str, ratio: float) -> QImage:
+def _name_image(word: str, colour: str, ratio: float) -> QImage:
     """Return a word with a dark outline, for a screen with pixel ratio ``ratio``."""
     face = font("label", weight=600)
     wide = QFontMetricsF(face).horizontalAdvance(word) + 4

@@ -53,18 +53,18 @@ class Captions:
         self._way = Qt.LayoutDirection.RightToLeft if wording.right_to_left else Qt.LayoutDirection.LeftToRight
         self.lay_out(*DESIGNED_FOR, 0.84 * DESIGNED_FOR[1])
 
-    def turn_to(self, page: TaskPage) -> None:
+    def show_interval(self, page: TaskPage) -> None:
         self._page = page
 
-    def below(self, width: float, height: float) -> float:
+    def height_below(self, width: float, height: float) -> float:
         """Return the height of instruction and foot below the tank [px]; the same for most instructions."""
         self._size_words(width, height)
         lines = max(2, self._instruction_lines())
-        stacked = self._stacked()
+        stacked = self._is_stacked()
         foot = height - self._top_of_foot(stacked=True) if stacked or self._text_scale > 1 else 0.0
         return max(168 * self._scale, foot + (lines + 0.3) * self._line) + self._controls_above
 
-    def above(self, width: float, height: float) -> float:
+    def height_above(self, width: float, height: float) -> float:
         """Return the height of progress and count above the tank [px]."""
         self._size_words(width, height)
         return 102 * self._scale if self._text_scale > 1 else 0.0
@@ -79,13 +79,13 @@ class Captions:
         if self._page.interval is not None:
             marks = interval_width(self._page.interval, self._words, self._head_scale)
             across = min(across, (width - marks) / 2 - margin - 24 * scale)
-        self._head = self._placed(QRectF(margin, head - 20 * scale, across, 40 * scale))
-        self._count = self._placed(QRectF(width - margin - count, head - 26 * scale, count, 70 * scale))
+        self._head = self._mirrored_place(QRectF(margin, head - 20 * scale, across, 40 * scale))
+        self._count = self._mirrored_place(QRectF(width - margin - count, head - 26 * scale, count, 70 * scale))
         start, room = self._room_of_foot()
         if self._foot_width() > room:
             self._pause_font = font("statement", scale=self._fine * room / self._foot_width())
         self._foot = QRectF(start, self._foot_middle() - small, min(self._foot_width(), room), 2 * small)
-        longest, stacked = self._longest_hint(), self._stacked()
+        longest, stacked = self._longest_hint(), self._is_stacked()
         middle = self._foot_middle() - (1.25 * small if stacked else 0)
         self._hint = QRectF((width - longest) / 2, middle - 0.62 * small, longest, 1.24 * small)
         if stacked:
@@ -121,7 +121,7 @@ class Captions:
     def _longest_hint(self) -> float:
         return max(QFontMetricsF(self._small).horizontalAdvance(text) for text in self._longest_hints()) + 8
 
-    def _stacked(self) -> bool:
+    def _is_stacked(self) -> bool:
         """Return whether the hint is above the foot because there is no room next to it."""
         start, room = self._room_of_foot()
         return start + min(self._foot_width(), room) + 24 > (self._width - self._longest_hint()) / 2
@@ -140,7 +140,7 @@ class Captions:
 
     def things(self, task: TaskShown | None, hint: str = "") -> dict[str, Placed]:
         return {
-            "count": Placed(self._counted(task), self._count),
+            "count": Placed(self._count_and_total(task), self._count),
             "hint": Placed(self._hint_words(task, hint), self._hint),
         }
 
@@ -157,20 +157,20 @@ class Captions:
         if region.intersects(self._instruction.toAlignedRect()):
             rest = page.interval if page.interval is not None and page.interval.resting else None
             said = page.said if rest is None else rest.announced
-            _text(painter, self._instruction, CENTRED, said, self._instruction_font, PARTICIPANT.text)
-        if region.intersects(self._placed(self._foot).toAlignedRect()):
+            _draw_text(painter, self._instruction, CENTRED, said, self._instruction_font, PARTICIPANT.text)
+        if region.intersects(self._mirrored_place(self._foot).toAlignedRect()):
             self._draw_foot(painter)
         hints = self._hint_words(task, hint)
         if hints and region.intersects(self._hint.toAlignedRect()):
             strong = bool(hint) or hints.startswith(wording.continue_now) or hints == wording.time_is_up
             colour = PARTICIPANT.text if strong else PARTICIPANT.text3
-            _text(painter, self._hint, int(Qt.AlignmentFlag.AlignCenter), hints, self._small, colour)
+            _draw_text(painter, self._hint, int(Qt.AlignmentFlag.AlignCenter), hints, self._small, colour)
 
     @property
     def _head_scale(self) -> float:
         return max(1.25 * self._scale, self._fine)
 
-    def _placed(self, place: QRectF) -> QRectF:
+    def _mirrored_place(self, place: QRectF) -> QRectF:
         """Return a rectangle of a left-to-right page on this page."""
         return mirrored(place, self._width) if self._words.right_to_left else place
 
@@ -210,10 +210,12 @@ class Captions:
     def _draw_foot(self, painter: QPainter) -> None:
         fine, wording = self._fine, self._words
         key, _ = key_size(wording.escape_key, 1.1 * fine)
-        cap = self._placed(QRectF(self._foot.left(), self._foot.top(), key, self._foot.height()))
+        cap = self._mirrored_place(QRectF(self._foot.left(), self._foot.top(), key, self._foot.height()))
         draw_key(painter, cap.left(), cap.center().y(), wording.escape_key, 1.1 * fine)
         words_at = self._foot.adjusted(key + 12 * fine, 0, 0, 0)
-        _text(painter, self._placed(words_at), BEGINNING, wording.pause_hint, self._pause_font, PARTICIPANT.text2)
+        _draw_text(
+            painter, self._mirrored_place(words_at), BEGINNING, wording.pause_hint, self._pause_font, PARTICIPANT.text2
+        )
 
     def _hint_words(self, task: TaskShown | None, hint: str) -> str:
         """Return the hint how the ball reaches its target, or the time until the participant may or must continue."""
@@ -235,18 +237,18 @@ class Captions:
         counts = todo.wanted is None or left <= COUNTED_DOWN_S
         return " · ".join(filter(None, (hint, counted if counts else "")))
 
-    def _counted(self, task: TaskShown | None) -> tuple[int, int | None]:
+    def _count_and_total(self, task: TaskShown | None) -> tuple[int, int | None]:
         if task is not None:
             return task.reached, task.of
         return 0, self._page.task.wanted
 
     def _draw_count(self, painter: QPainter, task: TaskShown | None) -> None:
-        reached, of = self._counted(task)
+        reached, of = self._count_and_total(task)
         count = str(reached) if of is None else self._words.reached.format(reached=reached, of=of)
         upper = QRectF(self._count.topLeft(), self._count.size() * 0.5)
         upper.setWidth(self._count.width())
-        _text(painter, upper, RIGHT, count, self._count_font, PARTICIPANT.text)
-        _text(
+        _draw_text(painter, upper, RIGHT, count, self._count_font, PARTICIPANT.text)
+        _draw_text(
             painter,
             upper.translated(0, upper.height()),
             RIGHT,
@@ -256,7 +258,7 @@ class Captions:
         )
 
 
-def _text(painter: QPainter, place: QRectF, flags: int, text: str, face: QFont, colour: str) -> None:
+def _draw_text(painter: QPainter, place: QRectF, flags: int, text: str, face: QFont, colour: str) -> None:
     painter.setFont(face)
     painter.setPen(QColor(colour))
     painter.drawText(place, flags, text)

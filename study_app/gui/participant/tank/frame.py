@@ -193,7 +193,7 @@ def target_place(camera: Camera, box: Box, centre: Point, radius_m: float) -> Ta
         depth_m=camera.distance(centre),
         circle=QPolygonF([QPointF(*camera.point(point)) for point in circle]),
         diamond=QPolygonF([QPointF(*camera.point(point)) for point in corners]),
-        feet=_feet(QPointF(*camera.point((x, box.floor, z))), middle + QPointF(0, radius), 9.0),
+        feet=_plumb_dots(QPointF(*camera.point((x, box.floor, z))), middle + QPointF(0, radius), 9.0),
     )
 
 
@@ -240,11 +240,11 @@ class BallPlacer:
             floor_flat=round((near - far) / (2 * floor_radius), 2),
             spread=1.15 + 0.35 * height,
             shade=0.98 - 0.42 * height,
-            feet=_feet(floor, middle + QPointF(0, radius), 11.0),
+            feet=_plumb_dots(floor, middle + QPointF(0, radius), 11.0),
         )
 
 
-def _feet(floor: QPointF, end: QPointF, pitch: float) -> tuple[QPointF, ...]:
+def _plumb_dots(floor: QPointF, end: QPointF, pitch: float) -> tuple[QPointF, ...]:
     """Return dots from the floor up to ``end``, ``pitch`` px apart: they stay in place while the ball rises."""
     along = end - floor
     length = math.hypot(along.x(), along.y())
@@ -255,7 +255,7 @@ def _feet(floor: QPointF, end: QPointF, pitch: float) -> tuple[QPointF, ...]:
     )
 
 
-def ball_things(ball: BallPlace) -> dict[str, Placed]:
+def ball_parts(ball: BallPlace) -> dict[str, Placed]:
     """Return ball, shadow and plumb line as parts of a frame."""
     state = (ball.middle.x(), ball.middle.y(), ball.radius, ball.floor.x(), ball.floor.y())
     around = ball.radius + 3
@@ -269,7 +269,7 @@ def ball_things(ball: BallPlace) -> dict[str, Placed]:
     }
 
 
-def changes(before: dict[str, Placed], after: dict[str, Placed]) -> QRegion:
+def changed_region(before: dict[str, Placed], after: dict[str, Placed]) -> QRegion:
     """Return the region that differs between two frames [whole logical px]."""
     region = QRegion()
     for name in before.keys() | after.keys():
@@ -295,7 +295,7 @@ def paint_marks(painter: QPainter, target: TargetPlace, stroke: float, *, is_lit
     points = target.diamond.toList()
     for start, end in zip(points, points[1:] + points[:1], strict=True):
         along = end - start
-        painter.setPen(sprites.dashes(ink, thin, (along.x() ** 2 + along.y() ** 2) ** 0.5, 4))
+        painter.setPen(sprites.dashed_pen(ink, thin, (along.x() ** 2 + along.y() ** 2) ** 0.5, 4))
         painter.drawLine(start, end)
     ink.setAlphaF(0.45)
     painter.setPen(QPen(ink, thin, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))

@@ -1,4 +1,4 @@
-"""How glass, water, light and floor of the tank are painted; used once for each size by ``backdrop``."""
+"""How glass, water, light and floor of the tank are painted; used once for each size by ``paint_backdrop``."""
 
 import math
 from functools import cache
@@ -34,8 +34,8 @@ SEED = 7
 def brightness() -> NDArray[np.float32]:
     """Return the light on the floor above its mean as a (320, 512) array in 0 … 1, back of the tank first."""
     random = np.random.Generator(np.random.PCG64(SEED))
-    x = _starts(COLUMNS)[None, :]
-    z = _starts(ROWS)[:, None]
+    x = _ray_starts(COLUMNS)[None, :]
+    z = _ray_starts(ROWS)[:, None]
     shift_x = np.zeros((z.size, x.size), np.float32)
     shift_z = np.zeros_like(shift_x)
     for _ in range(WAVES):
@@ -45,21 +45,21 @@ def brightness() -> NDArray[np.float32]:
         slope = BEND / WAVES * np.cos(number * (along_x * x + along_z * z) + random.uniform(0, math.tau))
         shift_x += along_x * slope
         shift_z += along_z * slope
-    landed = _gathered(x + shift_x, z + shift_z)
+    landed = _count_rays(x + shift_x, z + shift_z)
     soft = _blurred(_blurred(_blurred(landed)))
     above = np.clip(soft - 0.85, 0, None)
     light: NDArray[np.float32] = np.clip(above / 2.6, 0, 1).astype(np.float32)
     return light
 
 
-def _starts(cells: int) -> NDArray[np.float32]:
+def _ray_starts(cells: int) -> NDArray[np.float32]:
     """Return the start positions of rays along one axis [widths of the floor], beyond both ends."""
     beyond = math.ceil(BEND * COLUMNS) * RAYS
     starts: NDArray[np.float32] = np.arange(-beyond, cells * RAYS + beyond, dtype=np.float32)
     return (starts + np.float32(0.5)) / np.float32(COLUMNS * RAYS)
 
 
-def _gathered(x: NDArray[np.float32], z: NDArray[np.float32]) -> NDArray[np.float64]:
+def _count_rays(x: NDArray[np.float32], z: NDArray[np.float32]) -> NDArray[np.float64]:
     """Count rays per cell of the floor; 1 is the brightness without ripples."""
     column = np.floor(x * COLUMNS).astype(np.int32).ravel()
     row = np.floor(z * COLUMNS).astype(np.int32).ravel()
@@ -84,14 +84,14 @@ def _blurred(image: NDArray[np.float64], radius: int = 1) -> NDArray[np.float64]
 FLOOR_LINES = 10
 
 
-def at(camera: Camera, point: Point) -> QPointF:
+def point_on_screen(camera: Camera, point: Point) -> QPointF:
     """Return the screen position of a point."""
     return QPointF(*camera.point(point))
 
 
 def polygon(camera: Camera, points: list[Point]) -> QPolygonF:
     """Return the screen polygon of points in the tank."""
-    return QPolygonF([at(camera, point) for point in points])
+    return QPolygonF([point_on_screen(camera, point) for point in points])
 
 
 def ink(colour: str, alpha: int = 255) -> QColor:
@@ -113,7 +113,7 @@ def shade(gradient: QGradient, *stops: tuple[float, str, int]) -> QBrush:
     return QBrush(gradient)
 
 
-def fill(painter: QPainter, shape: QPolygonF | QPainterPath, brush: QBrush) -> None:
+def fill_shape(painter: QPainter, shape: QPolygonF | QPainterPath, brush: QBrush) -> None:
     """Fill a shape, without an edge."""
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(brush)
@@ -123,15 +123,15 @@ def fill(painter: QPainter, shape: QPolygonF | QPainterPath, brush: QBrush) -> N
         painter.drawPolygon(shape)
 
 
-def walls(painter: QPainter, box: Box, camera: Camera) -> None:
+def paint_walls(painter: QPainter, box: Box, camera: Camera) -> None:
     """Paint the back wall, lit from behind, and the two side walls."""
     x, z = box.x, box.z
     back = polygon(camera, [(-x, box.top, -z), (x, box.top, -z), (x, box.floor, -z), (-x, box.floor, -z)])
     frame = back.boundingRect()
     base = QLinearGradient(frame.topLeft(), frame.bottomLeft())
-    fill(painter, back, shade(base, (0, "#284A5E", 255), (0.45, "#25475B", 255), (1, "#1A3548", 255)))
+    fill_shape(painter, back, shade(base, (0, "#284A5E", 255), (0.45, "#25475B", 255), (1, "#1A3548", 255)))
     glow = QRadialGradient(QPointF(frame.center().x(), frame.top() + 0.18 * frame.height()), frame.width() * 0.52)
-    fill(
+    fill_shape(
         painter, back, shade(glow, (0, "#6B95AA", 150), (0.35, "#4A7489", 96), (0.75, "#2F5A70", 24), (1, "#244A60", 0))
     )
     for side in (-1, 1):
@@ -140,37 +140,43 @@ def walls(painter: QPainter, box: Box, camera: Camera) -> None:
             camera,
             [(far_edge, box.top, -z), (near_edge, box.top, z), (near_edge, box.floor, z), (far_edge, box.floor, -z)],
         )
-        near, far = at(camera, (near_edge, 0, z)), at(camera, (far_edge, 0, -z))
+        near, far = point_on_screen(camera, (near_edge, 0, z)), point_on_screen(camera, (far_edge, 0, -z))
         along = QLinearGradient(QPointF(near.x(), 0), QPointF(far.x(), 0))
-        fill(painter, wall, shade(along, (0, "#25435A", 255), (0.7, "#1D3B4F", 255), (1, "#1A364A", 255)))
+        fill_shape(painter, wall, shade(along, (0, "#25435A", 255), (0.7, "#1D3B4F", 255), (1, "#1A364A", 255)))
         down = QLinearGradient(wall.boundingRect().topLeft(), wall.boundingRect().bottomLeft())
-        fill(painter, wall, shade(down, (0, "#0F2B40", 190), (0.28, "#16364B", 60), (1, "#2A4A5C", 60)))
+        fill_shape(painter, wall, shade(down, (0, "#0F2B40", 190), (0.28, "#16364B", 60), (1, "#2A4A5C", 60)))
 
 
-def floor(painter: QPainter, box: Box, camera: Camera) -> None:
+def paint_floor(painter: QPainter, box: Box, camera: Camera) -> None:
     """Paint the floor: glass with caustics and a grid for the sense of scale."""
     x, y, z = box.x, box.floor, box.z
     quad = polygon(camera, [(-x, y, -z), (x, y, -z), (x, y, z), (-x, y, z)])
     far, near = quad.at(0).y(), quad.at(2).y()
-    fill(painter, quad, shade(QLinearGradient(0, far, 0, near), (0, "#24485D", 255), (1, "#3A6B85", 255)))
-    middle = QRadialGradient(at(camera, (0, y, 0)), (quad.at(2).x() - quad.at(3).x()) * 0.5)
-    fill(painter, quad, shade(middle, (0, "#5B8CA4", 60), (1, "#2F6079", 0)))
+    fill_shape(painter, quad, shade(QLinearGradient(0, far, 0, near), (0, "#24485D", 255), (1, "#3A6B85", 255)))
+    middle = QRadialGradient(point_on_screen(camera, (0, y, 0)), (quad.at(2).x() - quad.at(3).x()) * 0.5)
+    fill_shape(painter, quad, shade(middle, (0, "#5B8CA4", 60), (1, "#2F6079", 0)))
     for side in (-1, 1):
-        edge = QLinearGradient(at(camera, (side * x, y, 0)), at(camera, (side * x * 0.72, y, 0)))
-        fill(painter, quad, shade(edge, (0, "#122B3C", 110), (1, "#122B3C", 0)))
-    _caustics(painter, quad)
+        edge = QLinearGradient(
+            point_on_screen(camera, (side * x, y, 0)), point_on_screen(camera, (side * x * 0.72, y, 0))
+        )
+        fill_shape(painter, quad, shade(edge, (0, "#122B3C", 110), (1, "#122B3C", 0)))
+    _paint_caustics(painter, quad)
     for index in range(1, FLOOR_LINES):
         share = 2 * index / FLOOR_LINES - 1
-        _grid_line(painter, at(camera, (share * x, y, -z)), at(camera, (share * x, y, z)))
-        _grid_line(painter, at(camera, (-x, y, share * z)), at(camera, (x, y, share * z)))
+        _paint_grid_line(
+            painter, point_on_screen(camera, (share * x, y, -z)), point_on_screen(camera, (share * x, y, z))
+        )
+        _paint_grid_line(
+            painter, point_on_screen(camera, (-x, y, share * z)), point_on_screen(camera, (x, y, share * z))
+        )
 
 
-def _grid_line(painter: QPainter, start: QPointF, end: QPointF) -> None:
+def _paint_grid_line(painter: QPainter, start: QPointF, end: QPointF) -> None:
     painter.setPen(pen("#BFE0F0", 34, 1.0))
     painter.drawLine(start, end)
 
 
-def _caustics(painter: QPainter, quad: QPolygonF) -> None:
+def _paint_caustics(painter: QPainter, quad: QPolygonF) -> None:
     light = brightness()
     alpha = np.rint(255 * light).astype(np.uint32)
     pixels = np.ascontiguousarray(alpha * 0x01010101)
@@ -187,24 +193,24 @@ def _caustics(painter: QPainter, quad: QPolygonF) -> None:
     painter.restore()
 
 
-def light(painter: QPainter, box: Box, camera: Camera) -> None:
+def paint_light(painter: QPainter, box: Box, camera: Camera) -> None:
     """Paint three shafts of light that fall from the surface at the back of the tank."""
     painter.save()
     painter.setCompositionMode(QPainter.CompositionMode.CompositionMode_Screen)
     for place, wide, strength in ((-0.54, 0.10, 74), (0.0, 0.16, 96), (0.46, 0.12, 66)):
-        top = at(camera, (place * box.x, box.water, -0.75 * box.z))
-        foot = at(camera, (place * box.x * 1.04, box.floor, -0.6 * box.z))
-        half = (at(camera, (wide * box.x, box.water, 0)) - at(camera, (0, box.water, 0))).x()
+        top = point_on_screen(camera, (place * box.x, box.water, -0.75 * box.z))
+        foot = point_on_screen(camera, (place * box.x * 1.04, box.floor, -0.6 * box.z))
+        half = (point_on_screen(camera, (wide * box.x, box.water, 0)) - point_on_screen(camera, (0, box.water, 0))).x()
         painter.save()
         painter.translate(top)
         painter.shear((foot.x() - top.x()) / (foot.y() - top.y()), 0)
         painter.scale(half, (foot.y() - top.y()) * 0.92)
-        _shaft(painter, strength)
+        _paint_shaft(painter, strength)
         painter.restore()
     painter.restore()
 
 
-def _shaft(painter: QPainter, strength: int) -> None:
+def _paint_shaft(painter: QPainter, strength: int) -> None:
     """Paint one shaft into [-1, 1] × [0, 1]: soft on both sides, fading downwards."""
     steps = 48
     for step in range(steps):
@@ -225,7 +231,7 @@ def _shaft(painter: QPainter, strength: int) -> None:
         painter.fillRect(QRectF(-1.5, step / steps, 3, 1 / steps), brush)
 
 
-def far_edges(painter: QPainter, box: Box, camera: Camera) -> None:
+def paint_far_edges(painter: QPainter, box: Box, camera: Camera) -> None:
     """Paint the far edges of the glass."""
     x, z = box.x, box.z
     far = [(-x, box.top, -z), (x, box.top, -z), (x, box.floor, -z), (-x, box.floor, -z)]
@@ -234,12 +240,16 @@ def far_edges(painter: QPainter, box: Box, camera: Camera) -> None:
     painter.drawPolygon(polygon(camera, far))
     for side in (-1, 1):
         painter.setPen(pen(TANK.glass, 92, 1.0))
-        painter.drawLine(at(camera, (side * x, box.floor, -z)), at(camera, (side * x, box.floor, z)))
+        painter.drawLine(
+            point_on_screen(camera, (side * x, box.floor, -z)), point_on_screen(camera, (side * x, box.floor, z))
+        )
         painter.setPen(pen(TANK.glass, 128, 1.0))
-        painter.drawLine(at(camera, (side * x, box.top, -z)), at(camera, (side * x, box.top, z)))
+        painter.drawLine(
+            point_on_screen(camera, (side * x, box.top, -z)), point_on_screen(camera, (side * x, box.top, z))
+        )
 
 
-def near_sides(painter: QPainter, box: Box, camera: Camera) -> None:
+def paint_near_sides(painter: QPainter, box: Box, camera: Camera) -> None:
     """Paint the near edges at the sides and below, which moving parts cannot hide."""
     x, z = box.x, box.z
     painter.setPen(pen(TANK.glass, 150, 1.25))
@@ -247,11 +257,13 @@ def near_sides(painter: QPainter, box: Box, camera: Camera) -> None:
     painter.drawPolyline(polygon(camera, corners))
 
 
-def near_lines(painter: QPainter, box: Box, camera: Camera) -> None:
+def paint_near_lines(painter: QPainter, box: Box, camera: Camera) -> None:
     """Paint the near edge of the glass above the water, and the water line, in front of moving parts."""
     for height, colour, alpha, width in ((box.top, TANK.glass, 150, 1.25), (box.water, "#E9F6FD", 215, 1.5)):
         painter.setPen(pen(colour, alpha, width))
-        painter.drawLine(at(camera, (-box.x, height, box.z)), at(camera, (box.x, height, box.z)))
+        painter.drawLine(
+            point_on_screen(camera, (-box.x, height, box.z)), point_on_screen(camera, (box.x, height, box.z))
+        )
 
 
 def front_area(box: Box, camera: Camera) -> QRectF:
@@ -261,17 +273,17 @@ def front_area(box: Box, camera: Camera) -> QRectF:
     return QRectF(polygon(camera, level + glass).boundingRect().adjusted(-2, -2, 2, 2).toAlignedRect())
 
 
-def surface(painter: QPainter, box: Box, camera: Camera) -> None:
+def paint_surface(painter: QPainter, box: Box, camera: Camera) -> None:
     """Paint the water's surface, seen from above: a pale skin with a few still ripples."""
     x, y, z = box.x, box.water, box.z
     skin = polygon(camera, [(-x, y, -z), (x, y, -z), (x, y, z), (-x, y, z)])
     far, near = skin.at(0).y(), skin.at(2).y()
     down = QLinearGradient(0, far, 0, near)
-    fill(
+    fill_shape(
         painter, skin, shade(down, (0, "#D5E8F1", 118), (0.16, "#A9C8D8", 72), (0.5, "#7FA6BA", 26), (1, "#A4C3D3", 64))
     )
-    sheen = QRadialGradient(at(camera, (0, y, -0.55 * z)), (skin.at(1).x() - skin.at(0).x()) * 0.42)
-    fill(painter, skin, shade(sheen, (0, "#E4F4FC", 26), (1, "#E4F4FC", 0)))
+    sheen = QRadialGradient(point_on_screen(camera, (0, y, -0.55 * z)), (skin.at(1).x() - skin.at(0).x()) * 0.42)
+    fill_shape(painter, skin, shade(sheen, (0, "#E4F4FC", 26), (1, "#E4F4FC", 0)))
     painter.setClipRegion(skin.toPolygon())
     for depth, high, waves, phase, alpha in (
         (-0.88, 0.003, 4.6, 0.4, 96),
@@ -279,7 +291,7 @@ def surface(painter: QPainter, box: Box, camera: Camera) -> None:
         (-0.34, 0.007, 2.6, 4.4, 62),
         (0.14, 0.009, 2.0, 1.2, 50),
     ):
-        _ripple(painter, box, camera, depth * z, high, waves, phase, alpha)
+        _paint_ripple(painter, box, camera, depth * z, high, waves, phase, alpha)
     painter.setClipping(False)
     painter.setPen(pen("#DDEFF8", 120, 1.0))
     painter.drawLine(skin.at(0), skin.at(1))
@@ -287,7 +299,7 @@ def surface(painter: QPainter, box: Box, camera: Camera) -> None:
     painter.drawLine(skin.at(1), skin.at(2))
 
 
-def _ripple(
+def _paint_ripple(
     painter: QPainter, box: Box, camera: Camera, depth: float, high: float, waves: float, phase: float, alpha: int
 ) -> None:
     height = high * (box.water - box.floor)
@@ -295,7 +307,7 @@ def _ripple(
     for step in range(97):
         share = step / 48 - 1
         swell = math.sin(math.pi * waves * share + phase) + 0.4 * math.sin(math.pi * waves * 1.7 * share + 2 * phase)
-        points.append(at(camera, (share * box.x, box.water + height * swell, depth)))
+        points.append(point_on_screen(camera, (share * box.x, box.water + height * swell, depth)))
     fade = QLinearGradient(points[0], points[-1])
     painter.setPen(
         QPen(shade(fade, (0, "#E9F6FD", 0), (0.2, "#E9F6FD", alpha), (0.8, "#E9F6FD", alpha), (1, "#E9F6FD", 0)), 1.0)

@@ -32,57 +32,57 @@ class Backdrop:
     front_at: QRectF
 
 
-def backdrop(size: tuple[int, int], ratio: float, box: Box, camera: Camera) -> Backdrop:
+def paint_backdrop(size: tuple[int, int], ratio: float, box: Box, camera: Camera) -> Backdrop:
     """Return both images of a tank for a widget of ``size`` [logical px] on a screen with pixel ratio ``ratio``.
 
     The last two are kept. It may be called in another thread to have them at hand: who asks meanwhile waits for it.
     """
     with _PAINTING:
-        return _painted(size, ratio, box, camera)
+        return _paint_backdrop(size, ratio, box, camera)
 
 
 @lru_cache(maxsize=2)
-def _painted(size: tuple[int, int], ratio: float, box: Box, camera: Camera) -> Backdrop:
+def _paint_backdrop(size: tuple[int, int], ratio: float, box: Box, camera: Camera) -> Backdrop:
     area = QRectF(0, 0, *size)
-    back = _blank(area.size(), ratio, QImage.Format.Format_RGBX64)
-    painter = _painter(back)
-    _room(painter, area, box, camera)
-    glass.walls(painter, box, camera)
-    glass.floor(painter, box, camera)
-    glass.light(painter, box, camera)
-    glass.far_edges(painter, box, camera)
-    glass.near_sides(painter, box, camera)
+    back = _blank_image(area.size(), ratio, QImage.Format.Format_RGBX64)
+    painter = _image_painter(back)
+    _paint_room(painter, area, box, camera)
+    glass.paint_walls(painter, box, camera)
+    glass.paint_floor(painter, box, camera)
+    glass.paint_light(painter, box, camera)
+    glass.paint_far_edges(painter, box, camera)
+    glass.paint_near_sides(painter, box, camera)
     painter.end()
     front_at = glass.front_area(box, camera).intersected(area)
-    front = _blank(front_at.size(), ratio, QImage.Format.Format_ARGB32_Premultiplied)
-    painter = _painter(front)
+    front = _blank_image(front_at.size(), ratio, QImage.Format.Format_ARGB32_Premultiplied)
+    painter = _image_painter(front)
     painter.translate(-front_at.topLeft())
-    glass.surface(painter, box, camera)
-    glass.near_lines(painter, box, camera)
+    glass.paint_surface(painter, box, camera)
+    glass.paint_near_lines(painter, box, camera)
     painter.end()
     return Backdrop(_dithered(back), front, front_at)
 
 
-def _blank(size: QSizeF, ratio: float, kind: QImage.Format) -> QImage:
+def _blank_image(size: QSizeF, ratio: float, kind: QImage.Format) -> QImage:
     image = QImage(max(1, math.ceil(size.width() * ratio)), max(1, math.ceil(size.height() * ratio)), kind)
     image.setDevicePixelRatio(ratio)
     image.fill(Qt.GlobalColor.transparent)
     return image
 
 
-def _painter(image: QImage) -> QPainter:
+def _image_painter(image: QImage) -> QPainter:
     painter = QPainter(image)
     painter.setRenderHints(QPainter.RenderHint.Antialiasing | QPainter.RenderHint.SmoothPixmapTransform)
     return painter
 
 
-def _room(painter: QPainter, area: QRectF, box: Box, camera: Camera) -> None:
+def _paint_room(painter: QPainter, area: QRectF, box: Box, camera: Camera) -> None:
     """Paint the dark room, faint light around the tank, and its reflection on the table."""
     top, middle, bottom = ROOM
     painter.fillRect(
         area, glass.shade(QLinearGradient(0, 0, 0, area.height()), (0, top, 255), (0.6, middle, 255), (1, bottom, 255))
     )
-    centre = glass.at(camera, (0, 0, 0))
+    centre = glass.point_on_screen(camera, (0, 0, 0))
     reach = area.width() * 0.52
     painter.fillRect(
         area,
@@ -90,13 +90,16 @@ def _room(painter: QPainter, area: QRectF, box: Box, camera: Camera) -> None:
             QRadialGradient(centre, reach), (0, "#1E3443", 120), (0.6, "#1A2A36", 60), (1, PARTICIPANT.window, 0)
         ),
     )
-    near_left, near_right = glass.at(camera, (-box.x, box.floor, box.z)), glass.at(camera, (box.x, box.floor, box.z))
+    near_left, near_right = (
+        glass.point_on_screen(camera, (-box.x, box.floor, box.z)),
+        glass.point_on_screen(camera, (box.x, box.floor, box.z)),
+    )
     deep = (near_right.x() - near_left.x()) * 0.075
     mirror = QPolygonF(
         [near_left, near_right, near_right + QPointF(-deep * 0.25, deep), near_left + QPointF(deep * 0.25, deep)]
     )
     fade = QLinearGradient(0, near_left.y(), 0, near_left.y() + deep)
-    glass.fill(painter, mirror, glass.shade(fade, (0, "#2F6079", 86), (0.35, "#254C61", 36), (1, "#1A3445", 0)))
+    glass.fill_shape(painter, mirror, glass.shade(fade, (0, "#2F6079", 86), (0.35, "#254C61", 36), (1, "#1A3445", 0)))
 
 
 def _dithered(image: QImage) -> QImage:
@@ -134,7 +137,7 @@ class OnsetPatch:
         self._slow_since_ns: int | None = None
         self._rested = True
 
-    def follow(self, position_m: tuple[float, float, float], time_ns: int) -> bool:
+    def follow_motion(self, position_m: tuple[float, float, float], time_ns: int) -> bool:
         """Take the shown proxy (3,) [m] and its sample's time [ns]; return whether the patch is lit."""
         if self._position is None:
             self._position, self._time_ns = position_m, time_ns
@@ -210,14 +213,14 @@ class VideoLayer:
         self._frame: VideoFrame | None = None
         self._image = QImage()
 
-    def show(self, frame: VideoFrame | None) -> None:
+    def show_frame(self, frame: VideoFrame | None) -> None:
         if frame is not None and (self._frame is None or frame.pixels is not self._frame.pixels):
             size = frame.width, frame.height
             self._image = QImage(frame.pixels, *size, frame.stride, QImage.Format.Format_RGB32)
         self._frame = frame
 
     @property
-    def thing(self) -> Placed:
+    def placed_frame(self) -> Placed:
         return Placed(None if self._frame is None else self._frame.number, self.place)
 
     def size(self, ratio: float) -> tuple[int, int]:
@@ -227,9 +230,9 @@ class VideoLayer:
         around = region.boundingRect()
         painter.fillRect(around, QColor(PARTICIPANT.window))
         if self._frame is not None and region.intersects(self.place.toAlignedRect()):
-            painter.drawImage(self.middle(self._frame), self._image)
+            painter.drawImage(self.frame_place(self._frame), self._image)
 
-    def middle(self, frame: VideoFrame) -> QRectF:
+    def frame_place(self, frame: VideoFrame) -> QRectF:
         """Return the rectangle of a frame: as large as the place allows, with its aspect ratio."""
         share = min(self.place.width() / frame.width, self.place.height() / frame.height)
         drawn = QRectF(self.place.topLeft(), QSizeF(share * frame.width, share * frame.height))

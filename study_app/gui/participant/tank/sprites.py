@@ -28,7 +28,7 @@ class Sprite:
         return QRectF(middle.x() - wide, middle.y() - high, 2 * wide, 2 * high)
 
 
-def _sprite(half_width: float, half_height: float, ratio: float) -> tuple[Sprite, QPainter]:
+def _empty_sprite(half_width: float, half_height: float, ratio: float) -> tuple[Sprite, QPainter]:
     """Return an empty sprite with room for its edge, and a painter with the origin in its middle."""
     wide, high = math.ceil(half_width * ratio) + 1, math.ceil(half_height * ratio) + 1
     image = QImage(2 * wide, 2 * high, QImage.Format.Format_ARGB32_Premultiplied)
@@ -48,9 +48,9 @@ def _ink(colour: str, alpha: float = 1.0) -> QColor:
 
 
 @lru_cache(maxsize=256)
-def ball(radius: float, ratio: float, haze: float) -> Sprite:
+def ball_sprite(radius: float, ratio: float, haze: float) -> Sprite:
     """Return the proxy of ``radius`` [logical px]; ``haze`` in 0 … 1 is how much water lies before it."""
-    sprite, painter = _sprite(radius, radius, ratio)
+    sprite, painter = _empty_sprite(radius, radius, ratio)
     painter.scale(radius, radius)
     disc = QRectF(-1, -1, 2, 2)
     body = QRadialGradient(QPointF(0, 0), 1.25, QPointF(-0.34, -0.42))
@@ -69,7 +69,7 @@ def ball(radius: float, ratio: float, haze: float) -> Sprite:
     bounce.setColorAt(1, _ink("#BFD3D8", 0))
     painter.setBrush(bounce)
     painter.drawEllipse(disc)
-    _rim(painter)
+    _paint_rim(painter)
     painter.save()
     painter.translate(-0.33, -0.42)
     painter.rotate(-36)
@@ -86,7 +86,7 @@ def ball(radius: float, ratio: float, haze: float) -> Sprite:
     return sprite
 
 
-def _rim(painter: QPainter) -> None:
+def _paint_rim(painter: QPainter) -> None:
     """Paint the light that the floor throws on the ball's lower edge."""
     along = QLinearGradient(-0.85, 0, 0.75, 0)
     for place, alpha in ((0, 0), (0.3, 0.62), (0.6, 0.5), (1, 0)):
@@ -98,10 +98,10 @@ def _rim(painter: QPainter) -> None:
 
 
 @lru_cache(maxsize=256)
-def shadow(radius: float, ratio: float, flat: float) -> Sprite:
+def shadow_sprite(radius: float, ratio: float, flat: float) -> Sprite:
     """Return the shadow of a ball of ``radius`` [logical px]; ``flat`` is its height over its width."""
     reach = SOFT * radius
-    sprite, painter = _sprite(reach, reach * flat, ratio)
+    sprite, painter = _empty_sprite(reach, reach * flat, ratio)
     painter.scale(reach, reach * flat)
     dark = QRadialGradient(QPointF(0, 0), 1)
     for place, alpha in ((0, 0.78), (0.38, 0.62), (0.68, 0.24), (1, 0)):
@@ -113,10 +113,10 @@ def shadow(radius: float, ratio: float, flat: float) -> Sprite:
 
 
 @lru_cache(maxsize=16)
-def ring(radius: float, ratio: float, stroke: float) -> Sprite:
+def ring_sprite(radius: float, ratio: float, stroke: float) -> Sprite:
     """Return the lit target without its dwell arc: light, track and four ticks."""
     reach = GLOW * radius
-    sprite, painter = _sprite(reach, reach, ratio)
+    sprite, painter = _empty_sprite(reach, reach, ratio)
     glow = QRadialGradient(QPointF(0, 0), reach)
     for place, alpha in ((0, 0.07), (0.5, 0.13), (0.655, 0.42), (0.72, 0.30), (0.86, 0.10), (1, 0)):
         glow.setColorAt(place, _ink("#CFE9F7", alpha))
@@ -137,21 +137,21 @@ def ring(radius: float, ratio: float, stroke: float) -> Sprite:
 
 
 @lru_cache(maxsize=32)
-def diamond(radius: float, ratio: float, stroke: float) -> Sprite:
+def diamond_sprite(radius: float, ratio: float, stroke: float) -> Sprite:
     """Return a dim target: a dashed diamond of half diagonal ``radius`` [logical px]."""
     reach = radius + 2 * stroke
-    sprite, painter = _sprite(reach, reach, ratio)
+    sprite, painter = _empty_sprite(reach, reach, ratio)
     corners = [QPointF(0, -radius), QPointF(radius, 0), QPointF(0, radius), QPointF(-radius, 0)]
     path = QPainterPath(corners[0])
     for corner in (*corners[1:], corners[0]):
         path.lineTo(corner)
-    painter.setPen(dashes(_ink(TANK.dim, 0.86), stroke, math.hypot(radius, radius), 6))
+    painter.setPen(dashed_pen(_ink(TANK.dim, 0.86), stroke, math.hypot(radius, radius), 6))
     painter.drawPath(path)
     painter.end()
     return sprite
 
 
-def dashes(ink: QColor, stroke: float, side: float, count: int) -> QPen:
+def dashed_pen(ink: QColor, stroke: float, side: float, count: int) -> QPen:
     """Return a pen that makes ``count`` dashes on a side [px], with half a dash at both ends."""
     pen = QPen(ink, stroke, Qt.PenStyle.CustomDashLine, Qt.PenCapStyle.FlatCap, Qt.PenJoinStyle.MiterJoin)
     period = side / (count * stroke)
@@ -160,7 +160,9 @@ def dashes(ink: QColor, stroke: float, side: float, count: int) -> QPen:
     return pen
 
 
-def draw(painter: QPainter, sprite: Sprite, middle: QPointF, *, opacity: float = 1.0, grown: float = 1.0) -> None:
+def draw_sprite(
+    painter: QPainter, sprite: Sprite, middle: QPointF, *, opacity: float = 1.0, grown: float = 1.0
+) -> None:
     """Draw a sprite around a sub-pixel position, ``grown`` times its size."""
     painter.setOpacity(opacity)
     painter.drawImage(sprite.place(middle, grown), sprite.image)

@@ -159,7 +159,7 @@ def test_home_offers_first_to_go_on_with_a_session_that_stopped(stopped, results
             steps.append(operator.rail.heading.text())
             operator.ask("end", "withdrawn", "")
             operator.close()
-        elif len(steps) == 3 and home is not None and not home.reading:
+        elif len(steps) == 3 and home is not None and not home.is_reading:
             home.sessions.show_kind("every")
             steps.append([one.status for one in home.sessions.shown])
             steps.append(home.banner.isVisible())

@@ -183,7 +183,7 @@ def test_a_source_that_fails_in_a_trial_ends_in_zero_force(
         fail(bridge, error)
         forces.append(bridge.parts.servo.force_is_on)
         offers.append(bridge.view().may_reconnect)
-        bridge.leave_now()
+        bridge.leave_without_asking()
 
     monkeypatch.setattr(SessionBridge, "fail", failed)
     monkeypatch.setattr("study_app.video.sources.Footage.frame_at", _lost)
