@@ -31,7 +31,7 @@ DHD_LIBRARY: Final = DeviceOption(
 )
 
 
-def _real_and_emulated_descriptors(
+def _felt_and_emulated(
     name: str,
     title: str,
     driver: str,
@@ -77,7 +77,7 @@ def _real_and_emulated_descriptors(
 
 
 DEVICES: Final = (
-    *_real_and_emulated_descriptors(
+    *_felt_and_emulated(
         "falcon",
         "Novint Falcon",
         "falcon.device:FalconDevice",
@@ -88,7 +88,7 @@ DEVICES: Final = (
         options=(FIRMWARE,),
         emulated_options=(BY_COMMAND,),
     ),
-    *_real_and_emulated_descriptors(
+    *_felt_and_emulated(
         "force-dimension",
         "Force Dimension",
         "force_dimension.device:ForceDimensionDevice",
@@ -98,7 +98,7 @@ DEVICES: Final = (
         "simulated hand; the Force Dimension driver with emulated library functions; needs no C compiler",
         options=(DHD_LIBRARY,),
     ),
-    *_real_and_emulated_descriptors(
+    *_felt_and_emulated(
         "inverse3",
         "Haply Inverse3",
         "inverse3.device:Inverse3Device",

@@ -44,10 +44,10 @@ _HEX_DUMP: Final = re.compile(rb"[0-9A-Fa-f\s:|.,x]{32,}")
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A block of ``word_count`` 16-bit words for the address ``destination``."""
+    """A block of ``words`` 16-bit words for the address ``destination``."""
 
     destination: int
-    word_count: int
+    words: int
 
 
 @dataclass(frozen=True, slots=True)

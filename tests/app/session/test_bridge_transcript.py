@@ -164,7 +164,7 @@ def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, ca
 
     recorder = SimpleNamespace(
         start=world.call("recorder.start"), append=lambda *_: None, frame=world.call("recorder.frame"),
-        stop=world.call("recorder.stop"), settled=lambda: True, lost=(), dropped=2,
+        stop=world.call("recorder.stop"), end_without_waiting=lambda: True, lost=(), dropped=2,
     )  # fmt: skip
     bridge = make(
         blinding, servo=world, journal=world, clock=world.seconds, point_to=world.call("point_to"), recorder=recorder,

@@ -65,12 +65,12 @@ def test_the_force_is_zero_first_and_a_part_that_fails_leaves_no_other_open(
     parts = {name: Part(name, closed, fails=name == fails) for name in ("rig", "videos", "outlets")}
     for name, value in {
         "load_windows": lambda: None,
-        "check": lambda *_: None,
+        "check_choices": lambda *_: None,
         "study_settings": lambda *_: None,
         "open_rig": lambda *_, **__: parts["rig"],
         "open_outlets": lambda *_: parts["outlets"],
-        "videos_of": lambda *_: parts["videos"],
-        "measured": refuse,
+        "unopened_videos": lambda *_: parts["videos"],
+        "measure_rig": refuse,
     }.items():
         monkeypatch.setattr(live_session, name, value)
     session = LiveSession(CHOSEN, LIGHT)

@@ -243,4 +243,4 @@ def test_no_bytes_make_it_fail_otherwise(data: bytes, at: int, byte: int) -> Non
             continue
         assert found.size == len(candidate)
         assert (found.sha256 == check_firmware(stream()).sha256) == (candidate == stream())
-        assert sum(2 * block.word_count + 6 for block in found.blocks) == len(candidate) - 24
+        assert sum(2 * block.words + 6 for block in found.blocks) == len(candidate) - 24
