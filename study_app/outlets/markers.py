@@ -194,7 +194,7 @@ class SinkThread:
         except OutletError as error:
             with self._changed:
                 self._give_up(str(error))
-        except Exception as error:  # noqa: BLE001 - any error of a driver: the session goes on without it
+        except Exception as error:  # noqa: BLE001 - any error of a driver: the session continues without it
             with self._changed:
                 self._give_up(f"{type(error).__name__}: {error}")
         try:

@@ -46,7 +46,7 @@ class MarkerStream:
 
     @property
     def listens(self) -> bool:
-        outlet = self._outlet  # its thread may release it meanwhile
+        outlet = self._outlet  # its thread may release it at any time
         return bool(outlet is not None and outlet.have_consumers())
 
     def send(self, marker: Marker) -> None:

@@ -169,7 +169,7 @@ class SampleStream:
 
     @property
     def listens(self) -> bool:
-        outlet = self._outlet  # its thread may release it meanwhile
+        outlet = self._outlet  # its thread may release it at any time
         return bool(outlet is not None and outlet.have_consumers())
 
     def close(self) -> None:
@@ -182,7 +182,7 @@ class SampleStream:
                 self.send_new()
             self.send_new()
             close_outlet(self._outlet)
-        except Exception as error:  # noqa: BLE001 - any error of the library: the session goes on without it
+        except Exception as error:  # noqa: BLE001 - any error of the library: the session continues without it
             self.lost = f"{type(error).__name__}: {error}"
         self._outlet = None
 

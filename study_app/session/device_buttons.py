@@ -1,4 +1,4 @@
-"""The buttons of the device: the events that they make, and steps of an adjustment while one is held."""
+"""The device's buttons: their events, and the steps of an adjustment while a button is held."""
 
 from collections.abc import Callable, Iterator
 from typing import Any, Final

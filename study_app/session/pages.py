@@ -1,4 +1,4 @@
-"""What the participant sees at one moment, as values: a machine makes them, a widget draws them.
+"""The participant's pages as values: made by the state machine, drawn by widgets.
 
 Texts are already in the participant's language. Lengths are metres in the hand frame, times seconds.
 """

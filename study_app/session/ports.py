@@ -1,4 +1,4 @@
-"""What the runner asks of the world, as small protocols: a servo, a journal, a recorder, a screen and a clock."""
+"""The interfaces for the runner's side effects: servo, journal, recorder, screen and clock."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -63,7 +63,7 @@ class KeptSession(JournalPort, Protocol):
 class Ports:
     """The side effects of a session: ``present`` shows a page, ``clock`` gives seconds since the session's origin.
 
-    ``recorder`` is None where no recordings are kept. Without ``paints`` there is no window: the first frame of a
+    ``recorder`` is None in a session without recordings. Without ``paints`` there is no window: the first frame of a
     trial is reported, and a later one need not come. ``settled`` says whether all recordings are on the disk, so that
     the session's end waits for none: until then it is put off. ``video`` gives the source of a condition's view, None
     where videos are not shown.

@@ -1,6 +1,6 @@
-"""Whether a session may begin: a pure judgement of what was measured before it, and how the motors were masked.
+"""The pre-flight: checks whether a session may begin, from measurements and the masking of the motors.
 
-A failure refuses the session; a warning is something that would make trials invalid, or that somebody should know.
+A failure prevents the session; a warning is about something that would make trials invalid or should be known.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ class Measurements:
     are expected to withhold in the fastest stroke of a task, by liquid; None where it was not computed. ``delivery`` is
     what a simulated participant would lose, None where it was not computed. ``velocity_errors`` are the relative error
     of the velocity and what it would be if all of the device's dynamics were known; None where all is. ``outlets`` are
-    the streams and ports to other programs; ``video`` is what was found of the study's videos, None without any.
+    the streams and ports to other programs; ``video`` is the state of the study's videos, None without any.
     ``ran_otherwise`` is a participant with whom the same version of the study ran from another file; ``untranslated``
     are texts of the pages that are still in another language.
     """

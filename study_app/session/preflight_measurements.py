@@ -1,4 +1,4 @@
-"""Measures what ``preflight`` judges: two seconds of the servo at rest, and the disk that the results will be on."""
+"""Measurements for ``preflight``: two seconds of the servo at rest, and the disk for the results."""
 
 import time
 from collections.abc import Callable

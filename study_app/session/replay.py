@@ -271,8 +271,7 @@ class _Device(NamedTuple):
 class _Before:
     """A recomputed recording and the final state of its models, from which the next recording may continue.
 
-    ``knows_its_start`` says that no force was under way as it began, or that it goes on from a recording of which that
-    is so.
+    ``knows_its_start``: it began without a force, or continues a recording of which that is true.
     """
 
     serial: int
@@ -328,8 +327,8 @@ def _copy_forces(known: Any, out: Any) -> None:
 def _set_safety_state(safety: Any, out: Any) -> None:
     """Set the state of the safety layer to the first of the samples ``out``, which is recorded exactly.
 
-    Of a fade under way nothing but its length counts, since nothing is felt before the trial's own scene, which begins
-    its fade anew. The start's fade is over where a later sample before the next scene shows no fade.
+    Of a running fade only its length matters, since no force is felt before the trial's own scene, which restarts the
+    fade. The start's fade is over where a later sample before the next scene shows no fade.
     """
     other = np.flatnonzero(out.scene != out.scene[0])
     lead = out[: other[0]] if other.size else out[:1]

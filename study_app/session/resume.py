@@ -1,4 +1,4 @@
-"""Where a session that was interrupted goes on: at the trial that was under way, or at the beginning of its block."""
+"""The start of a resumed session: the interrupted trial, or the beginning of its block."""
 
 import contextlib
 import math
@@ -43,13 +43,13 @@ def resume_at(
 ) -> Start:
     """Return the start from which the session with these journal lines continues.
 
-    The levels of answered trials are those of the journal, opened with the study's ``key``; without it `Start.heard`
-    is empty.
+    The levels of answered trials are those of the journal, opened with the study's ``key``; without it `Start.heard` is
+    empty.
 
-    A trial whose answers are not all confirmed is presented again as its next attempt, so that nobody answers what they
-    felt before the gap; one that asks nothing and was done is over. With ``resume = "block"`` the whole block is
-    presented again, unless the session is to go on ``exactly`` where it was. SessionError says that the journal is not
-    of this schedule.
+    A trial whose answers are not all confirmed is presented again as its next attempt, so that no answer is about what
+    was felt before the gap; a completed trial without questions is over. With ``resume = "block"`` the whole block is
+    presented again, unless the session continues ``exactly`` at the interrupted step. SessionError says that the
+    journal is not of this schedule.
     """
     lines = list(lines)
     progress = progress_of(lines)

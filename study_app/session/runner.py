@@ -1,6 +1,6 @@
-"""The shell around the machine: carries out its commands, and looks at the device for it.
+"""Run one session: feed events to the state machine, execute its commands, and poll the device.
 
-Everything that touches something goes through ``Ports``. Events come from windows (``post``) and from the device
+All side effects go through ``Ports``. Events come from windows (``post``) and from the device
 (``poll``, once a frame); what the participant sees comes from ``view``, what was seen goes into ``frame_shown``. All of
 it in one thread; a window that answers a page while it is being presented is heard after the commands under way.
 

@@ -1,4 +1,4 @@
-"""Starting a session: what the operator chose, refused early or measured, then claimed on the disk or reopened."""
+"""Starting a session: check the choices, measure the device, then claim or reopen the session on the disk."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ PLAYED_MEASURED_S = 0.5  # the same before a session played from the designer [s
 class NewSession:
     """The choices of the operator; ``results`` is the study's folder, ``screen`` counts from 1 (None: the last).
 
-    ``resumes`` is the folder of the session that goes on, None for a new one; ``device_options`` are the values
+    ``resumes`` is the folder of the session to resume, None for a new one; ``device_options`` are the values
     of the device's options, by name. ``row_of`` is the id of the participant who is replaced, ``group`` the
-    participant's pre-existing group; None: nobody, or as the participant's first session says.
+    participant's pre-existing group; None: no one, or as in the participant's first session.
     ``played`` says that it is played from the designer: exactly from where it was left, without an operator's window.
     ``footage`` is the folder of the study's footage, None: that of its file.
     """
@@ -111,8 +111,8 @@ def resumed_choices(
 ) -> NewSession:
     """Return the choices with which the session in a folder is resumed: its own, and the present screen.
 
-    StoreError says that it cannot go on: it is not a session folder, open in another program, finished, damaged, or of
-    another protocol; SessionError that no protocol at hand is of its study.
+    StoreError: the session cannot be resumed, since it is not a session folder, open in another program, finished,
+    damaged, or of another protocol. SessionError: no available protocol is of its study.
     """
     study, folder = locate_session(session_folder)
     refuse_never_begun(folder)

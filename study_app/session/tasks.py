@@ -1,4 +1,4 @@
-"""What the participant does in the tank, decided on the device's clock and drawn later.
+"""The tasks in the tank, tracked on the device's clock and drawn later.
 
 A tracker eats samples and knows two things: whether the task is over, and what it looked like at any moment since it
 began. Whoever draws asks for (now − delay), so that lit target, dwell arc and count are as old as the proxy; whoever
@@ -68,7 +68,7 @@ class TargetReached:
 class Tracker:
     """Track one task through the samples of its trial; `new_tracker` makes the right tracker.
 
-    ``outcome`` and ``end_ns`` (time of the sample that ended the task) are None while it goes on.
+    ``outcome`` and ``end_ns`` (time of the sample that ended the task) are None while the task runs.
     """
 
     def __init__(self, limit_s: float, at_limit: Outcome) -> None:

@@ -1,4 +1,4 @@
-"""The trial under way: prepared, begun with the first painted frame of its tank, followed, recorded and summed up.
+"""The running trial: prepared, begun by the first painted frame of its tank, tracked, recorded and summarised.
 
 Until that frame there is no force, the task's clock stands at zero and nothing is recorded, however long a window takes
 to show the tank. Without a window, whoever runs the session reports the first frame at once. A recording has every tick

@@ -1,4 +1,4 @@
-"""A trial or interval to watch again: what its recording and its session's journal say of every moment of it.
+"""Playback of a trial or interval from its recording and its session's journal.
 
 The key opens a recording only once the study is unblinded. While it is sealed, the key gives the task in memory alone,
 and a recording of an earlier version, which is not encrypted, shows the motion without forces, delay and condition.
@@ -58,7 +58,7 @@ class Mark:
 class Watched:
     """A recorded trial, or one of its ``intervals`` (0: it has none); times are since its task began [s].
 
-    ``presented`` is the condition, or what the interval was, "" while the study is ``blinded``: then forces and delay
+    ``presented`` is the condition or the interval's contents, "" while the study is ``blinded``: then forces and delay
     are not shown either. ``samples`` (n,), at ``times_s``, have positions that are believed. Frames were painted at
     ``painted_s`` (k,) and showed the hand of ``shown_s`` (k,); ``lacking`` says why they cannot be read, if so.
     """

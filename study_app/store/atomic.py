@@ -278,7 +278,7 @@ def refuse_special_files(path: Path) -> None:
     Raises
     ------
     StoreError
-        Names what it is.
+        Names the path and its type.
     """
     for inside in (path, *paths_in(path)):
         if inside.is_symlink():

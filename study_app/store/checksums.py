@@ -1,4 +1,4 @@
-"""The proofs that a session is as it ended: ``checksums.sha256``, and the study's list of fingerprints.
+"""The proofs that a session has not changed since its end: ``checksums.sha256`` and the study's list of fingerprints.
 
 ``checksums.sha256`` has the SHA-256 of every file at the session's end, in the format of ``sha256sum -c``. The
 fingerprint of a session is the beginning of a SHA-256 over its checksums, but for those of its tables, which are made

@@ -1,4 +1,4 @@
-"""Whether trials and intervals were delivered as requested: what was measured, and the limits of the study that break.
+"""The delivered values of trials and intervals, and the limits of the study that they break.
 
 The session asks at the end of each interval, the analysis of the recording of the same interval. Forces are taken as
 recordings have them, so that both compute the same.
@@ -60,7 +60,7 @@ def judged_fields(samples: Any) -> Any:
 class Delivered:
     """The delivered values of an interval; names and meanings are those of the columns of ``intervals``.
 
-    ``clipped`` is whether the force limit, or saturated motors, cut what was judged.
+    ``clipped`` tells whether the force limit or saturated motors clipped the evaluated force.
     """
 
     value_delivered: float | None
@@ -91,7 +91,7 @@ def delivered_values(
     samples : array of `JUDGED` (n,)
         The interval's samples, from the first one that its task took to the one that ended it.
     adjusted : bool
-        Whether the participant set the varied number meanwhile: then no single value was delivered.
+        Whether the participant adjusted the varied number, so that no single value was delivered.
     """
     samples = _plausible_samples(samples)
     times_s = (samples["time_ns"] - samples["time_ns"][:1]) * 1e-9

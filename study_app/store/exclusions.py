@@ -67,7 +67,7 @@ def exclude(
     by : str
         The rule, or the initials of the person.
     reason : str
-        Why, in words.
+        The reason.
     now : datetime, optional
         Wall time with its zone; by default the system's.
 

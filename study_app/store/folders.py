@@ -1,4 +1,4 @@
-"""Where everything lies: names and folders of a study's results, and which participant ids they can hold.
+"""Names and folders of a study's results, and the permitted participant ids.
 
 ::
 
@@ -121,7 +121,7 @@ class StudyFolder:
         """Return the sessions that were begun, by participant and number."""
         try:
             paths = list(self.data.glob("sub-*/ses-*"))
-        except FileNotFoundError:  # a participant was withdrawn meanwhile
+        except FileNotFoundError:  # a participant was withdrawn in the meantime
             return self.sessions()
         sessions = [
             SessionFolder(path, path.parent.name.removeprefix("sub-"), int(match[1]))

@@ -1,4 +1,4 @@
-"""Trials that were not delivered: the plan asks for them, and every presentation broke a limit, so nobody answered.
+"""Missing trials: planned trials without an answer, because every presentation broke a limit.
 
 `progress.Progress` finds them in a journal. Windows, commands, tables, the report and exports take them from there.
 """

@@ -84,7 +84,7 @@ class Recorder:
         waits: bool = False,
         room: int = ROOM,
     ) -> None:
-        # The Parquet library takes a while to load: now, before a participant sits down, and only where it is needed.
+        # Loads the Parquet library, which takes a while, before the participant sits down, and only if it is needed.
         from study_app.store import recordings  # noqa: PLC0415
 
         self._files = recordings
@@ -261,7 +261,7 @@ class Recorder:
             seconds = (file.taken + end.dropped) / begin.rate_hz
             shown = self._files.write_frames(frames_path, frames, facts, seconds, self._secret)
             return recorded_event(begin.which, file.finish(end.dropped), shown, end.dropped)
-        except Exception as error:  # noqa: BLE001 - whatever it is, the next trial's recording is still to be written
+        except Exception as error:  # noqa: BLE001 - after any error the next trial's recording is still written
             with contextlib.suppress(Exception):  # `verify` reports files that cannot be removed
                 if shown is not None:
                     shown.path.unlink(missing_ok=True)

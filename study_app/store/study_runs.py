@@ -1,4 +1,4 @@
-"""Which contents of a study were run, and by how many sessions."""
+"""The contents of a study's file with which sessions were run, and the numbers of sessions."""
 
 import re
 from collections.abc import Iterable, Mapping

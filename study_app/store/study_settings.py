@@ -1,4 +1,4 @@
-"""Which study a study's file is a copy of, kept with drafts and versions in the user's data folder."""
+"""The original of a copied study, stored with drafts and versions in the user's data folder."""
 
 import contextlib
 import json

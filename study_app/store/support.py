@@ -1,4 +1,4 @@
-"""One zip file for whoever helps: versions, settings, log, last error, and what was found of a device.
+"""A zip file for support: versions, settings, log, last error, and the report on a device.
 
 It holds no participant's id, no answer, no value of a liquid and nothing of a key. Of a study it reads nothing but the
 traces of crashes, and of these the places in the source.

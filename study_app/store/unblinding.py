@@ -1,4 +1,4 @@
-"""Opening a study: the reveal is recorded, and what was sealed appears in tables, their checksums and the description.
+"""Unblinding a study: record the reveal, and write the sealed columns into tables, checksums and description.
 
 Then the rule `catch` excludes sessions with too many incorrect answers to catch trials: before that, the count would
 reveal which answers were correct. If the program ends meanwhile, the journals contain everything, and opening the study

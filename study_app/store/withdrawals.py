@@ -98,8 +98,9 @@ def withdraw(
     """Erase the sessions of a participant from the study in ``folder``, and from copies of it.
 
     Erased are the participant's folder, the rows of tables and lists, and outputs in the results folder. A tombstone
-    remains, and the participant's ID is not used again. Withdrawing again finishes what was interrupted, and reaches
-    further copies. Where a folder is the copy of a site in a merged study, outputs of the merged study are erased, too.
+    remains, and the participant's ID is not used again. Withdrawing again completes an interrupted withdrawal, and
+    reaches further copies. Where a folder is the copy of a site in a merged study, outputs of the merged study are
+    erased, too.
 
     Parameters
     ----------
@@ -110,7 +111,7 @@ def withdraw(
     by : str
         The operator's initials.
     reason : str
-        Why, in words; it remains, so it must not tell who the person is.
+        The reason; it is kept, so it must not identify the person.
     also : iterable of Path
         Folders with copies of the study, searched at any depth.
     now : datetime, optional

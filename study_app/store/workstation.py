@@ -1,4 +1,4 @@
-"""What this machine is like, apart from every study: its screens, its display's offset, its device, its folders.
+"""The settings of this computer, independent of studies: screens, display offset, device and folders.
 
 Kept as one JSON file in the user's folder, so that a protocol never says it and a study can move to another machine.
 Nothing here knows a window: sizes of screens come as numbers, in logical pixels and millimetres.

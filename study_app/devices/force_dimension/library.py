@@ -1,4 +1,4 @@
-"""The maker's library as it is installed: found, loaded, and called while a device is opened and closed.
+"""The maker's installed library: found, loaded, and called while a device is opened and closed.
 
 Signatures follow ``dhdc.h`` and ``drdc.h`` of the Force Dimension SDK 3.17.5 (public in CHAI3D 3.3.0,
 ``externals/DHD/include``); nothing of the maker's is part of this program. Loads no compiler.

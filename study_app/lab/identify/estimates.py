@@ -29,9 +29,10 @@ _SINGULAR: Final = 1e-9
 class Estimates:
     """The fitted parameters of a liquid, by their requested names.
 
-    ``values`` and ``intervals`` (95 %, within what is permitted). ``correlation`` (p, p) is that of the estimates, nan
-    where a parameter does nothing, ``following`` that of residuals from row to row. ``distinguishable`` tells whether
-    every parameter has an effect, and no two have the same. ``scene`` has the values in it, and its effects named.
+    ``values`` and ``intervals`` (95 %, within the permitted range). ``correlation`` (p, p) is that of the estimates,
+    nan where a parameter does nothing, ``following`` that of residuals from row to row. ``distinguishable`` tells
+    whether every parameter has an effect, and no two have the same. ``scene`` has the values in it, and its effects
+    named.
     """
 
     scene: Scene

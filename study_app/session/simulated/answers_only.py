@@ -1,4 +1,4 @@
-"""Sessions that are answered without being held: the machine, the questionnaires and the answer model, and no servo.
+"""Simulated sessions of answers alone: state machine, questionnaires and answer model, without a servo.
 
 What a trial felt like is drawn from what rehearsed participants felt in its condition (`condition_features`); a task
 takes its least time, and nothing of it is measured, so those columns say n/a. Everything else is as in a rehearsal: the

@@ -1,4 +1,4 @@
-"""What every simulated participant does with a page of questions: notice, answer by what was felt, and confirm.
+"""The behaviour of every simulated participant on a page of questions: notice, answer, and confirm.
 
 Settings are adjusted until the strength equals the remembered one, as it is taken.
 """

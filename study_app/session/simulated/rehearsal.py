@@ -108,7 +108,7 @@ REHEARSED_PEOPLE: Final = 4
 class Question:
     """The page of a question, and the features of each interval of its trial: none for a separate form.
 
-    A task is the page where its level is set; the last that was felt is what is set, since the last steps.
+    For a setting the page is its task, and the last features are those of the set level since the last steps.
     """
 
     page: QuestionnairePage | DesignPage | TaskPage
@@ -490,7 +490,7 @@ def rehearse(
     results : Path, optional
         Study folder; by default a new ``results/<study>-rehearsal-<n>`` of the workspace.
     recordings : bool
-        Whether every tick of the servo and every frame of a trial is kept.
+        Whether every tick of the servo and every frame of a trial is recorded.
     group : str, optional
         The pre-existing group of all of them; by default they are dealt evenly to such groups.
     progress : callable, optional
@@ -560,7 +560,7 @@ def finish_session(
     results : Path
         The study folder.
     progress : callable, optional
-        Called with a line about what was done; not if there was nothing to do.
+        Called with a line about the session that was run; not called if there was nothing to do.
 
     Raises
     ------
@@ -637,7 +637,7 @@ def open_session(
     device : str
         A simulated device.
     recordings : bool
-        Whether every tick and frame of a trial is kept.
+        Whether every tick and frame of a trial is recorded.
     group : str, optional
         The participant's pre-existing group; in a later session by default the recorded one.
     row_of : str, optional

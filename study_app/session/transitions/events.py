@@ -56,7 +56,7 @@ class StartTrial(Command):
 class Adjust(Command):
     """Change the varied number within the current interval, and write the event of its steps.
 
-    The force goes on from what it is; the line has the number by which recordings know the scene from then on.
+    The force continues from its value; the event has the scene's new number in recordings.
     """
 
     presented: Stimulated = field(repr=False)
@@ -93,8 +93,8 @@ class FadeIn(Command):
 class Write(Command):
     """Write one line to the journal; with ``waits``, as for answers and notes, wait until it is on the disk.
 
-    Other lines are flushed in the background, so that nothing drawn waits for the disk. With ``measured`` the runner
-    adds what it measured of the trial that was stopped.
+    Other lines are flushed in the background, so that drawing does not wait for the disk. With ``measured`` the runner
+    adds the measures of the stopped trial.
     """
 
     line: Line
@@ -243,7 +243,7 @@ class EndRequested(Event):
 class Broke(Event):
     """Device, servo or program failed; ``what`` is for the operator and the log, not for the participant.
 
-    After a failure ``by`` the device (its servo, or a video) the session can go on, see `Reconnected`.
+    After a failure ``by`` the device (its servo, or a video) the session can continue, see `Reconnected`.
     """
 
     what: str

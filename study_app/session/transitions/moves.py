@@ -1,4 +1,4 @@
-"""What each row of the machine's table does: a state and an event in, the next state and the commands out. Pure."""
+"""The transitions of the state machine as pure functions: state and event → next state and commands."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Pages made of a session's state: the protocol's texts and the interface's words, in the participant's language.
+"""Pages made from a session's state: texts of protocol and interface in the participant's language.
 
 The state is that of a session that runs, or of a preview: the session that a seed gives before any is run. For that no
 sealed key is read: the codes are drawn from the seed, so that a preview reveals nothing of a study that is run.

@@ -1,4 +1,4 @@
-"""Where a session is: one frozen value, changed only by `table.advance`."""
+"""The state of a session as a frozen value, changed only by `table.advance`."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

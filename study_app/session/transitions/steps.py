@@ -1,4 +1,4 @@
-"""How a step of the schedule is entered, and what the machine does with answers. Pure."""
+"""Transitions into the steps of the schedule, and the handling of answers, as pure functions."""
 
 from dataclasses import asdict, replace
 from typing import Any, Final, TypeAlias

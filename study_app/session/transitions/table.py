@@ -1,4 +1,4 @@
-"""The machine that runs a session: it decides, and does nothing.
+"""The state machine of a session: it makes decisions without side effects.
 
 Rules of this file:
 
@@ -64,7 +64,7 @@ OPEN = (Phase.OPENING, *RUNNING, Phase.PAUSED, Phase.TROUBLE)
 
 TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     # phase           event           what happens              next phase
-    (Phase.OPENING, Begin): moves.begin_session,  # → reading, task; paused before a trial of a session that goes on
+    (Phase.OPENING, Begin): moves.begin_session,  # → reading, task; paused before a trial of a resumed session
     (Phase.READING, Continue): moves.continue_reading,  # → reading, task, answering (a form), complete
     (Phase.READING, LanguageChosen): moves.choose_language,  # stays
     (Phase.TASK, Continue): moves.leave_task,  # stays until the task is done
@@ -99,7 +99,7 @@ TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     # Writing fails: all other events are rejected until it succeeds.
     **{(phase, WriteFailed): moves.stall_session for phase in Phase},  # → stalled
     (Phase.STALLED, WriteRetried): moves.retry_writes,  # stays
-    (Phase.STALLED, WriteCompleted): moves.recover_from_stall,  # → paused; what it was in trouble and at the end
+    (Phase.STALLED, WriteCompleted): moves.recover_from_stall,  # → paused; trouble and the end stay
     (Phase.STALLED, ForceStopped): moves.stop_force_of_stalled,  # stays
     (Phase.STALLED, EndRequested): moves.end_stalled_session,  # stays, over
 }

@@ -1,4 +1,4 @@
-"""The key of codes to conditions, and what is encrypted with it until it is opened.
+"""The sealed key from codes to conditions, and the encryption of blinded fields until the key is opened.
 
 ``blinding/key.sealed`` is base64 of a JSON object with the codes, the conditions' and liquids' tables and a 256-bit
 nonce. It is drawn once per study, and opened only with a name and a reason. It is encoded, not encrypted: that prevents
@@ -46,7 +46,7 @@ from study_app.store.journals import journal_events as events
 Codes: TypeAlias = dict[str, dict[str, str]]
 NO_FILES: Final[Mapping[str, str]] = MappingProxyType({})
 _FORMATS: Final = (1, 2)
-"""Keys of studies with designs are of format 2: they also hold what is varied and how levels are chosen."""
+"""Formats of keys; keys of studies with designs have format 2, with stimuli, designs and methods."""
 _OF_DESIGNS: Final = ("conditions", "standard", "stimulus", "standards", "method")
 _OF_RECEIPT: Final = ("codes", "slots", "order", "compares")
 """Keys that a receipt adds to a block with a design."""

@@ -1,4 +1,4 @@
-"""Beginning a session: its ID is checked, its folder claimed once, and what the first trial needs is written."""
+"""Beginning a session: check its ID, claim its folder once, and write the files needed before the first trial."""
 
 import contextlib
 import re
@@ -75,7 +75,7 @@ class SessionStart:
     pilot : bool
         Whether the session only tries the study out.
     recordings : bool
-        Whether the trials' samples and frames are kept, through the ``recorder`` of the store.
+        Whether the trials' samples and frames are recorded, by the ``recorder`` of the store.
     motors_masked : mapping, optional
         How the motors of the device are masked, for the receipt; None where that was not asked.
     outlets : mapping, optional
@@ -83,9 +83,9 @@ class SessionStart:
     video : mapping, optional
         Description of camera and footage for the receipt; None in a study without a video.
     row_of : str, optional
-        The id of the participant who is replaced; None: nobody, or as the participant's first session says.
+        The id of the replaced participant; None: no one, or as in the participant's first session.
     group : str, optional
-        The participant's pre-existing group; None: there is none, or as the participant's first session says.
+        The participant's pre-existing group; None: no group, or as in the participant's first session.
     """
 
     participant: str
@@ -121,7 +121,7 @@ def begin_session(
     protocol : Protocol
         What is run.
     source : bytes
-        The protocol's file as it is, hashed into the receipt.
+        The content of the protocol's file, hashed into the receipt.
     start : SessionStart
         Whose session it is, and with what.
     clock : SessionClock, optional
@@ -346,7 +346,7 @@ def check_participant(participant: str, *, pilot: bool = False) -> None:
     Raises
     ------
     StoreError
-        Names the id and what is permitted.
+        Names the id and the permitted characters.
     """
     if not ID_PATTERN.fullmatch(participant) or len(participant) > MAX_ID_LENGTH:
         raise StoreError(

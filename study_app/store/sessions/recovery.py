@@ -92,7 +92,7 @@ def reopen_store(
     protocol : Protocol
         What is run.
     source : bytes
-        The protocol's file as it is; its hash must be the one the session began with.
+        The content of the protocol's file, with the hash recorded when the session began.
     operator : str
         The operator who resumes the session.
     device : mapping

@@ -45,7 +45,7 @@ class SimulatedStudy:
     protocol : Protocol
         What is answered.
     source : bytes
-        The protocol's file as it is, hashed into the receipts.
+        The content of the protocol's file, hashed into the receipts.
     participants : tuple of str
         Ids of all that are to come; none may be used.
     seed : int

@@ -251,7 +251,7 @@ def check_study(folder: StudyFolder, study: str) -> None:
     Raises
     ------
     StoreError
-        Says what the folder is, and which one to use.
+        Names the kind of folder and the one to use instead.
     """
     refuse_merged(folder.path)
     described = described_study(folder)

@@ -1,4 +1,4 @@
-"""What would tell a condition, and where it stands: the search that proves that blinding holds.
+"""Search for words that reveal a condition, which shows that blinding is intact.
 
 A condition is revealed by its id, its liquid's id, the liquid's parameters and its delay; what a trial with a design
 presents by its level, standard and comparison. None of them may stand in a file or a name of a study folder, but for

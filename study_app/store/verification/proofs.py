@@ -1,4 +1,4 @@
-"""Proofs that leave the room: a line for each session and each record, signed and time-stamped where that is possible.
+"""Proofs to store elsewhere: a line for each session and record, signed and time-stamped if possible.
 
 A line is one of ``fingerprints.txt`` with two check characters. Each withdrawal, reveal and exclusion (a reversed one,
 too) has a line that names its file and participant. Below the lines of a file may be ``signature KEY SIGNATURE``

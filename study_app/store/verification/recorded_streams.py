@@ -1,4 +1,4 @@
-"""Whether a recording of the Lab Streaming Layer (XDF, as LabRecorder writes it) has what the sessions sent.
+"""Comparison of a recording of the Lab Streaming Layer (XDF, by LabRecorder) with what the sessions sent.
 
 Markers are compared with the journals by their text, which contains the event's time. Lost samples are gaps in the
 stream's tick numbers. Clocks are compared by the offsets that the recorder measured.

@@ -1,4 +1,4 @@
-"""A session's orders and levels made again and compared with its journal.
+"""Reproduction of a session's orders and levels, and comparison with its journal.
 
 Receipt and key, opened in memory alone, give the session's protocol. Levels are compared with those that follow from
 the answers before them, these taken at the levels presented, so that a difference does not propagate. No level is

@@ -1,4 +1,4 @@
-"""One session against its journal, its receipt, its checksums and its recordings.
+"""Verification of one session: its files against its journal, receipt, checksums and recordings.
 
 Of a session that is open in a program only the journal is judged, which that program does not change again; its other
 files follow the journal. If `fingerprints.txt` lists it as ended, its fingerprint is compared even if a lock says that

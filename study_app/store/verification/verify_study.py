@@ -1,4 +1,4 @@
-"""Whether a study folder is what it says: every file against the journals, the dictionary, the checksums and the key.
+"""Verification of a study folder: every file against the journals, the column dictionary, the checksums and the key.
 
 Nothing is changed. An error is a file that cannot be trusted as it is; a warning is something to know before the
 analysis, such as a session that was not finished. No sentence shows a condition. Of sessions that are open in a program
