@@ -137,5 +137,5 @@ def test_garbage_is_collected_again_after_an_import_that_failed(monkeypatch):
     enabled = []
     monkeypatch.setattr(gc, "enable", lambda: enabled.append(True))
     with pytest.raises(DisplayError, match="Qt cannot be loaded"):
-        app.home  # noqa: B018 - it is imported where it is asked for
+        app.run_home_window  # noqa: B018 - it is imported where it is asked for
     assert enabled

@@ -30,7 +30,7 @@ def begin(asked):
 
 def test_home_closes_with_exit_code_0(tmp_path):
     QTimer.singleShot(0, lambda: QTimer.singleShot(0, lambda: window(MainWindow).close()))
-    assert app.home(tmp_path / "results") == 0
+    assert app.run_home_window(tmp_path / "results") == 0
     assert not (tmp_path / "results").exists()
 
 
@@ -59,7 +59,7 @@ def test_from_home_into_a_session_and_home_again(tmp_path, monkeypatch):
             home.window().close()
 
     with looking(step):
-        assert app.home(tmp_path / "results") == 0
+        assert app.run_home_window(tmp_path / "results") == 0
     assert steps == ["asked", "looked", "ended", "withdrawn"]
     assert events(tmp_path / "results" / "demo")[-1]["status"] == "withdrawn"
 
@@ -87,7 +87,7 @@ def test_going_back_before_the_session_leaves_nothing(tmp_path, monkeypatch):
             home.window().close()
 
     with looking(step):
-        assert app.home(tmp_path / "results") == 0
+        assert app.run_home_window(tmp_path / "results") == 0
     assert steps == ["asked", "again", "back", "home"]
     assert list(tmp_path.iterdir()) == []
 
@@ -166,7 +166,7 @@ def test_home_offers_first_to_go_on_with_a_session_that_stopped(stopped, results
             home.window().close()
 
     with looking(step):
-        assert app.home(results.parent) == 0
+        assert app.run_home_window(results.parent) == 0
     assert steps[0] == "P001, session 1 of demo stopped in part 1, liquid setting 2 of 2"
     assert "Answers on disk: 2 of 8" in steps[1]
     assert steps[2:] == ["Trial 2 of 4", ["withdrawn"], False]
