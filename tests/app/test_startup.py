@@ -45,7 +45,11 @@ class Idle:
 
 application, results, plain = application_here(), Path(sys.argv[1]), threading.Thread
 threading.Thread = Idle
-live = live_session.LiveSession(NewSession("demo", "P001", 1, 1, "", "en", "scripted", True, None, results), LIGHT)
+chosen = NewSession(
+    source="demo", participant="P001", session=1, seed=1, operator="", language="en", device="scripted", windowed=True,
+    screen=None, results=results,
+)
+live = live_session.LiveSession(chosen, LIGHT)
 live.open()
 application.processEvents()
 assert live.note.isVisible()
