@@ -79,7 +79,7 @@ def test_every_answer_is_exported_and_the_report_is_whole(
     assert failed == []
     (ran,) = set(written_by(folder))
     methods = (tmp_path / "report" / "methods.txt").read_text("utf-8")
-    assert f"Sessions: liquid-study {ran}; analysis: liquid-study {__version__}." in methods
+    assert f"The sessions were run with liquid-study {ran} and analysed with liquid-study {__version__}." in methods
 
 
 @needs_servo

@@ -58,7 +58,7 @@ def left(request: pytest.FixtureRequest, study: StudyFolder, start: Start) -> St
     if request.param in KILLED_BEFORE:
         killed(start, "P004", *KILLED_BEFORE[request.param])
     elif request.param == "the end of the first line":
-        killed(start, "P004", journal, "write_whole", half_a_line)
+        killed(start, "P004", journal, "write_all", half_a_line)
     else:
         study.session("P004", 1).path.mkdir(parents=True)
     assert study.session("P004", 1).path.is_dir()
