@@ -11,13 +11,14 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import hypothesis
 import pytest
 
 from study_app.evidence.outlets.localhost import localhost_only
 from study_app.workers.executors import Workers
+from tests import golden
 
 # An example may compile on a fresh machine: how long one takes is no failure.
 hypothesis.settings.register_profile("unhurried", deadline=None)
@@ -180,14 +181,28 @@ def pytest_runtest_teardown() -> None:
             gc.freeze()
 
 
-def pytest_sessionfinish() -> None:
+def pytest_sessionfinish(session: pytest.Session) -> None:
     """Wait for what windows left in threads: Python aborts if it ends while one of them loads a module."""
+    if hasattr(session.config, "workeroutput"):
+        session.config.workeroutput["changed_texts"] = dict(golden.CHANGED)
     if (background := sys.modules.get("study_app.gui.widgets.background")) is not None:
         background.wait_for_jobs(60)
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:
+    """Take the changed texts of a worker process."""
+    golden.CHANGED.update(getattr(node, "workeroutput", {}).get("changed_texts", {}))
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say why a test ran again."""
+    """Print each text that ``--regenerate`` changed, and why a test ran again."""
+    if golden.CHANGED:
+        terminalreporter.section(
+            "texts that recordings no longer have (-) and have now (+), with their places", sep="-"
+        )
+        for text, count in sorted(golden.CHANGED.items(), key=lambda item: (item[0][2:], item[0])):
+            terminalreporter.line(f"{text}  ({count})")
     for report in terminalreporter.stats.get("rerun", []):
         terminalreporter.section(f"ran again: {report.nodeid} ({report.when})", sep="-")
         terminalreporter.line(report.longreprtext)

@@ -1,18 +1,16 @@
 """Outputs as lines of text, compared with reviewed files: ``python -m pytest FILE --regenerate`` writes these anew.
 
-To review what was written: commit everything else first, then read ``git diff -U0`` of the folder.
-Every changed line must follow from the change of the program; one that you cannot explain is a fault.
-A change of one window changes several files. List each changed line once, with the count of its places, by
-``git diff -U0 tests/gui/golden | grep '^[-+]' | sort | uniq -c``; read in full only the file named after the window.
-In a transcript, "+" and "-" tell what a step changed: what merely moved to another step is in the list twice.
-Lines that tell numbers of a whole table or figure (count, ends, sums) change with any cell: find it in the output.
+A recording keeps the words of the program, for one reason stated in docs/testing.md; an assertion proves the numbers.
+``--regenerate`` prints each text that is removed or added once, with the number of its places, and writes the files.
+Every one must follow from the change of the program; one that you cannot explain is a fault.
 Regenerate windows with the Qt of ``tests/gui/golden/qt_version``; commit texts and program together.
 """
 
 import re
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from difflib import unified_diff
-from itertools import zip_longest
+from itertools import groupby, zip_longest
 from pathlib import Path
 
 import pytest
@@ -23,8 +21,33 @@ CHANGING = re.compile(
 )
 """Dates, versions, hashes and fingerprints."""
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
+MASKED = re.compile(r"(?:(?<![\w.])-)?\d+(?:[.,:]\d+)*(?:e[+-]?\d+)?")
+HEADINGS = ("== ", "-- ")
 SHOWN = 40
 """Most lines of a difference that are printed."""
+TEXT_ENDS = re.compile(r" [|/] |^[-+=]+ ")
+"""What separates the texts of a line."""
+CHANGED: Counter[str] = Counter()
+"""How often each text was removed ("- ...") or added ("+ ...") by ``--regenerate``."""
+
+
+def masked(line: str) -> str:
+    """Return a line with * for each date, version and hash, and # for each other number."""
+    return MASKED.sub("#", CHANGING.sub("*", line))
+
+
+def each_once(lines: Iterable[str], known: Iterable[str] = ()) -> Iterator[str]:
+    """Yield each line that is neither known nor repeated, with # for numbers; a heading only if such a line follows."""
+    seen, headings = {masked(line) for line in known}, list[str]()
+    for line in lines:
+        if line.startswith(HEADINGS):
+            headings = [kept for kept in headings if kept.startswith("==") and line.startswith("--")]
+            headings.append(line)
+        elif (text := masked(line)) not in seen:
+            seen.add(text)
+            yield from headings
+            headings = []
+            yield text
 
 
 def compare(
@@ -46,6 +69,7 @@ def compare(
     if mask is not None:
         found = [mask.sub("*", line) for line in found]
     if config.getoption("regenerate"):
+        note_changed_texts(kept.read_text(encoding="utf-8").splitlines() if kept.exists() else [], found)
         kept.parent.mkdir(parents=True, exist_ok=True)
         kept.write_text("\n".join(found) + "\n", encoding="utf-8")
     expected = kept.read_text(encoding="utf-8").removesuffix("\n").split("\n")
@@ -65,3 +89,24 @@ def _alike(expected: str, found: str, rel: float, abs_: float) -> bool:
         return False
     numbers = [[float(number) for number in NUMBER.findall(line)] for line in (expected, found)]
     return numbers[0] == pytest.approx(numbers[1], rel=rel, abs=abs_)
+
+
+def runs(lines: Iterable[str]) -> Iterator[str]:
+    """Yield each line that repeats once, with the number of its times."""
+    for line, same in groupby(lines):
+        count = sum(1 for _ in same)
+        yield line if count == 1 else f"{line} ({count} times)"
+
+
+def what_comes(changes: Iterable[str]) -> Iterator[str]:
+    """Yield the lines that come of those of ``changed``, and the lines between them, without their indentation."""
+    for line in changes:
+        if not line.startswith("- "):
+            yield line.removeprefix("+ ").strip()
+
+
+def note_changed_texts(before: Iterable[str], after: Iterable[str]) -> None:
+    """Count the texts that lines no longer have, and those that they have now."""
+    old, new = (Counter(text for line in lines for text in TEXT_ENDS.split(line) if text) for lines in (before, after))
+    for sign, texts in (("-", old - new), ("+", new - old)):
+        CHANGED.update({f"{sign} {text}": count for text, count in texts.items()})
