@@ -385,7 +385,8 @@ class Arrangement(QWidget):
         self.show_side("pane")
         pane = self.pane
         page = next(page for page in pane.pages if page.name == pane.tab)
-        (page.body.focusProxy() or page.body).setFocus(SHORTCUT)
+        part = page.body.focusProxy() or page.body
+        (part if part.isVisible() else pane.tabs).setFocus(SHORTCUT)
 
     def show_tab(self, name: str) -> None:
         self.pane.show_tab(name)

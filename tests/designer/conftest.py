@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tests.designer.support.designer import Designer
-from tests.designer.support.record import NEVER_MS, Record
+from tests.designer.support.story import NEVER_MS, Story
 
 
 @pytest.fixture
@@ -22,17 +22,17 @@ def designer(qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ite
 
 
 @pytest.fixture
-def record(designer: Designer, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Record]:
-    """Return what begins a record: the participant's page stands still, typing is one step, and drafts are due."""
+def story(designer: Designer, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Story]:
+    """Return what begins a story: the participant's page stands still, typing is one step, and drafts are due."""
     for module in ("document.document", "editing", "participant.preview"):
         monkeypatch.setattr(f"study_app.designer.{module}.time", SimpleNamespace(monotonic=lambda: 1000.0))
     monkeypatch.setattr("study_app.designer.saving.time", SimpleNamespace(monotonic=lambda: 2000.0))
     for timer in ("saving.DRAFT", "form.fields.HAND_ON", "form.fields.CLICK", "file.HAND_ON", "problems.REST"):
-        monkeypatch.setattr(f"study_app.designer.{timer}_MS", NEVER_MS)  # each is let go by the record, after an act
+        monkeypatch.setattr(f"study_app.designer.{timer}_MS", NEVER_MS)  # each is let go by the story, after an act
     spoken: list[str] = []
     for module in ("header", "window"):
         monkeypatch.setattr(f"study_app.designer.{module}.announce", lambda _by, words: spoken.append(words))
-    return partial(Record, designer, spoken)
+    return partial(Story, designer, spoken)
 
 
 @pytest.fixture(params=["special editors", "no special editors"])

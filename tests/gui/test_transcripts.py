@@ -1,4 +1,4 @@
-"""Every window, compared with a reviewed text: what it paints and tells in each state, and what each control does."""
+"""Every window, compared with a reviewed text: what it tells in each state, and what each control does."""
 
 import time
 from collections.abc import Iterator
@@ -73,7 +73,7 @@ def opened(qtbot: Any, name: str) -> Any:
 
 
 @pytest.mark.parametrize("name", [name for name in WINDOWS if name not in STATES])
-def test_what_a_window_paints_and_tells(qtbot: Any, name: str, pytestconfig: pytest.Config) -> None:
+def test_what_a_window_tells(qtbot: Any, name: str, pytestconfig: pytest.Config) -> None:
     window = opened(qtbot, name)
     compare(f"{name}, shown", list(states(window, {}, lambda: at_rest(window))), pytestconfig)
     window.window().close()
@@ -81,7 +81,7 @@ def test_what_a_window_paints_and_tells(qtbot: Any, name: str, pytestconfig: pyt
 
 
 @pytest.mark.parametrize("name", [pytest.param(one, marks=[pytest.mark.slow] * (one in SLOW)) for one in STATES])
-def test_what_each_state_paints_and_tells(qtbot: Any, name: str, pytestconfig: pytest.Config) -> None:
+def test_what_each_state_tells(qtbot: Any, name: str, pytestconfig: pytest.Config) -> None:
     make, actions = STATES[name]
     window = make(qtbot)
     at_rest(window)

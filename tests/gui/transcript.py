@@ -1,37 +1,29 @@
-"""A window as text, for golden files: what it paints, what it tells a screen reader, what each control does.
+"""A window as text, for golden files: what it tells a screen reader in each state, and what each control does.
 
 ``python -m pytest tests/gui/test_transcripts.py --regenerate`` writes the files anew: read the difference.
 """
 
 import re
-from base64 import b64decode
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import cache
-from itertools import groupby
+from difflib import SequenceMatcher
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import pytest
 from PySide6.QtCore import (
     QAbstractAnimation,
     QAbstractItemModel,
     QAbstractListModel,
-    QBuffer,
-    QByteArray,
     QEvent,
     QMetaMethod,
     QPoint,
     QPointF,
-    QRectF,
-    QSizeF,
     Qt,
     QTimer,
     qVersion,
 )
-from PySide6.QtGui import QAccessible, QAction, QEnterEvent, QImage, QPainter, QShortcut, QWheelEvent
-from PySide6.QtSvg import QSvgGenerator
+from PySide6.QtGui import QAccessible, QAction, QEnterEvent, QShortcut, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -49,7 +41,6 @@ from PySide6.QtWidgets import (
 
 from study_app.gui.widgets.main_view import Place
 from tests import golden
-from tests.golden_values import changed
 
 Actions = Mapping[str, Callable[[Any], object]]
 """What brings a window into each of its states, by the state's name."""
@@ -57,114 +48,11 @@ GOLDEN = Path(__file__).parent / "golden"
 QT_VERSION = GOLDEN / "qt_version"
 CONTROLS = (QAbstractButton, QAbstractItemView, QAbstractSlider, QAbstractSpinBox, QComboBox, QLineEdit, QPlainTextEdit)
 STATES = ("disabled", "checked", "readOnly", "expanded", "selected", "focused", "invisible", "offscreen")
-NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
-STILL = "matrix(1,0,0,1,"
-"""How a transform begins that only moves."""
-SVG = "{http://www.w3.org/2000/svg}"
-PLACES = ("d", "points", "x", "y", "width", "height", "x1", "x2", "y1", "y2", "cx", "cy", "r", "rx", "ry")
-HREF = "{http://www.w3.org/1999/xlink}href"
-SMALL_PX = 4096
+TEXT, DISABLED_TEXT = "StaticText readOnly ", "StaticText disabled readOnly "
+LONGEST = 400
+"""Most characters of a line: no one reads a whole study in it."""
 ALIKE = 4
 """Most controls of one kind in parts of one kind, such as cards of studies, that are used."""
-LONGEST = 12
-"""Most numbers of a shape that are listed; of a longer one the count, the bounds and the sum are."""
-
-
-def painted(window: QWidget) -> list[str]:
-    """Return a line for each text and shape that the window paints, with colours and whole pixels."""
-    content = QByteArray()
-    buffer = QBuffer(content)
-    buffer.open(QBuffer.OpenModeFlag.WriteOnly)
-    generator = QSvgGenerator()
-    generator.setOutputDevice(buffer)
-    generator.setSize(window.size())
-    generator.setViewBox(window.rect())
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(QPainter, "drawImage", _draw_small)
-        window.render(generator)
-    return list(_shapes(ElementTree.fromstring(bytes(content.data()))))  # noqa: S314
-
-
-def _draw_small(painter: QPainter, *arguments: Any, draw: Any = QPainter.drawImage) -> None:
-    """Draw a large image with few pixels: the generator encodes each image, of which only colours are compared."""
-    *at, image = arguments
-    if image.width() * image.height() <= SMALL_PX:
-        draw(painter, *arguments)
-        return
-    corner = at[0] if len(at) == 1 else QPointF(*at)
-    target = corner if isinstance(corner, QRectF) else QRectF(corner, QSizeF(image.deviceIndependentSize()))
-    small = image.scaled(8, 8, Qt.AspectRatioMode.IgnoreAspectRatio, Qt.TransformationMode.SmoothTransformation)
-    small.setDevicePixelRatio(1.0)
-    draw(painter, target, small)
-
-
-@cache
-def _colours_of(image: str) -> str:
-    """Return red, green, blue and opacity (0 to 7) of the four quarters of an encoded image."""
-    decoded = QImage.fromData(b64decode(image.partition(",")[2]))
-    few = decoded.scaled(2, 2, Qt.AspectRatioMode.IgnoreAspectRatio, Qt.TransformationMode.SmoothTransformation)
-    pixels = [few.pixelColor(x, y).getRgb() for y in range(2) for x in range(2)]
-    return " ".join("".join(str(part // 32) for part in pixel) for pixel in pixels)  # type: ignore[attr-defined]
-
-
-@cache
-def _ink(name: str, value: str, opacity: str, width: str, dashes: str) -> str:
-    """Return a colour with its opacity and, of a stroke, its width and dashes, or "" where nothing is painted."""
-    if value == "none" or float(opacity) == 0:
-        return ""
-    said = f"{name}={value}" + (f"/{float(opacity):.2g}" if float(opacity) < 1 else "")
-    if name == "stroke":
-        said += (f" {float(width):.2g} px" if width != "1" else "") + (f" dashes {dashes}" if dashes != "none" else "")
-    return said
-
-
-def _inks(group: ElementTree.Element, gradients: Mapping[str, str]) -> list[str]:
-    """Return what a group fills and strokes its shapes with."""
-    line = group.get("stroke-width", "1"), group.get("stroke-dasharray", "none")
-    values = ((name, group.get(name, "none"), group.get(f"{name}-opacity", "1")) for name in ("fill", "stroke"))
-    return [ink for name, value, opacity in values if (ink := _ink(name, gradients.get(value, value), opacity, *line))]
-
-
-def _shapes(root: ElementTree.Element) -> Iterator[str]:
-    """Yield the texts, and between them the shapes of one place together: a frame is a dozen lines and curves."""
-    gradients = {
-        f"url(#{one.get('id')})": "-".join(stop.get("stop-color", "") for stop in one)
-        for kind in ("linearGradient", "radialGradient")
-        for one in root.iter(f"{SVG}{kind}")
-    }
-    drawn = (
-        (shape.tag.removeprefix(SVG), group, shape)
-        for group in root.iter(f"{SVG}g")
-        for shape in group
-        if shape.tag != f"{SVG}g"
-    )
-    for (at, is_text), shapes in groupby(drawn, lambda one: (one[1].get("transform", ""), one[0] == "text")):
-        looks: list[str] = []
-        corner = _rounded(at.removeprefix(STILL))
-        places = ""
-        for kind, group, shape in shapes:
-            colours = _inks(group, gradients)
-            if kind == "image":
-                colours = [_colours_of(shape.get(HREF, ""))]
-            elif not colours:
-                continue
-            looks.append(" ".join([kind, *colours]))
-            place = " ".join(value for name, value in shape.items() if name in PLACES)
-            if is_text:
-                size = f"{group.get('font-size')} {group.get('font-weight')}"
-                yield f"{looks[-1]} {size} @{corner} {_rounded(place)} {(shape.text or '').strip()}"
-            places += f" {place}"
-        if looks and not is_text:
-            yield f"{', '.join(dict.fromkeys(looks))} @{corner} {_rounded(places)}"
-
-
-@cache
-def _rounded(text: str) -> str:
-    numbers = [round(float(each)) for each in NUMBER.findall(text)]
-    if len(numbers) <= LONGEST:
-        return " ".join(map(str, numbers))
-    across, down = numbers[::2], numbers[1::2]
-    return f"{len(numbers)}: {min(across)} {min(down)} {max(across)} {max(down)} {sum(numbers)}"
 
 
 def told(window: QWidget) -> list[str]:
@@ -202,11 +90,22 @@ def _cells(model: QAbstractItemModel) -> Iterator[str]:
         yield "row " + " | ".join(" / ".join(cell).replace("\n", " / ") for cell in cells)
 
 
-def lines_of(window: QWidget) -> list[str]:
-    """Return what a window tells and paints once its animations have ended."""
+def spoken(window: QWidget) -> list[str]:
+    """Return what a window tells once its animations have ended, without texts that another of its lines has."""
     for animation in window.findChildren(QAbstractAnimation):
         animation.setCurrentTime(animation.totalDuration())
-    return [*told(window), *painted(window)]
+    lines = [golden.masked(line.replace(DISABLED_TEXT, TEXT))[:LONGEST] for line in told(window)]
+    others = "\n".join(line for line in lines if not line.startswith(TEXT))
+    return [line for line in lines if not (line.startswith(TEXT) and line.removeprefix(TEXT) in others)]
+
+
+def comes_and_goes(before: list[str], after: list[str]) -> Iterator[str]:
+    """Yield lines that come, and of lines that go and are not replaced the first and how many others."""
+    for how, start, end, first, last in SequenceMatcher(None, before, after, autojunk=False).get_opcodes():
+        if how == "delete":
+            yield f"- {before[start][:60]}" + (f" … {end - start - 1} more" if end - start > 1 else "")
+        elif how != "equal":
+            yield from after[first:last]
 
 
 def listen(window: QWidget) -> list[str]:
@@ -273,7 +172,7 @@ def _close_dialogs(seen: list[str], kept: set[QWidget]) -> None:
                     if QApplication.focusWindow() is other.windowHandle():
                         break
                     QTest.qWait(1)
-                seen += lines_of(other)
+                seen += spoken(other)
             other.close()
 
 
@@ -284,7 +183,7 @@ class Recorder:
         self.window, self.base, self._settled = window, window.window(), settled
         self._kept = {one for one in QApplication.topLevelWidgets() if one.isVisible()}
         self.heard = listen(window)
-        self.lines = lines_of(window)
+        self.lines = spoken(window)
 
     def _rest(self) -> None:
         """Let the window come to rest; it is painted for the comparison alone."""
@@ -309,11 +208,11 @@ class Recorder:
         QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
         if not self.base.isVisible():
             seen.append("closed")
-        before, self.lines = self.lines, lines_of(self.window)
+        before, self.lines = self.lines, spoken(self.window)
         yield f"== {name}"
         yield from self.heard
         yield from seen
-        yield from changed(before, self.lines)
+        yield from comes_and_goes(before, self.lines)
 
 
 def steps(window: QWidget, settled: Callable[[], None]) -> Iterator[str]:
@@ -346,7 +245,7 @@ def _unused(window: QWidget, used: set[str | QWidget]) -> Iterator[tuple[str, QW
 
 
 def states(window: Any, shown: Actions, settled: Callable[[], None]) -> Iterator[str]:
-    """Yield what a window tells and paints, then what changes with each of the states it is brought into in turn."""
+    """Yield what a window tells, then what changes with each of the states it is brought into in turn."""
     recorder = Recorder(window, settled)
     yield from recorder.lines
     for name, bring in shown.items():
@@ -356,17 +255,17 @@ def states(window: Any, shown: Actions, settled: Callable[[], None]) -> Iterator
 def story(
     window: QWidget, acts: Iterable[tuple[str, Callable[[], object]]], settled: Callable[[], None]
 ) -> Iterator[str]:
-    """Yield what a window shows, then its signals and what it shows otherwise after each act in turn."""
+    """Yield what a window tells, then its signals and what it tells otherwise after each act in turn."""
     heard = listen(window)
     settled()
-    before = told(window)
+    before = spoken(window)
     yield from before
     for name, act in acts:
         heard.clear()
         act()
         settled()
-        after = told(window)
-        yield from [f"== {name}", *heard, *changed(before, after)]
+        after = spoken(window)
+        yield from [f"== {name}", *heard, *comes_and_goes(before, after)]
         before = after
 
 
@@ -430,10 +329,10 @@ def is_usable(control: QWidget) -> bool:
 
 
 def compare(name: str, lines: Iterable[str], config: pytest.Config) -> None:
-    """Compare lines with the golden file of a window, unless that was recorded with another version of Qt."""
+    """Compare lines, each once, with the golden file of a window, unless another version of Qt recorded it."""
     version = qVersion().rpartition(".")[0]
     if config.getoption("regenerate"):
         QT_VERSION.write_text(f"{version}\n")
     if (recorded := QT_VERSION.read_text().strip()) != version:
-        pytest.skip(f"recorded with Qt {recorded}, here is Qt {version}: styles paint otherwise")
-    golden.compare((GOLDEN / re.sub(r"\W+", "_", name)).with_suffix(".txt"), lines, config)
+        pytest.skip(f"recorded with Qt {recorded}, here is Qt {version}: screen readers are told otherwise")
+    golden.compare((GOLDEN / re.sub(r"\W+", "_", name)).with_suffix(".txt"), golden.each_once(lines), config)

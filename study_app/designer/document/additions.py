@@ -325,8 +325,12 @@ def edits_to_add(
                 if fault.path not in {problem.path for problem in study.with_edits(first, *others)[0].faults}:
                     break
         else:
-            others += _edits_outside(after, fault)
+            others += (edit for edit in _edits_outside(after, fault) if not _unsets(edit, path))
     return (first, *others), path
+
+
+def _unsets(edit: Edit, path: Path) -> bool:
+    return isinstance(edit, Unset) and path[: len(edit.path)] == edit.path
 
 
 def additions_for(study: Study, fault: Fault) -> tuple[Repair, ...]:

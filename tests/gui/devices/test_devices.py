@@ -8,7 +8,7 @@ import pytest
 from study_app.devices.descriptor import DRIVER_READY, NONE, NOT_AVAILABLE, READY, Backend
 from study_app.devices.registry import backends, list_devices
 from study_app.gui.kit.devices import device_before_look, device_named, devices_shown
-from tests.golden import compare
+from tests.golden import compare, each_once
 from tests.golden_values import value_lines
 
 MOUSE = Backend("mouse", "the window", state=READY, can="seen, not felt")
@@ -44,7 +44,7 @@ def told() -> Iterator[str]:
 
 
 def test_devices_are_told_as_reviewed(pytestconfig: pytest.Config) -> None:
-    compare(Path(__file__).parent / "golden" / "devices.txt", told(), pytestconfig)
+    compare(Path(__file__).parent / "golden" / "devices.txt", each_once(told()), pytestconfig)
 
 
 def test_every_device_is_shown_once_and_those_that_people_feel_with_first() -> None:

@@ -23,7 +23,7 @@ def open_home(qtbot, results, size=None):
     window.show()
     home = window.place("home")
     home.main = window  # or it would be collected here
-    qtbot.waitUntil(lambda: not home.reading and home.sessions.where.text() != "")
+    qtbot.waitUntil(lambda: not home.is_reading and home.sessions.where.text() != "")
     return home
 
 

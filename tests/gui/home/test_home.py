@@ -1,6 +1,5 @@
 """Home: cards, sessions, and the ways into a session, while studies, drafts and files come, change and go."""
 
-import re
 import threading
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from study_app.gui.widgets.background import wait_for_jobs
 from study_app.protocol.source.files import source_bytes
 from study_app.store.drafts import Draft, delete_draft, write_draft
 from study_app.store.study_settings import keep_original
+from tests.golden import masked
 from tests.gui.home.home_window import hold, open_home
 from tests.gui.transcript import compare, story
 
@@ -102,7 +102,7 @@ def test_home_follows_what_happens(qtbot, tmp_path, monkeypatch, pytestconfig, a
         qtbot.waitUntil(lambda: not home.is_reading)
 
     lines = (
-        re.sub(r"\d\d:\d\d", "HH:MM", line.replace(str(tmp_path), "FOLDER"))
+        line.replace(masked(str(tmp_path)), "FOLDER").replace(str(tmp_path), "FOLDER")
         for line in story(home.main, acts(home, tmp_path, monkeypatch), settled)
     )
     compare(f"home, {acts.__name__}", lines, pytestconfig)

@@ -1,4 +1,7 @@
-"""The participant's window, compared with reviewed texts: every kind of page; what keys, clicks and views change."""
+"""The participant's window, compared with reviewed texts: what each kind of page tells, and what keys and views do.
+
+The tank is painted, not told: the places of its things are recorded, and one coarse picture of each case.
+"""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -23,7 +26,7 @@ from study_app.session.pages import (
 )
 from study_app.session.tasks import TankView
 from study_app.video.frames import VideoFrame
-from tests.golden_values import changed
+from tests import golden
 from tests.gui.drawn import shown
 from tests.gui.participant.driver import KEY, Participant
 from tests.gui.small import (
@@ -41,8 +44,9 @@ from tests.gui.small import (
     text_page,
     view,
 )
-from tests.gui.transcript import compare, painted, told
+from tests.gui.transcript import GOLDEN, comes_and_goes, compare, spoken
 
+TILES = 8
 FULL, SMALL, LARGE, NARROW = (1366, 768), (1024, 640), (1920, 1080), (683, 384)
 LONG = tuple(f"Sentence {number} is about the study. " * 20 for number in range(1, 5))
 PAIR = Progress(part=1, parts=1, label="Pair 57", index=57, of=220, at_most=True)
@@ -297,26 +301,21 @@ def plain(value: Any) -> str:
 
 
 def picture(widget: QWidget) -> Iterator[str]:
-    """Yield the mean and the spread of each colour in the tiles of a widget's picture, in steps of 4 of 255."""
+    """Yield the mean of each colour in the tiles of a widget's picture, in steps of 16 of 255."""
     image = shown(widget)
-    height, width = (length // 16 * 16 for length in image.shape[:2])
-    tiles = image[:height, :width].reshape(16, height // 16, 16, width // 16, 3).swapaxes(1, 2).astype(float)
-    steps = np.round(np.concatenate([tiles.mean((2, 3)), tiles.std((2, 3))], 2) / 4).astype(int)
-    for number, row in enumerate(steps):
-        yield f"tiles {number}: {' '.join(bytes(map(int, tile)).hex() for tile in row)}"
+    height, width = (length // TILES * TILES for length in image.shape[:2])
+    tiles = image[:height, :width].reshape(TILES, height // TILES, TILES, width // TILES, 3)
+    for number, row in enumerate(np.round(tiles.astype(float).mean((1, 3)) / 16).astype(int)):
+        yield f"tiles {number}: {' '.join(''.join(f'{part:x}' for part in tile) for tile in row)}"
 
 
-def lines(seen: Participant, *, paints: bool) -> dict[str, list[str]]:
-    """Return what a window tells and shows, by the way to see it; of a tank its things and a coarse picture as well."""
+def lines(seen: Participant) -> Iterator[str]:
+    """Yield what a window tells, and the places of a tank's things."""
     focus = seen.focus
-    found = {"told": [f"keyboard at {getattr(focus, 'text', focus.accessibleName)()!r}", *told(seen.window)]}
-    if paints:
-        found["painted"] = painted(seen.window)
+    yield f"keyboard at {getattr(focus, 'text', focus.accessibleName)()!r}"
+    yield from spoken(seen.window)
     if (tank := seen.window.tank) is not None:
-        placed = tank.things.items()
-        found["things"] = [f"thing {name}: {plain(thing.state)} @{plain(thing.place)}" for name, thing in placed]
-        found["picture"] = list(picture(tank))
-    return found
+        yield from (f"thing {name}: {plain(thing.state)} @{plain(thing.place)}" for name, thing in tank.things.items())
 
 
 def act(seen: Participant, step: Any) -> None:
@@ -350,18 +349,19 @@ def named(step: Any) -> str:
 
 
 def transcript(seen: Participant, case: Case) -> Iterator[str]:
-    """Yield what each step tells and changes; what is painted every fourth time, for it takes longest."""
+    """Yield what each step tells the session and changes, and at last the picture of a tank."""
     seen.clock.step_s = 0.0
-    before: dict[str, list[str]] = {}
-    for number, step in enumerate(case.steps):
+    before: list[str] = []
+    for step in case.steps:
         seen.events.clear()
         act(seen, step)
-        after = lines(seen, paints=number % 4 == 0 or number == len(case.steps) - 1)
         yield f"-- {named(step)}"
         yield from (f"told {event}" for event in seen.events)
-        for way, now in after.items():
-            yield from changed(before.get(way, []), now)
-        before |= after
+        after = list(lines(seen))
+        yield from comes_and_goes(before, after)
+        before = after
+    if seen.window.tank is not None:
+        yield from picture(seen.window.tank)
 
 
 @pytest.mark.parametrize("group", ["tanks", *(pytest.param(one, marks=pytest.mark.slow) for one in list(GROUPS)[:2])])
@@ -371,4 +371,7 @@ def test_what_pages_show_and_tell(opening: Callable[..., Participant], pytestcon
         seen = opening(None, case.size, case.said, **case.named)
         found += [f"== {name}", *transcript(seen, case)]
         seen.close()
-    compare(f"participant, {group}", found, pytestconfig)
+    if group == "tanks":
+        golden.compare(GOLDEN / "participant_tanks.txt", found, pytestconfig)
+    else:
+        compare(f"participant, {group}", found, pytestconfig)

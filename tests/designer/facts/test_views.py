@@ -1,6 +1,8 @@
-"""What the designer shows of each kind of element, compared with reviewed texts: outline, form, measures, file."""
+"""What the designer shows of a study: each element once, repairs that repair, and the words of measures."""
 
-from collections.abc import Iterable, Iterator
+import re
+from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path as File
 from typing import Any
 
@@ -8,11 +10,9 @@ import pytest
 
 from study_app.designer.document.additions import additions_for, repairs
 from study_app.designer.document.document import template
-from study_app.designer.document.elements import found_fields, outline, position_of, short_note, usage_text
+from study_app.designer.document.elements import found_fields
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Set
-from study_app.designer.file import file_text
-from study_app.designer.form.form import form_of
 from study_app.designer.measures.measures_page import clipped_sentence
 from study_app.designer.measures.measures_view import MeasuresView, measures_view
 from study_app.designer.measures.plots import forces_sentence, function_sentence, track_sentence
@@ -28,15 +28,16 @@ from study_app.designer.measures.simulation import (
     Simulated,
 )
 from study_app.designer.measures.study_facts import facts
-from study_app.designer.outline import addable_elements, outline_rows
+from study_app.designer.outline import outline_rows
 from study_app.designer.problems import problem_rows
-from study_app.protocol.source.document import Path
-from tests.designer.document.test_study_transcripts import elements, generic, studies
-from tests.golden import compare
-from tests.golden_values import changed, one_line, value_lines
+from tests.designer.document.grown import PROTOCOLS
+from tests.designer.document.test_commands import edited, elements, studies
+from tests.golden import compare, each_once
+from tests.golden_values import one_line, value_lines
 from tests.protocol.edited_studies import CASES, cases_of
 
 GOLDEN = File(__file__).parent / "golden"
+SINGLE = ("study", "sequence", "device", "scene", "limits", "analysis")
 STUDIES = ("rows", "sound", "every_design", "grouped", "slime")
 """Studies of which each has kinds of elements that none before it has; the first is short."""
 
@@ -55,63 +56,35 @@ def measures(view: MeasuresView) -> dict[str, Any]:
     }
 
 
-class Shown:
-    """What each view of the designer showed last, to note what changes."""
-
-    def __init__(self) -> None:
-        self.before: dict[str, list[str]] = {}
-
-    def note(self, view: str, value: Any) -> Iterator[str]:
-        """Yield the lines of a view that changed since it was last noted."""
-        lines = list(value_lines(value))
-        found = list(changed(self.before.get(view, []), lines))
-        self.before[view] = lines
-        yield from [f"{view}:", *found] if found else ()
-
-    def of_study(self, study: Study) -> Iterator[str]:
-        times = facts(study).steps_s
-        yield from self.note("facts", facts(study))
-        yield from self.note("rows of the outline", outline_rows(study, times))
-        yield from self.note("outline", outline(study))
-        for words in ("viscosity", "hon", "order"):
-            yield f"find {words}"
-            yield from self.note("rows found", outline_rows(study, times, words))
-            yield from self.note("fields found", found_fields(study, words))
-
-    def of_element(self, study: Study, path: Path) -> Iterator[str]:
-        document = study.document
-        marked = file_text(study, "study.toml", path)
-        yield f"brief: {short_note(document, path)} | {usage_text(document, path)} | {position_of(document, path)}"
-        yield f"lines: {marked.selected} {marked.faulty}"
-        yield from value_lines(form_of(study, path), "form")
-        view = measures_view(study, facts(study), path, Controls(participants=12), Simulated(), {})
-        yield from self.note("measures", measures(view))
-        yield from self.note("to add", tuple(addable_elements(study, path)))
+@pytest.mark.parametrize("name", [STUDIES[0], *(pytest.param(one, marks=pytest.mark.slow) for one in STUDIES[1:])])
+def test_the_outline_shows_each_element_once_with_its_name(name: str) -> None:
+    ((_, study),) = studies((name,))
+    rows = outline_rows(study, facts(study).steps_s)
+    parts = rows[next(at for at, row in enumerate(rows) if row.title == "Parts it is made of") :]
+    shown, in_parts = Counter(row.path for row in rows), Counter(row.path for row in parts)
+    for path in elements(study.document):
+        if len(path) == 1 and path[0] in {*SINGLE} & {*study.document}:
+            assert shown[path] == 1, path
+        elif path[2:3] == ("items",):
+            assert shown[path] >= 1, "below each step that asks it"
+        elif len(path) == 2 and path[0] not in SINGLE:
+            assert in_parts[path] == 1, path
+    for row in rows:
+        assert row.title, row
+        assert row.name.startswith(row.title), row
+    steps = [row.step for row in rows if row.step and row.step[0] == "sequence"]
+    assert steps == [("sequence", at) for at in range(len(study.document.get("sequence", ())))]
 
 
-def transcript(before: Iterable[str], names: Iterable[str]) -> Iterator[str]:
-    """Yield what is shown of some studies, and of each kind of element that none of the studies before has."""
-    seen = {generic(path) for _, study in studies(before) for path in elements(study.document)}
-    shown = Shown()
-    for name, study in studies(names):
-        yield f"== {name}"
-        yield from shown.of_study(study)
-        for path in elements(study.document):
-            if generic(path) not in seen:
-                seen.add(generic(path))
-                yield f"== {name} at {path}"
-                yield from shown.of_element(study, path)
-
-
-def of_faults(study: Study) -> Iterator[str]:
-    """Yield the rows of a study's problems, and what each repair and addition is called and changes."""
-    yield from value_lines(problem_rows(study))
-    for fault in study.faults:
-        for repair in (*repairs(study, fault), *additions_for(study, fault)):
-            yield f"repair {one_line(fault.path)}: {repair.words}"
-            yield from changed(
-                study.text.split("\n"), study.with_edits(*repair.edits)[0].text.split("\n"), numbered=True
-            )
+@pytest.mark.parametrize("words", ["viscosity", "hon", "order"])
+def test_what_is_found_has_the_words(words: str) -> None:
+    ((_, study),) = studies(("slime",))
+    found = outline_rows(study, facts(study).steps_s, words)
+    assert {row.path for row in found} <= {row.path for row in outline_rows(study, facts(study).steps_s)}
+    fields = found_fields(study, words)
+    assert found or fields
+    for row in (*found, *fields):
+        assert words in one_line(row).lower() or any(words in one_line(other).lower() for other in found), row
 
 
 OBSERVED = Observed(
@@ -167,18 +140,6 @@ def of_blocks(study: Study, simulated: Simulated) -> Iterator[str]:
             yield from value_lines(measures(view))
 
 
-@pytest.mark.parametrize("name", [STUDIES[0], *(pytest.param(one, marks=pytest.mark.slow) for one in STUDIES[1:])])
-def test_what_is_shown_of_studies(name: str, pytestconfig: pytest.Config) -> None:
-    before = STUDIES[: STUDIES.index(name)]
-    compare(GOLDEN / f"shown_of_{name}.txt", transcript(before, (name,)), pytestconfig)
-
-
-@pytest.mark.parametrize("name", SIMULATED)
-def test_what_is_shown_of_simulations(name: str, pytestconfig: pytest.Config) -> None:
-    (_, study), *_ = studies((name,))
-    compare(GOLDEN / f"simulations_of_{name}.txt", list(of_blocks(study, SIMULATED[name])), pytestconfig)
-
-
 DAMPING = ("stimuli", "damping")
 WIDE = Set((*DAMPING, "levels"), [0.02, 2.0])
 FREE = Set(("tasks", "stir"), {"kind": "explore", "min_s": 2, "max_s": 4, "instruction": "Feel."})
@@ -195,7 +156,6 @@ LIMITED: dict[str, tuple[Set, ...]] = {
 
 def of_limits() -> Iterator[str]:
     """Yield what is said where limits clip levels, before and after observers were simulated, and of weak forces."""
-    shown = Shown()
     for name, edits in {"as it is": (), **LIMITED}.items():
         study, _ = template("viscosity-jnd").with_edits(*edits)
         for threshold in (0.019, 0.19):
@@ -230,21 +190,23 @@ def of_limits() -> Iterator[str]:
                 for block in ("viscosity", "training"):
                     view = measures_view(study, facts(study), ("blocks", block), controls, simulated, {})
                     clipped = "" if view.levels is None else clipped_sentence(view.levels)
-                    yield from shown.note(block, {"numbers": view.numbers, "clipped": clipped})
+                    yield from value_lines({"numbers": view.numbers, "clipped": clipped})
     (_, study), (_, late) = studies(("rek2024", "forcedelay"))
     for edit in (Set(("device", "force_limit_n"), 0.5), Set(("blocks", "liquids", "repetitions"), -1)):
         edited, _ = study.with_edits(edit)
         yield f"== {edit.path[-1]} {edit.value}"
-        yield from shown.note(
-            "study", measures_view(edited, facts(edited), ("study",), Controls(), Simulated(), {}).cards
-        )
+        yield from value_lines(measures_view(edited, facts(edited), ("study",), Controls(), Simulated(), {}).cards)
     view = measures_view(late, facts(late), ("blocks", "delay"), Controls(), Simulated(), {})
     yield f"simulated: {measures(view)['simulated']}"
 
 
 @pytest.mark.slow
-def test_what_is_said_of_limits(pytestconfig: pytest.Config) -> None:
-    compare(GOLDEN / "limits.txt", of_limits(), pytestconfig)
+def test_what_measures_say(pytestconfig: pytest.Config) -> None:
+    lines = list(of_limits())
+    for name, study in studies(SIMULATED):
+        lines += [f"== {name}", *of_blocks(study, SIMULATED[name])]
+    words = (line.strip() for line in lines if not re.search(r"icon:|NumberCard$|path:", line))
+    compare(GOLDEN / "measures.txt", each_once(words), pytestconfig)
 
 
 FAULTS = ("designs", "formats", "adjustment", "groups", "impossible", "methods", "pace", "questions", "sound")
@@ -252,8 +214,19 @@ FAULTS = ("designs", "formats", "adjustment", "groups", "impossible", "methods",
 
 
 @pytest.mark.parametrize("name", [*FAULTS[:2], *(pytest.param(one, marks=pytest.mark.slow) for one in FAULTS[2:])])
-def test_repairs_of_faults(name: str, pytestconfig: pytest.Config) -> None:
-    found = list[str]()
+def test_each_repair_removes_its_problem_and_undo_gives_the_text_back(name: str, pytestconfig: pytest.Config) -> None:
+    words = list[str]()
     for case in cases_of(CASES / f"{name}.txt"):
-        found += [f"== {case.study}, {case.name}", *of_faults(read_study(case.text.encode(), File()))]
-    compare(GOLDEN / f"repairs_in_{name}.txt", found, pytestconfig)
+        study = read_study(case.text.encode(), PROTOCOLS)
+        rows = problem_rows(study)
+        assert Counter(row.fault for row in rows) == Counter(study.faults)
+        assert all(row.line is None or row.line <= study.text.count("\n") + 1 for row in rows)
+        for fault in study.faults:
+            for repair in (*repairs(study, fault), *additions_for(study, fault)):
+                after = edited(study, *repair.edits)
+                known, left = ({(fault.path, fault.message) for fault in one.faults} for one in (study, after))
+                assert (fault.path, fault.message) not in left, (case.name, repair.words)
+                assert len(left) <= len(known), (case.name, repair.words)
+                words.append(repair.words)
+    assert words
+    compare(GOLDEN / f"repairs_in_{name}.txt", each_once(words), pytestconfig)
