@@ -1,8 +1,9 @@
-"""Every cell of the report and of every exported table of some studies, compared with files that people review.
+"""The words of each kind of file that a study's report and export write, compared with files that people review.
 
 ``python -m pytest tests/end_to_end/test_golden_outputs.py --regenerate`` writes the files anew: read the difference.
 """
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,8 +16,8 @@ from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.csv_files import unguard_formula
 from study_app.store.unblinding import unblind_folder
 from tests.analysis.levels.level_studies import levels_file
-from tests.analysis.outputs import figures_as_lines, sav_lines
-from tests.golden import CHANGING, compare
+from tests.analysis.outputs import figures_as_lines, sav_labels
+from tests.golden import compare, each_once
 from tests.golden_values import file_lines
 from tests.studies import made_up, once
 
@@ -27,8 +28,7 @@ pytest.importorskip("pyreadstat", reason="the extra analysis is not installed")
 GOLDEN = Path(__file__).parent / "golden"
 FILES = {"levels": levels_file}
 PEOPLE = {"rek2024": 12, "levels": 3}
-OUTPUTS = ("report.html", "report.json", "report.R", "codebook.json", "tests.csv", "methods.txt")
-IN_SPSS = ("responses", "wide", "thresholds", "settings")
+OUTPUTS = ("report.html", "report.json", "codebook.json", "methods.txt", "responses.sav")
 
 
 @pytest.fixture(scope="module", params=PEOPLE)
@@ -48,14 +48,33 @@ def outputs(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     return once(tmp_path_factory, f"golden-{name}", make)
 
 
-def test_every_cell(outputs: Path, pytestconfig: pytest.Config) -> None:
+def test_the_words_of_each_kind_of_file(outputs: Path, pytestconfig: pytest.Config) -> None:
     study = outputs.name.removeprefix("once-golden-")
-    tables = [path.name.split("_")[1].removeprefix("description-") for path in outputs.glob("outputs/*_data.csv")]
-    names = {*OUTPUTS, *(f"{name}.csv" for name in tables), *(f"{name}.sav" for name in tables if name in IN_SPSS)}
-    for name in sorted(names):
-        found = list(lines(outputs / "outputs", name)) or ["(no rows)"]
-        compare(GOLDEN / study / f"{name}.txt", found, pytestconfig, mask=CHANGING)
-    assert {path.name.removesuffix(".txt") for path in (GOLDEN / study).iterdir()} == names
+    for name in sorted(OUTPUTS):
+        compare(GOLDEN / study / f"{name}.txt", each_once(lines(outputs / "outputs", name)), pytestconfig)
+    tables = list[str]()
+    for path in sorted(outputs.glob("outputs/*_data.csv")):
+        frame = pd.read_csv(path, dtype=str, keep_default_na=False)
+        assert frame.columns.is_unique
+        tables.append(f"{path.name.split('_')[1].removeprefix('description-')}: {', '.join(frame)}")
+    compare(GOLDEN / study / "tables.txt", tables, pytestconfig)
+    assert {path.name for path in (GOLDEN / study).iterdir()} == {f"{name}.txt" for name in (*OUTPUTS, "tables")}
+
+
+def test_aggregates_are_those_of_the_responses(outputs: Path) -> None:
+    responses, aggregates = (
+        pd.concat([pd.read_csv(path) for path in (outputs / "outputs").glob(f"*_description-{name}_data.csv")])
+        for name in ("responses", "aggregate")
+    )
+    for row in aggregates.to_dict("records"):
+        same = (responses["code"] == row["code"]) & (responses["item"] == row["item"])
+        found = responses[same & (responses["block"] == row["block"]) & responses["counted"]]["response"].dropna()
+        assert row["n"] == len(found)
+        assert [row[f"count_{answer}"] for answer in range(1, 8)] == [(found == answer).sum() for answer in range(1, 8)]
+        quartiles = found.quantile([0.25, 0.5, 0.75]).tolist()
+        assert [row["q1"], row["median"], row["q3"]] == pytest.approx(quartiles)
+        assert row["agree_percent"] == pytest.approx(100 * (found > 4).mean())
+    assert (len(aggregates) > 0) == outputs.name.endswith("rek2024")
 
 
 def test_parquet_has_the_cells_of_the_csv_file(outputs: Path) -> None:
@@ -74,7 +93,24 @@ def test_parquet_has_the_cells_of_the_csv_file(outputs: Path) -> None:
 
 
 def lines(folder: Path, name: str) -> Iterator[str]:
-    """Yield the cells, labels and texts of an output."""
+    """Yield the words of an output: of a report in JSON the names of its values, of a file of SPSS the labels."""
     stem, kind = name.split(".")
     (path,) = folder.glob(f"*_description-{stem}_data.{kind}") if not (folder / name).exists() else [folder / name]
-    yield from sav_lines(path) if kind == "sav" else file_lines(path.name, path.read_bytes())
+    if kind == "sav":
+        yield from sav_labels(path)
+    elif kind == "json" and stem == "report":
+        yield from names_in(json.loads(path.read_bytes()))
+    else:
+        yield from file_lines(path.name, path.read_bytes())
+
+
+def names_in(value: object, place: str = "") -> Iterator[str]:
+    """Yield the place of each value of a content of JSON."""
+    if isinstance(value, dict):
+        for name, inner in value.items():
+            yield from names_in(inner, f"{place}.{name}" if place else name)
+    elif isinstance(value, list):
+        for inner in value:
+            yield from names_in(inner, f"{place}[]")
+    else:
+        yield place

@@ -22,8 +22,8 @@ from study_app.evidence.thresholds import known_values, noticed_delays
 from study_app.evidence.timing import delays, device_lateness, report
 from study_app.evidence.timing.delays import Shown
 from tests.filled import filled
-from tests.golden import CHANGING, compare
-from tests.golden_figures import figure_of, stub_png
+from tests.golden import CHANGING, compare, each_once
+from tests.golden_figures import figure_words, stub_png
 
 GOLDEN = Path(__file__).parent / "golden"
 
@@ -110,8 +110,8 @@ def lines_of(make: Callable[..., Any], seed: int, folder: Path, *, files: bool) 
         return
     for path in sorted(one for one in made if one.suffix != ".svg"):
         content = path.read_bytes()
-        yield f"## {path.name}"
-        yield from figure_of(content) if content.startswith(b"\x89PNG") else content.decode().splitlines()
+        yield f"-- {path.name}"
+        yield from figure_words(content) if content.startswith(b"\x89PNG") else content.decode().splitlines()
 
 
 @pytest.mark.parametrize(("name", "make"), REPORTS)
@@ -120,6 +120,6 @@ def test_reports_of_results(
 ) -> None:
     monkeypatch.setattr(Figure, "savefig", lambda figure, to, **_: to.write(stub_png(figure)))
     files = name.endswith("write")
-    seeds = 1 if make is soaked else 2 if name.endswith("write") else 4
-    found = [line for seed in range(seeds) for line in (f"##### {seed}", *lines_of(make, seed, tmp_path, files=files))]
-    compare(GOLDEN / f"{name}.txt", found, pytestconfig, mask=CHANGING)
+    seeds = 1 if make is soaked else 2
+    found = [line for seed in range(seeds) for line in (f"== {seed}", *lines_of(make, seed, tmp_path, files=files))]
+    compare(GOLDEN / f"{name}.txt", each_once(found), pytestconfig, mask=CHANGING)

@@ -1,4 +1,4 @@
-"""All that is found in the answers to levels of each design, compared with a reviewed file."""
+"""The answers to levels of each design are those that are counted here from the table of trials."""
 
 from dataclasses import replace
 from typing import Any
@@ -8,15 +8,13 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.data.blocks import LevelBlock, Setting
+from study_app.analysis.levels.answers import Answers
 from study_app.analysis.levels.evaluate import level_results
 from study_app.protocol.presented.presentation import arrangement_text
 from study_app.protocol.trials.designs import Rated
 from study_app.protocol.trials.stimuli import Stimulus
 from tests.analysis.levels.level_studies import ONE, STIMULUS, block
 from tests.analysis.made_up import delays, everybody, study
-from tests.analysis.outputs import GOLDEN
-from tests.golden import compare
-from tests.golden_values import value_lines
 
 LINK = Stimulus(vary="force_delay_ms", levels=(0, 100), standards=(10.0, 20.0), spacing="linear")
 CONDITIONS = tuple(
@@ -76,11 +74,36 @@ def intervals(opened: pd.DataFrame) -> pd.DataFrame:
     return pd.concat([first, standards, *last])
 
 
-def test_what_is_found_in_answers_to_levels(pytestconfig: pytest.Config) -> None:
+def test_answers_to_levels_are_counted_by_hand() -> None:
     every = [replace(one, id=name, title=name.capitalize()) for name, one in BLOCKS.items()]
     frame = pd.DataFrame([row for seed, one in enumerate(every) for row in rows(one, seed)])
     opened = frame.astype({"level_delivered": "Float64", **dict.fromkeys(("success", "right", "catch"), "boolean")})
     made = study(delays([0, 50]), list(everybody(delays([0, 50]), 2, lambda *_: 4)))
     answered = opened.assign(onset_s=1.0, first_choice_s=1.0 + opened["response_s"], counted=opened["analysed"])
     asked = replace(made, levels=tuple(every), intervals=intervals(opened), answered=answered)
-    compare(GOLDEN / "levels-found.txt", value_lines(level_results(asked, opened)), pytestconfig)
+    results = level_results(asked, opened)
+    assert [result.block for result in results] == list(BLOCKS)
+    for result in results:
+        trials = opened[(opened["block"] == result.block) & opened["analysed"]]
+        answers = Answers.of(result)
+        assert answers
+        assert sum(row.n for row in answers if row.participant is None) == len(trials)
+        for row in answers:
+            of_row = trials[trials["catch"].astype(bool) == row.catch]
+            if row.participant is not None:
+                of_row = of_row[of_row["participant"] == row.participant]
+            if row.standard is not None:
+                of_row = of_row[of_row["standard"] == row.standard]
+            if row.level is not None:
+                of_row = of_row[np.isclose(of_row["level"].astype(float), row.level)]
+            if row.comparison is not None:
+                of_row = of_row[of_row["track"] == row.comparison]
+            assert (row.n, row.participants) == (len(of_row), of_row["participant"].nunique()), row
+            if result.summary == "share":
+                assert row.count == of_row["success"].sum(), row
+                assert row.value == pytest.approx(of_row["success"].astype(float).mean()), row
+            elif row.participant is not None:
+                values = of_row["value"].astype(float)
+                middle = np.exp(np.log(values).mean()) if result.block == "estimation" else values.mean()
+                assert row.value == pytest.approx(middle), row
+            assert row.low is None or row.low <= row.value <= row.high, row

@@ -1,10 +1,13 @@
-"""Counts, tables and figures of the power of small plans, compared with reviewed files."""
+"""Counts, tables and figures of the power of small plans: shares of studies with their intervals, and their words."""
 
+import io
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.figure import Figure
+from scipy.stats import binomtest
 
 from study_app.analysis.planning.power_curves import powers, write_power
 from study_app.analysis.planning.simulated_studies import count, plan
@@ -14,9 +17,8 @@ from tests.analysis.conftest import SMALL
 from tests.analysis.outputs import GOLDEN
 from tests.analysis.power.test_power import felt_in
 from tests.analysis.power.test_threshold_power import study, swept
-from tests.golden import CHANGING, compare
-from tests.golden_figures import figure_of, stub_png
-from tests.golden_values import numbers
+from tests.golden import CHANGING, compare, each_once
+from tests.golden_figures import figure_words, stub_png
 
 PLANS = {"two": SMALL, "rek2024": None}
 
@@ -30,7 +32,7 @@ def test_power_of_small_plans(
     protocol = load(name) if text is None else parse(text.encode(), "small.toml")
     planned = plan(protocol, felt_in(protocol))
     counts = count(planned, (3, 7), 1, 0, 3)
-    lines = [f"{kind} {' '.join(what)}: {numbers(found)}" for kind, of in counts.items() for what, found in of.items()]
+    lines = list[str]()
     rng = np.random.default_rng(5)
     drawn = {
         kind: {what: one if what[1] == "means" else rng.integers(0, 4, one.shape) for what, one in of.items()}
@@ -40,13 +42,32 @@ def test_power_of_small_plans(
         for path in sorted(write_power(powers(planned, (3, 7), 3, asked, 1, given), tmp_path)):
             if path.suffix not in (".svg", ".pdf"):
                 content = path.read_bytes()
-                lines.append(f"##### {path.name}, {asked} asked")
-                lines += figure_of(content) if path.suffix == ".png" else content.decode().splitlines()
-    compare(GOLDEN / f"power-{name}.txt", lines, pytestconfig, mask=CHANGING)
+                if path.suffix == ".csv":
+                    check_powers(pd.read_csv(path), 3)
+                else:
+                    lines += figure_words(content) if path.suffix == ".png" else content.decode().splitlines()
+    compare(GOLDEN / f"power-{name}.txt", each_once(lines), pytestconfig, mask=CHANGING)
+
+
+def check_powers(table: pd.DataFrame, studies: int) -> None:
+    """Check that each power is in its interval: of a share of the studies in Wilson's."""
+    assert set(table["studies"]) == {studies}
+    for row in table[table["power"].notna()].itertuples():
+        assert 0 <= row.power_low <= row.power <= row.power_high <= 1
+        if round(row.power * studies) == pytest.approx(row.power * studies, abs=1e-3):
+            ends = binomtest(round(row.power * studies), studies).proportion_ci(method="wilson")
+            assert (row.power_low, row.power_high) == pytest.approx(tuple(ends), abs=6e-4)
 
 
 @pytest.mark.parametrize("name", ["updown", pytest.param("questplus", marks=pytest.mark.slow)])
 def test_precision_of_small_plans(name: str, pytestconfig: pytest.Config) -> None:
     method = {"updown": 'kind = "updown", trials = 20', "questplus": 'kind = "questplus", trials = 20'}[name]
     found = swept(study(('kind = "questplus", trials = 20', method)), (10, 20), (1, 3), 4)
-    compare(GOLDEN / f"precision-{name}.txt", [threshold_csv(found).decode(), threshold_markdown(found)], pytestconfig)
+    table = pd.read_csv(io.BytesIO(threshold_csv(found)))
+    assert [tuple(row) for row in table[["trials", "participants"]].to_numpy()] == [(10, 1), (10, 3), (20, 1), (20, 3)]
+    assert (table["half_interval"].isna() == (table["participants"] == 1)).all(), "one participant has no interval"
+    for row in table[table["within"].notna()].itertuples():
+        ends = binomtest(round(row.within * row.studies), row.studies).proportion_ci(method="wilson")
+        assert (row.within_low, row.within_high) == pytest.approx(tuple(ends), abs=6e-4)
+    if name == "updown":
+        compare(GOLDEN / "precision.txt", each_once(threshold_markdown(found).splitlines()), pytestconfig)
