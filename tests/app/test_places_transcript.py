@@ -23,7 +23,7 @@ from study_app.session.start import NewSession
 from study_app.store.exclusions import Exclusion
 from study_app.store.workstation import load_settings
 from study_app.workers.server import Crashed, Refused
-from tests.golden import compare
+from tests.golden import compare, each_once, what_comes
 from tests.golden_values import changed, value_lines
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -146,7 +146,7 @@ def test_results(qtbot: Any, pytestconfig: pytest.Config) -> None:
         after = [f"busy: {place.is_busy} {place._listening.isActive()}", *value_lines(place.view, "view")]
         lines += [f"== {name} {given}", *done, *changed(before, after)]
         before = after
-    compare(GOLDEN / "results.txt", lines, pytestconfig)
+    compare(GOLDEN / "results.txt", each_once(what_comes(lines)), pytestconfig)
 
 
 CHANGES: list[tuple[str, Any]] = [
@@ -184,7 +184,7 @@ def test_settings(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: py
         after = [*settings, f"undo: {machine.undo_name}"]
         lines += [f"== {name} {value}", *heard, *changed(before, after)]
         before = after
-    compare(GOLDEN / "settings.txt", lines, pytestconfig)
+    compare(GOLDEN / "settings.txt", each_once(what_comes(lines)), pytestconfig)
 
 
 MOUSE, FALCON = (
@@ -241,7 +241,7 @@ def test_devices(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: pyt
             *value_lines(device_named(machine.settings.device, place.shown), "preferred"),
             *value_lines([one.word for one in place.shown], "shown"),
         ]
-    compare(GOLDEN / "devices.txt", lines, pytestconfig)
+    compare(GOLDEN / "devices.txt", each_once(what_comes(lines)), pytestconfig)
 
 
 DEVICE_ACTS = {"look": "look_for_devices", "end": "stop_looking"}
@@ -336,4 +336,4 @@ def test_the_stay(visit: MainController, monkeypatch: Any, pytestconfig: pytest.
         state = f"{visit.window.here} {visit.window.isVisible()} {visit.window.theme.name} {visit.code} {page}"
         lines += [f"== {name}", *Live.done, *told, f"{state} {visit.live is not None} {len(visit._called_off)}"]
         lines += [f"operator {visit.machine.settings.operator} {visit.results.name}"]
-    compare(GOLDEN / "stay.txt", lines, pytestconfig)
+    compare(GOLDEN / "stay.txt", each_once(what_comes(lines)), pytestconfig)

@@ -16,7 +16,7 @@ import pytest
 from study_app.cli import main
 from study_app.session.simulated.answers_only import rehearse_answers
 from tests.compiled import needs_servo
-from tests.golden import CHANGING, compare
+from tests.golden import CHANGING, compare, masked
 from tests.platforms import needs_window_system
 from tests.studies import made_up, once
 from tests.transcripts import Files, every, value_of
@@ -74,6 +74,16 @@ def workspace(
     return tmp_path
 
 
+def without_repeats(lines: list[str]) -> Iterator[str]:
+    """Yield commands, codes and files, and each line that is printed once, with # for numbers."""
+    seen = set[str]()
+    for line in lines:
+        text = masked(line) if line.startswith(("| ", "! ")) else line
+        if not line.startswith(("| ", "! ")) or text not in seen:
+            seen.add(text)
+            yield text
+
+
 @pytest.mark.parametrize(
     "golden", [pytest.param(path, marks=LATER.get(path.stem, []), id=path.stem) for path in GOLDEN]
 )
@@ -108,4 +118,4 @@ def test_commands(golden: Path, workspace: Path, capsys: Any, monkeypatch: Any, 
         lines += [f"- {one}" for one in sorted(before - now)]
         before = now
     lines = [line.replace(str(workspace), "FOLDER").replace("python -m pytest.", "") for line in lines]
-    compare(golden, lines, pytestconfig, mask=CHANGING)
+    compare(golden, without_repeats(lines), pytestconfig, mask=CHANGING)

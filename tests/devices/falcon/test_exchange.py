@@ -33,7 +33,7 @@ from tests.devices.falcon.support.scripted_bridge import (
     force_of,
     reply,
 )
-from tests.golden import compare
+from tests.golden import compare, runs
 
 ANSWERS = {READ_NEW: "new", READ_NOTHING_NEW: "nothing", READ_LOST: "lost"}
 GREAT_N = tuple(20 * np.array(PUSH_N))
@@ -258,7 +258,7 @@ def test_what_the_exchange_answers_and_sends(scenario: Callable[[Recorded], None
     recorded = Recorded()
     scenario(recorded)
     recorded.lines.append(" ".join(f"{name} {recorded.falcon[name]}" for name in COUNTERS if recorded.falcon[name]))
-    compare(Path(__file__).parent / "golden" / f"exchange_{scenario.__name__}.txt", recorded.lines, pytestconfig)
+    compare(Path(__file__).parent / "golden" / f"exchange_{scenario.__name__}.txt", runs(recorded.lines), pytestconfig)
 
 
 @pytest.mark.slow
