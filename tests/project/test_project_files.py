@@ -73,6 +73,14 @@ def test_pre_commit_runs_the_linters_of_the_check() -> None:
         assert f".venv/bin/{entry.split(' --')[0]}" in check
 
 
+def test_recordings_stay_few_enough_to_be_read() -> None:
+    kept = [path for path in (ROOT / "tests").rglob("*") if "golden" in str(path.relative_to(ROOT))]
+    texts = (path for path in kept if path.suffix in {".txt", ".json", ".html", ".csv"})
+    lines = {path: path.read_bytes().count(b"\n") for path in texts}
+    largest = [path.relative_to(ROOT).as_posix() for path in sorted(lines, key=lambda path: -lines[path])[:10]]
+    assert 1_000 < sum(lines.values()) <= 15_000, f"docs/testing.md says what is kept; the largest are {largest}"
+
+
 def test_every_test_of_the_list_of_circles_exists() -> None:
     missing = []
     for line in (ROOT / "tests" / "circles.txt").read_text("utf-8").splitlines():
