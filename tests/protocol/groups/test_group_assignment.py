@@ -83,12 +83,13 @@ def test_design_counts_orders_within_each_group(assignment: str) -> None:
 
 
 def test_the_preregistration_says_how_groups_are_formed() -> None:
-    assert "assigned at random, in permuted blocks, to the groups experts" in preregistration(experts(), "0" * 64)
+    randomised = "randomised in permuted blocks to the groups experts and novices, with an allocation ratio of 1:1."
+    assert randomised in preregistration(experts(), "0" * 64)
     text = preregistration(experts(PREEXISTING), "0" * 64)
-    assert "at random" not in text.partition("## Participants")[0]
-    assert "belong to a group by an existing attribute (experts (share 1), novices (share 1))" in text
+    assert "permuted blocks" not in text
+    assert "belong to the groups experts and novices by an existing attribute" in text
     assert "Groups are not randomised" in text
-    assert "Order of blocks balanced: 2 orders, by the place in the group" in text
+    assert "The order of blocks is balanced: 2 orders, by the place in the group" in text
 
 
 def test_groups_are_dealt_by_their_shares() -> None:
