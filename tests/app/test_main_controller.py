@@ -163,7 +163,7 @@ class Held(QObject):
     """A session that was held and is over as soon as it is opened."""
 
     over = Signal()
-    began, opening, error, code = True, False, None, 0
+    has_begun, is_opening, error, code = True, False, None, 0
 
     def __init__(self, chosen: NewSession, theme: Any, *, asks: bool) -> None:
         super().__init__()
@@ -186,7 +186,7 @@ def test_the_sidebar_has_one_width_per_size_of_window_at_every_place(visit: Main
 def test_results_show_what_was_run_last(visit: MainController, monkeypatch: Any) -> None:
     shown: list[Path] = []
     monkeypatch.setattr(main_controller, "LiveSession", Held)
-    monkeypatch.setattr(visit, "results_place", SimpleNamespace(choose=shown.append))
+    monkeypatch.setattr(visit, "results_place", SimpleNamespace(choose_study=shown.append))
     visit.window.place("home").session_asked.emit(CHOSEN)
     assert (shown, visit.live) == ([CHOSEN.results], None)
 

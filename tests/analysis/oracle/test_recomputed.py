@@ -44,7 +44,8 @@ PROVED = {
     r"results\.blocks\.threshold\..*": PROPERTIES + "test_the_detection_threshold_is_that_of_the_people",
     r"results\.levels\.thresholds\.fit_p": "tests/analysis/statistics/psychometrics/test_threshold.py::"
     "test_p_of_fit_is_uniform_where_the_function_is_true",
-    r"results\.levels\.thresholds\.reversal_mean": "tests/psychophysics/test_tables_of_cases.py::",
+    r"results\.levels\.thresholds\.reversal_mean": "tests/psychophysics/test_grid.py::"
+    "test_percent_correct_at_the_mean_of_reversals_in_the_long_run",
     r"results\.levels\.thresholds\.target_percent": "tests/psychophysics/test_grid.py::"
     "test_percent_correct_at_the_mean_of_reversals_in_the_long_run",
     r"results\.levels\.thresholds\.compared.*": THRESHOLDS

@@ -106,7 +106,7 @@ def paint_position(bridge):
         ("participant.window.ParticipantWindow", "keyPressEvent", tap),
         (
             "participant.window.ParticipantWindow",
-            "_pause",
+            "_ask_to_pause",
             lambda bridge: bridge.participant.findChild(EscapeKey).tapped.emit(),
         ),
     ],

@@ -104,7 +104,7 @@ class ServedTransport:
             self._connection = Client(self.name)
         except OSError as error:
             raise FalconNotFound("not-found", f"connecting to {self.name}: {error.strerror}") from error
-        self._ask("claimed")
+        self._ask("note_claim")
 
     def control(self, request: int, value: int) -> None:
         _check(self._ask("control", request, value), "setting the bridge")

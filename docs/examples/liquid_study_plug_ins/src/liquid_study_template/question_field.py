@@ -34,7 +34,7 @@ class Cells(QWidget):
         x = int((event.position().x() - square.left()) / square.width() * count)
         y = int((square.bottom() - event.position().y()) / square.height() * count)
         if 0 <= x < count and 0 <= y < count:
-            self.field.give(f"{x + 1} {y + 1}")
+            self.field.give_answer(f"{x + 1} {y + 1}")
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         count = self.field.view.cells
@@ -44,7 +44,7 @@ class Cells(QWidget):
             return
         here = map(int, str(self.field.value).split()) if self.field.value else ((count + 1) // 2,) * 2
         x, y = (min(max(one + by, 1), count) for one, by in zip(here, step, strict=True))
-        self.field.give(f"{x} {y}")
+        self.field.give_answer(f"{x} {y}")
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter, square, view = QPainter(self), self.place(), self.field.view
@@ -76,4 +76,4 @@ class GridField(QuestionField):
         super().__init__(view, words, parent)
         self.cells = Cells(self)
         self.setFocusProxy(self.cells)
-        self.put(self.cells)
+        self.put_answer_part(self.cells)
