@@ -295,7 +295,7 @@ class Results:
 
 
 SEALED: Final = "computed after unblinding, because it needs to know which condition each code stands for"
-"""Why what waits for the key is not there."""
+"""The reason for results that are missing because the key is sealed."""
 
 VERDICTS_MEAN: Final = (
     "Shown: the adjusted p is at most {alpha}. Suggested: the same in a statement that was not stated as primary "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import weakref
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
@@ -26,9 +27,10 @@ _open: Final = weakref.WeakSet["Rig"]()
 
 @atexit.register
 def _stop_open_rigs() -> None:
-    """Stop the rigs that a program left open at its end, such as that of a ``with`` block that it never left."""
-    for rig in tuple(_open):
-        rig.stop()
+    """Stop the rigs that a program left open at its end, each of them even if another one fails to stop."""
+    with ExitStack() as stops:
+        for rig in tuple(_open):
+            stops.callback(rig.stop)
 
 
 @dataclass(frozen=True, slots=True, weakref_slot=True, eq=False)

@@ -310,7 +310,7 @@ DELIVERED: tuple[Column, ...] = (
     _measure("pace_mps", "RMS speed of the hand, after the lead.", "m/s", sealed=True, later=True),
     _signed("setting", "The level that the participant set; n/a in intervals that were not adjusted."),
 )
-"""Columns of what was delivered in an interval."""
+"""Columns of the stimulus that each interval delivered."""
 
 
 VIDEO: tuple[Column, ...] = (

@@ -85,9 +85,9 @@ class StudyFolder:
     ignore = _Within(".psychds-ignore")
     """Paths that validators of Psych-DS ignore."""
     exclusions = _Within("exclusions.csv")
-    """Exclusions from the analysis, by whom and why."""
+    """Exclusions from the analysis, with who decided and the reason."""
     reversed_exclusions = _Within("exclusions_reversed.jsonl")
-    """Reversed exclusions, by whom and why."""
+    """Reversed exclusions, with who decided and the reason."""
     fingerprints = _Within(FINGERPRINTS)
     """The fingerprint of every session that ended."""
     withdrawals = _Within("withdrawals.jsonl")

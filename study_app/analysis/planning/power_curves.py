@@ -38,7 +38,7 @@ from study_app.analysis.planning.simulated_studies import (
 from study_app.analysis.results import enough
 from study_app.analysis.statistics.equivalence import STEPS, fewest
 from study_app.protocol.model import Contrast
-from study_app.protocol.raters import STATED
+from study_app.protocol.raters import CONSISTENT, NOISY, STATED
 from study_app.psychophysics.grid import Z_95
 from study_app.store.csv_files import Column, csv_bytes, optional
 from study_app.store.output_files import write_files
@@ -382,7 +382,7 @@ def _preface(found: Powers) -> list[str]:
     looks = f" of all looks ({of_looks}), found at a look or an earlier one" if of_looks else ""
     lines = [
         f"**SIMULATED.** {found.studies} studies of each size were answered by the rehearsals' answer model (seed "
-        f"{found.seed}, liquid-study {__version__}), whose shapes and constants are plausible and not measured: real "
+        f"{found.seed}, liquid-study {__version__}), whose effects are plausible and not measured: real "
         "effects may be smaller. Read the tables of the smallest detectable difference together with those of power.",
         "",
         f"Tests at α = {decided.alpha:g}{looks}; p from {PLANNED_DRAWS} random rearrangements of each participant's "
@@ -433,7 +433,7 @@ def _summary(found: Powers) -> Iterator[str]:
     plan, sizes = found.plan, found.sizes
     place = sizes.index(plan.participants) if plan.participants in sizes else len(sizes) - 1
     planned = "the planned " if plan.participants in sizes else ""
-    main, consistent, noisy = found.kinds
+    main = next(iter(found.kinds))
     lines = []
     for curve in found.curves:
         primary = (
@@ -445,8 +445,8 @@ def _summary(found: Powers) -> Iterator[str]:
             shares = dict(zip(found.kinds, (one.power[place] for one in found.among_kinds(curve)), strict=True))
             about = "" if curve.question == "contrast" else f" ({HEADS[curve.question]})"
             lines.append(
-                f"- {_name(curve, found).strip('*')}{about}: {shares[consistent]:.0%} of studies find it if people are "
-                f"{consistent}, {shares[main]:.0%} if {main}, and {shares[noisy]:.0%} if {noisy}."
+                f"- {_name(curve, found).strip('*')}{about}: {shares[CONSISTENT]:.0%} of studies find it if people are "
+                f"{CONSISTENT}, {shares[main]:.0%} if {main}, and {shares[NOISY]:.0%} if {NOISY}."
             )
     if lines:
         yield from ("", f"## Power with {planned}{sizes[place]} participants", "", *lines)

@@ -29,7 +29,7 @@ _MAY_LEAVE_OUT = (("blocks", "task"), ("stimuli", "condition"))
 
 
 def named_at(document: Document, place: Path) -> Path | None:
-    """Return the path of what the text at ``place`` refers to; None if it refers to nothing."""
+    """Return the path of the element that the text at ``place`` names, or None."""
     name = value_at(document, place)
     if not isinstance(name, str):
         return None

@@ -50,6 +50,7 @@ from study_app.gui.kit.commands import command_tip, with_key
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed, name_scroll_bars, remove_widget
+from study_app.gui.widgets.accessible import button_text
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, insert_layout, vbox
 from study_app.gui.widgets.boxes import grid as grid_of
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Icon, Rule, fill_rounded, scrolled, smooth_painter
@@ -469,7 +470,7 @@ class FormHead(QWidget):
         self.ask.setVisible(bool(form.asks) and not read_only)
         self.asks.clear()
         for sentence, asked in form.asks:
-            self.asks.addAction(sentence.replace("&", "&&")).triggered.connect(
+            self.asks.addAction(button_text(sentence)).triggered.connect(
                 lambda _on=False, asked=asked: self.asked.emit(asked)
             )
         self.id_line.setVisible(form.id is not None)

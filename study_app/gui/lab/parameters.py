@@ -10,7 +10,7 @@ from study_app.gui.lab.lab_state import SIDES, Choices, LabView
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed, give_ground, replace_inside
-from study_app.gui.widgets.accessible import plain_tip
+from study_app.gui.widgets.accessible import button_text, plain_tip
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Card, Icon, MaskedPanel, Rule, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Cap, Choice, CompactStop, IconButton, Toggle
@@ -81,7 +81,7 @@ class Segment(Themed, QPushButton):
             return
         self._shown = shown
         text = self.fontMetrics().elidedText(name, Qt.TextElideMode.ElideRight, WIDEST - BADGE - 30)
-        self.setText(text.replace("&", "&&"))
+        self.setText(button_text(text))
         self.setToolTip(plain_tip(name))
         picture = QPixmap((QSizeF(self.iconSize()) * self.devicePixelRatioF()).toSize())
         picture.setDevicePixelRatio(self.devicePixelRatioF())

@@ -84,11 +84,11 @@ def _post_request(server: str, question: bytes, answers: queue.SimpleQueue[bytes
     """Put the server's answer, truncated after `LONGEST`, or the error of the request; follow no redirect."""
     import urllib.request as network  # noqa: PLC0415 - loads the network's modules: only where a stamp is asked for
 
-    opener = network.OpenerDirector()
-    kinds = (network.ProxyHandler, network.HTTPHandler, network.HTTPSHandler, network.HTTPDefaultErrorHandler)
-    for kind in (*kinds, network.HTTPErrorProcessor):
-        opener.add_handler(kind())
     try:
+        opener = network.OpenerDirector()
+        kinds = (network.ProxyHandler, network.HTTPHandler, network.HTTPSHandler, network.HTTPDefaultErrorHandler)
+        for kind in (*kinds, network.HTTPErrorProcessor):
+            opener.add_handler(kind())
         request = network.Request(  # noqa: S310 - http or https, as checked
             server, question, {"Content-Type": "application/timestamp-query"}
         )

@@ -182,7 +182,7 @@ class Captions:
 
     @property
     def _controls_above(self) -> float:
-        """The height of controls above the foot [px]; 0 if they fit beside it or there are none."""
+        """The height of the controls above the foot [px]; 0 if they fit beside it, or without controls."""
         wide, high = (side * self._fine for side in CONTROLS_PX)
         start = 64 * caption_scale(self._width, self._height)
         beside = start + self._foot_width() + 24 <= (self._width - wide) / 2
