@@ -6,6 +6,7 @@ import itertools
 import logging
 import os
 import re
+import signal
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
@@ -110,6 +111,8 @@ def pytest_plugin_registered(plugin: object, manager: pytest.PytestPluginManager
 
 def pytest_sessionstart() -> None:
     """Collect garbage between tests alone: a thread that collected would destroy widgets whose timers then crash Qt."""
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in a job that a script starts in the background
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if QT_IS_HERE:
         gc.disable()
 
