@@ -277,12 +277,14 @@ def _unpublished_fault(path: Path, of: str, language: str, lacks: Sequence[tuple
     listed = "; ".join(
         f"{', '.join(texts)} of {', '.join(names)}".removesuffix(f" of {of}") for texts, names in same.items()
     )
-    published = instrument(of)["languages"]
+    source = instrument(of)
+    translation = source.get("published", {}).get(language)
+    published = f", but a translation is published, {translation}" if translation else ""
     why = (
-        f"{of} has no published text in {language_name(language)}"
-        if published
+        f"the program does not include {of} in {language_name(language)}{published}"
+        if source["languages"]
         else f"the texts of {of} may not be passed on"
     )
     message = f"{why}: write {listed}"
-    hint = f'items = [{{ id = "{instrument(of)["items"][0]["id"]}", text = {{ {language} = "…" }} }}, …]'
+    hint = f'items = [{{ id = "{source["items"][0]["id"]}", text = {{ {language} = "…" }} }}, …]'
     return Fault(path, message, hint, missing_language=language)

@@ -23,6 +23,7 @@ from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK
 from study_app.protocol.warnings.delayed_force import delay_warnings
 from study_app.protocol.warnings.expected_precision import imprecise
 from study_app.protocol.warnings.group_names import suggests_attribute
+from study_app.protocol.wording.languages import language_name
 
 TELLING = 0.39
 """Twice the difference of viscosity that people just tell, 19 % (Jones, Hunter & Lafontaine 1997): what two liquids
@@ -48,6 +49,7 @@ def warnings(protocol: Protocol, *, simulates: bool = True, without_force: str =
         *_analysis_warnings(protocol),
         *_tasks_without_target(protocol),
         *_recalled_instruments(protocol),
+        *_untitled_forms(protocol),
     )
 
 
@@ -354,3 +356,11 @@ def _recalled_instruments(protocol: Protocol) -> Iterator[str]:
         of = questionnaire.instrument
         if of is not None and (recalled := instrument(of).get("from_memory")) is not None:
             yield f"questionnaires.{name}: from memory, compared with no source: {recalled}: compare it with your copy"
+
+
+def _untitled_forms(protocol: Protocol) -> Iterator[str]:
+    """Yield the forms whose heading would be their id, in a study that is not in English."""
+    others = [language_name(language) for language in protocol.study.languages if language != "en"]
+    for name in protocol.forms if others else ():
+        if protocol.questionnaires[name].title is None:
+            yield f"questionnaires.{name}.title: is missing; participants see the ID as heading: add it in {others[0]}"

@@ -44,9 +44,13 @@ class Words:
 
     def joined(self, entries: Sequence[str]) -> str:
         """Return "2", "2 and 5", "2, 5 and 8"."""
-        if len(entries) < 2:
-            return "".join(entries)
-        return f"{', '.join(entries[:-1])} {self.and_} {entries[-1]}"
+        if not entries:
+            return ""
+        joined = entries[0]
+        for number, entry in enumerate(entries[1:], 2):
+            template = self.list_end if number == len(entries) else self.list_comma
+            joined = template.format(first=joined, last=entry)
+        return joined
 
     def unclear_number(self, text: str) -> str:
         """Return the sentence that asks again for an ambiguous number; "" if it is not."""

@@ -149,8 +149,9 @@ def _answer_page(state: SessionState) -> pages.Page:
         return pages.ChoicePage(state.trial.number, view, progress)
     assert isinstance(view, NumberView)  # noqa: S101 - the only other reply
     if design.first is not None and state.trial.index == 1:
-        named = _words(state).modulus.format(number=f"{design.first.number:g}")
-        view = replace(view, text=f"{named} {view.text}")
+        words = _words(state)
+        modulus = f"{design.first.number:g}".replace(".", words.decimal_sign)
+        view = replace(view, text=words.modulus.format(number=modulus))
     return pages.NumberPage(state.trial.number, view, progress)
 
 

@@ -38,7 +38,7 @@ def test_names_of_trials_are_in_every_language_of_the_study() -> None:
     text = SOUND.replace("format = 1", "format = 2")
     text = "\n".join(line for line in text.splitlines() if not line.startswith("setting_label"))
     label = parse(text.encode(), "small").blocks["feel"].setting_label
-    assert label == {"en": "Trial", "nl": "Proef"}
+    assert label == {"en": "Trial", "nl": "Ronde"}
 
 
 def test_file_of_format_1_means_the_same_in_format_2_but_for_an_estimator_that_it_leaves_out() -> None:
@@ -74,7 +74,7 @@ def test_a_study_inherits_what_is_known_of_an_instrument_and_is_asked_for_the_re
     for fault in faults:
         assert all(item["id"] in fault.message for item in source["items"])
         words = (
-            f"{name} has no published text in" if source["languages"] else f"the texts of {name} may not be passed on"
+            f"the program does not include {name} in" if source["languages"] else f"the texts of {name} may not be passed on"
         )
         assert fault.message.startswith(words)
 

@@ -123,7 +123,11 @@ FIELD_WIDTH = 120.0
 
 
 class Entry(EntryKeys, QLineEdit):
-    """The field."""
+    """The field; it has no menu, as Qt's is in English."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.NoContextMenu)
 
 
 class NumberField(TypedField):
@@ -501,11 +505,12 @@ FRAME = 20.0  # of a field around its lines
 
 
 class TextEntry(EntryKeys, QPlainTextEdit):
-    """The field; Tab leaves it, and in a single line Enter is the page's."""
+    """The field, without a menu; Tab leaves it, and in a single line Enter is the page's."""
 
     def __init__(self, lines: int, parent: QWidget) -> None:
         super().__init__(parent)
         self._lines = lines
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.NoContextMenu)
         self.setTabChangesFocus(True)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         if lines == 1:

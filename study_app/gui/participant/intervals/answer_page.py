@@ -229,6 +229,7 @@ class NumberWidget(AnswerPage):
         super().__init__(page, context)
         self._permits = page.item.permits
         self.field = QLineEdit(self, maxLength=LONGEST, alignment=Qt.AlignmentFlag.AlignCenter)
+        self.field.setContextMenuPolicy(Qt.ContextMenuPolicy.NoContextMenu)  # Qt's is in English
         self.field.setAccessibleName(page.item.text)
         self.field.setAccessibleDescription(self._words.number_wanted)
         self.wrong = PlainLabel("", self)

@@ -29,6 +29,7 @@ COUNTED_DOWN_S = 10  # before a task's limit
 CONTROLS_PX = (470, 64)  # of an adjustment's buttons, with the space above and below
 PATCH_ROOM = 88  # of the photodiode's patch in the lower right corner [px]
 CENTRED = int(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap)
+LEFT_TO_RIGHT, ISOLATE, END = "\u2066", "\u2068", "\u2069"  # of Unicode: isolated runs of text
 RIGHT = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
 
 
@@ -194,8 +195,13 @@ class Captions:
 
     @property
     def setting_keys(self) -> str:
+        """The keys of an adjustment, from left to right in every language."""
         wording = self._words
-        return f"← {wording.less} · {wording.more} → · {wording.enter_key}: {wording.done}"
+        finish = wording.key_does.format(key=wording.enter_key, action=wording.done)
+        if not wording.right_to_left:
+            return f"← {wording.less} · {wording.more} → · {finish}"
+        less, more, finish = (f"{ISOLATE}{text}{END}" for text in (wording.less, wording.more, finish))
+        return f"{LEFT_TO_RIGHT}← {less} · {more} → · {finish}{END}"
 
     def _longest_hints(self) -> tuple[str, ...]:
         wording = self._words
