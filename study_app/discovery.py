@@ -118,7 +118,7 @@ class Registry(Mapping[str, T], Generic[T]):
             words = f'"{name}" is a {self.kind} of the plug-in {package}, which is not installed'
             return words, f"pip install {package}"
         faults = [one.fault for one in self.plug_ins if one.fault and _canonical(one.package) == package]
-        words = f'"{name}" is a {self.kind} that the plug-in {package} {versions[0]} does not give'
+        words = f'"{name}" is a {self.kind} that the plug-in {package} {versions[0]} does not provide'
         return ": ".join([words, *faults]), UPDATE
 
     def __getitem__(self, name: str) -> T:
@@ -159,7 +159,7 @@ class Registry(Mapping[str, T], Generic[T]):
             found.model_json_schema()  # what its keys lack is said now, not by a form
             kind = found.model_fields.get("kind")
             if kind is not None and kind.is_required():
-                raise StudyError("its kind has no default: give it the value of its Literal")
+                raise StudyError("its kind does not have a default: give it the value of its Literal")
             name = "" if kind is None else kind.default
             if not re.fullmatch(rf"{begins}[a-z][a-z0-9_]*", str(name)):
                 raise StudyError(f"its kind is {name!r}: call it '{begins}' and small letters, digits or underscores")

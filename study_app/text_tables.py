@@ -100,7 +100,9 @@ def wrong_length(fields: Sequence[str], columns: int) -> str:
     if len(fields) < columns:
         return f"has {counted(len(fields), 'field')}, fewer than the {columns} of the header"
     if any(fields[columns:]):
-        hint = "write decimal points" if len(fields) == 2 * columns else "remove the surplus or name its columns"
+        hint = (
+            "write decimal points" if len(fields) == 2 * columns else "remove the additional fields or add column names"
+        )
         return f"has {len(fields)} fields, more than the {columns} of the header: {hint}"
     return ""
 
@@ -120,7 +122,9 @@ def decimal_sign_of(lines: Iterable[Line], places: Collection[int]) -> str:
     for number, field in fields:
         if "." in field and readings_of(field):
             other, comma = commas[0]
-            raise ValueError(f"line {number}: {_shown(field)} has a point, and {_shown(comma)} in line {other} a comma")
+            raise ValueError(
+                f"line {number}: {_shown(field)} has a point, but {_shown(comma)} in line {other} has a comma"
+            )
     if all(len(readings_of(field)) == 2 for _, field in commas):
         number, field = commas[0]
         raise ValueError(f"line {number}: {unclear_number(field)}")

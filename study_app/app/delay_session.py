@@ -206,7 +206,7 @@ class _Showing:
         if self._ended:
             raise KeyboardInterrupt
         if bridge.trouble:
-            raise SessionError(f"the session of delays broke: {bridge.trouble}")
+            raise SessionError(f"the delay session failed: {bridge.trouble}")
         return self._read_delays(store, schedule, paced)
 
     def _resize_windows(self, bridge: SessionBridge) -> None:

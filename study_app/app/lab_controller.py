@@ -277,7 +277,7 @@ INITIAL_A: Final = Choice(source="rek2024", liquid="water", title="Water")
 INITIAL_B: Final = Choice(source="rek2024", liquid="light_oil", title="Light oil")
 FRAME_MS: Final = 33
 APPRAISE_AFTER_MS: Final = 300
-COMPILING: Final = "Compiling the force model, once after an installation or an update; this takes about a minute"
+COMPILING: Final = "Compiling the force model (once after each installation or update; about a minute)"
 
 
 class LabController(QObject):
@@ -558,7 +558,7 @@ class LabController(QObject):
 
     def _save_preset(self, path: Path, setting: Setting) -> None:
         if self.bench.blind:
-            self.trouble = "no preset can be saved during a blind comparison: end it first"
+            self.trouble = "presets cannot be saved during a blind comparison: end it first"
             return
         self._clear_trouble()
         self._saving.save_preset(path, setting)

@@ -28,16 +28,19 @@ from study_app.number_text import counted
 @click.option(
     "--wide",
     is_flag=True,
-    help="Also the answers as a wide table: one row per participant, one column per statement and setting.",
+    help=(
+        "Also write the answers as a wide table, with a row for each participant and a column for each statement "
+        "and condition."
+    ),
 )
 @click.option("--parquet", is_flag=True, help="Also every table as Parquet.")
 @click.option(
-    "--sav", is_flag=True, help="Also the answers, long and wide, for SPSS, jamovi and JASP; needs pyreadstat."
+    "--sav", is_flag=True, help="Also write the answers, long and wide, for SPSS, jamovi and JASP; needs pyreadstat."
 )
 @click.option(
     "--psych-ds",
     is_flag=True,
-    help="Also a folder to share that follows Psych-DS: all tables, the report with its script, the study's file.",
+    help="Also write a Psych-DS folder to share, with all tables, the report with its script, and the study's file.",
 )
 @click.option(
     "--validator",
@@ -126,7 +129,7 @@ def report(results: Path, to: Path) -> None:
 def unblind(results: Path, by: str, reason: str) -> None:
     """Open the sealed key of a study and write the sealed columns; name, time and reason are recorded.
 
-    In a merged study the key of each site is opened; for one site name its folder, such as pooled/sites/A.
+    In a merged study the key of each site is opened; for one site give its folder, such as pooled/sites/A.
     """
     from study_app.store.exclusions import describe_exclusion
     from study_app.store.unblinding import unblind_folder
@@ -147,7 +150,7 @@ def unblind(results: Path, by: str, reason: str) -> None:
 @takes_study
 @PARTICIPANT
 @SESSION
-@click.option("--trial", type=click.IntRange(1), help="Only this trial; default: the whole session.")
+@click.option("--trial", type=click.IntRange(1), help="This trial only; default: the whole session.")
 @BY
 @REASON
 def exclude(results: Path, participant: str, session: int, trial: int | None, by: str, reason: str) -> None:
@@ -172,11 +175,11 @@ def _warn_if_opened(results: Path) -> None:
 @takes_study
 @PARTICIPANT
 @SESSION
-@click.option("--trial", type=click.IntRange(1), help="Only this trial, if it was excluded alone.")
+@click.option("--trial", type=click.IntRange(1), help="This trial only, if it was excluded by itself.")
 @BY
 @REASON
 def include(results: Path, participant: str, session: int, trial: int | None, by: str, reason: str) -> None:
-    """Reverse an exclusion: the session or trial counts again; name, time and reason are recorded."""
+    """Reverse an exclusion, so that the session or trial is analysed again; name, time and reason are recorded."""
     from study_app.store.exclusions import describe_exclusion
     from study_app.store.exclusions import include as include_in
     from study_app.store.merged import locate_participant
@@ -214,8 +217,8 @@ def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[
     if not (done.folders or done.outputs):
         click.echo(f"nothing to erase: participant {participant} withdrew at {done.tombstone.at}")
     for output in done.elsewhere:
-        state = "delete it, and make it again" if output.paths else "no longer there"
-        click.echo(f"warning: output of {output.at} outside of the results folder: {output.to} ({state})", err=True)
+        state = "delete it, and create it again" if output.paths else "no longer there"
+        click.echo(f"warning: output of {output.at} outside the results folder: {output.to} ({state})", err=True)
     for sentence in done.left:
         click.echo(f"warning: {sentence}", err=True)
 
@@ -289,13 +292,16 @@ def reproduce(session: Path) -> None:
     "--fingerprints",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Compare with fingerprints kept elsewhere (a copy, or what proof made): what was changed or removed since?",
+    help=(
+        "Compare with fingerprints kept elsewhere (a copy, or the output of proof) and list what has been changed "
+        "or removed since."
+    ),
 )
 @click.option(
     "--xdf",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Compare with a recording of its LSL streams: markers, lost samples, drift of the clocks; needs pyxdf.",
+    help="Compare markers, lost samples and clock drift with a recording of its LSL streams; needs pyxdf.",
 )
 def verify(results: Path, fingerprints: Path | None, xdf: Path | None) -> None:
     """Check everything in a study's folder: columns, checksums, receipts, journals, key, recordings."""
@@ -325,7 +331,7 @@ def verify(results: Path, fingerprints: Path | None, xdf: Path | None) -> None:
 @takes_study
 @click.option("--to", type=Target(), metavar="FILE", help="Write the lines into this file; default: print them.")
 @click.option("--sign", is_flag=True, help="Sign them with the key of the lab, which the system's key store keeps.")
-@click.option("--server", metavar="URL", help="Let this server stamp them with the time (RFC 3161).")
+@click.option("--server", metavar="URL", help="Obtain a time stamp from this server (RFC 3161).")
 @click.option(
     "--root",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
@@ -341,9 +347,10 @@ def verify(results: Path, fingerprints: Path | None, xdf: Path | None) -> None:
 def proof(
     results: Path, to: Path | None, *, sign: bool, server: str | None, root: Path | None, always: Path | None
 ) -> None:
-    """Prove a study: a line for each session, withdrawal, reveal and exclusion, to print, scan or mail.
+    """Prove a study with a line for each session, withdrawal, unblinding and exclusion, to print, scan or mail.
 
-    Keep the lines where people who can write to the results cannot; verify --fingerprints compares the study with them.
+    Keep the lines where people who can change the results cannot change them; verify --fingerprints compares the
+    study with them.
     """
     from study_app.store import workstation
     from study_app.store.atomic import write_file
@@ -379,7 +386,7 @@ def replay(session: Path) -> None:
         click.echo("the session kept no recordings")
     verdict = "forces differ" if replayed.differences else "all compared forces are equal"
     if not replayed.seconds:
-        verdict = "no force was compared, so the result is not proved"
+        verdict = "no force was compared, so the result is not confirmed"
     if replayed.recordings:
         pace = replayed.lasted_s / replayed.computed_s if replayed.computed_s else 0.0
         many, ran = ("1 recording", "it") if replayed.recordings == 1 else (f"{replayed.recordings} recordings", "they")

@@ -28,7 +28,7 @@ def demo(context: click.Context, *, no_window: bool) -> None:
     """Run the demo study with two simulated participants on an emulated Falcon, report it, and show the results.
 
     Uses the session runner, the servo, and the Falcon's own driver on an emulated device. Needs no display; if there is
-    one, the program opens on the results. Called again, it finishes what was interrupted and changes nothing else.
+    one, the program opens on the results. If it was interrupted, run it again to finish.
     """
     from study_app.workspace import workspace
 
@@ -93,7 +93,7 @@ def _unblind(study: Path) -> None:
     for opened in unblind_folder(study, by="demo", reason="every participant is simulated").values():
         for sentence in opened.left:
             click.echo(f"warning: {sentence}", err=True)
-    click.echo("Key opened: the tables name the conditions")
+    click.echo("Key opened: the tables contain the conditions")
 
 
 def _write_report(study: Path, to: Path) -> list[str]:
@@ -131,7 +131,7 @@ def _show_results(study: Path) -> int:
 
             click.echo("Opening the program on these results; close its window to end")
             return int(app.run_home_window(then=lambda visit: visit.show_study(study)))
-        reason = f"QT_QPA_PLATFORM={platform} shows no window"
+        reason = f"QT_QPA_PLATFORM={platform} does not show windows"
     except DisplayError as error:
         reason = missing_for_windows() or str(error)
     click.echo(f"The program was not opened: {reason}; open it later with: liquid-study")

@@ -58,9 +58,9 @@ def list_devices() -> None:
 
 @click.command()
 def plugins() -> None:
-    """List the plug-ins of other packages: version, place, what each adds, and what is wrong with it.
+    """List the plug-ins of other packages with version, location, what each adds, and problems.
 
-    Exit code 3 if one cannot be used.
+    Exit code 3 if a device cannot be used.
     """
     from study_app.discovery import UPDATE, plug_ins
 
@@ -165,7 +165,7 @@ def bench(name: str, to: Path | None, device_options: dict[str, str | Path]) -> 
     check_options(name, device_options)
     if descriptor.kind == "seen":
         raise DeviceError(
-            f"device '{name}' has no force to measure: see 'liquid-study devices list' for those that have"
+            f"device '{name}' does not produce force: see 'liquid-study devices list' for devices that do"
         )
     click.echo(_PREPARING)
     from study_app.devices.bench.procedure import ask_simulated_hand, run_bench
@@ -202,10 +202,12 @@ def _save_bench(results: Found, folder: Path, *, simulated: bool) -> None:
         write_file(folder / name, content.encode())
     click.echo(f"\n{text}\nWritten: {folder / 'bench.md'}, {folder / 'bench.json'}")
     if simulated:
-        click.echo("The device is simulated: its measurements are not kept for receipts.")
+        click.echo("The device is simulated: its measurements are not stored for receipts.")
         return
     if not results.fits:
-        click.echo("Nothing was kept for receipts: mass, damping and friction do not explain how the handle moved.")
+        click.echo(
+            "Nothing was stored for receipts, because mass, damping and friction do not explain how the handle moved."
+        )
         exit_if(True)
     report = str((folder / "bench.md").resolve())
     bench = workstation.DeviceBench.model_validate({**workstation_results(results, day), "report": report})
@@ -247,7 +249,7 @@ def _calibration_lines(fit: Calibration, notes: Notes) -> list[str]:
     share = fit.units_per_nm / UNCALIBRATED_UNITS_PER_NM
     lines += [
         "",
-        f"{fit.units_per_nm:.0f} motor units per newton metre, {share:.2f} times those of one without calibration",
+        f"{fit.units_per_nm:.0f} motor units per newton metre, {share:.2f} times the default without calibration",
         f"arms' offset {degrees(fit.arm_offset_rad):+.2f} degrees; the grip's own weight {fit.own_weight_n:.2f} N",
         f"unexplained {fit.residual_n:.3f} N RMS, mostly friction",
     ]
@@ -314,7 +316,9 @@ def _ask_emulator(emulator: Emulator, weight_n: float) -> Ask:
     type=click.Choice((OFF, "single-blind", "always")),
     help="Samples over LSL; single-blind: not in double-blind studies.",
 )
-@click.option("--triggers", metavar="PORT", help="Trigger codes on a port, such as serial:/dev/ttyUSB0; off: none.")
+@click.option(
+    "--triggers", metavar="PORT", help=("Trigger codes on a port, such as serial:/dev/ttyUSB0; off sends none.")
+)
 def outlets(markers: str | None, samples: str | None, triggers: str | None) -> None:
     """Print what sessions on this machine send to other programs; with options, change it."""
     from study_app.errors import OutletError

@@ -77,8 +77,10 @@ REAL = "physical2"
     "--liquids",
     "every",
     is_flag=True,
-    help="Compare the liquids of FILE (default: physical2) instead, each with its own model: error of the force, up to "
-    "which speed, and computation time of a tick.",
+    help=(
+        "Compare the liquids of FILE (default: physical2) instead, each with its own model: error of the force, "
+        "speed range, and computation time of a tick."
+    ),
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for table and figure; default: print.")
 def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, *, every: bool) -> None:
@@ -116,7 +118,7 @@ def _print_survey(file: str | None, to: Path | None) -> None:
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
         errors = survey(load_scenes(file or REAL), show)
     if not errors:
-        raise click.UsageError(f"{file}: no liquid has a viscosity, so there is no physical reference to compare with")
+        raise click.UsageError(f"{file}: none of the liquids has a viscosity, so there is no physical reference")
     present_evidence(evidence(errors), to, with_text=False)
 
 
@@ -131,7 +133,7 @@ def _scenes_to_compare(scene: str | None, liquid: str | None) -> tuple[Scene | N
         if liquid in thesis or liquid in real:
             return thesis.get(liquid or ""), real.get(liquid or ""), ()
         known = ", ".join(dict.fromkeys([*thesis, *real]))
-        raise click.UsageError(f"--liquid {liquid}: there are {known}; or give FILE, which has it")
+        raise click.UsageError(f"--liquid {liquid}: there are {known}; or give the FILE that contains it")
     if liquid is None:
         scenes = load_scenes(scene)
         if len(scenes) > 1:
@@ -139,9 +141,9 @@ def _scenes_to_compare(scene: str | None, liquid: str | None) -> tuple[Scene | N
         liquid = next(iter(scenes))
     chosen = load_scene(scene, liquid)
     if chosen.liquids[0].viscosity_pa_s is None:
-        return chosen, None, (f"{liquid} has no viscosity, so there is no physical reference to compare with",)
+        return chosen, None, (f"{liquid} does not state a viscosity, so there is no physical reference",)
     if chosen.liquids[0].drag.law == "linear":
-        return chosen, None, (f"{liquid} is a linear damper, so there is no physical reference to compare with",)
+        return chosen, None, (f"{liquid} is a linear damper, so there is no physical reference",)
     return chosen, chosen, ()
 
 
@@ -165,14 +167,18 @@ def motion_along(path: str, scene: Scene) -> Motion:
 @click.option(
     "--solve",
     is_flag=True,
-    help="Solve the flow again instead of using the stored tables: 20 minutes on one core, an hour on a busy one; "
-    "needs the extra cfd (NGSolve, 350 MB).",
+    help=(
+        "Solve the flow again instead of using the stored tables (20 minutes on one core, an hour on a busy core); "
+        "needs the extra cfd (NGSolve, 350 MB)."
+    ),
 )
 @click.option(
     "--refit",
     is_flag=True,
-    help="Fit the constants of unsteady drag to the stored motions, and print the error for each motion, with and "
-    "without this motion in the fit; takes about two minutes.",
+    help=(
+        "Fit the constants of unsteady drag to the stored motions, and print the error of each motion, fitted and "
+        "not fitted; takes about two minutes."
+    ),
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figure; default: print.")
 @click.option(
@@ -183,12 +189,14 @@ def motion_along(path: str, scene: Scene) -> Motion:
 @click.option(
     "--score",
     is_flag=True,
-    help="Score the models by the benchmark that other engines can enter: error, time, energy given, delay borne; "
-    "takes about five minutes.",
+    help=(
+        "Score the models by the benchmark for other engines (error, time, energy given, tolerated delay); takes "
+        "about five minutes."
+    ),
 )
 @takes_workers
 def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, materials: bool, score: bool) -> None:
-    """Fit models of honey and glycerin to the force of a fluid solver; report the remaining error.
+    """Fit models of honey and glycerin to the force of a fluid solver, and report the remaining error.
 
     A ball of 68 mm starts, moves at constant speed and stops abruptly, at 0.2 and 0.6 m/s. Fitting takes about a
     minute. Further motions, such as oscillations and a reversal, are used by --refit.
@@ -241,8 +249,10 @@ def _print_material_errors(to: Path | None, workers: Workers, *, solve: bool) ->
 @click.option(
     "--table", type=click.Path(path_type=Path), metavar="FILE", help="Only measure the table of slope limits."
 )
-@click.option("--withheld", is_flag=True, help="Only print the share of each liquid's force that safety withholds.")
-@click.option("--delivered", is_flag=True, help="Only print the error of each liquid's force in the hand.")
+@click.option(
+    "--withheld", is_flag=True, help=("Only print the proportion of each liquid's force that safety holds back.")
+)
+@click.option("--delivered", is_flag=True, help="Only print the error of each liquid's force at the hand.")
 @click.option(
     "--velocity",
     is_flag=True,
@@ -252,7 +262,7 @@ def _print_material_errors(to: Path | None, workers: Workers, *, solve: bool) ->
     "--delayed",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Only measure how much of a delayed force is sent.",
+    help="Only measure the proportion of a delayed force that is sent.",
 )
 @click.option("--seed", default="stability", show_default=True, help="Seed of the cases.")
 @click.option("--cases", type=click.IntRange(1), metavar="N", help="Only simulate N cases of each group.")
@@ -316,7 +326,7 @@ def stability(
     chosen = groups(seed, cases) if only is None else tuple(it for it in groups(seed, cases) if only in it.name)
     if not chosen:
         names = ", ".join(group.name for group in groups(seed, cases))
-        raise StudyError(f"no group has {only!r} in its name: there are {names}")
+        raise StudyError(f"none of the groups has {only!r} in its name; known groups: {names}")
     with progress() as show, executor_for(workers) as executor:
         swept = stability_report.run_sweep(
             some(sweep(seed), cases) if only is None else (),
@@ -332,7 +342,7 @@ def stability(
         click.echo()
         echo_files(shown.write(to))
     if swept.unstable:
-        click.echo("\nunstable with safety on; repeat one with --case:", err=True)
+        click.echo("\nunstable with safety on; repeat a case with --case:", err=True)
         click.echo("\n".join(str(verdict.case) for verdict in swept.unstable), err=True)
     exit_if(swept.unstable)
 
@@ -355,7 +365,12 @@ LOAD = click.Choice(("none", "gui", "gui+cpu"))
 
 @click.command()
 @click.option(
-    "--seconds", type=float, default=10.0, show_default=True, metavar="S", help="Time for each loop, or for each delay."
+    "--seconds",
+    type=float,
+    default=10.0,
+    show_default=True,
+    metavar="S",
+    help=("Duration for each loop, or for each delay."),
 )
 @click.option(
     "--load", type=LOAD, default="none", show_default=True, help="Also paint both windows; also keep all cores busy."
@@ -389,17 +404,17 @@ def timing(
     They alternate every quarter second, in each priority class that the system grants. Ctrl+C ends the command.
 
     With --delays a session presents the delays of rek2024 on screens of 60 and 144 Hz, with and without load, and
-    the error of every frame's delay is computed from its recordings. No display is needed.
+    computes the error of every frame's delay from its recordings. It does not need a display.
 
-    With --devices the servo runs alternately on each emulated device and on the scripted hand. Ends with exit code 3
-    if the 99th percentile of the lateness on one of them is above 1.5 times that on the scripted hand, with its whole
-    95 % interval.
+    With --devices the servo runs alternately on each emulated device and on the scripted hand. Ends with exit code 3 if
+    the 99th percentile of the lateness on one of them is more than 1.5 times the value on the scripted hand, with its
+    whole 95 % interval.
 
     With --lsl another process receives samples at 1 kHz and markers for the given time; then the servo runs with and
     without both streams, alternately, for up to 300 s each. Ends with exit code 3 if something is lost, a marker's
     time differs from the servo's clock by more than 1 ms, or the median lateness grows by more than 10 %.
 
-    With --triggers a byte is sent to a port for each event, and its delay is measured.
+    With --triggers the command sends a byte to a port for each event, and measures its delay.
     """
     from study_app.evidence.computer import under_load
     from study_app.evidence.table import check_seconds
@@ -490,7 +505,7 @@ def ending_by_signal() -> Iterator[tuple[threading.Event, list[int]]]:
 @click.command()
 @click.argument("protocol", metavar="[FILE]", default="rek2024")
 @click.option("--hours", type=float, required=True, metavar="H", help="Duration in hours; 0.01 is 36 seconds.")
-@click.option("--virtual", is_flag=True, help="In virtual time: a day takes minutes.")
+@click.option("--virtual", is_flag=True, help="Run in virtual time, in which a day takes minutes.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the faults.")
 @click.option(
     "--load", type=LOAD, default="none", help="Also paint both windows of a session; also keep all cores busy."
@@ -500,7 +515,7 @@ def ending_by_signal() -> Iterator[tuple[threading.Event, list[int]]]:
 def soak(
     context: click.Context, hours: float, protocol: str, seed: int, load: LoadName, to: Path | None, *, virtual: bool
 ) -> None:
-    """Run the servo for hours with a moving hand and every fault; report drift, leaks and failures.
+    """Run the servo for hours with a moving hand and every fault, and report drift, leaks and failures.
 
     FILE defines the liquids; default: rek2024. Ctrl+C ends it with the report so far.
     """
@@ -541,13 +556,13 @@ SAID_EVERY_S: Final = 20.0
 def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) -> None:
     """Measure how often the report's verdicts are wrong, on studies simulated with no, some or all effects.
 
-    Studies of rek2024 with 5, 12 and 24 participants, by the rehearsals' answer model and by an ordinal probit model
-    with random effects, are analysed by the report's own tests. Every rate is printed with its Wilson interval, and
+    The report's own tests analyse studies of rek2024 with 5, 12 and 24 participants, simulated by the rehearsals'
+    answer model and by an ordinal probit model with random effects. Every rate is printed with its Wilson interval, and
     whether it meets its limit: "at most 5 %" is met if the interval ends below 7.5 %, and exceeded if an interval that
     allows for the number of rates lies above 5 %. Hypotheses, recognition, equivalence with a minority and skewed
-    trends are tested on numbers that are drawn directly. A cell with an undecided rate is continued with further
-    studies, up to four times as many. Ctrl+C ends the command with the results so far. Ends with exit code 3 if a rate
-    exceeds its limit, otherwise with 4 if there are too few studies to decide about a rate.
+    trends are tested on numbers drawn directly. If a rate is undecided, its cell gets more studies, up to four times as
+    many. Ctrl+C ends the command with the results so far. Ends with exit code 3 if a rate exceeds its limit, otherwise
+    with 4 if there are too few studies to decide about a rate.
     """
     from study_app.analysis.planning.simulated_studies import plan
     from study_app.evidence.report_rates.simulation import Rate, evidence, validate
@@ -590,7 +605,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     type=click.IntRange(10, 1_000_000),
     default=200,
     show_default=True,
-    help="Studies of 20 participants, of each protocol and seed.",
+    help="Number of studies of 20 participants, for each protocol and seed.",
 )
 @click.option(
     "--seed",
@@ -599,17 +614,17 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     multiple=True,
     default=(1,),
     show_default=True,
-    help="Seed of the simulation; may be given several times: studies of all seeds are judged together.",
+    help="Seed of the simulation; repeatable; studies of all seeds are evaluated together.",
 )
 @takes_workers
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for thresholds.md and thresholds.csv.")
 def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], workers: Workers, to: Path | None) -> None:
     """Recover the known thresholds of simulated observers, with methods and analysis alone and with the whole program.
 
-    For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay) many studies of 20
-    observers, who differ by a factor of 1.2, are simulated and analysed; in magnitude estimation the exponent is known.
-    Then three participants are rehearsed with servo, files, unblinding and analysis. Every value is printed with its
-    limit. Ends with exit code 3 if a value exceeds its limit.
+    For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay) the command simulates and
+    analyses many studies of 20 observers whose thresholds differ by a factor of 1.2; in magnitude estimation the
+    exponent is known. Then it rehearses three participants with servo, files, unblinding and analysis. Every value is
+    printed with its limit. Ends with exit code 3 if a value exceeds its limit.
     """
     from study_app.evidence.thresholds.known_values import NAMES, evidence, known_value
     from study_app.evidence.thresholds.known_values import validate as validate_values
@@ -634,7 +649,7 @@ def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], worke
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the simulation.")
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for the table and the figure.")
 def delay_thresholds(people: int, seed: int, to: Path | None) -> None:
-    """Compare the delay that simulated people rate as different (rek2024) with the one they detect (delaydetect).
+    """Compare delays that simulated people rate as different (rek2024) with delays that they detect (delaydetect).
 
     The forced choice does not depend on a person's criterion; the rating does.
     """

@@ -13,7 +13,7 @@ from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, MOST_DELAY
 if TYPE_CHECKING:
     from study_app.haptics.model.scene import Scene
 
-LIQUID = click.option("--liquid", required=True, metavar="NAME", help="Id of the liquid in that file.")
+LIQUID = click.option("--liquid", required=True, metavar="NAME", help="ID of the liquid in that file.")
 INITIAL = click.option(
     "--set", "changes", multiple=True, metavar="NAME=VALUE", help="Initial value, or a fixed parameter."
 )
@@ -65,7 +65,7 @@ def _parse_changes(changes: tuple[str, ...]) -> dict[str, str]:
     default=ASSUMED_TICKS,
     show_default=True,
     metavar="TICKS",
-    help="The device's delay, for the expected error.",
+    help="The device's delay, used for the expected error.",
 )
 def scene(scene: str, liquid: str | None, delay: int) -> None:
     """Print the effects that a scene needs and why, the measured cost of each, and the expected force error."""
@@ -112,8 +112,8 @@ def identify(
     """Fit a liquid's parameters to measured motion and force, or to a flow curve, with intervals and warnings.
 
     CSV has columns t_s, x_m, y_m, z_m, fx_n, fy_n, fz_n (scene frame; the liquid's force on the ball), and vx_mps,
-    vy_mps, vz_mps where they are known; or t_s, velocity_mps, force_n for a motion along one line; or, from a
-    rheometer, shear_rate_per_s, shear_stress_pa.
+    vy_mps, vz_mps if they are known; or t_s, velocity_mps, force_n for a motion along one line; or, from a rheometer,
+    shear_rate_per_s, shear_stress_pa.
     """
     from study_app.lab.identify import measured_force as measurements
     from study_app.lab.identify import preset as identified

@@ -116,7 +116,7 @@ class Target(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the path."""
         if not str(value):
-            self.fail("is empty: name a file or folder (. is the current folder)", param, ctx)
+            self.fail("is empty: give a file or folder (. is the current folder)", param, ctx)
         return super().convert(value, param, ctx)
 
 
@@ -129,7 +129,7 @@ def exclude_each_other(**given: object) -> None:
     """Raise a usage error if more than one of these options is given (neither None nor False)."""
     names = [f"--{name}" for name, value in given.items() if value is not None and value is not False]
     if len(names) > 1:
-        raise click.UsageError(f"{' and '.join(names)} exclude each other: give one of them")
+        raise click.UsageError(f"{' and '.join(names)} cannot be combined: give one of them")
 
 
 def takes_study(function: Command) -> Command:
@@ -161,7 +161,7 @@ def study_at(named: str | None, results: Path | None) -> Path:
     from study_app.workspace import workspace
 
     if (named is None) == (results is None):
-        raise click.UsageError("name one study: RESULTS, or --results DIR (liquid-study studies lists them)")
+        raise click.UsageError("give one study: RESULTS, or --results DIR (liquid-study studies lists them)")
     if results is not None:
         return results
     path = Path(str(named))
@@ -263,7 +263,7 @@ def takes_workers(function: Command) -> Command:
         default=-1,
         metavar="N",
         callback=_check_worker_count,
-        help="Worker processes on this computer; default: one per core.",
+        help="Number of worker processes on this computer; default: one per core.",
     )
     @click.option(
         "--cluster",
@@ -276,7 +276,7 @@ def takes_workers(function: Command) -> Command:
     def run(*arguments: Any, count: int, cluster: str | None, **options: Any) -> Any:
         of_count, of_cluster = (click.get_current_context().get_parameter_source(it) for it in ("count", "cluster"))
         if of_count == of_cluster == ParameterSource.COMMANDLINE:
-            raise click.UsageError("--workers and --cluster exclude each other: a cluster has its own workers")
+            raise click.UsageError("--workers and --cluster cannot be combined: a cluster has its own workers")
         here = cluster is None or of_count == ParameterSource.COMMANDLINE
         workers = Workers(None if count < 0 else count) if here else Workers(cluster=cluster)
         return function(*arguments, workers=workers, **options)
@@ -295,7 +295,9 @@ def executor_for(workers: Workers) -> "Iterator[Executor]":
     """Open the executor of a command; report a cluster without workers."""
     with open_executor(workers) as executor:
         if not getattr(executor, "has_workers", True):
-            click.echo(f"{workers.cluster} has no worker yet: the computation begins when one joins", err=True)
+            click.echo(
+                (f"{workers.cluster} does not have a worker yet: the computation starts when a worker joins"), err=True
+            )
         yield executor
 
 

@@ -62,13 +62,13 @@ def _parse_numbers(value: str, least: int, most: int, what: str) -> tuple[int, .
         () if value is None else _parse_numbers(value, *TRIALS, "numbers of trials")
     ),
     metavar="N,N,…",
-    help="Trials of each standard, comparison or rated level, for studies of thresholds, d′, ratings or magnitude "
-    "estimation; default: the protocol's.",
+    help="Number of trials per standard, comparison or rated level, for studies of thresholds, d′, ratings or "
+    "magnitude estimation; default: the protocol's.",
 )
 @click.option(
     "--studies",
     type=click.IntRange(1, 1_000_000),
-    help=f"Simulated studies for each size; default: {STUDIES}, for thresholds {THRESHOLD_STUDIES}.",
+    help=f"Number of simulated studies for each size; default: {STUDIES}, for thresholds {THRESHOLD_STUDIES}.",
 )
 @takes_workers
 @click.option("--engine", type=click.Choice(["processes", "dask"]), hidden=True)
@@ -86,12 +86,12 @@ def power(
 ) -> None:
     """Estimate the power of the protocol's own tests on simulated studies, and the smallest detectable difference.
 
-    Four sessions are rehearsed to obtain the features of each condition; then thousands of participants answer with
-    the rehearsals' answer model, which is plausible but not measured. Power is printed for typical people, or those of
-    [simulated_participants], and as a range over consistent, typical and noisy people. For a study of thresholds, d′,
-    ratings or magnitude estimation the command prints the standard deviation of one participant, half the group's 95 %
-    interval, and how many studies reach analysis.precision, for each number of participants and of --trials. Ctrl+C
-    ends the command with the results so far.
+    Four sessions are rehearsed to obtain the features of each condition; then thousands of participants answer with the
+    rehearsals' answer model, which is plausible but not measured. Power is printed for typical people, or for the
+    values in [simulated_participants], with the range over consistent, typical and noisy people. For a study of
+    thresholds, d′, ratings or magnitude estimation the command prints, for each number of participants and of --trials,
+    the standard deviation of one participant's estimate, the half width of the group's 95 % interval, and the
+    proportion of studies that reach analysis.precision. Ctrl+C ends the command with the results so far.
     """
     if engine == "processes":
         workers = Workers(workers.count)
@@ -106,7 +106,8 @@ def power(
     planned = plans(study, trials)
     if trials and not planned:
         raise click.UsageError(
-            f"--trials: {study.study.name} has no main block of thresholds, d′, ratings or magnitude estimation"
+            f"--trials: {study.study.name} does not have a main block of thresholds, d′, ratings or magnitude "
+            f"estimation"
         )
     if to is not None:
         make_folder(to, waits=False)
@@ -192,7 +193,7 @@ def _write_estimate(estimate: Powers | Precisions, to: Path | None) -> None:
 def preregister(protocol: str, computed: Path | None, to: Path | None) -> None:
     """Write a preregistration from the protocol: hypotheses, design, participants, exclusions, analysis, and its hash.
 
-    In the study's folder (results/<study>) the report compares the study with it and lists every deviation.
+    If it is in the study's folder (results/<study>), the report compares the study with it and lists every deviation.
     """
     from study_app.analysis.planning.preregistration import FILE as NAME
     from study_app.analysis.planning.preregistration import preregistration
@@ -210,7 +211,9 @@ def preregister(protocol: str, computed: Path | None, to: Path | None) -> None:
                 f"--power {computed}: power.md cannot be read ({error.strerror}): give a folder that power --to wrote"
             ) from error
         if f"({study.study.name} {study.study.version})" not in power_md:
-            raise click.UsageError(f"--power {computed}: power.md is not of {study.study.name} {study.study.version}")
+            raise click.UsageError(
+                f"--power {computed}: power.md does not belong to {study.study.name} {study.study.version}"
+            )
     text = preregistration(study, protocol_hash(source), power_md)
     if to is None:
         click.echo(text, nl=False)

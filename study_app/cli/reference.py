@@ -66,7 +66,7 @@ def delayed_force_markdown() -> str:
             ("liquid", *(f"{delay:g} ms" for delay in delays)),
             shares,
         ),
-        ("Longest delay [ms] at which at most 5 % is withheld", ("liquid", *map(", ".join, LOOPS)), longest),
+        ("Longest delay [ms] at which at most 5 % is held back", ("liquid", *map(", ".join, LOOPS)), longest),
     )
     return "\n".join(line for heading, columns, rows in tables for line in _table_lines(heading, columns, rows))
 

@@ -36,17 +36,17 @@ OPERATOR = click.option("--operator", default="", metavar="INITIALS", help="Name
     is_flag=False,
     flag_value="protocol",
     type=click.Choice(["protocol", "journal"]),
-    help="Print the JSON Schema of protocol files instead, or that of a line of a session's journal.",
+    help="Print the JSON Schema of protocol files, or of a line of a session's journal, instead.",
 )
 @click.option(
     "--delay-ticks",
     type=click.IntRange(1, MOST_DELAY),
     default=ASSUMED_TICKS,
     show_default=True,
-    help="Delay of the device's forces [ticks] for which levels are checked; the pre-flight uses the measured delay.",
+    help="Delay of the device's force [ticks] for checking levels; the pre-flight uses the measured delay.",
 )
 def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None:
-    """Describe the study or the scenes, or list every problem of the file with line and hint."""
+    """Describe the study or the scenes, or list every problem of the file with its line and a hint."""
     from study_app.protocol import describe, load
 
     if schema:
@@ -154,7 +154,7 @@ def design(protocol: str, participants: int, first: str, seed: int) -> None:
 @WINDOWED
 @SCREEN
 @click.option("--pilot", is_flag=True, help="Pilot session: in a marked window, stored in results/<study>-pilot.")
-@click.option("--no-recordings", is_flag=True, help="Store answers and trial rows only, not every sample and frame.")
+@click.option("--no-recordings", is_flag=True, help="Store only answers and trial rows, not every sample and frame.")
 @RESULTS
 def run(protocol: str, *, no_recordings: bool, results: Path | None, **chosen: Any) -> None:
     """Run a session with a participant, without dialogs."""
@@ -175,17 +175,19 @@ def run(protocol: str, *, no_recordings: bool, results: Path | None, **chosen: A
 @click.option(
     "--device", cls=DeviceName, only_moving=True, default="scripted", show_default=True, help="Simulated device."
 )
-@click.option("--no-recordings", is_flag=True, help="Store answers and trial rows only, not every sample and frame.")
+@click.option("--no-recordings", is_flag=True, help="Store only answers and trial rows, not every sample and frame.")
 @click.option(
     "--answers-only",
     is_flag=True,
     help=(
-        "Simulate thousands of participants in seconds, to try an analysis: four sessions are rehearsed without "
-        "being stored, then every participant answers from the features of one of them. Nothing is measured, so "
-        "the columns of measurements are n/a. Sessions are written without waiting for the disk."
+        "Simulate thousands of participants in seconds, to try an analysis. Four sessions are rehearsed without "
+        "being stored; then every participant answers from the features of one of them. The columns of measurements "
+        "are n/a. Sessions are written without waiting for the disk."
     ),
 )
-@click.option("--group", metavar="GROUP", help="Pre-existing group of them all; default: dealt evenly to all groups.")
+@click.option(
+    "--group", metavar="GROUP", help=("Pre-existing group of all participants; default: spread evenly over the groups.")
+)
 @click.option(
     "--results",
     type=Target(),
@@ -203,7 +205,7 @@ def rehearse(
         keep_offered_workspace()
     study = load(protocol)
     if study.asks_group and chosen["group"] is None:
-        click.echo(f"Simulated participants are dealt evenly to the pre-existing groups {', '.join(study.groups)}.")
+        click.echo(f"Simulated participants are spread evenly over the pre-existing groups {', '.join(study.groups)}.")
     if answers_only:
         if context.get_parameter_source("device") is not ParameterSource.DEFAULT:
             raise click.UsageError("--answers-only uses no device: omit --device")
@@ -220,12 +222,12 @@ def rehearse(
 @click.command(cls=TakesDeviceOptions)
 @takes_session
 @click.option("--protocol", metavar="FILE", help="Protocol of the session; default: found among the known protocols.")
-@click.option("--device", cls=DeviceName, help="Device; default: that of the interrupted session.")
+@click.option("--device", cls=DeviceName, help="Device; default: the device of the interrupted session.")
 @OPERATOR
 @WINDOWED
 @SCREEN
 def resume(session: Path, **chosen: Any) -> None:
-    """Resume an interrupted session: same order and seed, at the interrupted trial."""
+    """Resume an interrupted session at the interrupted trial, with the same order and seed."""
     from study_app import app
 
     click.get_current_context().exit(app.resume(session, progress=click.echo, **chosen))
@@ -234,7 +236,7 @@ def resume(session: Path, **chosen: Any) -> None:
 @click.command()
 @click.argument("folder", metavar="[DIR]", required=False, type=Target())
 def workspace(folder: Path | None) -> None:
-    """Print the workspace, the folder of protocols and results of this machine; with DIR, change it."""
+    """Print this machine's workspace, the folder of protocols and results; with DIR, change it."""
     from study_app.store.workstation import keep_workspace
     from study_app.workspace import WORKSPACE_VARIABLE, Workspace, chosen_workspace
     from study_app.workspace import workspace as workspace_here
@@ -243,7 +245,7 @@ def workspace(folder: Path | None) -> None:
         keep_workspace(Workspace(folder.absolute()))
     here = workspace_here()
     if folder is not None and here.folder.absolute() != folder.absolute():
-        click.echo(f"{WORKSPACE_VARIABLE} names another workspace for this run", err=True)
+        click.echo(f"{WORKSPACE_VARIABLE} sets another workspace for this run", err=True)
     click.echo(here.folder.absolute() if chosen_workspace() else f"{here.folder} (not chosen yet)")
 
 
@@ -293,7 +295,7 @@ def sessions(named: str | None, results: Path | None) -> None:
     folders = list(_study_folders(at)) if named is None and results is None else [study_at(named, results)]
     for folder in folders:
         if not folder.is_dir():
-            raise StoreError(f"{folder} is not a folder: name one that liquid-study studies lists, or its path")
+            raise StoreError(f"{folder} is not a folder: give a study that liquid-study studies lists, or its path")
         left_out = {row.what for row in all_exclusions(folder)}
         inside = folder.parent.resolve() == at.resolve()
         for row in participants_of(folder):
@@ -336,7 +338,7 @@ def docs(search_words: tuple[str, ...]) -> None:
         return
     sections = documentation.search(typed)[:SECTIONS_SHOWN]
     if not sections:
-        raise click.UsageError(f"no page has a word of {typed!r}: liquid-study docs lists the pages")
+        raise click.UsageError(f"none of the pages contains a word of {typed!r}: liquid-study docs lists the pages")
     best, *others = sections
     click.echo(f"{best.page}: {best.heading}\n\n{best.source.strip()}\n")
     for section in others:

@@ -206,7 +206,7 @@ class DesignerController(QObject):
         numbers = number_rows(opened.study.document, path)
         if not numbers or opened.read_only:
             why = opened.read_only or "This element has no numeric field."
-            self.place.message.emit("There can be no series of this element", why)
+            self.place.message.emit("A series of this element is not possible", why)
             return
         self.editing.select(path)
         card = SeriesCard(opened.study, path, numbers)

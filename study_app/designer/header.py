@@ -136,7 +136,7 @@ class PlayDevices:
 
 def device_question(title: str, step: str, *, has_force: bool) -> Notice:
     """Return the question before a device other than the simulated hand is used."""
-    force = "The force fades in when a trial begins; hold" if has_force else "It has no force. Hold"
+    force = "The force fades in when a trial begins; hold" if has_force else "This device has no force. Hold"
     question = f"Play from {step}, with the device {title}? {force} Esc to stop."
     return Notice(question, (("play", "Play"), ("close", "Cancel")), "warn", "device")
 
@@ -157,12 +157,12 @@ def playing_notice(step: str, title: str) -> Notice:
 
 def ended_notice(step: str, how: str) -> Notice:
     """Return the question whether the data of a played pilot are kept."""
-    return Notice(f"Played from {step}: {how}. Its data are deleted unless you keep them.", KEEP, "neutral", "flag")
+    return Notice(f"Played from {step}: {how}. Its data are deleted unless you save them.", KEEP, "neutral", "flag")
 
 
 def kept_notice(folder: str) -> Notice:
     """Return the notice with the folder of a kept pilot."""
-    return Notice(f"Kept as a pilot in {folder}.", (("close", "Close"),), "ok", "check")
+    return Notice(f"Saved as a pilot in {folder}.", (("close", "Close"),), "ok", "check")
 
 
 PLAY, PLAY_NARROW = "Play from here", "Play"

@@ -41,7 +41,7 @@ IDLE_MS: Final = 20
 REST_MS: Final = 800
 LOOK_MS: Final = 100
 MOST_PARTICIPANTS: Final = 500
-FAILED: Final = "the process of the simulations does not start"
+FAILED: Final = "the simulation process does not start"
 
 
 class MeasuresController(QObject):

@@ -115,7 +115,7 @@ COPY: Final = "copy"
 TEMPLATES: Final[Mapping[str, tuple[str, str]]] = {
     "compare-liquids": (
         "Compare liquids",
-        "Do people tell liquids apart, and what do they call them? Statements after each one.",
+        "Can people tell liquids apart, and what do they call them? Statements after each liquid.",
     ),
     "viscosity-jnd": (
         "Viscosity JND",
@@ -123,14 +123,14 @@ TEMPLATES: Final[Mapping[str, tuple[str, str]]] = {
     ),
     "delay-detection": (
         "Delay detection",
-        "From how many milliseconds on is a late picture noticed? Two intervals, adaptive levels.",
+        "What is the shortest picture delay that people notice? Two intervals, adaptive levels.",
     ),
     "rate-realism": (
         "Rate realism",
         "How real does a liquid feel? A slider after each of four liquids, three times each.",
     ),
     "questionnaire-only": ("Questionnaire only", "Questions of every kind before, during and after a single trial."),
-    "empty": ("Empty study", "One liquid, one block, a welcome and thanks: it runs as it is."),
+    "empty": ("Empty study", "One liquid, one block, welcome and thanks; ready to run."),
 }
 """Title and question of each template, in the order in which they are shown."""
 
@@ -599,7 +599,9 @@ class Questions(Themed, QWidget):
         chosen = [code for code, check in self.languages.items() if check.isChecked()]
         without = bool(languages and chosen) and set(languages).isdisjoint(chosen)
         if without:
-            self.first_texts.setText(f"The texts begin in {dict(languages_offered())[languages[0]]}: translate them.")
+            self.first_texts.setText(
+                f"The texts are still in {dict(languages_offered())[languages[0]]}: translate them."
+            )
         self.first_texts.setVisible(without)
 
     @property
@@ -649,7 +651,7 @@ class NoStudyCard(Card):
         parts = (
             Icon("designer", "accent", 44),
             label("No study is open", "card"),
-            label("Choose a study above, or begin a new one.", "body", "text2"),
+            label("Choose a study above, or start a new one.", "body", "text2"),
             self.new,
         )
         centred = ((part, 0, Qt.AlignmentFlag.AlignHCenter) for part in parts)
@@ -757,7 +759,7 @@ class NewStudyPage(Themed, QWidget):
         self.buttons = []
         for heading, aside, copies, across in (
             ("Templates", "", False, ACROSS),
-            ("Or a copy of a study", "with its comments; the original stays as it is", True, COPIES_ACROSS),
+            ("Or a copy of a study", "including comments; the original does not change", True, COPIES_ACROSS),
         ):
             labels = label(heading, "card"), label(aside, "small", "text2")
             add_layout(column, hbox(*labels, STRETCH, spacing=10, margins=(RING, 0, 0, 0)))

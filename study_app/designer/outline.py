@@ -74,7 +74,7 @@ ICONS: Final = {
 """The icon of each section; a section that is not listed has a ring."""
 PAGES: Final[Mapping[Any, str]] = {"consent": "pen", "break": "pause", "debrief": "flag"}
 """The icon of a page by its kind, where it is not that of every page."""
-SECTIONS: Final = ("Session, in order", "Parts it is made of", "Settings")
+SECTIONS: Final = ("Session, in order", "Elements", "Settings")
 """The headings; above them is the study itself, with its title, description and languages."""
 SESSION, PARTS, SETTINGS = SECTIONS
 QUESTIONNAIRES: Final = "questionnaires"
@@ -337,7 +337,7 @@ class AddList(Themed, QFrame):
             self.list.addItem(item)
         self.list.setCurrentRow(0)
         if not self.list.count():
-            self.help.setText(f"Nothing that can be added here has this name. {command_tip('find')}")
+            self.help.setText(f"No item with this name can be added here. {command_tip('find')}")
 
     def _choose(self) -> None:
         if (item := self.list.currentItem()) is not None:
@@ -668,7 +668,7 @@ class OutlineCard(Coloured, Card):
 
     def _show_whether_found(self, rows: tuple[OutlineRow, ...]) -> None:
         text = self.words.text().strip()
-        sentence = f'Nothing called "{text}" in this study' if text and not rows else ""
+        sentence = f'"{text}" was not found in this study' if text and not rows else ""
         if sentence and sentence != self.nothing.whole:
             announce(self.words, sentence)
         self.nothing.show_text(sentence)

@@ -289,7 +289,7 @@ class ProblemsCard(Card):
         self.next = small_button("", "Next", cap=key_cap("next problem"), height=36)
         self.next.setToolTip(command_tip("next problem"))
         self.close_button = IconButton("cross", "Close the list of problems", size=36, role="plain")
-        titles = self.heading, label("the same as liquid-study check prints", "small", "text2")
+        titles = self.heading, label("the same problems as printed by liquid-study check", "small", "text2")
         top = hbox(*titles, STRETCH, self.limit, self.next, self.close_button, spacing=10)
         self.area = QScrollArea()
         self.area.setWidgetResizable(True)
@@ -347,7 +347,7 @@ class ProblemsCard(Card):
         inside = QWidget()
         self._column = column = vbox(spacing=0, margins=0, parent=inside)
         if rows and not listed:
-            column.addWidget(label(f"None in this element, {len(rows)} in others", "label", "text2"))
+            column.addWidget(label(f"No problems in this element, {len(rows)} in others", "label", "text2"))
         column.addStretch()
         self.lines = []
         for row in listed:

@@ -86,7 +86,7 @@ class DeleteCard(Prompt):
         self.all.clicked.connect(lambda: self.answered.emit(DeleteElement(path, "all")))
         self.gaps = ActionButton("", "Leave the gaps", height=40)
         self.gaps.clicked.connect(lambda: self.answered.emit(DeleteElement(path, "gaps")))
-        self.other = make_dense(Choice(), "Use another one in its place", 40)
+        self.other = make_dense(Choice(), "Use another instead", 40)
         self.other.setPlaceholderText("Use another …")
         self.other.setMinimumWidth(180)
         for name in names(document, str(path[0])) if len(path) == 2 else ():
@@ -121,8 +121,7 @@ class SeriesCard(Prompt):
     def __init__(self, study: Study, path: Path, numbers: Sequence[Row]) -> None:
         title = title_of(study.document, path)
         super().__init__(
-            f"Series of {title}",
-            f"Type a value for each copy of {title}; copies are listed in the blocks that list the original.",
+            f"Series of {title}", f"Type a value for each copy of {title}; the copies join the blocks of the original."
         )
         self.study, self.path, self.numbers = study, path, numbers
         self.number = make_dense(Choice(), "Number that differs")

@@ -138,7 +138,7 @@ class Saving(QObject):
             self._close_notice(opened)
             return
         if action == "discard" and not opened.base:
-            lost = "was never saved: without its draft nothing of this study is left. This cannot be undone."
+            lost = "was never saved: without its draft the whole study is lost. This cannot be undone."
             title = f"Discard “{opened.title or opened.file.stem}”?"
             card = ConfirmCard(title, f"{opened.file.name} {lost}", "Discard the draft", "trash")
             card.answered.connect(self.discard_study)
@@ -263,7 +263,7 @@ class Saving(QObject):
             self._drafting.setInterval(DRAFT_MS)
         if opened.keeper.others > self._others:
             self._others = opened.keeper.others
-            said = "Another window of the program edits this study, too: its unsaved edits are kept as a version"
+            said = "Another window of the program also edits this study; its unsaved edits are kept as a version"
             self._show_notice(said, ("compare", "Compare"))
             self._show_banner(opened)
         if written:
@@ -293,7 +293,7 @@ def _banner_notice(opened: Document) -> Notice | None:
         return None
     if not opened.file.exists():
         return Notice("Another program deleted or moved this file", (("keep", "Keep mine"),))
-    too = ", and it was edited here, too" if opened.edited else ""
+    too = ", and it was also edited here" if opened.edited else ""
     return Notice(
         f"Another program changed this file{too}",
         (("keep", "Keep mine"), ("take", "Take the file's"), ("compare", "Compare")),

@@ -104,7 +104,7 @@ def _read_runs(results: Path, study: str, file: Path) -> tuple[str, tuple[Run, .
     return study, known, recorded_items(known)
 
 
-NOTHING = "There is no version to compare with: no session was run, and nothing was saved before."
+NOTHING = "There is no version to compare with, because the study has not been run or saved before."
 LETTERS_PX = 12
 
 
@@ -147,15 +147,15 @@ class SaveCard(Prompt):
         sessions = "; ".join(f"{run_counts(run)} with version {run.version}" for run in known if run.sessions)
         super().__init__(
             "Save another version",
-            f"This study was run: {sessions}. A version that was run is never overwritten: the study is saved under "
-            "another number.",
+            f"This study was run: {sessions}. A version that was run is never overwritten, so the study is "
+            "saved under another number.",
         )
         self.difference = DifferenceText()
         self.difference.show_lines(difference.lines)
         self.column.addWidget(self.difference, 1)
         self.difference.setVisible(bool(difference.lines))
         are = "it is" if problems == 1 else "they are"
-        wrong = f"{counted(problems, 'problem')}: new sessions are refused until {are} solved." if problems else ""
+        wrong = f"{counted(problems, 'problem')}: correct {are} before you start a new session." if problems else ""
         for icon, ink, text in (("info", "text2", difference.note), ("warning", "warn", wrong)):
             if text:
                 sign = Icon(icon, ink, 18)  # type: ignore[arg-type]  # an ink
@@ -219,10 +219,12 @@ def _field(name: str, text: str, width: int) -> QLineEdit:
 TAB: Final = "changes"
 REST_MS: Final = 200
 NO_COPY: Final = (
-    "No copy of this version is kept on this computer. What differs is taken from a receipt, which does not say what "
-    "the conditions are."
+    "No copy of this version is kept on this computer. The differences come from a receipt, which does not "
+    "contain the conditions."
 )
-FAULTY: Final = "No copy of this version is kept on this computer: solve the problems of the study to list differences."
+FAULTY: Final = (
+    "No copy of this version is kept on this computer: correct the problems of the study to list differences."
+)
 EQUAL: Final = "The study does not differ from this version."
 
 
@@ -296,7 +298,7 @@ class Changes(Card):
         self.version = make_dense(Choice(), "Version to compare with")
         self.version.setMinimumWidth(120)
         self.restore = small_button("undo", "Restore", height=34)
-        self.restore.setToolTip("Give the study the text of this version, as one step")
+        self.restore.setToolTip("Restore the text of this version, in one step")
         self.note = label("", "label", "text2", wraps=True)
         self.difference = DifferenceText()
         self.top = QWidget()
@@ -366,7 +368,7 @@ class Changes(Card):
         with suppress(StoreError):  # an unreadable file is not offered for comparison
             if opened.base and opened.file.exists():
                 if opened.changed_outside():
-                    file = "The file as another program wrote it"
+                    file = "The file written by the other program"
                 elif opened.edited:
                     file = "The file, without the edits"
         now = datetime.now().astimezone()
@@ -394,9 +396,9 @@ class Changes(Card):
 
 
 BREAKS: Final = (
-    "answers before and after are in different columns of the tables",
-    "figures and tests take them as two questions",
-    "an analysis that was decided before and names the old id does not find the new one",
+    "answers before and after the change are in different columns of the tables",
+    "figures and tests treat them as two questions",
+    "a planned analysis that uses the old ID does not find the new ID",
 )
 
 
@@ -423,7 +425,7 @@ class Renaming(QObject):
         if len(path) != 4 or path[2] != "items" or path == self._unlocked:
             return ""
         sessions = self.runs.items.get((str(path[1]), self._item_id(path)), 0)
-        return f"Answers of {counted(sessions, 'session')} are recorded under this id." if sessions else ""
+        return f"Answers of {counted(sessions, 'session')} are recorded under this ID." if sessions else ""
 
     def _recorded_ids(self, element: Place) -> frozenset[str]:
         """Return the ids of a question's questionnaire that have recorded answers."""

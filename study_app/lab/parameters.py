@@ -92,7 +92,9 @@ def parameter(scene: Scene, name: str) -> Parameter:
         for it in section.parameters:
             if it.name == name:
                 return it
-    raise StudyError(f"this liquid has no parameter {name!r} now: select the effect to which it belongs")
+    raise StudyError(
+        f"this liquid currently does not have the parameter {name!r} now: select the effect to which it belongs"
+    )
 
 
 def value_of(scene: Scene, name: str) -> Value:
@@ -132,7 +134,7 @@ def the_liquid(scene: Scene) -> Liquid:
         It has none, or several, or its velocities come from a table.
     """
     if len(scene.liquids) != 1:
-        raise StudyError(f"the lab opens one liquid at a time, not {len(scene.liquids)}: choose one of them")
+        raise StudyError(f"the lab opens one liquid at a time, not {len(scene.liquids)}: choose one")
     if isinstance(scene.velocity, Given):
         raise StudyError('velocity "given" is for motions from a file: choose an estimator such as "ewma"')
     return scene.liquids[0]

@@ -57,7 +57,7 @@ ROOM: Final = 1000
 """Greatest number of waiting markers."""
 HANGS_S: Final = 5.0
 """A sink that takes longer over one marker counts as lost at the next. [choice]"""
-ADVICE: Final = "no more are sent; check the connection, then end and resume the session"
+ADVICE: Final = "sending has stopped; check the connection, then end and resume the session"
 PATIENCE_S: Final = 1.0
 HIGH_S: Final = 0.010
 LOW_S: Final = 0.004

@@ -33,7 +33,7 @@ class Criterion(Table):
     @model_validator(mode="after")
     def _can_be_met(self) -> Self:
         if self.right > self.of:
-            raise invalid(f"{self.right} of {self.of} answers cannot be correct: at most {self.of}", "right")
+            raise invalid(f"{self.right} of {self.of} answers cannot be correct: choose at most {self.of}", "right")
         return self
 
 
@@ -41,10 +41,11 @@ class Catch(Table):
     """Easy trials among the others: a participant who answers many of them incorrectly does not attend to the task."""
 
     share: Annotated[float, within(0.01, 0.5, "a catch trial in 100 to one in 2 others")] = Field(
-        default=0.1, description="Catch trials per other trial of a track: one in every stretch of 1/share trials."
+        default=0.1,
+        description="Number of catch trials per other trial of a track; one occurs at random in every 1/share trials.",
     )
     wrong_most: Annotated[float, within(0, 1, "a share of the catch trials")] = Field(
-        default=0.25, description="Share of incorrect answers to them above which the session is excluded."
+        default=0.25, description="Proportion of incorrect answers to catch trials above which the session is excluded."
     )
 
     def count(self, trials: int) -> int:
@@ -87,65 +88,65 @@ class Block(Table):
         default="main",
         description="main: analysed; practice: kept, not analysed; baseline: kept for comparison, not analysed.",
     )
-    part: int | None = Field(default=None, ge=1, le=20, description="Part of the study that the block belongs to.")
+    part: int | None = Field(default=None, ge=1, le=20, description="Part of the study to which the block belongs.")
     title: Localised = Field(description="Name of the block.")
     setting_label: Localised = Field(description="Neutral name of its trials; a number follows: Liquid setting 1.")
     code_prefix: str | None = Field(default=None, pattern=r"^[A-Z]$", description="Letter of the block's codes.")
-    conditions: tuple[Id, ...] = Field(
-        default=(), description="The conditions that are presented; left out with a stimulus."
-    )
+    conditions: tuple[Id, ...] = Field(default=(), description="The conditions to present; omit them with a stimulus.")
     standard: Id | None = later(
-        default=None, description="The condition that a design compares the block's other conditions with."
+        default=None, description="The reference with which a design compares the block's other conditions."
     )
-    stimulus: Id | None = later(default=None, description="The number that is varied, in place of conditions.")
+    stimulus: Id | None = later(default=None, description="The quantity to vary, instead of conditions.")
     standards: tuple[float, ...] = later(
-        default=(), max_length=8, description="The stimulus' standards that the block presents; left out: all."
+        default=(), max_length=8, description="The stimulus' standards that the block presents; default: all."
     )
     design: Kind | None = later(
-        default=None, description="How a trial is built: a table of [designs], or a kind with all its defaults."
+        default=None, description="How a trial is built: the name of a table in [designs], or a kind with its defaults."
     )
     method: Kind | None = later(
-        default=None, description="How levels are chosen: a table of [methods], or a kind with all its defaults."
+        default=None,
+        description="How levels are chosen: the name of a table in [methods], or a kind with its defaults.",
     )
-    until: Criterion | None = later(default=None, description="When the block ends early; left out: never.")
-    catch: Catch | None = later(default=None, description="Easy trials, and the rule that excludes; left out: none.")
+    until: Criterion | None = later(default=None, description="When the block ends early; default: never.")
+    catch: Catch | None = later(default=None, description="Easy trials, and the rule that excludes; default: none.")
     compares: Compared | None = Field(
         default=None,
-        description="liquids: the conditions of a main block differ in their liquids; delays: in their delays, the "
-        "default where all have one liquid and their delays differ; views: in what is seen, the default where all have "
-        "one liquid and their views differ. Written as views, their delays may differ, too.",
+        description="liquids: the conditions of a main block differ in their liquids; delays: in their delays "
+        "(the default if all have one liquid and different delays); views: in their views (the "
+        "default if all have one liquid and different views). With 'views' their delays may also "
+        "differ.",
     )
     replicates: bool = Field(
         default=False,
-        description="Whether conditions of equal delay are meant, in a block that compares delays: they are analysed "
-        "as replicates of one.",
+        description="In a block that compares delays: whether conditions with equal delay are intended; they "
+        "are analysed as replicates of one condition.",
     )
     order: Order = Field(
         default="fixed",
-        description="fixed: as written; shuffled: anew in each repetition; constrained: all trials together, within "
-        "max_repeats and min_distance; williams, latin: balanced, rows of a Williams design or Latin square, by the "
-        "number in the participant's id.",
+        description="fixed: as written; shuffled: a new order in each repetition; constrained: all trials "
+        "together, subject to max_repeats and min_distance; williams, latin: balanced, rows of a "
+        "Williams design or Latin square, by the number in the participant's ID.",
     )
     max_repeats: int | None = Field(
         default=None,
         ge=1,
         le=100,
-        description="How often in a row a condition may be presented; order constrained only.",
+        description="How many times in a row a condition may be presented; only with order constrained.",
     )
     min_distance: int | None = Field(
         default=None,
         ge=1,
         le=1000,
-        description="Trials from one presentation of a condition to its next: 2 is never twice in a row, 3 leaves two "
-        "others between; order constrained only.",
+        description="Number of trials from one presentation of a condition to the next: 2 means never twice in "
+        "a row, 3 means at least two others in between; only with order constrained.",
     )
     repetitions: int = Field(default=1, ge=1, le=100, description="How often each condition is presented.")
     break_every: int | None = Field(
-        default=None, ge=1, le=10_000, description="Trials between two breaks; left out: no breaks."
+        default=None, ge=1, le=10_000, description="Number of trials between two breaks; default: no breaks."
     )
-    break_page: Id | None = Field(default=None, description="The page shown in a break, of kind break.")
+    break_page: Id | None = Field(default=None, description="The page of kind break shown in a break.")
     task: Id = Field(description="What the participant does.")
-    questionnaire: Id | None = Field(default=None, description="The questionnaire after each trial; left out: none.")
+    questionnaire: Id | None = Field(default=None, description="The questionnaire after each trial; default: none.")
 
     @model_validator(mode="after")
     def _presents_in_one_way(self) -> Self:
@@ -155,9 +156,9 @@ class Block(Table):
             if name in self.model_fields_set:
                 elsewhere = (what, name) == ("a stimulus", "repetitions")
                 instead = "give it in the method's table" if elsewhere else "omit it"
-                raise invalid(f"does not belong to a block with {what}: {instead}", name, kind="surplus")
+                raise invalid(f"cannot be used in a block with {what}: {instead}", name, kind="surplus")
         if what == "conditions" and (self.standard not in self.conditions or len(self.conditions) < 2):
-            raise invalid("must be one of at least two conditions, which the others are compared with", "standard")
+            raise invalid("must be one of at least two conditions: choose the reference", "standard")
         return self
 
     @model_validator(mode="after")
@@ -168,13 +169,13 @@ class Block(Table):
             if self.part is None:
                 raise invalid("a main block needs a part: 1, 2, …", "part")
         elif self.compares is not None:
-            raise invalid(f"a {self.phase} block compares nothing: leave it out", "compares")
+            raise invalid(f"a {self.phase} block does not make a comparison: omit this key", "compares")
         elif self.code_prefix is not None:
-            raise invalid(f"a {self.phase} block is not blinded and has no code_prefix", "code_prefix")
+            raise invalid(f"a {self.phase} block is not blinded: omit code_prefix", "code_prefix")
         elif len(self.conditions) > 1 and self.design is None:
             count = len(self.conditions)
             raise invalid(
-                f"a {self.phase} block has one condition, this one {count}: use one block for each", "conditions"
+                f"a {self.phase} block must have one condition, but has {count}: use a block for each", "conditions"
             )
         return self
 
@@ -184,7 +185,7 @@ class Block(Table):
         if self.order != "constrained":
             if given:
                 raise invalid(
-                    f'belongs to order = "constrained", this is "{self.order}"',
+                    f'requires order = "constrained", but order is "{self.order}"',
                     given[0],
                     'write order = "constrained", or omit the key',
                     ("order", "constrained"),
@@ -194,9 +195,7 @@ class Block(Table):
         if not given:
             raise invalid('"constrained" needs max_repeats, min_distance or both', "order")
         if self.repetitions == 1:
-            raise invalid(
-                'is 1: every condition comes once and none can come again, which order = "shuffled" says', "repetitions"
-            )
+            raise invalid('is 1, so conditions cannot repeat: write order = "shuffled"', "repetitions")
         constraint = Constraint(self.max_repeats, self.min_distance)
         if (impossible := constraint.impossible_key(len(self.conditions), self.repetitions)) is not None:
             key, sentence = impossible
@@ -212,5 +211,5 @@ class Block(Table):
         trials = len(self.conditions) * self.repetitions
         if self.break_every is not None and self.design is None and trials <= self.break_every:
             counted = "1 trial" if trials == 1 else f"{trials} trials"
-            raise invalid(f"is {self.break_every}, and the block has {counted}: no break would come", "break_every")
+            raise invalid(f"is {self.break_every}, but the block has {counted}: there would be no break", "break_every")
         return self

@@ -41,7 +41,7 @@ from study_app.protocol.warnings.study_warnings import warnings
 
 LEVELS = {"weber": "Weber fraction", "difference": "difference", "value": "value"}
 BLINDINGS = {
-    "double": "double-blind: the operator sees no force",
+    "double": "double-blind: the operator does not see the force",
     "single": "single-blind: the operator sees force and wake",
 }
 GROUP_WORDS = {
@@ -63,7 +63,7 @@ def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force
         for name, condition in protocol.conditions.items()
     ]
     warned = [f"  {sentence}" for sentence in warnings(protocol, without_force=without_force)]
-    decided = [("nothing", "there is no table [analysis]: the report will call all it finds exploratory")]
+    decided = [("nothing", "there is no table [analysis]: the report will call all findings exploratory")]
     if protocol.analysis is not None:
         named = [f"{name} by {condition.label}" for name, condition in protocol.conditions.items() if condition.label]
         decided = list(protocol.analysis.described(named))
@@ -81,7 +81,7 @@ def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force
         *(_question_lines(protocol, name, language) for name in protocol.questionnaires),
         _titled("Decided about the analysis", decided),
         *([] if people is None else [_titled("Simulated participants", [("Answers", people.described())])]),
-        _titled("A trial is valid up to", limit_rows(protocol)),
+        _titled("Limits of a valid trial", limit_rows(protocol)),
         *([("Warnings", *warned)] if warned else []),
     )
     return "\n\n".join("\n".join(section) for section in sections)
@@ -223,7 +223,7 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
     if isinstance(method, Adjustment):
         low, high = stimulus.domain
         steps = round((high - low) / method.step(stimulus))
-        yield "Settings", f"{steps} steps from end to end, started near either, at most {method.most_s:g} s each"
+        yield "Settings", f"{steps} steps from end to end, starting near either end, at most {method.most_s:g} s each"
     pairs = product(standards_of(protocol, block), levels)
     compared = [stimulus.comparison(standard, level) for standard, level in pairs]
     unit = quantity(stimulus.vary).unit
@@ -255,13 +255,15 @@ def _order_text(block: Block) -> str:
         return ""
     match block.order:
         case "fixed":
-            return "in the order written: who reads the protocol can tell the codes"
+            return "in the order written: readers of the protocol can identify the codes"
         case "shuffled":
             return "another order for each participant"
         case "constrained":
             most, least = block.max_repeats, block.min_distance
-            kept = [] if most is None else [f"at most {most} of a kind in a row"]
-            kept += [] if least is None else [f"at least {least} trials from one to the next of its kind"]
+            kept = [] if most is None else [f"a condition at most {most} times in a row"]
+            kept += (
+                [] if least is None else [(f"at least {least} trials from one presentation of a condition to the next")]
+            )
             return f"another order for each participant, {' and '.join(kept)}"
         case "williams" | "latin" as square:
             rows = row_count(square, len(block.conditions))
@@ -272,8 +274,11 @@ def _order_text(block: Block) -> str:
 def _assignment_and_break_rows(protocol: Protocol, block: Block, language: str) -> Iterator[tuple[str, str]]:
     """Yield the rows about the assignment of square rows and about breaks."""
     if block.order in ("williams", "latin") and len(block.conditions) > 1:
-        of_id = "assigned by the number in the participant's id (P007 is number 7), not by the seed"
-        yield "Rows", "assigned by the participant's place in the group, not by the seed" if protocol.groups else of_id
+        of_id = "assigned by the number in the participant's ID (P007 is number 7), not by the seed"
+        yield (
+            "Rows",
+            ("assigned by the participant's position in the group, not by the seed") if protocol.groups else of_id,
+        )
     if block.break_page is not None:
         title = protocol.text(protocol.pages[block.break_page].title, language)
         yield (

@@ -93,7 +93,7 @@ def newer_keys(document: Mapping[str, Any]) -> Iterator[Fault]:
     known = {*names(document, "pages"), *names(document, "blocks")}
     for path, name in entries(document, "sequence.*"):
         if name in names(document, "questionnaires") and name not in known:
-            yield Fault(path, "a questionnaire on its own belongs to format 2", HINT, kind="surplus")
+            yield Fault(path, "a questionnaire outside a block requires format 2", HINT, kind="surplus")
 
 
 def upgrade(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Fault]]:

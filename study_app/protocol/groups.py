@@ -27,9 +27,14 @@ class Group(Table):
 
     share: Annotated[int, within(1, MOST_SHARE, "a share is a small whole number")] = Field(
         default=1,
-        description="Its participants per round of randomisation; of a pre-existing group, its part of the plan.",
+        description=(
+            "Number of its participants per randomisation round; for a pre-existing group, its part in the "
+            "planned ratio."
+        ),
     )
-    sequence: Steps = later(default=(), min_length=1, description="Its pages, blocks and forms, in every session.")
+    sequence: Steps = later(
+        default=(), min_length=1, description=("The group's pages, blocks and forms, in every session.")
+    )
     sequences: Sequences = later(default=(), min_length=1, description="Its steps of session 1, 2 …")
 
     @model_validator(mode="after")

@@ -17,7 +17,7 @@ from study_app.documentation import anchor_of
 from study_app.protocol.formats import relax_schema
 from study_app.protocol.model import Protocol
 
-LIQUID_FILE = "A liquid file with one liquid, in place of the keys of this table: its path, relative to this file."
+LIQUID_FILE = "Path of a liquid file with one liquid, relative to this file; it replaces the keys of this table."
 
 
 LINEAR_DRAG: Final = {"properties": {"law": {"const": "linear"}}, "required": ["law"]}

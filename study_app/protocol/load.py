@@ -271,7 +271,7 @@ def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
         broken = Problem("file", "is nested too deeply", hint="use fewer brackets within brackets")
         raise ProtocolError(name, (broken,)) from error
     except ValueError as error:  # Python's own limit of digits names no place either
-        raise ProtocolError(name, (Problem("file", "holds a whole number beyond 64 bits"),)) from error
+        raise ProtocolError(name, (Problem("file", "contains a whole number beyond 64 bits"),)) from error
     return document, Places(text)
 
 
@@ -281,7 +281,7 @@ def _validate(model: type[M], document: Mapping[str, Any]) -> tuple[M | None, li
         known = f"this program reads formats 1 to {formats.LATEST}"
         return None, [Fault(("format",), f"is {document['format']}, {known}", "use a newer version of liquid-study")]
     named = [path for section in ("liquids", "blocks") for path, _ in entries(document, f"{section}.*.id")]
-    faults = [Fault(path, "unknown key", "the name of the table is its id") for path in named]
+    faults = [Fault(path, "unknown key", "the name of the table is its ID") for path in named]
     try:
         validated = model.model_validate(document, strict=True)
     except ValidationError as error:

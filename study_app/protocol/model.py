@@ -98,19 +98,26 @@ class StudyHead(Table):
     )
     blinding: Literal["double", "single"] = Field(
         default="double",
-        description="double: neither participant nor operator knows the condition; single: the operator sees force and "
-        "wake while the session runs, the participant does not know the condition.",
+        description=(
+            "double: neither participant nor operator knows the condition; single: the operator sees force "
+            "and wake during the session, but the participant does not know the condition."
+        ),
     )
     codes: Literal["study", "participant"] = later(
         default="study",
-        description="study: a code means the same for everybody; participant: until unblinding files give each "
-        "participant own codes.",
+        description=(
+            "study: a code means the same for all participants; participant: until unblinding each "
+            "participant has separate codes."
+        ),
     )
     block_order: OrderOfBlocks = later(
         default="fixed",
-        description="Order of blocks, of the main ones, which take each other's places; pages, forms and practice "
-        "stay. fixed: as written; balanced: counterbalanced, in rows of a Williams design by the number in the "
-        "participant's id, or by the place in the participant's group; random: drawn in each session.",
+        description=(
+            "Order of the main blocks, which exchange positions; pages, forms and practice stay. fixed: as "
+            "written; balanced: counterbalanced, by rows of a Williams design, selected by the number in "
+            "the participant's ID or by the position in the participant's group; random: drawn in each "
+            "session."
+        ),
     )
     group_assignment: GroupAssignment = later(
         default="randomised",
@@ -153,7 +160,7 @@ class SceneDefaults(Table):
     velocity: Estimator = Field(default_factory=Ewma, description="How velocity is estimated from positions.")
     knee: Knee = Field(default_factory=Knee, description="How high speeds are reduced before forces are computed.")
     motion: MotionBox = Field(default_factory=MotionBox, description="How the ball is expected to move in the scene.")
-    accuracy: Accuracy = Field(default_factory=Accuracy, description='What effects = "auto" may leave out.')
+    accuracy: Accuracy = Field(default_factory=Accuracy, description='What effects = "auto" may omit.')
     fade_s: FadeS = later(default=FADE_S, description="Time over which the force fades in [s].")
 
 
@@ -171,15 +178,19 @@ class PageText(Table):
     """A page to read."""
 
     kind: Literal["consent", "instructions", "break", "debrief"] = Field(
-        description="consent: what the participant agrees to; instructions: what comes next; break: a rest; debrief: "
-        "what the study was about."
+        description=(
+            "consent: what the participant agrees to; instructions: what to do next; break: a rest; debrief: "
+            "what the study was about."
+        )
     )
     title: Localised = Field(description="Heading of the page.")
     body: PageBody = Field(description="The text; a blank line begins a paragraph.")
-    button: Localised | None = Field(default=None, description="Words on the button; left out: Continue.")
+    button: Localised | None = Field(default=None, description="Text on the button; default: Continue.")
     min_s: Seconds | None = Field(
         default=None,
-        description="A break's least time [s], counted down on the page; left out: as long as the participant likes.",
+        description=(
+            "Minimum duration of a break [s], counted down on the page; default: as long as the participant likes."
+        ),
     )
 
     @model_validator(mode="after")
@@ -243,10 +254,11 @@ class Limits(Table):
         default=250, description="Longest time before the first frame or between two, or before the trial's end [ms]."
     )
     withheld_percent: Annotated[float, within(0.01, 100, "a share of the force; none withheld at all is rare")] = Field(
-        default=5, description="Share of the force that slope limits, passivity controller and slew limit withhold [%]."
+        default=5,
+        description=("Proportion of the force that slope limits, passivity controller and slew limit hold back [%]."),
     )
     targets_percent: Annotated[float, within(0.01, 100, "a share of the targets; left out, any is enough")] | None = (
-        later(default=None, description="Least share of a reaching task's targets that must be reached [%].")
+        later(default=None, description="Minimum proportion of a reaching task's targets that must be reached [%].")
     )
     level_error_percent: Annotated[float, within(0.1, 100, "encoder counts alone give 0.2 %")] | None = later(
         default=None, description="Error of an interval's delivered level [%]; default: 2."
@@ -255,15 +267,17 @@ class Limits(Table):
         default=None, description="Error of a trial's delivered difference of delays [ms]; default: 2."
     )
     pace_error_percent: Annotated[float, within(1, 1000, "no hand keeps a pace to 1 %")] | None = later(
-        default=None, description="Error of the hand's RMS speed against a followed target's [%]; default: 40."
+        default=None, description="Error of the hand's RMS speed relative to the followed target [%]; default: 40."
     )
     attempts: Annotated[int, Field(ge=1, le=100)] | None = later(
-        default=None, description="How often a trial of intervals is presented until it is delivered; default: 3."
+        default=None, description="How many times a trial of intervals is presented until it is delivered; default: 3."
     )
     missing_percent: Annotated[float, within(0, 100, "a share of the trials; 0: none may be missing")] | None = later(
         default=None,
-        description="Share of a session's main trials of intervals that may be missing because they were not "
-        "delivered [%]; with more, the session is incomplete; default: 5.",
+        description=(
+            "Proportion of a session's main trials of intervals that may be missing because they were not "
+            "delivered [%]; above this the session is incomplete; default: 5."
+        ),
     )
 
 
@@ -273,17 +287,17 @@ Reported = Annotated[float, within(-1e9, 1e9, "no published value is larger")]
 class Published(Table):
     """A value of another study, which figures show next to the study's own."""
 
-    block: Id = Field(description="The block whose results it is comparable with.")
+    block: Id = Field(description="The block to whose results it is compared.")
     measure: Literal["weber", "threshold", "exponent", "pse"] = Field(
         description="weber: the Weber fraction; threshold: the threshold; exponent: the exponent of a power law; pse: "
         "the point of subjective equality."
     )
     value: Reported = Field(description="The value; a threshold in the unit of the varied number.")
-    standard: Reported | None = Field(default=None, description="Its standard, in that unit; left out: of all.")
+    standard: Reported | None = Field(default=None, description="Its standard, in that unit; default: all standards.")
     low: Reported | None = Field(default=None, description="Lower end of its interval or range.")
     high: Reported | None = Field(default=None, description="Upper end of its interval or range.")
     percent: Annotated[float, within(0, 100, "a share of answers")] | None = Field(
-        default=None, description="Percentage of correct answers at the value; left out: unknown."
+        default=None, description="Percentage of correct answers at the value; default: unknown."
     )
     n: Annotated[int, within(1, 1_000_000, "no study had more")] | None = Field(
         default=None, description="Number of its participants."
@@ -310,22 +324,26 @@ class Contrast(Table):
 
     measure: Id = Field(
         default="threshold",
-        description='"threshold", "exponent", "d_prime" or "pse" of blocks of levels, or the id of a statement.',
+        description='"threshold", "exponent", "d_prime" or "pse" for blocks of levels, or the ID of a statement.',
     )
     blocks: tuple[Id, ...] = Field(
-        min_length=1, max_length=2, description="The two blocks that are compared, or the one of conditions or groups."
+        min_length=1,
+        max_length=2,
+        description=("The two blocks to compare, or the block whose conditions or groups are compared."),
     )
     conditions: tuple[Id, Id] | None = Field(
-        default=None, description="The two conditions of the block that are compared, within participants."
+        default=None, description="The two conditions of the block to compare, within participants."
     )
-    groups: tuple[Id, Id] | None = Field(default=None, description="The two groups that are compared.")
+    groups: tuple[Id, Id] | None = Field(default=None, description="The two groups to compare.")
     expected: Literal["higher", "lower"] | None = Field(
         default=None,
-        description="higher: the first is expected to be above the second; lower: below it; left out: either.",
+        description=(
+            "higher: the first is expected to be above the second; lower: below the second; default: either direction."
+        ),
     )
     bound: Annotated[float, within(1e-9, 1e9, "no larger difference is published")] | None = Field(
         default=None,
-        description="Largest difference that would not matter, of thresholds the largest ratio, such as 1.25; left "
+        description="Largest difference that would not matter (for thresholds the largest ratio, such as 1.25); left "
         "out: equivalence is not tested.",
     )
 
@@ -374,42 +392,46 @@ class Analysis(Table):
     equivalence_bound: Annotated[float, within(0.05, 6, "the scale has 6 steps, means differ by tenths")] | None = (
         Field(
             default=None,
-            description="Largest mean difference to no delay that would not matter, in points of the scale; left out: "
+            description="Largest mean difference from no delay that would not matter, in points of the scale; default: "
             "equivalence is not tested.",
         )
     )
     primary: tuple[Id, ...] = Field(
-        default=(), description="Items of the questions asked; the others are exploratory. Left out: all are primary."
+        default=(), description="Items of the primary questions; all others are exploratory; default: all are primary."
     )
     names: tuple[Id, ...] = Field(
         default=(),
-        description="Items that name a liquid; the participant named the one with the single highest answer.",
+        description="Items that name a liquid; the single highest answer is the liquid that the participant named.",
     )
-    rising: tuple[Id, ...] = Field(default=(), description="Items whose answers are expected to rise with delay.")
-    falling: tuple[Id, ...] = Field(default=(), description="Items whose answers are expected to fall with delay.")
+    rising: tuple[Id, ...] = Field(default=(), description="Items whose answers are expected to increase with delay.")
+    falling: tuple[Id, ...] = Field(default=(), description="Items whose answers are expected to decrease with delay.")
     noticed: Id | None = Field(
-        default=None, description="Item for which agreement (5 to 7) means that a delay was noticed."
+        default=None, description="Item for which agreement (5 to 7) means that the participant noticed a delay."
     )
     participants: Annotated[int, Field(ge=1, le=100_000)] | None = later(
         default=None, description="How many participants are planned."
     )
     precision: Annotated[float, within(0.001, 10, "a share of the group's mean")] | None = later(
-        default=None, description="Half the 95 % interval of the group's mean that is planned, as a share of the mean."
+        default=None, description="Planned half width of the 95 % interval of the group mean, relative to the mean."
     )
     trends: Literal["ranks", "slopes"] = later(
         default="ranks",
-        description="What tests whether answers follow the delay; ranks: signs of each participant's rank correlation; "
-        "slopes: Student's t of each participant's own slope.",
+        description=(
+            "Test for a trend of answers with delay; ranks: sign-flip test of the participants' rank "
+            "correlations; slopes: Student's t test of the participants' slopes."
+        ),
     )
     looks: tuple[Annotated[int, Field(ge=2, le=100_000)], ...] = later(
         default=(),
-        description="Numbers of participants at which the key is opened and all is tested; the last is participants. "
-        "Left out: once, at the end.",
+        description="Numbers of participants at which the key is opened and all hypotheses are tested; the "
+        "last equals participants. Left out: once, at the end.",
     )
     spending: Literal["obrien-fleming", "pocock"] = later(
         default="obrien-fleming",
-        description="How the looks share alpha (Lan and DeMets 1983); obrien-fleming: most of it at the last one; "
-        "pocock: about evenly.",
+        description=(
+            "How the looks share alpha (Lan and DeMets 1983); obrien-fleming: most of it at the last look; "
+            "pocock: about evenly."
+        ),
     )
     published: tuple[Published, ...] = later(default=(), description="Published values to compare with.")
     contrasts: tuple[Contrast, ...] = later(default=(), description="Hypotheses that are tested, and reported first.")
@@ -417,9 +439,9 @@ class Analysis(Table):
     @model_validator(mode="after")
     def _looks_end_at_the_last_participant(self) -> Self:
         if self.looks and (len(self.looks) < 2 or self.looks[-1] != self.participants):
-            raise invalid("give two or more numbers, of which the last is analysis.participants", "looks")
+            raise invalid("give two or more numbers; the last must equal analysis.participants", "looks")
         if any(after <= look for look, after in pairwise(self.looks)):
-            raise invalid("each look has more participants than the one before", "looks")
+            raise invalid("each look needs more participants than the previous look", "looks")
         return self
 
     def described(self, named_by: Sequence[str]) -> Iterator[tuple[str, str]]:

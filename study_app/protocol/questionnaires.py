@@ -33,7 +33,7 @@ class Score(Table):
     combine: Literal["mean", "sum"] = Field(default="mean", description="mean: their mean; sum: their sum.")
     factor: Weight = Field(default=1, description="Factor by which the result is multiplied.")
     offset: Weight = Field(default=0, description="Number that is then added.")
-    weights: dict[Id, Weight] = Field(default_factory=dict, description="Weight of an item; left out: 1.")
+    weights: dict[Id, Weight] = Field(default_factory=dict, description="Weight of an item; default: 1.")
     weights_from: tuple[Id, ...] = Field(
         default=(), description="Choices between items: each item's weight is how often it was chosen."
     )
@@ -77,7 +77,7 @@ def score(
 class Questionnaire(Table):
     """Questions that are answered after a trial, or on their own where ``sequence`` names the questionnaire."""
 
-    title: Localised | None = Field(default=None, description="Heading; left out: the name of the setting.")
+    title: Localised | None = Field(default=None, description="Heading; default: the name of the setting.")
     intro: Localised = Field(description="The question above the statements.")
     scale: Id | None = Field(default=None, description="The scale of all statements; left out where there are none.")
     item_order: Literal["fixed", "shuffled"] = Field(

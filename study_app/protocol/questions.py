@@ -36,11 +36,13 @@ class Scale(Table):
     """The points of an answer, lowest first: seven for statements, 2 to 11 for other ratings."""
 
     labels: dict[str, Annotated[tuple[Printable, ...], Field(min_length=FEWEST_POINTS, max_length=MOST_POINTS)]] = (
-        Field(description="Per language the names of the points, lowest first: 7 in format 1, 2 to 11 in format 2.")
+        Field(
+            description=(
+                "For each language the labels of the points, lowest first: 7 in format 1, 2 to 11 in format 2."
+            )
+        )
     )
-    cannot_judge: Localised | None = Field(
-        default=None, description="Label of an answer off the scale; left out: none."
-    )
+    cannot_judge: Localised | None = Field(default=None, description="Label of an answer off the scale; default: none.")
 
     @property
     def points(self) -> int:
@@ -80,7 +82,7 @@ class ShowIf(Table):
     def _values_or_bounds(self) -> Self:
         bounded = self.at_least is not None or self.at_most is not None
         if (self.values is not None) == bounded:
-            raise invalid("needs either is, or at_least or at_most or both", "is")
+            raise invalid("needs is, or at_least, at_most or both", "is")
         return self
 
 
@@ -165,7 +167,7 @@ class Question(Table):
     short: Localised = Field(description="One to three words for figures and tables.")
     required: bool = Field(default=True, description="Whether an answer is needed to continue.")
     show_if: ShowIf | None = later(
-        default=None, description="The answer to an earlier item that shows this one; left out: always shown."
+        default=None, description="The answer to an earlier item that shows this one; default: always shown."
     )
 
     @property
@@ -330,7 +332,9 @@ class Choice(Question):
 
     kind: Literal["choice"] = "choice"
     options: tuple[Option, ...] = Field(
-        min_length=FEWEST_OPTIONS, max_length=MOST_OPTIONS, description="The options, in the order shown."
+        min_length=FEWEST_OPTIONS,
+        max_length=MOST_OPTIONS,
+        description=("The options, in the order in which they are shown."),
     )
     several: bool = Field(default=False, description="Whether any number of options can be chosen.")
 
@@ -404,8 +408,8 @@ class Number(Question):
     value_type: ClassVar[ValueType] = "number"
 
     kind: Literal["number"] = "number"
-    least: Bound | None = Field(default=None, alias="from", description="Smallest number; left out: any.")
-    most: Bound | None = Field(default=None, alias="to", description="Largest number; left out: any.")
+    least: Bound | None = Field(default=None, alias="from", description="Smallest number; default: any.")
+    most: Bound | None = Field(default=None, alias="to", description="Largest number; default: any.")
     whole: bool = Field(default=False, description="Whether only whole numbers are permitted.")
     unit: Localised | None = Field(default=None, description="Unit, shown after the field.")
 
@@ -487,7 +491,7 @@ class Slider(Question):
         steps = (self.most - self.least) / self.step
         if abs(steps - round(steps)) > 1e-6 or not 1 <= round(steps) <= MOST_STEPS:
             permitted = f"a whole number of 1 to {MOST_STEPS}"
-            raise invalid(f"is {self.step:g}: {steps:g} steps from end to end; it must be {permitted}", "step")
+            raise invalid(f"is {self.step:g}: {steps:g} steps from end to end; {permitted} are permitted", "step")
         return self
 
     def view(self, number: int, context: Context) -> ItemView:
@@ -539,11 +543,11 @@ class Text(Question):
 
     def problem(self, answer: Value, context: Context) -> str | None:
         if not isinstance(answer, str) or not answer.strip():
-            return "the text is empty: write one, or leave the question open"
+            return "the text is empty: write an answer, or skip the question"
         if (length := len(characters(answer))) > self.longest:
             return f"the text has {length} characters: write at most {self.longest}"
         if unprintable_character(answer, f"\n{DIRECTIONS}") is not None:
-            return "the text holds a character that cannot be printed: take it out"
+            return "the text contains a character that cannot be printed: remove it"
         return None
 
 

@@ -27,8 +27,7 @@ class SimulatedParticipants(Table):
     """How simulated participants answer statements; without this table `power` takes published values."""
 
     noise_sd: Annotated[float, within(0, 3, "half of the scale of seven points")] = Field(
-        default=1.10,
-        description="SD of a participant's answers to equal trials, in points; the mean over participants.",
+        default=1.10, description="SD of a participant's answers to equal trials, in points (mean over participants)."
     )
     bias_sd: Annotated[float, within(0, 3, "half of the scale of seven points")] = Field(
         default=0.76,
@@ -36,12 +35,16 @@ class SimulatedParticipants(Table):
     )
     slope_sd: Annotated[float, within(0, 2, "with 2, three in ten answer the opposite way")] = Field(
         default=0.50,
-        description="SD between participants of the slope of their answers over the settings, as a share of the mean "
-        "slope; used by power analyses, not by rehearsals.",
+        description=(
+            "SD between participants of the slope of their answers across conditions, relative to the mean "
+            "slope; used by power analyses, not by rehearsals."
+        ),
     )
     lapse_rate: Annotated[float, within(0, 0.5, "more than half of the answers are not given in error")] = Field(
         default=0.0,
-        description="Share of answers given in error, 3 points too high; used by power analyses, not by rehearsals.",
+        description=(
+            "Proportion of answers given in error, 3 points too high; used by power analyses, not by rehearsals."
+        ),
     )
 
     def described(self) -> str:

@@ -106,9 +106,9 @@ def unprintable_character(text: str, permitted: str = "") -> str | None:
 def _check_printable(text: str) -> str:
     """Return ``text`` if it is legible: something visible, and nothing that hides or reorders other characters."""
     if (letter := unprintable_character(text, "\t\n\r")) is not None:
-        raise invalid(f"holds the character U+{ord(letter):04X}, which cannot be printed: take it out")
+        raise invalid(f"holds the character U+{ord(letter):04X}, which cannot be printed: remove it")
     if not any(unicodedata.category(letter)[0] in VISIBLE for letter in text):
-        raise invalid("the text is empty: write one that can be read")
+        raise invalid("the text is empty: write a text")
     return text
 
 
@@ -183,7 +183,7 @@ class Table(BaseModel):
         for first, other in self.ONE_OF:
             given: list[Any] = [getattr(self, name) for name in (first, other)]
             if sum(value is not None and value != () for value in given) != 1:
-                message = f"give either {first} or {other}, one of the two"
+                message = f"give either {first} or {other}"
                 raise invalid(message, first)
         return self
 

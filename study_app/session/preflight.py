@@ -198,9 +198,9 @@ def _servo_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     if facts.dynamics.delay_s is not None:
         about = f"delay until a force acts: {1e3 * facts.dynamics.delay_s:.2f} ms, measured by the device"
         if facts.delay_ticks > facts.dynamics.delay_ticks(requested_hz):
-            about += " when it was opened; it measured more since"
+            about += " when it was opened; it has measured a longer delay since"
     well = facts.dynamics.delay_s is None or facts.delay_ticks <= ASSUMED_TICKS
-    advice = "Forces are limited more strictly: connect the device without a hub."
+    advice = "The force limits are stricter; connect the device without a hub."
     yield _warning_unless("Loop delay", counted(facts.delay_ticks, "tick"), about, advice, well=well)
 
     value, about = f"{facts.timing.rate_hz:.1f} Hz", f"requested: {requested_hz:g} Hz"
@@ -217,8 +217,8 @@ def _servo_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     late_ms, gap_ms = facts.timing.lateness_p99_s * 1e3, facts.timing.worst_gap_s * 1e3
     worst = max(late_ms / limits.lateness_ms, gap_ms / limits.worst_gap_ms)
     about = (
-        f"99 % of ticks, limit {limits.lateness_ms:g} ms; worst gap {gap_ms:.1f} of {limits.worst_gap_ms:g} ms, "
-        f"{facts.timing.overruns} overruns"
+        f"99 % of ticks, limit {limits.lateness_ms:g} ms; largest gap {gap_ms:.1f} of {limits.worst_gap_ms:g} "
+        f"ms, {facts.timing.overruns} overruns"
     )
     advice = "Trials would be invalid: close other programs."
     yield _warning_unless("Servo lateness", f"{late_ms:.2f} ms", about, advice, well=worst <= 1, share=worst)
@@ -297,21 +297,24 @@ def _outlet_checks(facts: Measurements, _protocol: Protocol) -> Iterator[Check]:
     for outlet in facts.outlets:
         if outlet.withheld:
             yield Check(
-                outlet.title, "ok", "off", about="in a double-blind study: whoever sees the force can tell the liquid"
+                outlet.title,
+                "ok",
+                "off",
+                about="in a double-blind study: anyone who sees the force can identify the liquid",
             )
         elif outlet.lost:
             yield Check(
                 outlet.title, "warning", "not available", about=outlet.lost, advice="The session can run without it."
             )
         elif outlet.shows_force:
-            advice = "A viewer of the force can tell the liquid: show the stream to no one."
+            advice = "A viewer of the force can identify the liquid: do not show the stream to anyone."
             who = "listener" if outlet.listens else "no listener"
             yield Check(outlet.title, "warning", who, about="the study is double-blind", advice=advice)
         elif outlet.listens is False:
             advice = "Start the program that records it, such as LabRecorder, and select this stream."
-            yield Check(outlet.title, "warning", "no listener", about="no program receives the stream", advice=advice)
+            yield Check(outlet.title, "warning", "no listener", about="the stream is not being received", advice=advice)
         else:
-            about = "open" if outlet.listens is None else "a program receives the stream"
+            about = "open" if outlet.listens is None else "the stream is being received"
             yield Check(outlet.title, "ok", "ready" if outlet.listens is None else "listener", about=about)
 
 
@@ -354,7 +357,7 @@ def _cost_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
 
     if facts.ran_otherwise:
         about = f"version {protocol.study.version} ran from another file with {facts.ran_otherwise}"
-        advice = "Give the changed file another study.version; the report names the change in any case."
+        advice = "Give the changed file another study.version; the report states the change in any case."
         yield Check("Study file", "warning", "changed", about=about, advice=advice)
 
     if facts.untranslated:
@@ -367,7 +370,7 @@ def _cost_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     elif protocol.assigns_rows and (number := enrolment_number(facts.participant)) is not None:
         yield Check("Balance", "ok", f"participant number {number}", about="determines the row of the square")
     elif protocol.assigns_rows:
-        advice = f"{facts.participant} has no number, so its row is drawn at random; use ids such as P007."
+        advice = f"{facts.participant} does not contain a number, so its row is drawn at random; use IDs such as P007."
         yield Check("Balance", "warning", "drawn", about="the row of the square", advice=advice)
 
 

@@ -219,10 +219,10 @@ def replay(session_folder: Path) -> Replayed:
         if resumed != resumed_at:  # the servo was restarted: nothing continues from the previous recording
             before, resumed_at = None, resumed
         if resumed not in devices:
-            raise StoreError(f"{session.receipt} lacks the device since {resumed}: restore it from a copy")
+            raise StoreError(f"{session.receipt} lacks the device used since {resumed}: restore it from a copy")
         name = attempt_name(*which)
         if not isinstance(line, events.Recorded):
-            why = "the journal gives no reason" if line is None else line.reason
+            why = "the journal does not say why" if line is None else line.reason
             replayed.uncompared += (f"{name}: has no recording: {why}",)
             continue
         path = session.path / line.recording
@@ -370,7 +370,7 @@ def _compare_recording(replayed: Replayed, name: str, samples: Any, again: _Befo
     whole = _samples_before_gap(samples.tick)
     if whole < len(samples):
         lost_s = whole / checks.rows
-        replayed.uncompared += (f"{name}: samples are missing after {lost_s:.1f} s; what follows was not compared",)
+        replayed.uncompared += (f"{name}: samples are missing after {lost_s:.1f} s; the rest was not compared",)
     replayed.seconds += sum(
         min((second + 1) * checks.rows, len(samples)) <= whole for second in range(len(checks.device_force))
     )

@@ -103,7 +103,7 @@ def find_protocol(
         with contextlib.suppress(ProtocolError):
             if parse(source, name).study.name == start.study:
                 return name
-    raise SessionError(f"no known protocol belongs to the study {start.study!r}: name its file with --protocol FILE")
+    raise SessionError(f"the protocol was not found for the study {start.study!r}: give its file with --protocol FILE")
 
 
 def _next_step(protocol: Protocol, schedule: Schedule, progress: Progress) -> int:
@@ -114,7 +114,7 @@ def _next_step(protocol: Protocol, schedule: Schedule, progress: Progress) -> in
     number = here.number if isinstance(here, Trial) else None
     if (progress.page, progress.trial) not in {(None, None), (named, number)}:
         raise SessionError(
-            "the journal does not follow the order given by seed and participant, so the session cannot be resumed"
+            "the journal does not follow the order determined by seed and participant, so the session cannot be resumed"
         )
     if number is not None and progress.invalid >= (protocol.limits.attempts or math.inf):
         return progress.step + 1  # it was presented the greatest permitted number of times

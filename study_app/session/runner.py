@@ -156,7 +156,7 @@ class Runner:
             self._follow_samples(samples)
         running = self._running
         if running is None and still_s > STOOD_STILL_S and self._state.phase not in {Phase.OPENING, *FINAL}:
-            self.post(events.Note(now_s, "note", f"the program stood still for {still_s:.1f} s"))
+            self.post(events.Note(now_s, "note", f"the program stalled for {still_s:.1f} s"))
         if running is not None and running.frozen:
             self.post(events.PauseRequested(self._ports.clock(), "program"))
         elif running is not None and (outcome := running.outcome()) is not None:
@@ -207,7 +207,8 @@ class Runner:
             self._notify_listeners()
         if isinstance(event, events.EndRequested) and stall is not None:
             raise StoreError(
-                f"{stall.reason}; the session's end is not written either: resume it later, or end it then"
+                f"{stall.reason}; the end of the session is not written either: resume the session later, or "
+                "end it then"
             )
 
     def _retry_writes(self, stall: Stall) -> None:

@@ -152,13 +152,13 @@ def check_row(row_of: str | None, study: Protocol) -> None:
         return
     if not study.assigns_rows:
         raise SessionError(
-            f"row of {row_of!r}: no block of {study.study.name} has a Williams or Latin order, so no participant has a "
-            "row; leave it out"
+            f"row of {row_of!r}: no block of {study.study.name} has a Williams or Latin order, so participants "
+            "do not have rows; omit it"
         )
     if not ID_PATTERN.fullmatch(row_of) or enrolment_number(row_of) is None:
         raise SessionError(
-            f"row of {row_of!r}: rows are assigned by the number in a participant's id; give the id of the participant "
-            "who is replaced, such as P007"
+            f"row of {row_of!r}: rows are assigned by the number in a participant's ID; give the ID of the "
+            "participant to be replaced, such as P007"
         )
 
 
@@ -205,7 +205,7 @@ def check_choices(chosen: NewSession, study: Protocol) -> None:
     if chosen.language not in study.study.languages:
         known = ", ".join(study.study.languages)
         raise SessionError(
-            f"language {chosen.language!r}: {study.study.name} is written in {known}; choose one of these"
+            f"language {chosen.language!r}: {study.study.name} is available in {known}; choose one of these"
         )
     if chosen.resumes is not None:
         return

@@ -134,7 +134,7 @@ def read_watched(session_folder: Path, trial: int, attempt: int = 1, interval: i
     begun = [at for at, line in enumerate(lines) if isinstance(line, events.TrialStarted)]
     first = next((at for at in begun if lines[at].which[:2] == (trial, attempt)), None)  # type: ignore[attr-defined]
     if first is None:
-        raise StoreError(f"{session.journal} has no attempt {attempt} at {named}: choose another trial")
+        raise StoreError(f"{session.journal} does not contain attempt {attempt} at {named}: choose another trial")
     _, *own = open_events([lines[0], *lines[first : next((at for at in begun if at > first), None)]], shown)
     started = own[0]
     assert isinstance(started, events.TrialStarted)  # noqa: S101 - it was looked for
@@ -142,7 +142,7 @@ def read_watched(session_folder: Path, trial: int, attempt: int = 1, interval: i
     stored = next((line for line in lines if isinstance(line, _STORED) and line.which == which), None)
     if not isinstance(stored, events.Recorded):
         why = "none was requested, or it was interrupted" if stored is None else stored.reason
-        raise StoreError(f"{named} has no recording ({why}): choose another trial")
+        raise StoreError(f"{named} does not have a recording ({why}): choose another trial")
     secret = None if shown is None else shown.nonce
     recorded = recordings.read_samples(session.path / stored.recording, secret)
     if why := reason_motion_is_hidden(events.start_of(lines), shown):
@@ -152,7 +152,7 @@ def read_watched(session_folder: Path, trial: int, attempt: int = 1, interval: i
     ended = next((line for line in own if isinstance(line, _ENDS) and line.which == which), None)
     samples, times_s = _timed_samples(recorded, own, last=at + 1 == len(begins))
     if not len(samples):
-        raise StoreError(f"the recording of {named} holds no sample: choose another trial")
+        raise StoreError(f"the recording of {named} is empty: choose another trial")
     page = _page(study, session.receipt, lines, started, which[-1])
     lasted_s = None if ended is None else ended.others.get("duration_s")
     tracker = new_tracker(page.task)
@@ -178,7 +178,7 @@ def read_watched(session_folder: Path, trial: int, attempt: int = 1, interval: i
     try:
         frames = recordings.read_frames(session.path / stored.recording_frames, secret)
     except StoreError as error:
-        return replace(watched_task, lacking=f"Without the frames of the participant's screen: {error}.")
+        return replace(watched_task, lacking=f"The frames of the participant's screen are missing: {error}.")
     start_ns = samples["time_ns"][0] - round(watched_task.begins_s * 1e9)
     painted_s, shown_s = ((frames[name] - start_ns) * 1e-9 for name in ("painted_ns", "sample_ns"))
     return replace(watched_task, painted_s=painted_s, shown_s=shown_s)

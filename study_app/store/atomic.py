@@ -248,7 +248,7 @@ def sync_folder(path: Path) -> None:
 def cannot_write(path: Path, error: OSError) -> StoreError:
     """Return the one-line error for ``path``: what, why, and what to do."""
     blocked = isinstance(error, FileExistsError | NotADirectoryError)
-    why = "a file is where a folder is needed" if blocked else system_message(error)
+    why = "a file is in the place of a folder" if blocked else system_message(error)
     return StoreError(
         f"{path} cannot be written ({why}): free disk space, correct its permissions, close the program "
         "that uses it, or choose another folder"
@@ -282,7 +282,7 @@ def refuse_special_files(path: Path) -> None:
     """
     for inside in (path, *paths_in(path)):
         if inside.is_symlink():
-            raise StoreError(f"{inside} is a link to {inside.readlink()}: replace the link by what it leads to")
+            raise StoreError(f"{inside} is a link to {inside.readlink()}: replace the link by its target")
         if is_there(inside) and not inside.is_file() and not inside.is_dir():
             raise StoreError(f"{inside} is neither a file nor a folder: remove it")
 

@@ -62,7 +62,7 @@ def renew_checksums(session: SessionFolder, rewritten: Collection[Path]) -> bool
         listed = read_checksums(session)
     except StoreError:
         gone = "was damaged" if session.checksums.exists() else "was missing"
-        note_rebuilt(session, f"the list of checksums {gone} and was made from the files that were there")
+        note_rebuilt(session, f"the list of checksums {gone} and was created from the existing files")
         write_checksums(session)
         return True
     ours = [path.relative_to(session.path).as_posix() for path in rewritten if path.is_relative_to(session.path)]
@@ -221,14 +221,14 @@ def parse_copy(path: Path, text: str) -> Proofs:
     for number, match in _matches(text):
         if match is None:
             raise StoreError(
-                f"{path}, line {number} is not a fingerprint: a line must be such as "
-                "'k3vq-7m2p-xw4d  data/sub-P007/ses-01'; name a copy of a study's fingerprints.txt"
+                f"{path}, line {number} is not a fingerprint: a line must be such as 'k3vq-7m2p-xw4d  "
+                "data/sub-P007/ses-01'; give a copy of a study's fingerprints.txt"
             )
         if match[2] not in (None, _check_characters(match[1], match[3])):
-            raise StoreError(f"{path}, line {number} was misread: its last two characters are of another line")
+            raise StoreError(f"{path}, line {number} was misread: its last two characters belong to another line")
         proofs.append((match[1], match[3]))
     if not proofs:
-        raise StoreError(f"{path} has no fingerprint: name a copy of a study's fingerprints.txt")
+        raise StoreError(f"{path} does not contain fingerprints: give a copy of a study's fingerprints.txt")
     return tuple(proofs)
 
 

@@ -12,13 +12,15 @@ from study_app.protocol.questions import KINDS
 from study_app.store.csv_files import Column, optional
 
 STUDY = Column("study", "text", "Short name of the study, from its protocol.")
-PARTICIPANT = Column("participant", "text", "The participant's id: letters and digits, not a name.")
+PARTICIPANT = Column("participant", "text", "The participant's ID: letters and digits, not a name.")
 SESSION = Column("session", "integer", "Number of the participant's session.", minimum=1, maximum=99)
 SIMULATED = Column("simulated", "flag", "true if participant and device were simulated (a rehearsal).")
 PILOT = Column("pilot", "flag", "true if the session was a pilot.")
 TRIAL = Column("trial", "integer", "Number of the trial in the session, in the order of presentation.", minimum=1)
-ATTEMPT = Column("attempt", "integer", "1, or higher if the trial was repeated; the highest counts.", minimum=1)
-BLOCK = Column("block", "text", "Id of the block of trials.")
+ATTEMPT = Column(
+    "attempt", "integer", ("1, or higher if the trial was repeated; the last attempt is analysed."), minimum=1
+)
+BLOCK = Column("block", "text", "ID of the block of trials.")
 PHASE = Column(
     "phase",
     "text",
@@ -31,14 +33,16 @@ PHASE = Column(
 )
 PART = optional("part", "integer", "Part of the study, as shown to the participant.", minimum=1)
 INDEX = Column("index", "integer", "Position of the trial in its block, from 1.", minimum=1)
-CODE = Column("code", "text", "What was presented, as a code (L1, D3 ...) that the sealed key translates.")
+CODE = Column(
+    "code", "text", ("Code of the condition presented (L1, D3 ...); the sealed key assigns it to the condition.")
+)
 SESSION_COLUMNS = (STUDY, PARTICIPANT, SESSION, SIMULATED, PILOT)
 """Which session a row is about."""
 TRIAL_COLUMNS = (TRIAL, ATTEMPT, BLOCK, PHASE, PART, INDEX)
 """Which trial of it."""
 _INVALID = (
     "invalid",
-    "an interval was not delivered as requested: nothing was asked, and the trial was presented again",
+    "an interval was not delivered as requested, so no question was asked and the trial was repeated",
 )
 _NOT_OF_INTERVALS = ("of", "trial_started_at", "trial_started_s", "marked", "notes")
 _LEVEL = "distance of the comparison from its standard, or the value itself, as the protocol asks"
@@ -57,18 +61,18 @@ PARTICIPANTS: tuple[Column, ...] = (
             ("unfinished", "no end recorded: it is still running, or its program was killed"),
         ),
     ),
-    Column("session_started_at", "time", "Time when the session began."),
-    optional("session_ended_at", "time", "Time when the session ended."),
+    Column("session_started_at", "time", "Time at which the session began."),
+    optional("session_ended_at", "time", "Time at which the session ended."),
     Column("resumed", "integer", "How often it was resumed after its program had ended.", minimum=0),
     optional("device", "text", "The haptic device."),
     Column("language", "text", "Language of the participant's pages."),
     Column("trials", "integer", "Number of completed main trials.", minimum=0),
-    Column("responses", "integer", "Number of answers in main trials, including those off the scale.", minimum=0),
+    Column("responses", "integer", "Number of answers in main trials, including answers off the scale.", minimum=0),
     optional(
         "validity",
         "text",
-        "Whether the session's main trials were valid; n/a before the first has ended.",
-        levels=(("valid", "all did"), ("invalid", "at least one did not")),
+        "Whether the session's main trials were valid; n/a until the first has ended.",
+        levels=(("valid", "all did"), ("invalid", "at least one was not valid")),
     ),
 )
 TRIALS_MISSING = optional(
@@ -79,11 +83,11 @@ TRIALS_MISSING = optional(
     later=True,
 )
 """A column of sessions in a study with trials of intervals."""
-_INCOMPLETE = ("incomplete", "it reached its last page, but more trials were not delivered than the study permits")
+_INCOMPLETE = ("incomplete", "it reached its last page, but more trials are missing than the study permits")
 GROUP = optional("group", "text", "The participant's group; n/a in a study without groups.", sealed=True, later=True)
 PARTICIPANTS_2: tuple[Column, ...] = (
     *(
-        replace(column, description="Answers given in main trials and forms, those off the scale included.")
+        replace(column, description="Number of answers in main trials and forms, including answers off the scale.")
         if column.name == "responses"
         else column
         for column in PARTICIPANTS
@@ -133,7 +137,7 @@ RESPONSES: tuple[Column, ...] = (
     *SESSION_COLUMNS,
     *TRIAL_COLUMNS,
     CODE,
-    Column("item", "text", "Id of the statement; its text is in the session's receipt."),
+    Column("item", "text", "ID of the statement; its text is in the session's receipt."),
     Column("number", "integer", "Position of the statement on its page, from 1.", minimum=1),
     optional(
         "response",
@@ -143,11 +147,11 @@ RESPONSES: tuple[Column, ...] = (
         maximum=7,
     ),
     Column("cannot_judge", "flag", "true if the participant chose the answer off the scale."),
-    _measure("onset_s", "Time when the statement was shown, on the session's clock.", "s"),
-    _measure("first_choice_s", "Time when an answer was first chosen, on the session's clock.", "s"),
-    _measure("last_change_s", "Time when the final answer was chosen, on the session's clock.", "s"),
+    _measure("onset_s", "Time at which the statement was shown, on the session's clock.", "s"),
+    _measure("first_choice_s", "Time at which an answer was first chosen, on the session's clock.", "s"),
+    _measure("last_change_s", "Time at which the final answer was chosen, on the session's clock.", "s"),
     Column("changes", "integer", "How often the answer was changed.", minimum=0),
-    Column("answered_at", "time", "Time when the page of statements was confirmed."),
+    Column("answered_at", "time", "Time at which the page of statements was confirmed."),
 )
 
 
@@ -156,20 +160,23 @@ _RESPONSES_BY_NAME = {column.name: column for column in RESPONSES}
 
 RESPONSES_2: tuple[Column, ...] = (
     *SESSION_COLUMNS,
-    optional("form", "text", "Id of the questionnaire that was presented on its own; n/a after a trial."),
+    optional("form", "text", "ID of the questionnaire that was presented on its own; n/a after a trial."),
     optional(
-        "after_block", "text", "Block that the form came after; n/a before the first, and after a trial.", later=True
+        "after_block",
+        "text",
+        ("Block after which the form was shown; n/a before the first block and after a trial."),
+        later=True,
     ),
     *(replace(column, may_miss=True) for column in (*TRIAL_COLUMNS, CODE)),
-    replace(_RESPONSES_BY_NAME["item"], description="Id of the question; its words are in the session's receipt."),
+    replace(_RESPONSES_BY_NAME["item"], description="ID of the question; its text is in the session's receipt."),
     Column("kind", "text", f"Kind of the question: {', '.join(KINDS.own)}."),
-    replace(_RESPONSES_BY_NAME["number"], description="Place of the question on its page, from 1, as shown."),
+    replace(_RESPONSES_BY_NAME["number"], description="Position of the question on its page as shown, from 1."),
     optional(
         "response",
         "text",
-        "The answer: a point of the scale, a number, the id of an option (of several, with spaces between), or a text.",
+        "The answer: a point of the scale, a number, the ID of an option (several are separated by spaces), or a text.",
     ),
-    optional("value", "number", "The answer as a number, where it is one."),
+    optional("value", "number", "The answer as a number, if it is a number."),
     *(_RESPONSES_BY_NAME[name] for name in ("cannot_judge", "onset_s", "first_choice_s", "last_change_s", "changes")),
     _RESPONSES_BY_NAME["answered_at"],
 )
@@ -181,12 +188,12 @@ TRIALS: tuple[Column, ...] = (
     *TRIAL_COLUMNS,
     Column("of", "integer", "Number of trials in the block.", minimum=1),
     CODE,
-    Column("trial_started_at", "time", "Time when the trial began."),
-    Column("trial_started_s", "number", "Time when the trial began, on the session's clock.", unit="s", minimum=0),
+    Column("trial_started_at", "time", "Time at which the trial began."),
+    Column("trial_started_s", "number", "Time at which the trial began, on the session's clock.", unit="s", minimum=0),
     optional(
         "outcome",
         "text",
-        "How the trial ended; n/a while it runs.",
+        "How the trial ended; n/a while it is running.",
         levels=(
             ("complete", "the task was done"),
             ("timeout", "the task's time ran out"),
@@ -213,22 +220,25 @@ TRIALS: tuple[Column, ...] = (
     _measure("force_peak_n", "Largest magnitude of the force sent to the device.", "N", sealed=True, of_trial="max"),
     _measure(
         "withheld_share",
-        "Share of the force that limits, passivity controller and device withheld during the task; 0.05 is 5 %.",
+        "Proportion of the force that limits, passivity controller and device held back during the task; 0.05 is 5 %.",
         sealed=True,
         later=True,
         of_trial="mean",
     ),
     _measure(
         "delivered_error",
-        "Error of the force sent against the force model on the motion itself, RMS over RMS, 0.2 s after the fade-in "
-        "and later; 0.05 is 5 %; n/a if the participant set the force, the study delays it, or it is below 0.05 N.",
+        (
+            "RMS error of the force sent divided by the RMS force of the model for the actual motion, from 0.2 s after "
+            "the fade-in;  0.05 is 5 %; n/a if the participant set the force, the study delays it, or it is below 0.05 "
+            "N."
+        ),
         sealed=True,
         later=True,
         of_trial="mean",
     ),
     _count(
         "loop_delay_ticks",
-        "Ticks from a command of the servo until its force acts; maximum during the task.",
+        "Largest number of ticks during the task from a command of the servo until its force acts.",
         later=True,
         of_trial="max",
     ),
@@ -263,8 +273,10 @@ TRIALS: tuple[Column, ...] = (
     optional(
         "valid",
         "flag",
-        "true if the trial met the protocol's limits of lateness, gaps, delay error and withheld force; until "
-        "unblinding, only those of lateness and gaps.",
+        (
+            "true if the trial met the protocol's limits of lateness, gaps, delay error and force held back; until "
+            "unblinding, only the limits of lateness and gaps."
+        ),
     ),
     optional("recording", "text", "File of the trial's samples, in the session's folder; n/a if none was stored."),
     optional("recording_frames", "text", "File of the frames shown, in the session's folder; n/a if none was stored."),
@@ -273,7 +285,7 @@ TRIALS: tuple[Column, ...] = (
     optional(
         "recording_lost",
         "text",
-        "Why the trial's recording could not be stored; n/a if it was stored or not requested.",
+        "Reason why the recording could not be stored; n/a if it was stored or not requested.",
         later=True,
     ),
     Column("marked", "flag", "true if the operator marked the trial."),
@@ -298,13 +310,13 @@ _OUTCOME = [column.name for column in TRIALS].index("outcome")
 DELIVERED: tuple[Column, ...] = (
     _signed(
         "value_delivered",
-        "The varied number as delivered, in its unit: a damping as fitted at the hand; the delay of the force as its "
-        "lag behind the force model's; another number as requested; n/a for a visual delay, whose error is in "
+        "The varied number as delivered, in its unit: a damping as fitted at the hand; a force delay as the lag "
+        "behind the model's force; another number as requested; n/a for a visual delay, whose error is in "
         "delay_error_mean_ms.",
     ),
     _signed(
         "force_share",
-        "Share of the force model's force that was sent to the hand, after the lead and any lag; 1 is all of it.",
+        "Proportion of the model's force that was sent to the hand, after the lead and any lag; 1 is all of it.",
     ),
     _signed("apparent_mass_kg", "Apparent mass of the fitted force, in addition to its damping.", "kg"),
     _measure("pace_mps", "RMS speed of the hand, after the lead.", "m/s", sealed=True, later=True),
@@ -323,11 +335,16 @@ VIDEO: tuple[Column, ...] = (
     ),
     _count(
         "video_frames_lost",
-        "Frames of the video between the first and the last shown that were not.",
+        "Frames of the video between the first and the last shown that were not shown.",
         sealed=True,
         later=True,
     ),
-    _signed("video_delay_error_max_ms", "Delay of the video, achieved minus requested: largest.", "ms", of_trial="max"),
+    _signed(
+        "video_delay_error_max_ms",
+        ("Largest delay error of the video, achieved minus requested."),
+        "ms",
+        of_trial="max",
+    ),
     _signed(
         "video_age_mean_ms",
         "Mean age of the camera's pictures when they were ready, by the source's time stamps, in addition to the "
@@ -341,9 +358,9 @@ VIDEO: tuple[Column, ...] = (
 
 INTERVALS: tuple[Column, ...] = (
     *(column for column in TRIALS[: TRIALS.index(CODE) + 1] if column.name not in _NOT_OF_INTERVALS),
-    Column("interval", "integer", "Which interval of the trial, from 1.", minimum=1),
+    Column("interval", "integer", "Number of the interval in the trial, from 1.", minimum=1),
     Column("interval_started_s", "number", "When the interval began, on the session's clock.", unit="s", minimum=0),
-    _measure("gap_s", "From the end of the interval before to the beginning of this one; n/a for the first.", "s"),
+    _measure("gap_s", "Time from the end of the previous interval to the start of this one; n/a for the first.", "s"),
     optional(
         "presented",
         "text",
@@ -357,7 +374,7 @@ INTERVALS: tuple[Column, ...] = (
     optional(
         "invalid_reasons",
         "text",
-        "Keys of the protocol's limits that the interval breaks, with spaces between; n/a if it was delivered as "
+        "Keys of the protocol's limits that the interval violates, separated by spaces; n/a if it was delivered as "
         "requested.",
         later=True,
     ),

@@ -254,8 +254,8 @@ def write_columns(path: Path, table: np.recarray[Any, Any]) -> None:
         if not (finite := np.isfinite(table[name])).all():
             row = int(np.argmin(finite))
             raise StudyError(
-                f"{path} is not written: {name} is {table[name][row]} in row {row + 1}; it must be finite: reduce "
-                "positions, speeds or parameters"
+                f"{path} was not written: {name} is {table[name][row]} in row {row + 1}; it must be finite: "
+                "reduce positions, speeds or parameters"
             )
     write_file(path, csv_text_of([names, *zip(*(table[name].tolist() for name in names), strict=True)]).encode())
 

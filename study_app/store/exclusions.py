@@ -230,13 +230,15 @@ def _check_recorded(study: StudyFolder, participant: str, session: int, trial: i
         more = f" … {ids[-1]}" if len(ids) > NAMED_IDS else ""
         participants = f"participants: {', '.join(ids[:NAMED_IDS]) or 'none'}{more}"
         its = f"sessions of that participant: {', '.join(known)}" if known else participants
-        raise StoreError(f"{study.path} has no session {session} of participant {participant}; {its}")
+        raise StoreError(f"{study.path} does not contain session {session} of participant {participant}; {its}")
     if trial is None:
         return
     presented = progress_of(journal.read(place.journal)).presented
     if trial not in presented:
         listed = ", ".join(map(str, sorted(presented))) or "none"
-        raise StoreError(f"participant {participant}, session {session} has no trial {trial}: it has {listed}")
+        raise StoreError(
+            f"participant {participant}, session {session} does not contain trial {trial}: it contains {listed}"
+        )
 
 
 def describe_exclusion(row: Exclusion) -> str:

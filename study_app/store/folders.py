@@ -144,7 +144,7 @@ def check_study_name(name: object) -> str:
         A study cannot have this name, nor can its files.
     """
     if not isinstance(name, str) or not STUDY_NAME.fullmatch(name):
-        raise ValueError("no study has this name")
+        raise ValueError("a study with this name does not exist")
     return name
 
 
@@ -162,8 +162,8 @@ def locate_session(path: Path) -> tuple[StudyFolder, SessionFolder]:
     named = number is not None and folder.parent.name.startswith("sub-") and ID_PATTERN.fullmatch(participant)
     if not named or folder.parent.parent.name != "data" or not folder.is_dir():
         raise StoreError(
-            f"{path} is not a session folder: name one such as results/rek2024/data/sub-P007/ses-01, or one that "
-            "liquid-study sessions lists"
+            f"{path} is not a session folder: give one such as results/rek2024/data/sub-P007/ses-01, or a name "
+            "that liquid-study sessions lists"
         )
     return StudyFolder(folder.parents[2]), SessionFolder(folder, participant, int(number[1]) if number else 0)
 
@@ -203,5 +203,5 @@ def check_name_and_reason(by: str, reason: str, why: str) -> tuple[str, str]:
         if not text.strip():
             raise StoreError(f"--{name} is empty: {why}")
         if (letter := unprintable_character(text, "\t\n\r")) is not None:
-            raise StoreError(f"--{name} holds the character U+{ord(letter):04X}, which cannot be printed: take it out")
+            raise StoreError(f"--{name} contains the character U+{ord(letter):04X}, which cannot be printed: remove it")
     return " ".join(by.split()), " ".join(reason.split())

@@ -156,8 +156,8 @@ def locate_participant(folder: Path, participant: str) -> tuple[Path, str]:
     if (place := folders.get(f"{site}{dash}")) is None or not own:
         known = ", ".join(name.removesuffix(DASH) for name in folders)
         raise StoreError(
-            f"{folder} holds several sites ({known}), and {participant!r} names none of them: give SITE-ID, such as "
-            f"{next(iter(folders))}P007"
+            f"{folder} contains several sites ({known}), and {participant!r} names none of them: give SITE-ID, "
+            f"such as {next(iter(folders))}P007"
         )
     return place, own
 
@@ -211,6 +211,8 @@ def merged_above(folder: Path) -> Path | None:
 def refuse_merged(folder: Path) -> None:
     """Raise an error for a merged study or its copy of a site, in which no sessions can run."""
     if (folder / MANIFEST).is_file():
-        raise StoreError(f"{folder} is a merged study, which holds copies: run sessions in the folder of a site")
+        raise StoreError(f"{folder} is a merged study, which contains copies: run sessions in the folder of a site")
     if (above := merged_above(folder)) is not None:
-        raise StoreError(f"{folder} is the copy of a site in the merged study {above}: run sessions in the site's own")
+        raise StoreError(
+            f"{folder} is the copy of a site in the merged study {above}: run sessions in the site's own folder"
+        )

@@ -13,7 +13,7 @@ MISSING_PERCENT: Final = "missing_percent"
 REASONS: Final[Mapping[str, str]] = {
     "lateness_ms": "the servo was late",
     "worst_gap_ms": "the servo missed ticks",
-    "delay_error_ms": "the visual delay was not kept",
+    "delay_error_ms": "the visual delay deviated too much",
     "frame_gap_ms": "frames were late or missing",
     "withheld_percent": "the safety layer withheld too much force",
     "targets_percent": "too few targets were reached",

@@ -53,7 +53,7 @@ def write_files(to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, 
     """
     for name in files:
         if not (to / name).resolve().is_relative_to(to.resolve()):
-            raise AnalysisError(f"{name!r} would be written outside of {to}: nothing was written")
+            raise AnalysisError(f"{name!r} would be written outside {to}: nothing was written")
     staged = {name: temporary_path(to / name) for name in files}
     within = sorted({folder for path in staged.values() for folder in (path.parent, *path.parent.parents)})
     created = [folder for folder in within if folder.is_relative_to(to) and not folder.exists()]

@@ -33,22 +33,22 @@ from study_app.store.csv_files import Column, Kind
 from study_app.store.journals.journal_events import plain_json
 
 FRAMES: tuple[Column, ...] = (
-    Column("painted_ns", "integer", "Time when the frame was shown, on the servo's clock.", unit="ns"),
-    Column("sample_ns", "integer", "Time of the hand position that was shown.", unit="ns"),
+    Column("painted_ns", "integer", "Time at which the frame was shown, on the servo's clock.", unit="ns"),
+    Column("sample_ns", "integer", "Time of the hand position shown.", unit="ns"),
     Column("age_ns", "integer", "Achieved visual delay: painted_ns - sample_ns.", unit="ns"),
-    Column("video_frame", "integer", "Number of the video's frame in it, from 0; -1 without one.", minimum=-1),
+    Column("video_frame", "integer", "Number of the video frame shown, from 0; -1 without a video.", minimum=-1),
     Column(
         "video_ns",
         "integer",
-        "Time when that was due without a delay, on the servo's clock: when the camera's picture was ready, or by the "
-        "time in the file; 0 without one.",
+        "Time at which the video frame was due without a delay, on the servo's clock (when the camera's "
+        "picture was ready, or the time in the file); 0 without a video.",
         unit="ns",
     ),
     Column(
         "video_age_ns",
         "integer",
-        "Age of the camera's picture when it was ready, by the source's time stamps: it was taken at video_ns - "
-        "video_age_ns; -1 if unknown or without one.",
+        "Age of the camera's picture when it was ready, by the source's time stamps: it was taken at video_ns "
+        "- video_age_ns; -1 if unknown or without a video.",
         unit="ns",
         minimum=-1,
     ),
@@ -176,7 +176,7 @@ def read_checks(path: Path, secret: bytes | None = None) -> Checks:
     """
     facts = read_facts(path, secret)
     if facts["kind"] != "samples":
-        raise StoreError(f"{path} holds {facts['kind']}, not samples: name the recording itself")
+        raise StoreError(f"{path} holds {facts['kind']}, not samples: give the recording itself")
     checks = facts["crc32"]
     return Checks(checks["rows"], tuple(checks["device_force"]), tuple(checks["effect_force"]))
 
@@ -215,7 +215,7 @@ def _read_columns(path: Path, kind: str, secret: bytes | None) -> tuple[dict[str
     with _opened(path, secret) as file:
         facts = _facts(path, file.metadata)
         if facts["kind"] != kind:
-            raise StoreError(f"{path} holds {facts['kind']}, not {kind}: name the other file of the trial")
+            raise StoreError(f"{path} holds {facts['kind']}, not {kind}: give the other file of the trial")
         table = file.read().combine_chunks()
     held = facts["format"]
     if kind == "frames":
@@ -223,7 +223,7 @@ def _read_columns(path: Path, kind: str, secret: bytes | None) -> tuple[dict[str
     else:
         columns = [name for field in RECORDED if field.since <= held for name in field.named()]
     if not _has_columns(table, columns, facts["rows"]):
-        raise StoreError(f"{path} is damaged (its columns differ from those of {kind}): restore it from a copy")
+        raise StoreError(f"{path} is damaged (its columns are not the columns of {kind}): restore it from a copy")
     return {name: _numbers(table.column(name), facts["rows"]) for name in table.column_names}, facts
 
 

@@ -26,10 +26,10 @@ _PLACE: Final = re.compile(r'^ *(File "[^"]*", line \d+ in \S+|<no Python frame>
 _HEADING: Final = re.compile(
     r"^(Fatal Python error: [\w \-]+|(Current thread|Thread) 0x[0-9a-f]+ \(most recent call first\):)$"
 )
-ABOUT: Final = """What liquid-study knows about itself on this machine, for support.
+ABOUT: Final = """What liquid-study knows about this machine, for support.
 
 versions.json    the program, Python, the system and libraries
-settings.json    the settings of this machine, without initials, folders and the camera's address
+settings.json    the settings of this machine, without initials, folders and camera address
 log.txt          the program's log: text and lines of the source, failures of devices
 last-error.txt   the last error in the log
 diagnosis.txt    findings about the device, if it was examined

@@ -108,7 +108,7 @@ def unblind(folder: Path, by: str, reason: str) -> Unblinded:
     try:
         excluded = exclude_inattentive(folder)
     except (StoreError, ValueError, KeyError, TypeError) as error:
-        left.append(f"the rule catch was not applied: {error}; then unblind again")
+        left.append(f"the rule catch was not applied ({error}); then unblind again")
     return Unblinded(codes, tuple(left), excluded)
 
 

@@ -141,8 +141,8 @@ def withdraw(
         with lock_folder(copy.path):
             if others := _other_sessions(copy, tombstone):
                 left += [
-                    f"{other} is not a copy of an erased session: {copy.path} was not changed; if it is of the same "
-                    "person, withdraw from that folder, too"
+                    f"{other} is not a copy of an erased session: {copy.path} was not changed; if it belongs to "
+                    "the same person, also withdraw from that folder"
                     for other in others
                 ]
             elif _erase(copy, replace(tombstone, at=at)):
@@ -158,7 +158,7 @@ def withdraw(
         of_merged, merged_elsewhere = _outputs(merged)
         outputs, elsewhere = (*outputs, *of_merged), (*elsewhere, *merged_elsewhere)
     left += [
-        f"{export.path} is an export with data of {participant}: delete it, and make it again"
+        f"{export.path} is an export with data of {participant}: delete it, and create it again"
         for export in shared
         if any(_remaining_mentions(export, participant, export.data, export.path / RESULTS))
     ]
@@ -233,7 +233,7 @@ def _find_copies(study: StudyFolder, also: Iterable[Path]) -> tuple[list[StudyFo
     by_path: dict[Path, StudyFolder] = {}
     for folder in also:
         if not folder.is_dir():
-            raise StoreError(f"{folder} is not a folder: --also names a folder with copies of the study")
+            raise StoreError(f"{folder} is not a folder: --also requires a folder with copies of the study")
         for description in sorted(folder.rglob(DATASET)):
             place = description.parent.resolve()
             if place != study.path.resolve() and StudyFolder(place).data.is_dir():

@@ -75,7 +75,7 @@ class Camera:
     def __init__(self, source: str, now_ns: Callable[[], int], holds_s: float) -> None:
         self.source = source  # may contain a name and a password: use `without_login` to show or store it
         if not source:
-            raise VideoError("no camera is set: set one under This machine, such as dshow:video=NAME")
+            raise VideoError("the camera is not set: set it under This machine, such as dshow:video=NAME")
         self._now_ns = now_ns
         self._holds_ns = round(holds_s * SECOND_NS) + SPARE_NS
         self._changed = threading.Condition()
@@ -450,7 +450,7 @@ class Videos:
                 self._open = {**self._open, view: source}
         if closed:
             source.close()
-            raise VideoError("the videos were closed meanwhile")
+            raise VideoError("the videos have been closed")
 
     def _opened(self, view: str) -> Camera | Footage:
         if view == CAMERA:

@@ -95,7 +95,7 @@ def test_a_replay_that_compared_nothing_does_not_say_that_all_is_the_same(monkey
         done = CliRunner().invoke(commands, ["replay", "ses-01"])
         return done.exit_code, done.output
 
-    nothing = "no force was compared, so the result is not proved\n"
+    nothing = "no force was compared, so the result is not confirmed\n"
     assert replayed(0) == (3, f"the session kept no recordings\n{nothing}")
     assert replayed(0, uncompared=("trial 1 is lost",)) == (3, f"trial 1 is lost\n{nothing}")
     same = "1 recording, 10.0 s, recomputed 100 times as fast as it ran (1.5 s in all): "

@@ -142,7 +142,7 @@ def others(story: Story) -> None:
         designer.change((old, new))
         look()
 
-    both = "Another program changed this file, and it was edited here, too"
+    both = "Another program changed this file, and it was also edited here"
     outside("A first look", "Another look")
     story.expect(undo="Take the file's content", kept="saved")
     story.ask(SetValue(VERSION, "0.7"))
@@ -164,7 +164,7 @@ def others(story: Story) -> None:
     session.mkdir(parents=True)
     opening = lock_folder(session)
     outside("Now reach", "Reach now")
-    story.expect("A session of this study is under way. Make a copy, or wait until it has ended.")
+    story.expect("A session of this study is running. Make a copy, or wait until it has ended.")
     story.ask(SetValue(VERSION, "1.0"))
     story.play("ctrl+s")
     story.expect(undo="Change Version", kept="edited")
@@ -295,7 +295,7 @@ def versions(story: Story) -> None:
     story.ask(SetValue(REPETITIONS, 5))
     story.act("save as pantry", lambda: designer.saving.save_as_another("pantry"))
     story.expect(
-        "The study was not saved: version 0.1 was run by 1 session with another content: save it as version 0.2.",
+        "The study was not saved: version 0.1 was run by 1 session with different content: save it as version 0.2.",
         kept="not saved",
     )
     story.play("ctrl+s")

@@ -310,7 +310,10 @@ def test_a_fault_in_a_session_or_a_report_is_one_line_and_nothing_is_lost(
     [
         ("raise RuntimeError('no such\\nlibrary')", "RuntimeError: no such library"),
         ("raise SystemExit('no licence')", "SystemExit: no licence"),
-        (QUESTION.replace(' = "toy-plug:toy"', ""), "its kind has no default: give it the value of its Literal"),
+        (
+            QUESTION.replace(' = "toy-plug:toy"', ""),
+            "its kind does not have a default: give it the value of its Literal",
+        ),
         ("Toy = 3", "toy_plug:Toy is not a class that extends Question"),
         (QUESTION.replace("toy-plug:toy", "mood"), "its kind is 'mood': call it 'toy-plug:' and"),
         (QUESTION.replace('"toy_plug:MEASURE"', "LATER"), "NameError: name 'LATER' is not defined"),
@@ -331,7 +334,7 @@ def test_what_cannot_be_used_is_a_line_and_hides_no_other(
     study.write_text(TOY_STUDY)
     code, _, said = run("check", study)
     assert code == 2
-    assert f'"toy-plug:toy" is a question that the plug-in toy-plug 1.0 does not give: {reason}' in said
+    assert f'"toy-plug:toy" is a question that the plug-in toy-plug 1.0 does not provide: {reason}' in said
     assert run("check", "demo")[0] == 0
 
 

@@ -58,7 +58,9 @@ class Examined:
 
 FALCON = failures_on("linux")
 REFUSED = Report(
-    ("opened",), FALCON.findings({"permission"}, FALCON.before("permission")), "this account may not open it"
+    ("opened",),
+    FALCON.findings({"permission"}, FALCON.before("permission")),
+    ("this account does not have permission to open it"),
 )
 FALCON_WELL = Report(("opened", "homed"), FALCON.findings(passed=FALCON.before("unplugged")), None)
 

@@ -122,8 +122,8 @@ def test_a_sink_that_hangs_is_lost_at_the_first_marker_after_the_limit(clock: Cl
     assert thread.lost == ""
     thread.mark(marker(3))
     assert thread.lost == (
-        "a marker was not sent in 5.2 s (limit 5 s): no more are sent; check the connection, "
-        "then end and resume the session"
+        "a marker was not sent in 5.2 s (limit 5 s): sending has stopped; check the connection, then end and "
+        "resume the session"
     )
     sink.go_on.set()
     assert sink.closed.wait(5)

@@ -69,7 +69,7 @@ def added(rows: Rows) -> Rows:
         (without(12, 13), list, "own.xdf lacks 1 marker of its journal; the first: {", 3),
         (added, list, 'own.xdf has 1 marker that its journal lacks; the first: {"event":"note","t_s":0.5}. The', 3),
         (without(0, 8), list, "markers: 4 before the recording and 0 after it", 0),
-        (without(0, 9999), list, "own.xdf: it has no marker of this study's sessions", 3),
+        (without(0, 9999), list, "own.xdf: it does not contain markers of this study's sessions", 3),
     ],
 )
 def test_what_a_recording_lacks_is_found(

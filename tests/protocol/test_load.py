@@ -177,7 +177,7 @@ def test_the_estimator_of_a_scene_file_is_that_of_its_format(
 @pytest.mark.parametrize("kind", ["line", "foaw", "lead"])
 def test_an_estimator_that_left_is_refused_with_its_place_and_what_to_write(tmp_path: Path, kind: str) -> None:
     liquid = f'[scene]\nvelocity = {{ kind = "{kind}" }}\n[liquids.water]\ndensity_kg_m3 = 1000\n'
-    with pytest.raises(ProtocolError, match=f'"{kind}" left the program') as refused:
+    with pytest.raises(ProtocolError, match=f'"{kind}" was removed from the program') as refused:
         load_scene(written(tmp_path / "water.toml", f"format = 2\n{liquid}"), "water")
     (problem,) = refused.value.problems
     assert (problem.place, problem.line, problem.hint) == ("scene.velocity.kind", 3, 'write "ewma", "kalman" or "raw"')
@@ -189,7 +189,7 @@ def test_the_density_counts_where_effects_are_chosen(tmp_path: Path) -> None:
         load_scene(written(tmp_path / "damper.toml", text), "damper")
     scene = load_scene(written(tmp_path / "damper.toml", f"{text}density_kg_m3 = 1000\n"), "damper")
     assert resolve(scene).liquids[0].drag == Drag(law="linear", damping_nspm=12)
-    assert "law linear, as the file says" in "\n".join(describe_gate(scene))
+    assert "linear law, as stated in the file" in "\n".join(describe_gate(scene))
 
 
 def test_only_a_scene_that_needs_it_is_written_in_format_2(tmp_path: Path) -> None:

@@ -687,7 +687,7 @@ def show_windows(
         yield
     shown_on, operated_on = screens()
     if shown_on is operated_on and bridge.strip is None:
-        raise DisplayError("a screen was removed while the session opened; begin it again")
+        raise DisplayError("a screen was disconnected while the session opened; start the session again")
     bridge.participant.open_on(shown_on)
     if not played:
         bridge.watch_screens()

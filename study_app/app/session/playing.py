@@ -42,7 +42,7 @@ from study_app.store.study_versions import keep_content
 
 END_SHOWN_MS: Final = 2500
 log = logging.getLogger(__name__)
-STOPPED: Final = "stopped while it was played in the study designer"
+STOPPED: Final = "stopped while playing in the study designer"
 
 
 class PlayedSession(LiveSession):
@@ -119,7 +119,7 @@ LOOK_S: Final = 0.01
 FOLDER: Final = "liquid-study-play-"
 OUTCOMES: Final = {
     "completed": "to the end",
-    "incomplete": "to the end, with trials not delivered",
+    "incomplete": "to the end; some trials were not delivered",
     "aborted": "stopped",
     "withdrawn": "no consent",
     "broken": "it failed",
@@ -235,7 +235,9 @@ class Playing(QObject):
         try:
             folder = Path(tempfile.mkdtemp(prefix=FOLDER))
         except OSError as error:
-            self.place.message.emit("The study cannot be played", f"No temporary folder can be made: {error.strerror}.")
+            self.place.message.emit(
+                "The study cannot be played", f"A temporary folder cannot be created: {error.strerror}."
+            )
             return
         pilot = self.pilot = _Pilot(part, self.device, folder)
         self._preparing.run(lambda: _prepare_session(pilot))
@@ -281,7 +283,7 @@ class Playing(QObject):
         try:
             copy_folder(pilot.choices.results, to)
         except StudyError as error:
-            self.place.message.emit("The pilot was not kept", f"{error}.")
+            self.place.message.emit("The pilot was not saved", f"{error}.")
             return
         with suppress(StoreError):  # only the tab Changes needs the copy
             keep_content(pilot.what.source)

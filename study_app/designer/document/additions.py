@@ -63,7 +63,7 @@ def with_language(study: Study, code: str) -> tuple[Edit, ...]:
     if code in codes:
         raise Refused(f"the study is in {language_name(code)} already")
     if code not in LANGUAGES:
-        raise Refused(f'the program has no words in "{code}": there are {", ".join(LANGUAGES)}')
+        raise Refused(f'the program does not have texts in "{code}"; known languages: {", ".join(LANGUAGES)}')
     tables = (Set(path, {codes[0]: text}) for path, text in texts_of(study) if isinstance(text, str))
     return (Set(("study", "languages"), [*codes, code]), *tables)
 
@@ -72,7 +72,7 @@ def without_language(study: Study, code: str) -> tuple[Edit, ...]:
     """Return the edits that remove a language and its texts."""
     codes = languages_of(study.document)
     if code not in codes or len(codes) == 1:
-        raise Refused("a study has at least one language")
+        raise Refused("a study needs at least one language")
     gone = (Unset((*path, code)) for path, text in texts_of(study) if isinstance(text, Mapping) and code in text)
     return (*gone, Set(("study", "languages"), [other for other in codes if other != code]))
 
@@ -433,7 +433,7 @@ def number_row(document: Mapping[str, Any], path: Path, field: Path) -> Row:
     """Return the number of an element that a series varies."""
     number = next((row for row in number_rows(document, path) if row.path == field), None)
     if number is None:
-        raise Refused("choose a number of this element")
+        raise Refused("choose a numeric value of this element")
     return number
 
 
@@ -444,7 +444,7 @@ def check_values(document: Mapping[str, Any], row: Row, values: Sequence[float])
         if why := violated_bound(document, row, value):
             raise Refused(f"{exact_text(value)} is not permitted: {row.label} is {why}")
         if value in known:
-            raise Refused(f"{exact_text(value)} is there twice, or is the value of the original")
+            raise Refused(f"{exact_text(value)} is listed twice, or is the value of the original")
         known.append(value)
     if not 0 < len(values) <= MOST:
         raise Refused(f"a series has 1 to {MOST} copies")

@@ -318,9 +318,9 @@ class Document:
         if any(self.file.resolve() == shipped_file(name).resolve() for name in shipped()):
             return "This study ships with the program. Make a copy to change it."
         if self.file.exists() and not os.access(self.file, os.W_OK):
-            return "You may not write this file. Make a copy to change it."
+            return "You do not have permission to write this file. Make a copy to change it."
         if any(is_open(session.path) for session in StudyFolder(results / self.name).sessions()):
-            return "A session of this study is under way. Make a copy, or wait until it has ended."
+            return "A session of this study is running. Make a copy, or wait until it has ended."
         return ""
 
     # versions
@@ -343,8 +343,8 @@ class Document:
         source = self.source()
         if others := self.standing(known).others:
             raise Refused(
-                f"version {self.version} was run by {counted(others, 'session')} with another content: "
-                f"save it as version {next_version(self.version)}"
+                f"version {self.version} was run by {counted(others, 'session')} with different content: save "
+                f"it as version {next_version(self.version)}"
             )
         self._write_named_files(source)
         keep_content(source)
@@ -360,7 +360,7 @@ class Document:
         for name, text in unbundle(source)[1].items():
             path = folder / name
             if path.exists() and _file_content(path) != text.encode():
-                raise Refused(f"{path} exists and holds another liquid: rename one of the two files")
+                raise Refused(f"{path} exists and contains another liquid: rename one of the two files")
             write_whole(path, text.encode())
         for name, digest in hashes_in(source).items():
             if (digest_here := file_hash(folder / name)) is None:
@@ -370,7 +370,7 @@ class Document:
                 except OSError as error:
                     raise cannot_write(folder / name, error) from error
             elif digest_here != digest:
-                raise Refused(f"{folder / name} exists and holds another video: rename one of the two files")
+                raise Refused(f"{folder / name} exists and contains another video: rename one of the two files")
         self.study = replace(self.study, folder=folder)
 
     def copy_as(self, name: str) -> Document:
@@ -449,7 +449,7 @@ def check_version(version: str, known: Iterable[Run]) -> None:
     if not _VERSION.fullmatch(version):
         raise Refused(f'"{version}" cannot be a version: write letters, digits, dots, plus and minus, such as 1.2')
     if any(run.sessions and run.version == version for run in known):
-        raise Refused(f"version {version} was run with another content: choose another number")
+        raise Refused(f"version {version} was run with different content: choose another number")
 
 
 def next_version(version: str) -> str:

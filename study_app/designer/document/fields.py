@@ -164,7 +164,7 @@ def check_id(name: str, free: str = "") -> None:
     if not plain or not name[:1].isalpha() or len(name) > MAX_ID:
         rule = f"at most {MAX_ID} small letters, digits and underscores, a letter first"
         proposed = f'; "{free}" is free' if free else ""
-        raise Refused(f'"{name}" is not an id: write {rule}{proposed}')
+        raise Refused(f'"{name}" is not a valid ID: write {rule}{proposed}')
 
 
 def _is_within(path: Path, outer: Path) -> bool:

@@ -188,7 +188,7 @@ class SwitchKey(Request):
         gone = () if value_at(at.study.document, self.path) is None else (Unset(self.path),)
         value = _first_value(at.study.with_edits(*gone)[0], place)
         if value in ("", []):
-            raise Refused(f"there is nothing that {label_of(self.to)} can name: add it first")
+            raise Refused(f"{label_of(self.to)} needs an element that does not exist yet: add it first")
         return Step(f"Give {label_of(self.to)}", (*gone, Set(place, value)))
 
 
@@ -324,7 +324,7 @@ class MoveElement(Request):
         document, by = at.study.document, self.by
         entry, title = step_of(document, self.path), title_of(document, self.path)
         if entry is None:
-            raise Refused(f"{title} is not in an order, so it cannot be moved")
+            raise Refused(f"{title} is not part of an ordered list, so it cannot be moved")
         to = index_of(entry) + (by if by < 0 else 1 + by)
         if not 0 <= to <= len(value_at(document, entry[:-1])):
             raise Refused(f"{title} is the {'first' if by < 0 else 'last'} already")
@@ -357,7 +357,7 @@ class AddToSession(Request):
 
     def step(self, at: Situation) -> Step:
         if not is_format_2(at.study.document):
-            raise Refused("a questionnaire on its own belongs to format 2: write format = 2 in the tab File")
+            raise Refused("a questionnaire outside a block requires format 2: write format = 2 in the tab File")
         title, places = title_of(at.study.document, self.path), sorted(self.places, key=index_of, reverse=True)
         said = f"{title}, now step {index_of(places[-1]) + 1}"
         return Step(f"Add {title} to the session", tuple(Insert(place, self.path[1]) for place in places), said=said)

@@ -36,7 +36,7 @@ def replace_value(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
     """Replace the value at ``path``; a comment behind it keeps its column if possible."""
     node = spans.node(path)
     if node is None or node.kind in {"table", "array table"}:
-        raise Refused("a table with headers cannot become a value in place")
+        raise Refused("a table with headers cannot become a single value")
     text, like = spans.text, spans.text[node.value : node.end]
     line = text.rfind("\n", 0, node.start) + 1
     indent = re.match(r"[ \t]*", text[line:]).group()  # type: ignore[union-attr]
@@ -142,7 +142,7 @@ def _add_line(spans: Spans, edit: Editor, owner: Node | None, path: Path, value:
 def _add_pair(spans: Spans, edit: Editor, owner: Node, path: Path, value: Any) -> None:
     inner = [piece for piece in spans.pieces(path[:-1])[:1] if piece.node is owner]
     if not inner or spans.text[owner.value] != "{":
-        raise Refused("a value that is not a table has no keys")
+        raise Refused("only a table can have keys")
     pair = f"{key_text(str(path[-1]))} = {inline_value(value)}"
     pairs = [node for node in spans.nodes if node.kind == "pair" and owner.value < node.start < owner.end]
     top = [node for node in pairs if len(node.path) - len(node.parts) == len(path) - 1]
@@ -240,7 +240,7 @@ _LINE_REST: Final = re.compile(r"[ \t]*(\r?\n)")
 def _array_and_index(path: Path) -> tuple[Path, int]:
     index = path[-1]
     if not isinstance(index, int):
-        raise Refused("an entry of an array has a number")
+        raise Refused("an entry of an array is identified by its number")
     return path[:-1], index
 
 
@@ -304,7 +304,7 @@ def _append_lines(spans: Spans, edit: Editor, last: Slot, body: str, tail: str =
 def _insert_table(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
     array, index = _array_and_index(path)
     if not isinstance(value, Mapping):
-        raise Refused("an entry of an array of tables is a table")
+        raise Refused("an entry of an array of tables must be a table")
     body = table_text(path, value, spans.newline, entry=True)
     if following := spans.pieces((*array, index)):
         edit.insert(following[0].start, body + spans.newline)
@@ -479,11 +479,11 @@ def apply_edit(text: str, edit: Edit) -> tuple[str, tuple[Splices, ...]]:
     try:
         edited = _parse(text)
     except tomllib.TOMLDecodeError as error:
-        raise WriterError(f"{edit} made a text that is not TOML: {error}") from error
+        raise WriterError(f"{edit} produced a text that is not TOML: {error}") from error
     if not is_same_value(edited, meant) and not is_same_value(
         _pruned(copy.deepcopy(edited), edit.path), _pruned(meant, edit.path)
     ):
-        raise WriterError(f"{edit} made another document than the one meant")
+        raise WriterError(f"{edit} produced a document other than the intended one")
     return text, tuple(steps)
 
 
@@ -503,14 +503,14 @@ def meant_document(document: Mapping[str, Any], edit: Edit) -> Document:
         if isinstance(node, list) or isinstance(last, int):
             _value_at(node, last)
         elif not isinstance(node, dict):
-            raise Refused(f"{_path_text(tuple(parent))} is not a table: it has no key {last}")
+            raise Refused(f"{_path_text(tuple(parent))} is not a table, so it does not have the key {last}")
         node[last] = copy.deepcopy(edit.value)
         return meant
     node = _own_value(meant, parent)
     if isinstance(edit, Insert):
         _check_value(edit.value)
         if not isinstance(node, list) or not isinstance(last, int) or not 0 <= last <= len(node):
-            raise Refused(f"{_path_text(tuple(parent))} has no place {last} for a new entry")
+            raise Refused(f"{_path_text(tuple(parent))} does not have position {last} for a new entry")
         node.insert(last, copy.deepcopy(edit.value))
         return meant
     value = _value_at(node, last)
@@ -557,7 +557,7 @@ def _duplicate(node: Any, last: Any, value: Any, name: str) -> None:
 
 def _rename(document: Document, node: Any, edit: Rename) -> None:
     if not isinstance(node, dict):
-        raise Refused("entries of an array have no name")
+        raise Refused("entries of an array do not have names")
     _check_free(node, edit.name)
     for *parent, last in edit.references:
         _own_value(document, parent)[last] = edit.name
@@ -587,12 +587,12 @@ def _check_value(value: Any) -> None:
 def check_encodable(text: str) -> None:
     """Refuse a text that cannot be encoded in UTF-8."""
     if any("\ud800" <= letter <= "\udfff" for letter in text):
-        raise Refused("the text holds half a character, which UTF-8 cannot write: type it again")
+        raise Refused("the text contains an incomplete character, which UTF-8 cannot encode: type it again")
 
 
 def _value_at(node: Any, step: str | int) -> Any:
     if not _has_step(node, step):
-        raise Refused(f"there is no {step + 1 if isinstance(step, int) else step} in the study any more")
+        raise Refused(f"there is no {step + 1 if isinstance(step, int) else step} in the study anymore")
     return node[step]
 
 
@@ -687,7 +687,7 @@ def _is_written_apart(spans: Spans, path: Path) -> bool:
     node = spans.node(path)
     apart = node.kind in {"table", "array table"} if node is not None else bool(spans.pieces(path))
     if apart and isinstance(path[-1], int):
-        raise Refused(f"{_path_text(path)} is a table with a header: it cannot become a value")
+        raise Refused(f"{_path_text(path)} is a table with a header, so it cannot become a single value")
     return apart
 
 

@@ -503,7 +503,7 @@ class ChoiceField(Field):
         self._values = [value for value, _ in values]
         known = self._values[: len(values) - len(row.sections)]
         self.list.setCurrentIndex(known.index(shown) if shown in known else -1)
-        self.list.setPlaceholderText("" if known else "Nothing can be named yet")
+        self.list.setPlaceholderText("" if known else "There is nothing to choose yet")
         self.arrow.setEnabled(row.target is not None)
 
     def words(self, choice: Any, default: object) -> str:
@@ -668,7 +668,7 @@ class LanguagesField(Field):
         if untranslated or "copied" in self.__dict__:
             source = language_name(untranslated[0].source) if untranslated else ""
             lacking = ", ".join(language_name(text.language) for text in untranslated)
-            self.copied.setText(f"As in {source}, not translated yet: {lacking}")
+            self.copied.setText(f"Same as in {source}, not yet translated: {lacking}")
             self.copied.setVisible(bool(untranslated))
         for number, (code, line) in enumerate(self.lines.items()):
             text = value.get(code, "") if isinstance(value, dict) else value if number == 0 else ""

@@ -413,7 +413,7 @@ class LanguageListField(EntryList):
             description = f"{entry.title}, {entry.note}, {at + 1} of {len(codes)}"
             shown = self.add_row(description, title, note, faulty=bool(entry.faults))
             if entry.faults and at:
-                made = self.copies[code] = add_button(f"Copy {first} where {entry.title} has no text", f"Copy {first}")
+                made = self.copies[code] = add_button(f"Copy {first} where {entry.title} is missing", f"Copy {first}")
                 made.clicked.connect(partial(self.asked.emit, ChangeLanguage("copy", code)))
                 shown.line.addWidget(made)
             if len(codes) > 1:

@@ -62,9 +62,9 @@ def order_balance(study: Study, row: Row) -> tuple[Verdict, str] | None:
         return None
     order, codes = row.default if row.value is None else row.value, len(conditions)
     if order == "fixed":
-        return ("neutral", "ring", "same for all"), "Effects of condition and of position cannot be separated."
+        return ("neutral", "ring", "same for all"), "Effects of condition and position cannot be separated."
     if not isinstance(order, str) or order not in SQUARES:
-        drawn = "Drawn anew in every session: positions are balanced on average only."
+        drawn = "Drawn again in every session, so positions are balanced only on average."
         return ("neutral", "ring", "balanced on average"), drawn
     square, repetitions = SQUARES[order], block.get("repetitions", 1)
     rows = row_count(square, codes)
@@ -372,7 +372,9 @@ RELATIONS: Final = (
     ("higher", "is higher than"), ("lower", "is lower than"), (None, "is different from"), ("equal", "is equal to"),
 )  # fmt: skip
 BOUND, RATIO = 0.5, 1.25
-NOTHING_TO_COMPARE: Final = "It compares two main blocks, two conditions of a block, or two groups: add a second one."
+NOTHING_TO_COMPARE: Final = (
+    "A hypothesis compares two main blocks, two conditions of a block, or two groups: add a second one."
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

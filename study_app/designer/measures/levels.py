@@ -16,7 +16,7 @@ from study_app.protocol.trials.stimuli import Stimulus
 Limit: TypeAlias = Literal["norm", "slope"]
 Ticks: TypeAlias = tuple[tuple[float, str], ...]
 LIMIT_NAMES: Final[dict[Limit, str]] = {"norm": "force limit", "slope": "slope limit"}
-AS_ASKED: Final = "Clipped levels are simulated as they are requested"
+AS_ASKED: Final = "The simulation uses the requested levels"
 MOST_TICKS: Final = 7
 _BY_DECADE: Final = ((1.0,), (1.0, 3.0), (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 5.0, 7.0), tuple(range(1, 10)))
 _STEPS: Final = (1, 2, 2.5, 5, 10)
@@ -128,8 +128,8 @@ class LevelBlock:
         if self.clipping.clips_standard:
             which = f"The standard{named} is"
         if self.clipping.paced:
-            return f"{which} clipped: observers are simulated with what the limits leave"
-        return f"{which} clipped in fast motions, whose trials are repeated. {AS_ASKED}"
+            return f"{which} clipped: the simulation uses the clipped levels"
+        return f"{which} clipped in fast motions; such trials are repeated. {AS_ASKED}"
 
 
 def level_block(protocol: Protocol, block: Block, *, forces: bool = True) -> LevelBlock | None:

@@ -27,7 +27,7 @@ from study_app.protocol.checks.force_limits import check_clipping, unpaced_clipp
 if TYPE_CHECKING:
     from study_app.designer.measures.plots import ForcesView, FunctionView, TrackView
 
-EARLIER = "These numbers are of the last valid state: solve the problems to update them."
+EARLIER = "These numbers describe the last valid state: correct the problems to update them."
 FIELD_PX = 48
 PLOT_PX, HIGHEST_PX, FORCES_PX = 300, 470, 216
 FUNCTION_LEGEND = (

@@ -47,8 +47,8 @@ MOST_CODES: Final = 8
 """Of more codes only how even they are is said."""
 MOST_ROWS: Final = 6
 """Positions that are shown of a long block."""
-NO_FORCES: Final = "Not known until the problems of device and scene are solved."
-ON_AVERAGE: Final = "The warning of check is about the precision that the planned participants reach on average"
+NO_FORCES: Final = "Unknown until you correct the problems of device and scene."
+ON_AVERAGE: Final = "The warning of check refers to the average precision with the planned participants"
 FAILED: Final[Verdict] = ("bad", "warning", "simulation failed")
 CLIPPED: Final[Verdict] = ("bad", "warning", "levels are clipped")
 TOO_SMALL: Final = "All levels are below twice the level error of a valid trial"
@@ -307,7 +307,7 @@ def text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
         named = f"{revealed[0].element}: “{revealed[0].word}” reveals a condition" if revealed else ""
         more = f", and {len(revealed) - 1} more" if len(revealed) > 1 else ""
         verdicts.append(
-            ("warn", "warning", named + more) if revealed else ("ok", "check", "No text reveals a condition")
+            ("warn", "warning", named + more) if revealed else ("ok", "check", "The texts do not reveal a condition")
         )
     return verdicts
 
@@ -333,7 +333,7 @@ def balance_card(study: Study, protocol: Protocol, block: Block, controls: Contr
     elif order == "fixed":
         verdict = ("warn", "warning", "all participants have the same order, which reveals the codes")
     else:
-        verdict = ("neutral", "info", "balanced on average only: drawn for each session")
+        verdict = ("neutral", "info", "balanced only on average: drawn for each session")
     aside = f"{_title(study, block.id)}, {people_text(participants, controls.planned)}"
     if len(evenness.codes) > MOST_CODES:
         cells = [count for line in evenness.positions for count in line]
@@ -379,7 +379,7 @@ def force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[s
     ]
     sentences: tuple[Verdict, ...] = tuple(("warn", "warning", f"{capitalised(warning)}.") for warning in alike)
     if not sentences and len(names) > 1:
-        sentences = (("ok", "check", "No pair is hard to tell apart"),)
+        sentences = (("ok", "check", "All pairs are distinguishable"),)
     return lines_card("Force of each liquid", f"0.1 m/s, {LIMIT_NAMES['norm']} {limit_n:g} N", tuple(lines), sentences)
 
 
@@ -400,12 +400,13 @@ def detectable_card(study: Study, block: Block, who: str, simulated: Simulated) 
         name = title_of(study.document, path)
         lines.append(Line(name, finding.number, (finding.detectable or 0.0) / (detectable.points - 1)))
     model = (
-        f"The smallest difference, in points of {detectable.points}, that 4 of 5 simulated studies show, if people are "
-        f"{detectable.kind} (range: consistent to noisy). The answers are a model's, not measured."
+        f"The smallest difference, in points of {detectable.points}, that 4 of 5 simulated studies detect, if "
+        f"people are {detectable.kind} (range: consistent to noisy). The answers come from a model, not from "
+        "measurements."
     )
     note: Verdict = ("neutral", "info", model)
     if not lines:
-        note = ("neutral", "info", "The answer model knows none of the statements.")
+        note = ("neutral", "info", "The answer model does not know these statements.")
     return lines_card(title, who, tuple(lines), (note,), simulated.waiting)
 
 

@@ -278,11 +278,11 @@ def function_sentence(scale: LevelWords, seen: Observed) -> str:
     most, _ = max(seen.asked, key=lambda pair: pair[1], default=(0.0, 0.0))
     low, high = _middle_half(seen)
     return (
-        f"Share of answers that are {scale.success}, over the {scale.kind}: {100 * seen.planted[0]:.0f} % at "
-        f"{scale.words(seen.levels[0])} to {100 * seen.planted[-1]:.0f} % at {scale.words(seen.levels[-1])}, "
-        f"{100 * seen.at_threshold:.0f} % at the simulated {scale.name} of {scale.words(seen.threshold)}. "
-        f"Half of {seen.observers} observers are estimated between {scale.number(low)} and {scale.words(high)}. "
-        f"The level presented most often is {scale.words(most)}."
+        f"Proportion of answers that are {scale.success}, against the {scale.kind}: {100 * seen.planted[0]:.0f} "
+        f"% at {scale.words(seen.levels[0])} to {100 * seen.planted[-1]:.0f} % at "
+        f"{scale.words(seen.levels[-1])}, {100 * seen.at_threshold:.0f} % at the simulated {scale.name} of "
+        f"{scale.words(seen.threshold)}. Half of the {seen.observers} estimates lie between {scale.number(low)} "
+        f"and {scale.words(high)}. The level presented most often is {scale.words(most)}."
     )
 
 
@@ -290,9 +290,10 @@ def track_sentence(scale: LevelWords, seen: Observed) -> str:
     """Describe the expected track in a sentence."""
     low, high = _middle_half(seen)
     return (
-        f"Estimates of the {scale.name} over {_last_trial(seen)} trials: after the last one half of the observers are "
-        f"between {scale.number(low)} and {scale.words(high)}, the simulated value is {scale.words(seen.threshold)}. "
-        f"One of them answered {sum(asked.success for asked in seen.one)} of {len(seen.one)} trials with success."
+        f"Estimates of the {scale.name} over {_last_trial(seen)} trials: after the last trial half of the "
+        f"estimates lie between {scale.number(low)} and {scale.words(high)}, the simulated value is "
+        f"{scale.words(seen.threshold)}. One of them answered {sum(asked.success for asked in seen.one)} of "
+        f"{len(seen.one)} trials correctly."
     )
 
 

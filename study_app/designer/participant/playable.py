@@ -377,11 +377,11 @@ class Feeling(QObject):
         path: Path = ("liquids", before.id)
         document = opened.study.document
         if value_at(document, path) is None:
-            self.place.message.emit("It was not put back", f"The study has no liquid {before.id} any more.")
+            self.place.message.emit("It was not put back", f"The study no longer contains the liquid {before.id}.")
             return
         title = title_of(document, path)
         if liquid_file_name(value_at(document, path)) is not None:
-            sentence = f"{title} is in a liquid file of its own. Save it there as a preset."
+            sentence = f"{title} is in a separate liquid file. Save it there as a preset."
             self.place.message.emit("It was not put back", sentence)
             return
         after = setting.scene.liquids[0]
@@ -398,7 +398,9 @@ class Feeling(QObject):
         shared = [name for name in setting.changed_names() if name.partition(".")[0] in OF_THE_STUDY]
         if shared:
             names = ", ".join(parameter(setting.scene, name).label.lower() for name in shared)
-            self.place.message.emit(f"{title} was put back", f"The study has these once for all liquids: {names}.")
+            self.place.message.emit(
+                f"{title} was put back", f"These settings apply to all liquids of the study: {names}."
+            )
 
 
 def _liquids(protocol: Protocol, path: Path) -> tuple[str, ...]:

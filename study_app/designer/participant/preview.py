@@ -641,7 +641,7 @@ class ParticipantPreview(Card):
         faults = [fault for fault in study.faults if fault.concerns(self._language, first)]
         count = len(study.problems) - len(study.faults) + len(faults)
         if not count:
-            return "This page is in no session." if step.session == STANDALONE else ""
+            return "This page does not occur in any session." if step.session == STANDALONE else ""
         values = "only valid parts" if self._valid is None else "the last valid values"
         own = next((fault for fault in faults if fault.path[: len(self._selected)] == self._selected), None)
         if own is None:

@@ -52,8 +52,8 @@ LEVELS_N: Final = (0.0, 1.0, 2.0, 3.0, 1.0)
 _PATIENCE_S: Final = 600.0
 FORMAT: Final = 1
 NOT_FREE: Final = (
-    f"Mass, damping and friction explain less than {100 * LEAST_EXPLAINED:g} % of the force: the handle was touched, "
-    "or met a stop. Measure again."
+    f"Mass, damping and friction explain less than {100 * LEAST_EXPLAINED:g} % of the force: somebody touched the "
+    f"handle, or it hit an end stop. Measure again."
 )
 _ENDED: Final = {
     "oscillation": "it oscillated",
@@ -140,7 +140,7 @@ def run_bench(
     lasts = durations or Durations()
     with Stand(device, clock) as stand:
         _wait_for_answer(
-            stand, ask("let-go", "Let go of the handle and keep clear of it until the scale is asked for.")
+            stand, ask("let-go", "Let go of the handle and keep clear of it until you are asked for the scale.")
         )
         progress(f"At rest, without force: {lasts.rest_s:g} s.")
         samples, _ = stand.run(lasts.rest_s)
@@ -206,17 +206,18 @@ def _measure_damping(
     if ended is None:
         return StableDamping(reached, "most" if answer is None else "operator")
     if ended != ENDED[OSCILLATES]:
-        raise DeviceError(f"the bench was ended, since {ended}; the force is zero: check the device, then start again")
+        raise DeviceError(f"the bench ended because {ended}; the force is zero: check the device, then start again")
     return StableDamping(reached, "oscillation")
 
 
 def _measure_gain(stand: Stand, lasts: Durations, ask: Ask, progress: Callable[[str], object]) -> Gain | None:
     """Push down on a scale, and ask for its reading."""
     request = (
-        "Rest the handle on a kitchen scale, near the middle of its range, and set the scale to zero; none: type 'no'."
+        "Rest the handle on a kitchen scale, near the middle of its range, and set the scale to zero. If you have no "
+        "scale, type 'no'."
     )
     if _wait_for_answer(stand, ask("scale", request)).lower().startswith("n"):
-        progress("Force against a scale: left out.")
+        progress("Force against a scale: omitted.")
         return None
     sent_n, shown_g = [], []
     for level_n in LEVELS_N:
@@ -234,7 +235,7 @@ def _measure_gain(stand: Stand, lasts: Durations, ask: Ask, progress: Callable[[
 def _wait_for_answer(stand: Stand, answered: Callable[[], str | None]) -> str:
     _, answer = stand.run(_PATIENCE_S, answered=answered)
     if answer is None:
-        raise DeviceError(f"nothing was answered for {_PATIENCE_S:g} s, so the bench was ended; the force is zero")
+        raise DeviceError(f"there was no answer for {_PATIENCE_S:g} s, so the bench ended; the force is zero")
     return answer
 
 
@@ -243,7 +244,7 @@ def _grams(answer: str) -> float:
         return float(answer.replace(",", ".").removesuffix("g").strip())
     except ValueError:
         raise DeviceError(
-            f"'{answer}' is not a reading of a scale, so the bench was ended: type grams, such as 102"
+            f"'{answer}' is not a reading of a scale, so the bench ended: type grams, such as 102"
         ) from None
 
 
@@ -305,7 +306,7 @@ def _lines(results: Found, day: str) -> Iterator[str]:
         ("Coulomb friction [N]", "friction_n", 3),
         ("delay from sending a force to motion [ms]", "delay_ms", 1),
         ("encoder count, from the noise in motion [µm]", "count_um", 1),
-        ("explained variance of the force", "explained", 4),
+        ("proportion of force variance explained", "explained", 4),
     ):
         yield f"| {label} | {_row(tuple(getattr(motion, name) for motion in results.motions), digits)} |"
     if not results.fits:
@@ -313,13 +314,16 @@ def _lines(results: Found, day: str) -> Iterator[str]:
     yield from ("", "## Greatest stable damping", "", "| axis | N·s/m | ended |", "| --- | ---: | --- |")
     for axis, damping in zip(AXES, results.damping, strict=True):
         yield f"| {axis} | {damping.damping_nspm:.0f} | {_ENDED[damping.ended]} |"
-    yield from ("", f"A free handle and a damper that grows; more than {SHAKE_N:g} N RMS above 20 Hz is oscillation.")
+    yield from (
+        "",
+        (f"The handle was free while a damper grew; more than {SHAKE_N:g} N RMS above 20 Hz counts as oscillation."),
+    )
     yield from ("", "## Force on a scale", "")
     gain = results.gain
     yield (
         "Not measured."
         if gain is None
-        else f"{gain.gain:.3f} N shown per newton sent, downward; offset {gain.offset_n:+.3f} N; greatest residual "
+        else f"{gain.gain:.3f} N measured per newton sent, downward; offset {gain.offset_n:+.3f} N; greatest residual "
         f"{gain.residual_n:.3f} N; {gain.readings} readings."
     )
     yield from ("", "## What the device reports", "", "```json")

@@ -79,9 +79,9 @@ def _refuse_other_files(data: bytes) -> None:
     if not data:
         raise _refusal("it is empty")
     if begin.startswith((b"<!doctype", b"<html", b"<?xml")):
-        raise _refusal("it is a web page: what was saved is the page about the file, or an error, not the file")
+        raise _refusal("it is a web page (a page about the file or an error), not the file itself")
     if begin.startswith(b"version https://git-lfs"):
-        raise _refusal("it is a Git LFS pointer, a note about the file: fetch the file itself with 'git lfs pull'")
+        raise _refusal("it is only a Git LFS pointer: fetch the file itself with 'git lfs pull'")
     if begin.startswith(b":") or _HEX_DUMP.fullmatch(data):
         raise _refusal("it is a hex dump, the bytes as text: use the binary file")
 
@@ -95,7 +95,7 @@ def _refuse_wrong_header(data: bytes) -> None:
     if key != BOOT_KEY:
         raise _refusal(f"it begins with the key 0x{key:04X}, not 0x{BOOT_KEY:04X}")
     if any(reserved):
-        raise _refusal("its header has numbers where zeros belong")
+        raise _refusal("its header contains numbers instead of zeros")
 
 
 def _blocks(data: bytes) -> tuple[Block, ...]:
@@ -104,18 +104,18 @@ def _blocks(data: bytes) -> tuple[Block, ...]:
     while True:
         number = len(blocks) + 1
         if len(data) < at + 2:
-            raise _refusal(f"it is cut short: after {len(blocks)} blocks, at byte {len(data)}, there is no end mark")
+            raise _refusal(f"it is cut short: after {len(blocks)} blocks, at byte {len(data)}, the end mark is missing")
         (word_count,) = struct.unpack_from("<H", data, at)
         if word_count == 0:
             break
         end = at + _BLOCK_HEAD.size + 2 * word_count
         if len(data) < end:
-            raise _refusal(f"it is cut short in block {number}: {len(data)} bytes, of which block {number} needs {end}")
+            raise _refusal(f"it is cut short in block {number}: {len(data)} bytes, but block {number} needs {end}")
         _, high, low = _BLOCK_HEAD.unpack_from(data, at)
         blocks.append(Block(high << 16 | low, word_count))
         at = end
     if not blocks:
-        raise _refusal("it has no block: there is nothing in it to load")
+        raise _refusal("it does not contain any block to load")
     extra = len(data) - at - 2
     if extra:
         raise _refusal(f"{extra} bytes follow its end mark at byte {at}")
@@ -332,9 +332,9 @@ def _expect_echo(line: _Line, chunk: bytes, at: int) -> None:
         if heard != sent:
             raise _Ended("echo", f"byte {number} of the firmware came back as {heard:02x}, not {sent:02x}")
     if len(echo) < len(chunk):
-        raise _Ended("echo", f"nothing came back from byte {at + len(echo)} of the firmware on")
+        raise _Ended("echo", f"the bridge returned nothing from byte {at + len(echo)} of the firmware onwards")
     if len(echo) > len(chunk):
-        raise _Ended("echo", f"more came back than byte {at + len(chunk) - 1} of the firmware")
+        raise _Ended("echo", f"the bridge returned more than byte {at + len(chunk) - 1} of the firmware")
 
 
 def _send(transport: Transport, data: bytes, step: str) -> None:

@@ -84,12 +84,12 @@ def fit(
     """
     counts, pulled_n, held = (np.asarray(given, np.float64) for given in (poses, forces_n, units))
     if counts.shape != pulled_n.shape or counts.shape != held.shape or counts.ndim != 2 or counts.shape[1:] != (3,):
-        raise DeviceError("a calibration needs three numbers a pose: counts, force and motor units")
+        raise DeviceError("a calibration needs three numbers per pose (counts, force and motor units)")
     if len(counts) < LEAST_POSES:
         raise DeviceError(f"a calibration needs {LEAST_POSES} poses or more, not {len(counts)}: measure at more places")
     if np.ptp(pulled_n, axis=0).max() < 0.5:
         raise DeviceError(
-            "a calibration needs two weights half a newton apart (one may be none): hang another one, too"
+            "a calibration needs two weights half a newton apart (one may be zero): also hang another weight"
         )
     offset_rad = 0.0
     for _ in range(_STEPS):
@@ -104,7 +104,7 @@ def fit(
     gain = 1.0 / share if share else math.inf
     if not _GAINS[0] <= gain <= _GAINS[1] or abs(offset_rad) >= _OFFSETS_RAD:
         raise DeviceError(
-            f"these weights would mean {gain:.0f} motor units a newton metre and arms {math.degrees(offset_rad):.1f} "
+            f"these weights would mean {gain:.0f} motor units per newton metre and arms {math.degrees(offset_rad):.1f} "
             f"degrees off; {_GAINS[0]:.0f} to {_GAINS[1]:.0f} and less than 15 degrees are possible: check the "
             "weights, and that nothing touches the grip"
         )
@@ -169,7 +169,7 @@ def save_calibration(serial: str, calibration: Calibration) -> Path:
         fresh.replace(file)
     except OSError as error:
         raise DeviceError(
-            f"the calibration cannot be kept in {file.parent}: {error.strerror}; set {FOLDER_VARIABLE} to a folder "
+            f"the calibration cannot be stored in {file.parent}: {error.strerror}; set {FOLDER_VARIABLE} to a folder "
             "that can be written"
         ) from error
     return file
@@ -336,7 +336,7 @@ def measure_with_weight(grip: Grip, weight_n: float, ask: Ask) -> Notes:
     """Measure without load at all places, then with a weight of ``weight_n`` newtons; return the measurements."""
     if not LEAST_N <= weight_n <= MOST_N:
         raise DeviceError(
-            f"a weight of {1000 * weight_n / GRAVITY_MPS2:.0f} g is {weight_n:.2f} N: take one of "
+            f"a weight of {1000 * weight_n / GRAVITY_MPS2:.0f} g is {weight_n:.2f} N: use a weight of "
             f"{LEAST_N:g} to {MOST_N:g} N, 110 to 600 g"
         )
     notes: list[tuple[Any, float, Any]] = []

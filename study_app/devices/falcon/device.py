@@ -183,8 +183,8 @@ class FalconDevice(FramedDevice):
                     for size in (self.workspace_m, mechanics.WORKSPACE_M)
                 )
                 raise DeviceError(
-                    f"a workspace of {asked} mm is more than a Falcon reaches; {known} mm is about the most: make the "
-                    "protocol's workspace_mm smaller"
+                    f"a workspace of {asked} mm exceeds the reach of a Falcon, about {known} mm: reduce the "
+                    f"protocol's workspace_mm"
                 )
 
     def _run_firmware(self, transport: Transport) -> str:
@@ -199,7 +199,7 @@ class FalconDevice(FramedDevice):
         except OSError as error:
             raise FAILURES.failure("firmware-file", f"{self._firmware} cannot be read: {error.strerror}") from error
         image = boot.check_firmware(data)
-        unknown = f"SHA-256 {image.sha256[:16]}…, which is none of those that are known to work"
+        unknown = f"SHA-256 {image.sha256[:16]}…, which is not a version known to work"
         self._progress(f"Loading the Falcon's firmware, {image.name or unknown}.")
         return boot.boot_falcon(transport, data, progress=self._progress).sha256
 

@@ -101,6 +101,6 @@ class ForceDimensionDevice(FramedDevice):
             f"opened: {facts['system']}, serial number {facts.get('serial')}, SDK {facts['sdk']}",
             f"velocity threshold {facts.get('velocity_threshold')}, "
             f"watchdog {'none' if watchdog_s is None else f'{1000 * watchdog_s:.1f} ms'}",
-            f"readings answered by the time guard: {counters['guarded']}",
-            f"forces beyond what the motors give: {counters['saturated']}",
+            f"readings rejected by the time guard: {counters['guarded']}",
+            f"forces beyond the capacity of the motors: {counters['saturated']}",
         )

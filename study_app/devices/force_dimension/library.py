@@ -90,7 +90,7 @@ LONGEST_WATCHDOG: Final = 255
 WATCHDOG_S: Final = 125e-6
 """Unit of the watchdog: documentation of forcedimension_core 1.0.0, expert.setWatchdog; CHAI3D 3.3.0 sets 255, too."""
 _ENABLE_S: Final = 0.5
-_CAN: Final = "force up to the device's own limit, through the maker's library; not proved on hardware"
+_CAN: Final = "force up to the device's own limit, through the manufacturer's library; not yet tested on hardware"
 
 
 class Library:

@@ -55,8 +55,8 @@ class Inverse3Device(FramedDevice):
         if math.hypot(*workspace_m) > REACH_M:
             asked = " x ".join(f"{2000 * half:g}" for half in workspace_m)
             raise DeviceError(
-                f"a workspace of {asked} mm is more than an Inverse3 reaches, whose workspace is a ball of "
-                f"{2000 * REACH_M:g} mm: make the protocol's workspace_mm smaller"
+                f"a workspace of {asked} mm exceeds the reach of an Inverse3, a ball of {2000 * REACH_M:g} mm: "
+                f"reduce the protocol's workspace_mm"
             )
         super().__init__(new_exchange("", force_limit_n, 1), workspace_m, force_limit_n, exchange_functions())
         self._host, self._port, self._wanted_id = address(where)

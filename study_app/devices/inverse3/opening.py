@@ -239,7 +239,7 @@ def find_device(message: Mapping[str, Any], wanted_id: str = "", *, inventory: b
         if not wanted_id or name == wanted_id:
             if not ID.fullmatch(name):
                 raise DeviceError(
-                    f"the Inverse Service lists a device whose id {name[:16]!r} has {len(name)} characters; 1 to 64 "
+                    f"the Inverse Service lists a device whose ID {name[:16]!r} has {len(name)} characters; 1 to 64 "
                     "printable ASCII characters are permitted, no spaces, quotes or backslashes: update this program"
                 )
             config, status = entry.get("config"), entry.get("status", {})

@@ -133,7 +133,7 @@ PORTS: Final = (10001, 10000)
 """Ports of HTTP: docs.haply.co 3.5.x, "Device Configuration" uses the first, "Settings Reference" names the second."""
 ID: Final = re.compile(r"[!#-\[\]-~]{1,64}")
 """Permitted ids, which are inserted unescaped: printable ASCII without spaces, quotes and backslashes."""
-CAN: Final = "force as commanded by the Inverse Service 3.5 or later (Haply Hub); not proved on hardware"
+CAN: Final = "force through the Inverse Service 3.5 or later (Haply Hub); not yet tested on hardware"
 
 
 def probe(host: str = "127.0.0.1", ports: tuple[int, ...] = PORTS) -> Backend:

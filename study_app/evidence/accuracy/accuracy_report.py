@@ -76,9 +76,9 @@ def draw(found: Accuracy) -> Figure:
 
 
 _KEY: Final = (
-    "Points: the greatest error of each model over its references; a thin line extends to the smallest. Ring: the "
-    "model that the program runs. Connected: no other model is both faster and more accurate. How fewer ticks per "
-    "second affect stability is not shown. "
+    "Points show the greatest error of each model over its references; a thin line extends to the smallest. "
+    "The ring marks the model that the program runs. For connected points, there is no model that is both "
+    "faster and more accurate. The effect of fewer ticks per second on stability is not shown. "
 )
 
 
@@ -288,16 +288,17 @@ def evidence(found: Accuracy) -> Evidence:
     text = "\n\n".join(parts) + "\n"
     cells = [[f"{it:.6g}" if isinstance(it, float) else it for it in _values(row)] for row in found.rows]
     files = {"accuracy.csv": Table(COLUMNS, cells).csv(), "accuracy.md": text}
-    return Evidence(text, files, plot_files("accuracy", "What accuracy costs in time", draw, found))
+    return Evidence(text, files, plot_files("accuracy", "Accuracy and computation time", draw, found))
 
 
 _WHAT: Final = (
-    "Times are computation times of one thread, without that of other programs: medians over repeats, in one "
-    "interleaved run, of the median and the 99th percentile of batches of 1,000 ticks. Errors: RMS in % of the RMS of "
-    "the reference's force, greatest in % of its greatest. Direction: RMS angle where the reference's force is "
-    "perceptible. Fewer ticks per second: the error of the force alone, without its effect on stability. Unsteady drag "
-    "is compared with each motion of the fluid solver with constants fitted to the other motions. ● no other model is "
-    "both faster, in real time, and more accurate, each by its greatest error; ◎ the model that the program runs."
+    "Times are computation times of one thread, excluding other programs: medians over repeats, in one "
+    "interleaved run, of the median and the 99th percentile of batches of 1,000 ticks. RMS errors are in % of "
+    "the RMS reference force, greatest errors in % of the greatest. Direction is the RMS angle while the "
+    "reference force is perceptible. Rows with fewer ticks per second give only the error of the force, not "
+    "its effect on stability. Unsteady drag is compared with each motion of the fluid solver with constants "
+    "fitted to the other motions. ● no other model is both faster, in real time, and more accurate, each by "
+    "its greatest error; ◎ the model that the program runs."
 )
 _HEADINGS: Final = (
     "", "model", "ns per tick", "p99", "RMS error [N]", "max [N]", "RMS [%]", "max [%]", "direction [°]",

@@ -50,9 +50,9 @@ MAP_DELAYS: Final = (0, 1, 2, 4)
 LIMIT_DELAYS: Final = (1, 2, 4)
 COLOURS: Final = dict(zip(MAP_DELAYS, (style.STEPS[0], style.STEPS[1], style.STEPS[3], style.STEPS[4]), strict=True))
 CAPTION: Final = (
-    "Lines: boundary measured with the servo's own tick, exact encoder, safety off. Dashed: b = B·α/(2 − α), extended "
-    "to a delay; no hand can make the loop unstable below it. Bars: limits in use; only at 1 kHz with up to one tick "
-    "of delay are they more than half of the boundary."
+    "Lines show the boundary measured with the servo's own tick, an exact encoder and safety off. The dashed "
+    "line is b = B·α/(2 − α), extended to a delay; below it the loop is stable for any hand. Bars show the "
+    "limits in use; they exceed half of the boundary only at 1 kHz with up to one tick of delay."
 )
 CAPTION_LETTERS: Final = 112
 MARKS: Final = dict(zip(MAP_DELAYS, "osD^", strict=True))
@@ -329,7 +329,7 @@ def summary(swept: Swept, fidelities: Sequence[Fidelity]) -> str:
 
 def _counts(swept: Swept) -> Iterator[str]:
     cases, others = len(swept.on), sum(len(one.verdicts) for one in swept.others)
-    yield f"{cases} cases with safety off and on, {others} others with it, {swept.took_s:.0f} s"
+    yield f"{cases} cases with safety off and on, {others} others with safety on, {swept.took_s:.0f} s"
     yield f"{'':24} safety off   safety on"
     reasons = [collections.Counter(r for v in verdicts for r in v.reasons) for verdicts in (swept.off, swept.on)]
     unstable = [sum(not verdict.stable for verdict in verdicts) for verdicts in (swept.off, swept.on)]
@@ -366,8 +366,14 @@ def _limiters(swept: Swept) -> Iterator[str]:
 
 
 def _fidelity(fidelities: Sequence[Fidelity]) -> Iterator[str]:
-    yield "force sent against the model clamped to 8 N, hand attached: rms difference in % of the rms force, the worst"
-    yield "of twelve motions; * more than 5 % and 0.05 N. The second number: the most ticks with such a difference."
+    yield (
+        "difference between the force sent and the model clamped to 8 N, hand attached: RMS in % of the RMS "
+        "force, the worst"
+    )
+    yield (
+        "of twelve motions; * more than 5 % and 0.05 N. The second number is the largest number of ticks "
+        "with such a difference."
+    )
     yield f"{'rate, ticks of delay':22}" + "".join(f"{f'{rate_hz:g} Hz, {delay}':>16}" for rate_hz, delay in LOOPS)
     for liquid, row in itertools.groupby(fidelities, key=lambda one: one.liquid):
         cells = (f"{f'{one.share:.1%}' + ' *'[not one.within]} {one.beyond:6.1%}" for one in row)

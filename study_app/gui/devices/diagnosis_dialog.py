@@ -23,7 +23,7 @@ from study_app.store.workstation import MachineSettings
 from study_app.workers.server import Crashed, Refused
 
 LOOK_MS = 100
-PREPARING = "Preparing … The first time the driver is compiled, which takes about a minute."
+PREPARING = "Preparing … The driver is compiled at the first use, which takes about a minute."
 SIZE = QSize(820, 700)
 
 
@@ -187,9 +187,7 @@ class DiagnosisDialog(QDialog):
         except StoreError as error:
             self.saved.setText(_sentence(str(error)))
         else:
-            self.saved.setText(
-                f"Saved as {path}. It contains no participant id, no answers and no parameters of liquids."
-            )
+            self.saved.setText(f"Saved as {path}. It does not contain participant IDs, answers or liquid parameters.")
         self.saved.show()
 
     def _end_process(self) -> None:

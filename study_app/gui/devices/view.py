@@ -90,7 +90,7 @@ class HelpCard(Card):
         super().__init__("Before the first session", gap=8)
         for paragraph in (
             "Connect the USB cable and the power adapter, then press “Refresh”.",
-            "“Diagnose …” finds, opens, loads, homes and tests the device without force, and says what is wrong.",
+            "“Diagnose …” finds, opens, loads, homes and tests the device without force, and reports faults.",
             "“liquid-study devices calibrate” measures its force with a known weight.",
             "“liquid-study devices bench” measures any device with force in ten minutes.",
         ):
@@ -188,7 +188,7 @@ class DevicesPlace(Place):
     def _show_unexamined(self, error: Exception) -> None:
         if not self._ended:
             self.show_looking(False)
-            self.troubled.emit("This machine could not be examined", f"{error}.")
+            self.troubled.emit("This machine could not be checked", f"{error}.")
 
     def show_devices(self, shown: tuple[DeviceShown, ...]) -> None:
         """Show devices; existing rows stay, with their keyboard focus."""

@@ -39,8 +39,8 @@ def check_display(environment: Mapping[str, str] = os.environ, platform: str = s
     display = environment.get("DISPLAY", "")
     if not display:
         raise DisplayError(
-            "no display to open a window on: DISPLAY and WAYLAND_DISPLAY are not set; start from a desktop session, "
-            f"or over SSH with ssh -X ({NEEDS_NO_DISPLAY})"
+            "there is no display for a window: DISPLAY and WAYLAND_DISPLAY are not set; start from a desktop "
+            f"session, or over SSH with ssh -X ({NEEDS_NO_DISPLAY})"
         )
     _load_plugin()
     _connect_to_display(display)
@@ -114,6 +114,6 @@ def _connect_to_display(display: str) -> None:
     xcb.xcb_disconnect(connection)
     if failed:
         raise DisplayError(
-            f"the display {display!r} (DISPLAY) cannot be reached: is its X server running, and may you use it? "
-            f"({NEEDS_NO_DISPLAY})"
+            f"the display {display!r} (DISPLAY) cannot be reached: check that its X server is running and that "
+            f"you have access ({NEEDS_NO_DISPLAY})"
         )

@@ -296,7 +296,7 @@ class HelpPlace(Place):
         self.list.setProperty("role", "links")
         self.list.setFrameShape(QFrame.Shape.NoFrame)
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.nothing = label("No page has these words.", "label", "text2", wraps=True)
+        self.nothing = label("No page contains these words.", "label", "text2", wraps=True)
         self.reader = PageReader(documentation.folder() if folder is None else folder)
         self.back = ActionButton("chevron_left", "Back", height=38)
         self.back.setEnabled(False)

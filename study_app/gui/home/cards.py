@@ -152,11 +152,11 @@ COLUMNS = (
 EVERY = "every"
 LEAST_HEIGHT = 200
 NONE = {
-    "": "No sessions of participants yet. The first one appears here when it begins.",
+    "": "No sessions of participants yet. The first session appears here when it starts.",
     "pilot": "No pilot sessions.",
     "simulated": "No simulated sessions.",
     "sample": "No sample sessions.",
-    EVERY: "No sessions yet. The first one appears here when it begins.",
+    EVERY: "No sessions yet. The first session appears here when it starts.",
 }
 
 

@@ -62,7 +62,7 @@ class RehearsalDialog(Work):
     ) -> None:
         self.folder = rehearsal_folder(results, facts.protocol.study.name)
         groups = ", ".join(facts.protocol.groups)
-        dealt = f" They are dealt evenly to the groups {groups}." if facts.protocol.asks_group else ""
+        dealt = f" They are spread evenly over the groups {groups}." if facts.protocol.asks_group else ""
         super().__init__(
             parent,
             theme,
@@ -138,9 +138,9 @@ class RehearsalDialog(Work):
 FRAME = 60  # of a window, at most
 INSIDE, OUTSIDE = "in the workspace", "outside the workspace: Home will not list its sessions"
 HOLDS = "It will contain the folders protocols and results."
-ROW_HINT = "the session takes that participant's row of the square; empty: its own row"
-PLACE_HINT = "the session takes that participant's order and place in the group; empty: its own"
-GROUP_HINT = "what the participant already is; recorded"
+ROW_HINT = "the session uses that participant's order; leave empty for its own order"
+PLACE_HINT = "the session uses that participant's order and position in the group; leave empty for its own"
+GROUP_HINT = "a property of the participant; it is recorded"
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,7 +230,7 @@ class NewSessionDialog(QDialog):
         languages = {code: language_name(code) for code in study.languages}
         screen_titles = {screen.number: f"Screen {screen.number}: {screen.words}" for screen in screens}
         fields = (
-            Field("participant", "Participant", aside="letters and digits, no name"),
+            Field("participant", "Participant", aside="letters and digits, not a name"),
             Field("session", "Session", "count", limits=(1, MAX_SESSION)),
             seed_field("determines every order; recorded"),
             Field("operator", "Operator", longest=40, placeholder="Initials, such as AK"),
@@ -459,8 +459,8 @@ class WorkspaceDialog(Question):
             parent,
             theme,
             "Choose your workspace",
-            "Protocols and results of this computer are kept in one folder. Windows and commands use it wherever they "
-            "are started. You can change it later under This machine.",
+            "Protocols and results of this computer are stored in one folder. Windows and commands use it "
+            "wherever they are started. You can change it later under This machine.",
             ActionButton("check", "Use this folder", role="primary"),
             back="Not now",
             fields=(Field("workspace", "Workspace folder", "folder", hint=HOLDS),),

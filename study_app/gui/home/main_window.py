@@ -167,7 +167,7 @@ def bug_sentence(error: BaseException) -> str:
     """Return the sentence about a bug of the program or a plug-in."""
     if isinstance(said := explained(error), StudyError):
         return f"{said}."
-    return f"{type(error).__name__}: {error}. This is a bug: please report it, with what the terminal shows."
+    return f"{type(error).__name__}: {error}. This is a bug: please report it with the output in the terminal."
 
 
 class MainWindow(Themed, QMainWindow):

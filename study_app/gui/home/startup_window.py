@@ -19,7 +19,7 @@ from study_app.number_text import minutes
 LONG_AFTER_S = 4.0
 STEP = "Opening the device and the force model …"
 FIRST_TIME = (
-    "The force model is being compiled. This happens once after an installation or an update and takes about a minute."
+    "The force model is being compiled. This happens once after each installation or update and takes about a minute."
 )
 
 

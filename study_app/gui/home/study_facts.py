@@ -340,7 +340,7 @@ def interrupted_session(
             source=source,
             participant=session.participant,
             heading=f"{kind}{session.participant}, session {session.session} of {session.study} stopped {where}",
-            line=f"{stopped}. Answers on disk: {session.answers}{whole}; nothing before that point is missing.",
+            line=f"{stopped}. Answers on disk: {session.answers}{whole}; all data before that point are complete.",
         )
     return None
 

@@ -64,9 +64,9 @@ COMMANDS: Final = (
     Command("back", "Previous element", ("Alt+Left",), run=lambda place: place.ask("back")),
     Command("page", "Participant's page", ("Ctrl+Return",)),
     Command("leave page", "Leave that page", ("Escape",), within="page"),
-    Command("language", "That page in the next language", ("Ctrl+L",)),
+    Command("language", "The page in the next language", ("Ctrl+L",)),
     Command("add", "Add", ("Insert",), run=lambda place: place.ask_to_add()),
-    Command("open entry", "Open what an entry names", ("Return",), within="lists"),
+    Command("open entry", "Open the element that an entry refers to", ("Return",), within="lists"),
     Command("duplicate", "Duplicate", ("Ctrl+D",), run=lambda place: place.duplicate()),
     Command("series", "Copies that differ in one number", ("Ctrl+Shift+D",), run=lambda place: place.make_series()),
     Command("rename", "Rename", ("F2",), run=lambda place: place.rename()),
@@ -84,7 +84,7 @@ COMMANDS: Final = (
     Command("next field", "Next field", ("Tab",), within="field"),
     Command("accept", "Accept", ("Return",), within="field"),
     Command("restore", "Restore", ("Escape",), within="field"),
-    Command("remove", "Remove its key from the file", ("Ctrl+Delete",), within="field"),
+    Command("remove", "Remove the key from the file", ("Ctrl+Delete",), within="field"),
     Command("count", "Count up, down", ("Up", "Down"), within="field"),
 )
 _OF: Final = {command.id: command for command in COMMANDS}

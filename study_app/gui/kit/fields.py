@@ -78,7 +78,7 @@ def seed_field(aside: str = "") -> Field:
 
     def parse(text: str) -> int:
         if not (text.isascii() and text.isdecimal() and int(text) <= MAX_SEED):
-            raise ValueError(f"the seed is a whole number from 0 to {MAX_SEED}")
+            raise ValueError(f"the seed must be a whole number from 0 to {MAX_SEED}")
         return int(text)
 
     return Field("seed", "Seed", aside=aside, parse=parse)
@@ -87,7 +87,7 @@ def seed_field(aside: str = "") -> Field:
 def typed_file(name: str, text: str) -> Path | None:
     """Return the file whose path was typed, None for an empty text."""
     if text and not Path(text).is_file():
-        raise ValueError(f"there is no {name} in {text}: choose the file, or leave the field empty")
+        raise ValueError(f"{name} is not in {text}: choose the file, or leave the field empty")
     return Path(text) if text else None
 
 

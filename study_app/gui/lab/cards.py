@@ -187,7 +187,7 @@ class PlotCard(ReadingCard):
     """A plot under its heading and its curves' names."""
 
     def __init__(self, title: str, unit: str, plot: Plot, sentence: str) -> None:
-        why = "A trace would reveal which is which."
+        why = "The trace would reveal the settings."
         super().__init__(title, label(unit, "small", "text2"), why, padding=14, gap=4)
         self.plot, self.legend = plot, Legend()
         describe_plot(plot, title, sentence)
@@ -301,7 +301,7 @@ class CostCard(ReadingCard):
     """What each effect takes of a tick."""
 
     def __init__(self) -> None:
-        super().__init__("Cost per tick", label("", "small", "text2"), "Costs would reveal which is which.")
+        super().__init__("Cost per tick", label("", "small", "text2"), "Costs would reveal the settings.")
         self.lines: list[CostLine] = []
         self.absent: list[AbsentLine] = []
         self._costs = vbox(spacing=0)
@@ -359,7 +359,7 @@ class ErrorCard(ReadingCard):
     """How far the felt setting is from its reference."""
 
     def __init__(self) -> None:
-        why = "Errors would reveal which is which."
+        why = "Errors would reveal the settings."
         super().__init__("Error against the reference", label("", "small", "text2"), why)
         self.lines: list[ErrorLine] = []
         self._lines = vbox(spacing=2)
@@ -424,7 +424,7 @@ class LimiterCard(ReadingCard):
     """Which limiter acts, and in how many ticks of the last ten seconds each did."""
 
     def __init__(self) -> None:
-        why = "Limiters would reveal which is which."
+        why = "Limiters would reveal the settings."
         super().__init__("Limiters", label("ticks, last 10 s", "small", "text2"), why)
         self.lines: list[LimiterLine] = []
         self._lines = vbox(spacing=0, margins=(-8, 0, -8, 0))

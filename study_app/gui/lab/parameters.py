@@ -392,7 +392,7 @@ class NumberRow(ParameterRow):
             self.show_refused(f"{unclear_number(text)}, or press Esc.")
             return
         said = f"“{text}” is not a number" if text.strip() else "This needs a number"
-        self.show_refused(f"{said}: write one such as {example}, or press Esc.")
+        self.show_refused(f"{said}: write a value such as {example}, or press Esc.")
 
     def _restore_number(self) -> None:
         self.show_refused("")
@@ -545,7 +545,7 @@ class FormPanel(Card):
         column.addWidget(Rule())
         column.addWidget(self.said)  # above the buttons, so that they stay in place when it appears
         add_parts(column, self.back, self.open)
-        self.hidden = MaskedPanel(HIDDEN, "Parameters would reveal which is which.")
+        self.hidden = MaskedPanel(HIDDEN, "Parameters would reveal the settings.")
         self._stack = QStackedLayout()
         self._stack.addWidget(whole)
         self._stack.addWidget(self.hidden)

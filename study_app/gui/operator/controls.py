@@ -82,9 +82,9 @@ def _hint_text(view: OperatorView) -> str:
     if view.state == "trouble":
         return "The force is off. All answers so far are on disk."
     if view.state == "force off":
-        return "The force returns only when you turn it on again."
+        return "The force returns only after you turn it on again."
     if view.state == "paused":
-        return "An interrupted trial starts again."
+        return "An interrupted trial restarts."
     return "You will be asked for a reason; both recordings are kept." if view.may_repeat else ""
 
 

@@ -374,8 +374,8 @@ def _delay_sentences(vitals: Vitals) -> tuple[str, ...]:
     if vitals.delay_ticks <= vitals.first_delay_ticks:
         return ()
     return (
-        f"The device answers after {vitals.delay_ticks} ticks, after {vitals.first_delay_ticks} at the start: the "
-        "force is limited to what is stable with this delay",
+        f"The device answers after {vitals.delay_ticks} ticks (at the start {vitals.first_delay_ticks}): the "
+        "force is limited to a stable level for this delay",
     )
 
 
@@ -459,7 +459,7 @@ def track_lines(progress: Progress, schedule: Schedule, trial: Trial, choices: M
         *(_answer_lines(answers, choices) if answers else ()),
         *(f"repeated {count}: {reason}" for reason, count in reasons.items()),
         *(f"not delivered {count}: {REASONS.get(limit, limit)}" for limit, count in limits.items()),
-        *([f"{len(given_up)} unanswered: no attempt was delivered"] if given_up else []),
+        *([f"{len(given_up)} unanswered because no attempt was delivered"] if given_up else []),
     )
 
 

@@ -153,7 +153,7 @@ class HiddenForceCard(Card):
     """In the place and size of the force's plot while the study is double-blind: nothing about the force."""
 
     TITLE = "Hidden while the study is double-blind"
-    WHY = "A trace would reveal the liquid."
+    WHY = "The trace would reveal the liquid."
 
     def __init__(self) -> None:
         super().__init__("Force", Chip("neutral", "eye_off", "Hidden", small=True), padding=16, gap=8)

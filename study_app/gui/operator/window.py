@@ -262,7 +262,7 @@ class OperatorWindow(Themed, QMainWindow):
             self._open_question(
                 "repeat",
                 "Repeat this trial?",
-                f"{setting} starts again from the beginning. The first recording is kept, together with your reason.",
+                f"{setting} restarts from the beginning. The first recording is kept with your reason.",
                 ActionButton("repeat", "Repeat trial", role="primary"),
                 fields=(Field("reason", "Reason", placeholder="For example: phone rang"),),
                 needs={"reason": REASON},

@@ -127,7 +127,9 @@ def planned_rows(
 OF_THE_COMPUTER: Final = ("Servo rate", "Servo lateness", "Priority", "Screen", "Results folder", "Free space")
 """The checks before a session that say nothing of the study or its device."""
 
-RECOMPILES: Final = "Every start compiles again, for up to a minute: set NUMBA_CACHE_DIR to a writable folder."
+RECOMPILES: Final = (
+    "Every start compiles the model again, for up to a minute: set NUMBA_CACHE_DIR to a writable folder."
+)
 
 
 def computer_checks(
@@ -150,7 +152,7 @@ def _device_check(devices: Sequence[Backend]) -> Check:
     about = f"cannot be used now: {', '.join(missing)}" if missing else "every device can be used"
     if haptic:
         return Check("Haptic devices", "ok", ", ".join(device.name for device in haptic), about=about)
-    advice = "Connect one, then look at Devices; without one only the mouse and the simulated hand can be used."
+    advice = "Connect a device, then open Devices; without a device you can use only the mouse and the simulated hand."
     return Check("Haptic devices", "warning", "none connected", about=about, advice=advice)
 
 
@@ -407,7 +409,7 @@ ABOUT = (
     "Measured for two seconds with the simulated hand. A session measures again, with its own device and limits. "
     "This page is also available under This machine."
 )
-MEASURING = "Measuring … The first time the force model is compiled, which may take a minute."
+MEASURING = "Measuring … The force model is compiled at the first use, which may take a minute."
 
 
 class ComputerWindow(Question):

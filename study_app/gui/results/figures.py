@@ -352,7 +352,9 @@ class WorkLine(Card):
             self.words.show_text(f"{going.what[:1].upper()}{going.what[1:]} …")
             self.bar.show_share(going.share)
         elif untested:
-            self.words.show_text("Stopped before the tests: recognition and the lowest delays are missing.")
+            self.words.show_text(
+                "The computation was stopped before the tests: recognition and the lowest delays are missing."
+            )
 
 
 class TroubleCard(Card):

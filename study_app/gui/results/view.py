@@ -155,8 +155,8 @@ class LeaveOutDialog(Question):
             parent,
             theme,
             "Exclude from the analysis",
-            "It no longer counts in measures, figures and tests. Nothing is deleted: exclusions.csv and every report "
-            "state what was excluded, by whom and why.",
+            "It is excluded from measures, figures and tests. No data are deleted: exclusions.csv and every "
+            "report state what was excluded, by whom and why.",
             ActionButton("minus", "Exclude", role="primary"),
             fields=(
                 choice_field(
@@ -215,7 +215,7 @@ class SessionsCard(Card):
         self.details = IconButton("file", "Details of the selected session", size=36, role="plain")
         self.details.setEnabled(False)
         self.details.clicked.connect(self.rows.open_chosen)
-        tip = "What changed in the study since the selected session"
+        tip = "What has changed in the study since the selected session"
         self.version = IconButton("designer", tip, size=36, role="plain")
         self.version.setEnabled(False)
         self.version.clicked.connect(self.rows.ask_for_version)
@@ -266,7 +266,7 @@ class ExclusionsCard(Card):
     def __init__(self) -> None:
         self.leave_out = ActionButton("minus", "Exclude …", height=36)
         super().__init__("Excluded", self.leave_out, padding=14, gap=6)
-        self.none = label("Nothing is excluded from the analysis.", "label", "text2", wraps=True, weight=400)
+        self.none = label("There are no exclusions from the analysis.", "label", "text2", wraps=True, weight=400)
         self.open = ActionButton("file", "Open the list", role="plain", height=30)
         inside = QWidget()
         self._rows = vbox(STRETCH, spacing=8, margins=0, parent=inside)
@@ -481,7 +481,7 @@ class ResultsPlace(Place):
         if self.view.kind == "pilot":
             chips.append(("warn", "info", "Pilot", "Pilot sessions, stored separately"))
         if self.view.sealed:
-            chips.append(("neutral", "lock", "Blinded: shown by code", "The names of the settings are sealed"))
+            chips.append(("neutral", "lock", "Blinded: shown by code", "The names of the conditions are sealed"))
         if self.view.opened:
             opened, most = self.view.opened, 2 * REASON_SIGNS
             text = opened if len(opened) <= most else f"{opened[: most - 1].rstrip()}…"
@@ -503,13 +503,16 @@ class ResultsPlace(Place):
     def _ask_unblind(self) -> None:
         running = sum(session.needs_care for session in self.view.sessions)
         many = "1 session is" if running == 1 else f"{running} sessions are"
-        later = f"{many} not complete. Operators of the remaining sessions will no longer be blind." if running else ""
+        later = (
+            f"{many} not complete. Operators of the remaining sessions will no longer be blinded." if running else ""
+        )
         dialog = Question(
             self,
             self.theme,
             f"Unblind {self._study_name()}?",
-            "Everyone who opens this study will see which setting was which, here and in every table, figure and "
-            "report. This cannot be undone. Your name, the reason and the time are stored with the data.",
+            "Everyone who opens this study will see which condition each code stands for, here and in every "
+            "table, figure and report. This cannot be undone. Your name, the reason and the time are stored "
+            "with the data.",
             ActionButton("eye", "Unblind", role="danger"),
             fields=decision_fields("Name", "Your name or initials, such as AK", "collection closed"),
             needs=NEEDS,
@@ -542,8 +545,8 @@ class ResultsPlace(Place):
             self,
             self.theme,
             f"Include again: {exclusion_text(exclusion)}",
-            f"It was excluded for this reason: “{exclusion.reason}”. It will count again in measures, figures and "
-            "tests. Your name, the reason and the time are stored in exclusions_reversed.jsonl.",
+            f"It was excluded for this reason: “{exclusion.reason}”. It will be included again in measures, "
+            "figures and tests. Your name, the reason and the time are stored in exclusions_reversed.jsonl.",
             ActionButton("undo", "Include again", role="primary"),
             fields=decision_fields("By", "Your name or initials, such as AK", "wrong participant"),
             needs=NEEDS,
@@ -600,7 +603,7 @@ class ResultsPlace(Place):
         dialog.open()
 
     def _code_note(self) -> str:
-        return " Settings appear as codes because the key is sealed." if self.view.sealed else ""
+        return " Conditions appear as codes because the study is blinded." if self.view.sealed else ""
 
     def _study_name(self) -> str:
         return "" if self.view.chosen is None else self.view.chosen.name

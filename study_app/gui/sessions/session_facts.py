@@ -211,7 +211,7 @@ LIMIT_WORDS: Mapping[str, tuple[str, str]] = {
     "delay_error_p95_ms": ("error of the delay (95th percentile)", "ms"),
     "first_frame_gap_ms": ("time before the first frame", "ms"),
     "worst_frame_gap_ms": ("longest time between two frames", "ms"),
-    "withheld_share": ("share of the force withheld", "%"),
+    "withheld_share": ("proportion of the force held back", "%"),
     "targets_reached": ("targets reached, at least", "%"),
 }
 """Of every measure that a limit judges: what it is, and its unit."""

@@ -89,7 +89,7 @@ def read_record(folder: Path) -> SessionRecord:
     key = opened_key(study)
     lines = open_events(journal.read(session.journal), key)
     if not lines:
-        raise StoreError(f"{session.journal} has no line: the session did not begin")
+        raise StoreError(f"{session.journal} is empty: the session did not begin")
     listed = exclusions(study.path)
     (facts,) = session_facts(study.path, row_of(session, key), listed, {})
     own = tuple(exclusion for exclusion in listed if exclusion.what[:2] == (facts.participant, facts.session))
@@ -122,7 +122,11 @@ def limits_sentence(
     """Return sentences on undelivered trials and on trials within the study's limits."""
     lost = f"{missing_sentence(missing, excluded=excluded)} " if missing.count else ""
     repeated = sum(trial.outcome == UNDELIVERED for trial in trials)
-    again = f"{counted(repeated, 'presentation')} broke a limit and had no question. " if repeated else ""
+    again = (
+        f"{counted(repeated, 'presentation')} exceeded a limit and were not followed by a question. "
+        if repeated
+        else ""
+    )
     return (
         f"{lost}{again}{_judged_sentence([trial for trial in trials if trial.outcome != UNDELIVERED], sealed=sealed)}"
     )
@@ -141,16 +145,16 @@ def missing_sentence(missing: MissingTrials, *, excluded: bool) -> str:
 def _judged_sentence(trials: Sequence[TrialRecord], *, sealed: bool) -> str:
     judged = [trial for trial in trials if trial.valid is not None]
     outside = [trial for trial in judged if not trial.valid]
-    later = " Delay error, withheld force and targets reached are judged once the study is unblinded." if sealed else ""
+    later = " Delay error, force held back and targets reached are checked after unblinding." if sealed else ""
     if not judged:
-        return f"No trial has been measured yet.{later}"
+        return f"Trials have not been measured yet.{later}"
     if not outside:
         every = "The measured trial" if len(judged) == 1 else f"All {len(judged)} measured trials"
         return f"{every} met the limits of the study.{later}"
     return (
-        f"Out of limits: {len(outside)} of {counted(len(judged), 'measured trial')} exceeded a limit of the study. The "
-        "answers are kept and still count; exclude those you do not trust in Results. The column “Limits” and the line "
-        f"below the table name the limit.{later}"
+        f"Out of limits: {len(outside)} of {counted(len(judged), 'measured trial')} exceeded a limit of the "
+        "study. The answers are still included; in Results you can exclude trials that you do not trust. The "
+        f"column “Limits” and the line below the table state the limit.{later}"
     )
 
 
@@ -271,7 +275,7 @@ def trial_limits_text(trial: TrialRecord) -> str:
     if trial.lost:
         said += f" The recording was lost: {trial.lost}."
     if trial.unconfirmed:
-        said += f" Chosen but not confirmed, so not in any table: {', '.join(trial.unconfirmed)}."
+        said += f" Chosen but not confirmed, and therefore not in the tables: {', '.join(trial.unconfirmed)}."
     return said
 
 

@@ -44,7 +44,7 @@ def session_cell(facts: SessionFacts, name: str, now: datetime) -> dict[int, Any
         case "version":
             text, face = facts.version, font("label", weight=400, tabular=True)
             face.setUnderline(True)
-            tip = f"Show what changed in the study since version {text}" if text else tip
+            tip = f"Show what has changed in the study since version {text}" if text else tip
         case _:
             text = answers_text(facts) if chip is None else chip(facts)[2]
     if name == "validity" and facts.excluded is not None:

@@ -299,7 +299,7 @@ def _check_server(text: str) -> str:
 
 def _check_path(text: str) -> str | None:
     if text and not Path(text).exists():
-        raise ValueError(f"There is no {text}: choose another, or leave the field empty.")
+        raise ValueError(f"{text} does not exist: choose another file, or leave the field empty.")
     return text or None
 
 
@@ -320,13 +320,13 @@ FIELDS = (
     Field("triggers", "Trigger port", hint=PORTS, parse=_check_port),
     Field("photodiode", "Square for a photodiode in the tank's corner", "switch"),
     choice_field("device", "Device", {name: title_of(name) for name in list_devices()}),
-    Field("camera", "Camera of conditions that show one", longest=CAMERA_LENGTH, placeholder=USUAL),
+    Field("camera", "Camera for conditions that show a camera picture", longest=CAMERA_LENGTH, placeholder=USUAL),
     Field(
         "proofs", "Folder for the study's proof, written when a session ends", "folder",
-        hint="Where people who can change results cannot write. Leave empty for none.",
+        hint="A folder that people who can change results cannot change. Leave empty for none.",
         parse=_check_path, write=_text_or_empty,
     ),
-    Field("stamps", "Server that stamps proofs with the time (RFC 3161)", hint=STAMPS, parse=_check_server),
+    Field("stamps", "Time-stamp server for proofs (RFC 3161)", hint=STAMPS, parse=_check_server),
     Field(
         "stamp_root", "Root certificate of the server (PEM), to verify its stamps", "file",
         file_filter="Certificates (*.pem *.crt *.cer)", parse=_check_path, write=_text_or_empty,
@@ -543,8 +543,8 @@ def text_size_sentence(settings: MachineSettings, screen: ScreenShown, scale: fl
     """Return a sentence on the text size for the viewing distance."""
     seen, least = settings.x_height_deg(screen.width_px, screen.width_mm), f"{LEAST_X_HEIGHT_DEG:g}°"
     if seen is None:
-        enlarged = f"Measure the distance: text is then enlarged until an x subtends {least}."
+        enlarged = f"Measure the viewing distance; text is then enlarged until an x subtends {least}."
         return f"{enlarged} Until then it has its default size."
     if scale == 1.0:
-        return f"Default size: an x subtends {seen:.2f}°; at least {least} is needed."
+        return f"Default size: an x subtends {seen:.2f}°; at least {least} is recommended."
     return f"{scale:.2f} times the default size: an x subtends {least} instead of {seen:.2f}°."

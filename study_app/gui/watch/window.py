@@ -97,7 +97,7 @@ class ForcePlot(Plot):
         self.show_ticks("bottom", [(along * k, f"{tick_text(along * k)} s") for k in np.arange(first, last + 1)])
         self.box.setXRange(shown.begins_s, shown.ends_s, padding=0)
         self.box.setYRange(0.0, 1.12 * peak, padding=0)
-        described = f"Size of the force sent and of the force requested over the trial, up to {peak:.2f} N."
+        described = f"Magnitude of the forces sent and requested during the trial, up to {peak:.2f} N."
         describe_plot(self, "Force on the hand", described)
         self.apply_theme(LIGHT)
 
@@ -247,7 +247,9 @@ class WatchWindow(Themed, QDialog):
         self.interval = Choice()
         self.interval.setAccessibleName("Interval")
         self.seen = Toggle("As on the screen")
-        self.seen.setToolTip("The ball as late as the participant saw it; arrows and curves are of the moment")
+        self.seen.setToolTip(
+            "The ball with the delay that the participant saw; arrows and curves show the current moment"
+        )
         self.export = ActionButton("download", "Export as video …", height=40)
         self.play = ActionButton("play", "Play", cap="Space", height=40)
         self.speed = Choice()
@@ -397,7 +399,7 @@ class WatchWindow(Themed, QDialog):
             self,
             self.theme,
             "Export as video",
-            f"{self._name} will show what is seen here at {self.speed.currentText()} speed.",
+            f"{self._name} will show this view at {self.speed.currentText()} speed.",
             ActionButton("download", "Export", role="primary"),
             fields=(Field("to", "Folder", "folder", hint="An existing file will be overwritten."),),
             needs={"to": "Please choose a folder."},

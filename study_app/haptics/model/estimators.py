@@ -70,7 +70,7 @@ class Withdrawn(Frozen):
     @property
     def refusal(self) -> tuple[str, str]:
         """Why no force is computed, and what to do."""
-        return f'the velocity estimator "{self.kind}" left the program', 'write "ewma", "kalman" or "raw"'
+        return f'the velocity estimator "{self.kind}" was removed from the program', 'write "ewma", "kalman" or "raw"'
 
 
 class DeviceVelocity(Frozen):

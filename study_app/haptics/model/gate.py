@@ -257,7 +257,7 @@ def _barred_effects(scene: Scene, liquid: Liquid, bound_of: Mapping[Effect, floa
     if liquid.effects != "auto":
         rivals = {it.name: it.excludes for it in EFFECTS if it.excludes and it.name in bound_of}
         names = [name for rival, others in rivals.items() for name in (others if rival in liquid.effects else (rival,))]
-        return dict.fromkeys(names, "another model of the same thing is named")
+        return dict.fromkeys(names, "another model of the same effect is selected")
     barred = {
         name: why
         for effect in EFFECTS
@@ -265,7 +265,7 @@ def _barred_effects(scene: Scene, liquid: Liquid, bound_of: Mapping[Effect, floa
         for names, why in (effect.bars(Extremes(scene, liquid)),)
         for name in names
     }
-    return barred | dict.fromkeys(NEVER_BY_ITSELF, "not determined by density and viscosity: name it to use it")
+    return barred | dict.fromkeys(NEVER_BY_ITSELF, "not determined by density and viscosity: list it to use it")
 
 
 def _named_verdicts(liquid: Liquid, bound_of: Mapping[Effect, float]) -> dict[Effect, tuple[bool, str]]:
@@ -291,7 +291,7 @@ def _chosen_verdicts(
             left_out_n = with_it_n
             judged[effect] = False, _omission_reason(bound_of[effect], left_out_n, budget_n)
         else:
-            judged[effect] = True, f"without it {with_it_n:.3g} N would be missing, more than {budget_n:.3g} N"
+            judged[effect] = True, f"omitting it would remove {with_it_n:.3g} N, more than {budget_n:.3g} N"
     for name in [name for name, (taken, _) in judged.items() if taken and NAMED[name].through]:
         carrier = next(it for it in NAMED[name].through if it not in barred)
         if not judged[carrier][0]:

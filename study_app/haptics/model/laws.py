@@ -82,7 +82,9 @@ def drag_n(
     if law == "constant":
         return 0.5 * density_kg_m3 * drag_coefficient * math.pi / 4 * diameter_m**2 * speed_mps**2
     if viscosity_pa_s is None or law not in LAWS:
-        raise ValueError(f"the law {law!r} needs a viscosity" if law in LAWS else f"{law!r} is no law of a sphere")
+        raise ValueError(
+            f"the law {law!r} needs a viscosity" if law in LAWS else (f"{law!r} is not a drag law for a sphere")
+        )
     reynolds = density_kg_m3 * speed_mps * diameter_m / viscosity_pa_s
     return 3 * math.pi * viscosity_pa_s * diameter_m * speed_mps * LAWS[law](reynolds)
 
@@ -102,7 +104,7 @@ _INDICES: Final = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 _SHAPES: Final = (1.354, 1.413, 1.458, 1.442, 1.420, 1.382, 1.320, 1.240, 1.140, 1.0)
 
 StressPa: TypeAlias = Annotated[
-    float, within(0, 5000, "no liquid is a solid: toothpaste has 50 to 200 Pa", what="Yield stress τ_y [Pa].")
+    float, within(0, 5000, "liquids have less than solids; toothpaste has 50 to 200 Pa", what="Yield stress τ_y [Pa].")
 ]
 ConsistencyPaSn: TypeAlias = Annotated[
     float, within(1e-4, 1e5, "water has 0.001 Pa·s, ketchup 10 Pa·sⁿ", what="Consistency K [Pa·sⁿ].")
@@ -112,11 +114,11 @@ FlowIndex: TypeAlias = Annotated[
     within(
         0.1,
         1,
-        'below, no drag on a sphere is known; above 1 it is "shear-thickening"',
+        'below this the drag on a sphere is unknown; above 1 use "shear-thickening"',
         what="Flow index n; 1: no shear thinning.",
     ),
 ]
-TimeS: TypeAlias = Annotated[float, within(1e-4, 1000, "shorter, a liquid is Newtonian; longer, it is a solid")]
+TimeS: TypeAlias = Annotated[float, within(1e-4, 1000, "below this a liquid is Newtonian; above this it is a solid")]
 ShearRate: TypeAlias = Annotated[float, within(0.01, 1e5, "a hand shears a liquid at 0.1 to 100 per second")]
 
 

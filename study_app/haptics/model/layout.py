@@ -54,10 +54,10 @@ class Limiter(NamedTuple):
 
 
 LIMITERS: Final = (
-    Limiter(bit=LIMITER_SLEW, name="slew", label="Slew", meaning="the change of force was slowed"),
+    Limiter(bit=LIMITER_SLEW, name="slew", label="Slew", meaning="the slew limit slowed the change of force"),
     Limiter(bit=LIMITER_FADE, name="fade", label="Fade", meaning="the force was fading in or out", expected=True),
     Limiter(
-        bit=LIMITER_SLOPE, name="slope", label="Slope", meaning="the slope limit bounded the change of force with speed"
+        bit=LIMITER_SLOPE, name="slope", label="Slope", meaning="the slope limit reduced the change of force with speed"
     ),
     Limiter(bit=LIMITER_NORM, name="norm", label="Force", meaning="the force was cut to the force limit"),
     Limiter(
@@ -79,14 +79,16 @@ LIMITERS: Final = (
         bit=LIMITER_ESTIMATOR,
         name="estimator",
         label="Velocity filter",
-        meaning="EWMA gave the velocity, because the Kalman filter's innovations were too large or the delay changed",
+        meaning=(
+            "EWMA estimated the velocity because the Kalman filter's innovations were too large or the delay changed"
+        ),
         later=True,
     ),
     Limiter(
         bit=LIMITER_SATURATED,
         name="saturated",
         label="Saturated motors",
-        meaning="the device's motors saturated: its force was between zero and the recorded one",
+        meaning="the device's motors saturated: its force was between zero and the recorded force",
         later=True,
     ),
 )
@@ -171,19 +173,19 @@ _CODE: Final = partial(SampleField, stored=np.int32)
 
 SAMPLE_FIELDS: Final = (
     SampleField("tick", "Number of the servo's tick since its start; gaps are lost samples.", stream="tick"),
-    SampleField("time_ns", "Time when the device was read, on the servo's clock.", unit="ns"),
+    SampleField("time_ns", "Time at which the device was read, on the servo's clock.", unit="ns"),
     SampleField(
         "lateness_ns",
-        "Time when the tick was due; its lateness is time_ns - due_ns.",
+        "Time at which the tick was due; its lateness is time_ns - due_ns.",
         column="due_ns",
         unit="ns",
         beside="time_ns",
         sign=-1,
     ),
-    SampleField("fresh", "true where the device reported a new sample.", stored=np.bool_),
+    SampleField("fresh", "true if the device reported a new sample.", stored=np.bool_),
     _VECTOR(
         "position_m",
-        "Position of the hand, exact, *.",
+        "Exact position of the hand, *.",
         column="position_*_m",
         unit="m",
         stored=np.float64,
@@ -213,7 +215,7 @@ SAMPLE_FIELDS: Final = (
     ),
     _FORCE(
         "force_n",
-        "Force of the liquid that was withheld: the force of the liquid is device_force + withheld, *.",
+        "Force of the liquid that was held back, *; the force of the liquid is device_force + withheld.",
         column="withheld_*_n",
         beside="device_force_n",
     ),  # sum of the effects on the body, before slope limit and safety

@@ -47,7 +47,9 @@ class Motion:
         vectors = [self.position_m] if self.velocity_mps is None else [self.position_m, self.velocity_mps]
         if n == 0 or self.t_s.shape != (n,) or any(vector.shape != (n, 3) for vector in vectors):
             shapes = ", ".join(str(values.shape) for values in (self.t_s, *vectors))
-            raise StudyError(f"a motion is times (n,), positions (n, 3) and perhaps velocities (n, 3), not {shapes}")
+            raise StudyError(
+                f"a motion consists of times (n,), positions (n, 3) and optionally velocities (n, 3), not {shapes}"
+            )
         if not all(np.isfinite(values).all() for values in (self.t_s, *vectors)):
             raise StudyError("a motion contains only finite numbers")
         if not (np.diff(self.t_s) > 0).all():
@@ -68,12 +70,12 @@ def read_motion(path: Path) -> Motion:
         refuse_device(path)
         table = split(decoded(path.read_bytes()), PLACES + VELOCITIES)
     except OSError as error:
-        raise StudyError(f"cannot read the motion {path}: {error.strerror}; name a CSV file of {HEADER}") from error
+        raise StudyError(f"cannot read the motion {path}: {error.strerror}; give a CSV file with {HEADER}") from error
     except ValueError as error:
-        raise StudyError(f"cannot read the motion {path}: {error}; name a CSV file of {HEADER}") from error
+        raise StudyError(f"cannot read the motion {path}: {error}; give a CSV file with {HEADER}") from error
     header = table.names
     if header not in {PLACES, PLACES + VELOCITIES}:
-        permitted = f"the first line must be {','.join(PLACES)}, or that and {','.join(VELOCITIES)}"
+        permitted = f"the first line must be {','.join(PLACES)}, optionally followed by {','.join(VELOCITIES)}"
         columns = ",".join(header)[:SHOWN] or "nothing"
         raise ProtocolError(str(path), (Problem("header", f"is {columns}; {permitted}", line=1),))
     if not table.lines:
@@ -93,7 +95,7 @@ def refuse_device(path: Path) -> None:
         The system cannot say what it is.
     """
     if path.is_char_device():
-        raise StudyError(f"cannot read {path}: it is a device, which may have no end; name a CSV file")
+        raise StudyError(f"cannot read {path}: it is a device, which may never end; give a CSV file")
 
 
 def _numbers(path: Path, lines: tuple[Line, ...], columns: int) -> Floats:

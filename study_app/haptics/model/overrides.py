@@ -84,7 +84,7 @@ def _reason(place: tuple[int | str, ...], message: str) -> str:
     name = ".".join(str(part) for part in place if part != "liquids" and not isinstance(part, int))
     said = message.removeprefix("Value error, ").split(", unable to parse")[0].replace("Input should be", "must be")
     if "valid dictionary" in said:
-        said = "is a table of parameters: set one of them by its name, such as --set drag_coefficient=0.42"
+        said = "is a table of parameters: set one parameter by its name, such as --set drag_coefficient=0.42"
     return f"{name}: {said}" if name else said
 
 

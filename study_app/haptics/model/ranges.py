@@ -30,11 +30,11 @@ def within(least: float, most: float, why: str, usual: float | None = None, what
 
 
 Coordinate: TypeAlias = Annotated[float, within(-1000, 1000, "a scene is at most 1 km wide")]
-Extent: TypeAlias = Annotated[float, within(1e-3, 1000, "from 1 mm, below what a hand resolves, to 1 km")]
+Extent: TypeAlias = Annotated[float, within(1e-3, 1000, "from 1 mm, which a hand cannot resolve, to 1 km")]
 Metres: TypeAlias = tuple[Coordinate, Coordinate, Coordinate]
 Vector: TypeAlias = tuple[float, float, float]
 """x, y and z."""
-Flow: TypeAlias = Annotated[float, within(-100, 100, "no liquid flows faster than 100 m/s where a hand can be")]
+Flow: TypeAlias = Annotated[float, within(-100, 100, "liquids around a hand flow at less than 100 m/s")]
 DensityKgM3: TypeAlias = Annotated[
     float,
     within(0.01, 25_000, "hydrogen has 0.08 kg/m³, osmium, the densest element, 22 590", 1200, "Density [kg/m³]."),
@@ -58,19 +58,24 @@ Alpha: TypeAlias = Annotated[
         what="Weight of the newest difference at 1 kHz.",
     ),
 ]
-ForceLimitN: TypeAlias = Annotated[float, within(0.1, 20, "below 0.1 N a hand feels little, above 20 N it may be hurt")]
-FadeS: TypeAlias = Annotated[float, within(0.05, 2, "a faster onset is a knock, a slower one is no onset")]
+ForceLimitN: TypeAlias = Annotated[float, within(0.1, 20, "a hand feels little below 0.1 N and may be hurt above 20 N")]
+FadeS: TypeAlias = Annotated[
+    float, within(0.05, 2, ("a faster onset feels like a knock; a slower one cannot be felt as an onset"))
+]
 Decay: TypeAlias = Annotated[
     float,
     within(
         0.5,
         1,
-        "the share left after 1 ms: at 0.5 nothing is left after 10 ms",
+        "the proportion left after 1 ms; at 0.5 the wake has vanished after 10 ms",
         what="Factor λ by which a stored velocity decays in 1 ms.",
     ),
 ]
 Exponent: TypeAlias = Annotated[
-    float, within(0.05, 10, "beyond, a wake is full at once, or never begins", what="Response exponent y of the wake.")
+    float,
+    within(
+        0.05, 10, ("outside this range a wake is full at once or never begins"), what="Response exponent y of the wake."
+    ),
 ]
 Smoothing: TypeAlias = Annotated[float, within(0, 1, "a hand moves on within a second")]
 TailLength: TypeAlias = Annotated[
@@ -84,5 +89,10 @@ TailLength: TypeAlias = Annotated[
 ]
 TailScaling: TypeAlias = Annotated[
     float,
-    within(1, 1e9, "elements; at least the length", what="Divisor S of the sum of stored velocities, at least N."),
+    within(
+        1,
+        1e9,
+        "elements; at least as many as the length",
+        what=("Divisor S of the sum of stored velocities, at least N."),
+    ),
 ]

@@ -80,7 +80,7 @@ class _Liquid(Frozen):
     viscosity_pa_s: ViscosityPaS | None = None
     region: Region = Everywhere()
     effects: Effects = Field(
-        default=("drag",), description='Names of its effects; "auto": chosen by their size (scene.accuracy).'
+        default=("drag",), description='Its effects; "auto" selects them by their size (scene.accuracy).'
     )
 
     @model_validator(mode="after")
@@ -91,19 +91,19 @@ class _Liquid(Frozen):
             )
             return self
         if len(set(self.effects)) < len(self.effects):
-            raise ValueError(f"an effect is named twice in {list(self.effects)}")
+            raise ValueError(f"an effect is listed twice in {list(self.effects)}")
         called_for = [effect for effect in EFFECTS if effect.name in self.effects]
         for effect in called_for:
             if effect.model is not None and getattr(self, effect.name) is None:
                 raise ValueError(f'the effect "{effect.name}" is selected, but its table ({effect.missing}) is missing')
             if effect.through and not set(effect.through) & set(self.effects):
                 carriers = " or ".join(f'"{name}"' for name in effect.through)
-                raise ValueError(f'the effect "{effect.name}" acts through {carriers}: name both')
+                raise ValueError(f'the effect "{effect.name}" acts through {carriers}: list both')
         for effect in called_for:
             for other in effect.excludes:
                 if other in self.effects:
                     raise ValueError(
-                        f'"{other}" and "{effect.name}" are two models of the same thing: select one of them'
+                        f'"{other}" and "{effect.name}" are two models of the same effect: select one of them'
                     )
         self._has_no_problem(called_for)
         return self
@@ -172,7 +172,9 @@ __all__ = [
     "Velocity",
     "Withdrawn",
 ]
-RateHz: TypeAlias = Annotated[float, within(50, 5000, "below, no servo is stable; above, no tick fits")]
+RateHz: TypeAlias = Annotated[
+    float, within(50, 5000, ("a slower servo is never stable; a faster servo has no time for a tick"))
+]
 SceneScale: TypeAlias = Annotated[float, within(0.01, 100, "a stroke of 60 mm is then 0.6 mm to 6 m in the scene")]
 FADE_S = 0.05
 HAND_SPEED_MPS = 0.3
@@ -250,7 +252,7 @@ class Knee(Frozen):
     law: Literal["sqrt", "square", "none"] = Field(
         default="sqrt",
         description="sqrt: above the threshold as √(1 + 2 excess) − 1; square: as the square of the excess; none: "
-        "speeds are not lowered.",
+        "speeds are not reduced.",
     )
     threshold_mps: Annotated[
         float,

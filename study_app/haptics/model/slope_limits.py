@@ -172,8 +172,8 @@ def refusal_reason(rate_hz: float) -> str | None:
     if rate_hz >= SLOWEST_HZ:
         return None
     return (
-        f"the servo runs at {rate_hz:g} Hz, and below {SLOWEST_HZ:g} Hz the stability limits are felt instead of the "
-        "liquids: set device.rate_hz to 1000"
+        f"the servo runs at {rate_hz:g} Hz; below {SLOWEST_HZ:g} Hz participants feel the stability limits instead "
+        f"of the liquids: set device.rate_hz to 1000"
     )
 
 

@@ -131,7 +131,9 @@ class ModelAlong:
         if given and not smooths:
             scene = scene.model_copy(update={"velocity": Given()})
         elif isinstance(scene.velocity, Given) and not given:
-            raise StudyError("the scene takes the velocity as given, but the motion has no vx_mps, vy_mps, vz_mps")
+            raise StudyError(
+                "the scene uses the given velocity, but the motion does not contain vx_mps, vy_mps, vz_mps"
+            )
         if dynamics is None:
             self._model = pack(scene, limits=handle_limits(1e-3, 1, estimator), dynamics=Dynamics(delay_s=1e-3))
             self._safety = new_safety()

@@ -26,7 +26,7 @@ _FAULTS = {
 }
 
 
-_STUCK = "or the computer blocked the servo: no tick for 75 ms; turn it off if it pushes"
+_STUCK = "or the computer blocked the servo, without a tick for 75 ms; turn the device off if it pushes"
 
 
 class Servo:
@@ -123,7 +123,7 @@ class Servo:
             The servo has stopped itself.
         """
         if not self.may_adjust(scene):
-            raise StudyError("the scene differs from the current one by more than numbers: load it instead")
+            raise StudyError("the scene differs from the current scene in more than numbers: load it instead")
         return self._present(scene, goes_on=True)
 
     def may_adjust(self, scene: Scene) -> bool:

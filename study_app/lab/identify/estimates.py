@@ -161,7 +161,7 @@ def _parameter_warnings(
         elif k not in paired and half[k] > (
             math.log(VAGUE) if coordinate(it).relative is False else abs(problem.u(z)[k]) / VAGUE
         ):
-            yield f"{it.name} is hardly determined by {problem.varied}: see its interval"
+            yield f"{it.name} is poorly determined by {problem.varied}: see its interval"
 
 
 def _edge_reason(problem: Problem, k: int, z: Floats) -> str:
@@ -170,5 +170,5 @@ def _edge_reason(problem: Problem, k: int, z: Floats) -> str:
     if it.field in NO_LESS_THAN and z[k] - problem.least[k] < problem.most[k] - z[k]:
         return f" (no less than {NO_LESS_THAN[it.field]})"
     if it.whole and z[k] > problem.least[k]:
-        return " (no more than the scaling, nor than what was measured lasts)"
+        return " (at most the scaling and the duration of the measurement)"
     return ""

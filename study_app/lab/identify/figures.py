@@ -70,11 +70,14 @@ def _values(fit: Fit) -> list[str]:
 
 def _caption(fit: Fit) -> str:
     text = (
-        "Grey: measured. Lines: fitted by least squares through the servo's own tick. The residual, measured − fitted, "
-        f"is {fit.rms_n:.3g} N RMS, {100 * fit.share:.1f} % of the force; its correlation from row to row is "
-        f"{fit.following:.2f}."
+        "Grey shows measurements, lines show the least-squares fit through the servo's own tick. The residual, "
+        f"measured − fitted, is {fit.rms_n:.3g} N RMS, {100 * fit.share:.1f} % of the force; its correlation "
+        f"from row to row is {fit.following:.2f}."
     ).replace("-", "−")
-    along = " Right: its part along the motion over speed, dots are medians; a slope or bend there is a wrong law."
+    along = (
+        " The right panel shows its component along the motion against speed; dots are medians. A slope or "
+        "bend there means a wrong law."
+    )
     return text + along + "".join(f" Warning: {warning}." for warning in fit.warnings)
 
 
@@ -112,7 +115,7 @@ def _along(axes: Axes, fit: Fit) -> None:
     moves = speed_mps > 1e-3
     along_n = np.sum(fit.residual_n[moves] * velocity_mps[moves], axis=1) / speed_mps[moves]
     axes.axhline(0, color=style.ZERO, linewidth=0.6, zorder=1)
-    axes.set_title("along the motion, over speed [m/s]", pad=6)
+    axes.set_title("along the motion, against speed [m/s]", pad=6)
     axes.xaxis.set_major_locator(MaxNLocator(4))
     axes.yaxis.set_major_locator(MaxNLocator(5))
     look: dict[str, Any] = {"markersize": 1.1, "alpha": 0.55, "rasterized": True}
@@ -193,7 +196,7 @@ def draw_curve(fit: CurveFit) -> Figure:
         va="bottom",
     )
     _curve_residual(below, fit)
-    caption = "Least squares of the residual as a share of the stress, with 95 % intervals."
+    caption = "Least-squares fit of the relative residual, with 95 % intervals."
     caption += "".join(f" Warning: {warning}." for warning in fit.warnings)
     below.set_xlabel("Shear rate [1/s]\n" + "\n".join(textwrap.wrap(caption, CURVE_LETTERS)))
     return figure

@@ -89,9 +89,9 @@ def _residual_warnings(residual_n: Floats, rho: float, force_n: Floats) -> Itera
     if rho > max(FOLLOWING, CHANCE / math.sqrt(residual_n.size)):
         share = _rms(residual_n) / _rms(force_n)
         yield (
-            f"residuals, {100 * share:.1f} % of the force, are autocorrelated (correlation {rho:.3f} from row to row): "
-            "the model misses something, the sensor filters, or velocities from positions blur sharp turns; the "
-            "intervals are widened for this, and are valid only if the model is"
+            f"residuals, {100 * share:.1f} % of the force, are autocorrelated (correlation {rho:.3f} from row "
+            "to row): the model is incomplete, the sensor filters, or velocities from positions blur sharp "
+            "turns; the intervals are widened for this, but are valid only if the model is valid"
         )
 
 
@@ -163,9 +163,9 @@ def _branch_warnings(curve: FlowCurve) -> Iterator[str]:
     size = math.sqrt(float(np.mean(gap**2)))
     if size > APART * noise and size > LEAST_GAP:
         yield (
-            f"{branches.description} differ by {100 * math.expm1(size):.0f} % of the stress, which noise does not "
-            "explain: thixotropy or hysteresis; the fit lies between them, and the intervals do not cover both: fit "
-            "one branch"
+            f"{branches.description} differ by {100 * math.expm1(size):.0f} % of the stress, more than noise "
+            "explains (thixotropy or hysteresis); the fit lies between them, and the intervals do not cover "
+            "both: fit one branch"
         )
 
 
@@ -173,7 +173,7 @@ class _CurveProblem(Problem):
     alike = 0.995  # those of a yield stress and a consistency over four decades, each known within 5 %, have 0.987
     compared = "stress at these shear rates"
     varied = "these shear rates"
-    more = "measure a wider range of them"
+    more = "measure a wider range of shear rates"
 
     def __init__(self, scene: Scene, liquid_id: str, parameters: tuple[Parameter, ...], curve: FlowCurve) -> None:
         super().__init__(scene, liquid_id, parameters)

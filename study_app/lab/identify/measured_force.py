@@ -20,8 +20,8 @@ _COLUMNS: Final = (PLACES + FORCES, ALONG_A_LINE, FLOW_CURVE)
 LONGEST_S: Final = 0.05
 SMOOTHED_S: Final = 0.025
 HEADER: Final = (
-    f"{','.join(PLACES + FORCES)}, with {','.join(VELOCITIES)} where they are known, or {','.join(ALONG_A_LINE)} for a "
-    f"motion along one line, or {','.join(FLOW_CURVE)} of a rheometer"
+    f"{','.join(PLACES + FORCES)}, with {','.join(VELOCITIES)} if they are known, or {','.join(ALONG_A_LINE)} "
+    f"for a motion along one line, or {','.join(FLOW_CURVE)} from a rheometer"
 )
 
 
@@ -66,7 +66,7 @@ class FlowCurve:
         if len(repeated) > len(rates) / 2:
             stresses = [self.stress_pa[self.rate_per_s == rate] for rate in repeated]
             least, greatest = (np.array([end(values) for values in stresses]) for end in (np.min, np.max))
-            description = "the greatest and the least stress at repeated shear rates"
+            description = "the greatest and the smallest stress at repeated shear rates"
             return Branches(description=description, first=(repeated, greatest), second=(repeated, least))
         turns = np.flatnonzero(np.diff(np.sign(np.diff(self.rate_per_s))))
         if len(turns) != 1:
@@ -102,18 +102,18 @@ def read(path: Path) -> Measured | FlowCurve:
         refuse_device(path)
         table = split(decoded(path.read_bytes()), {name for names in _COLUMNS for name in names}, comment="#")
     except OSError as error:
-        raise StudyError(f"cannot read {path}: {error.strerror}; name a CSV file of {HEADER}") from error
+        raise StudyError(f"cannot read {path}: {error.strerror}; give a CSV file with {HEADER}") from error
     except ValueError as error:
-        raise StudyError(f"cannot read {path}: {error}; name a CSV file of {HEADER}") from error
+        raise StudyError(f"cannot read {path}: {error}; give a CSV file with {HEADER}") from error
     names = max(_COLUMNS, key=lambda names: len({*names} & {*table.names}) / len(names))
     if names == PLACES + FORCES and {*VELOCITIES} <= {*table.names}:
         names += VELOCITIES
     if lacking := [name for name in names if name not in table.names]:
-        raise StudyError(f"{path} has no column {', '.join(lacking)}: the first line must name {HEADER}")
+        raise StudyError(f"{path} has no column {', '.join(lacking)}: the first line must contain {HEADER}")
     if twice := [name for name in names if table.names.count(name) > 1]:
         raise StudyError(f"{path} has two columns {twice[0]}: remove one of them")
     if not table.lines:
-        raise StudyError(f"{path} has a header and no rows: give one for each moment that was measured")
+        raise StudyError(f"{path} has a header but no rows: add one row for each measured moment")
     try:
         rows = rows_of(table, [table.names.index(name) for name in names])
     except ValueError as error:
@@ -180,10 +180,10 @@ def at_rate(motion: Motion, rate_hz: float) -> Motion:
     """
     step_s = np.diff(motion.t_s)
     if len(step_s) == 0:
-        raise StudyError("one row is not a motion: measure at least 20 rows per second")
+        raise StudyError("one row is not enough: measure at least 20 rows per second")
     if step_s.max() > LONGEST_S:
         row, gap_s = int(step_s.argmax()) + 2, float(step_s.max())
-        raise StudyError(f"row {row} comes {gap_s:.3g} s after the one before: {LONGEST_S:g} s is the most permitted")
+        raise StudyError(f"row {row} comes {gap_s:.3g} s after the previous row; at most {LONGEST_S:g} s is permitted")
     tick_s = 1 / rate_hz
     if abs(step_s.mean() / tick_s - 1) < 0.01 and (np.abs(step_s / tick_s - 1) < 0.5).all():
         return motion

@@ -52,12 +52,12 @@ def find_parameters(scene: Scene, liquid_id: str, names: Sequence[str]) -> tuple
     """
     tables = dict(_tables(scene, _liquid(scene, liquid_id)))
     if not names:
-        raise StudyError("no parameter is named: name one to fit, such as drag_coefficient")
+        raise StudyError("give at least one parameter to fit, such as drag_coefficient")
     parameters = tuple(_parameter(tables, name) for name in names)
     for k, parameter in enumerate(parameters):
         for other in parameters[:k]:
             if (parameter.table, parameter.field) == (other.table, other.field):
-                raise StudyError(f"{other.name} and {parameter.name} are the same parameter: name it once")
+                raise StudyError(f"{other.name} and {parameter.name} are the same parameter: give it once")
     return tuple(_narrow_range(it, tables[it.table], parameters) for it in parameters)
 
 
@@ -114,8 +114,8 @@ def _parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:
     place, _, field = name.rpartition(".")
     if field in THRESHOLDS:
         raise StudyError(
-            f"{name} cannot be fitted: it is a threshold, and the force jumps or does not depend on it; set it with "
-            "--set and compare the residuals"
+            f"{name} cannot be fitted: it is a threshold, so the force jumps or does not depend on it; set it "
+            "with --set and compare the residuals"
         )
     numbers = {name: dict(_numbers(table)) for name, table in tables.items()}
     for table, fields in numbers.items():
@@ -123,7 +123,9 @@ def _parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:
             least, most, above, whole = fields[field]
             value = getattr(tables[table], field)
             if value is None:
-                raise StudyError(f"the scene has no initial value of {name}: give one with --set {name}=VALUE")
+                raise StudyError(
+                    f"the scene does not contain an initial value of {name}: give one with --set {name}=VALUE"
+                )
             return Parameter(
                 name=name,
                 table=table,
@@ -137,7 +139,7 @@ def _parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:
     known = sorted({field for fields in numbers.values() for field in fields} - set(THRESHOLDS))
     near = difflib.get_close_matches(field, known, n=1)
     meant = f"did you mean {near[0]!r}? " if near else ""
-    raise StudyError(f"no parameter is called {name!r}: {meant}this liquid and its effects have {', '.join(known)}")
+    raise StudyError(f"unknown parameter {name!r}: {meant}this liquid and its effects have {', '.join(known)}")
 
 
 def _numbers(table: BaseModel) -> Iterator[tuple[str, tuple[float, float, bool, bool]]]:

@@ -199,7 +199,7 @@ class ForceProblem(Problem):
         self._spacing = max(1, math.ceil(1000 / scene.rate_hz))
         super().__init__(scene, liquid_id, parameters)
         if not measured.force_n.any():
-            raise StudyError("the measured force is zero throughout: there is nothing to fit to")
+            raise StudyError("the measured force is always zero: there is nothing to fit")
         simulated_n = self.force_n(self.start)
         self.axes = tuple(axis for axis in range(3) if measured.force_n[:, axis].any() or simulated_n[:, axis].any())
         if len(measured.force_n) * len(self.axes) <= len(parameters):

@@ -163,7 +163,7 @@ def check_liquids(parts: Draft) -> Iterator[Fault]:
             [liquid for liquid in condition.liquid_ids if liquid in parts.liquids],
         )
         if parts.scene is not None and len({parts.liquids[liquid].body_in(parts.scene) for liquid in known}) > 1:
-            message = "its liquids have different balls, and one ball moves through all of them"
+            message = "its liquids have different balls, but one ball moves through all of them"
             yield Fault(place, message, "give them the same body")
         if len(condition.liquids) > MAX_LIQUIDS:
             yield Fault(place, f"has {len(condition.liquids)} liquids", f"at most {MAX_LIQUIDS}")
@@ -171,7 +171,7 @@ def check_liquids(parts: Draft) -> Iterator[Fault]:
             if parts.device is None or parts.scene is None:
                 continue
             if not is_within_tank(parts.liquids[liquid], parts.scene, parts.device):
-                message = f'the region of "{liquid}" lies outside the tank, where no hand meets it'
+                message = f'the region of "{liquid}" lies outside the tank, so the hand cannot reach it'
                 yield Fault(place[:2], message, "move or enlarge the region, or scene.origin_m")
 
 
@@ -188,7 +188,7 @@ def check_forces(parts: Draft) -> Iterator[Fault]:
                 yield Fault(
                     ("blocks", name, "conditions", index),
                     f'"{condition}" exerts {exerted_n:.2g} N in the fastest stroke of task "{block.task}" '
-                    f"({stroke.speed_mps:.2g} m/s), less than {LEAST_N:g} N: it cannot be perceived",
+                    f"({stroke.speed_mps:.2g} m/s), less than {LEAST_N:g} N: participants cannot perceive it",
                     "select effects such as drag, or raise density, scale or the ball's diameter",
                 )
 
@@ -198,7 +198,9 @@ def check_liquids_differ(parts: Draft) -> Iterator[Fault]:
     first: dict[str, str] = {}
     for name, liquid in parts.liquids.items():
         if (earlier := first.setdefault(repr(felt_numbers(liquid)), name)) != name:
-            yield Fault(("liquids", name), f'has the same numbers as "{earlier}"', "change it, or use that one twice")
+            yield Fault(
+                ("liquids", name), f'has the same numbers as "{earlier}"', ("change it, or list that condition twice")
+            )
 
 
 def check_conditions_differ(parts: Draft) -> Iterator[Fault]:
@@ -240,9 +242,9 @@ def check_comparisons(parts: Draft) -> Iterator[Fault]:
         if len(varied) > 1:
             differ = " and in ".join(quantity.removesuffix("s") for quantity in varied)
             message = f"its conditions differ in {differ}, whose effects the analysis cannot tell apart"
-            yield Fault(("blocks", name, "conditions"), message, "vary one of them, or use a block for each")
+            yield Fault(("blocks", name, "conditions"), message, "vary only one of them, or use a block for each")
         elif block.compares is not None and varied not in ([], [block.compares]):
-            message = f'is "{block.compares}", and its conditions differ in {compared(presented)}'
+            message = f'is "{block.compares}", but its conditions differ in {compared(presented)}'
             yield Fault(("blocks", name, "compares"), message, "correct it, or leave it out")
 
 
@@ -275,7 +277,7 @@ def check_parts(parts: Draft) -> Iterator[Fault]:
             continue
         if part not in {latest, latest + 1}:
             expected, path = f"{latest} or {latest + 1}" if latest else "1", ("blocks", name, "part")
-            message = f"is {part}, must be {expected} at its place in sequence"
+            message = f"is {part}, but must be {expected} at its position in sequence"
             yield Fault(path, message, use=(path, latest or 1), kind="part")
         latest = max(latest, part)
 

@@ -111,10 +111,10 @@ def check_sequences(document: Document) -> Iterator[Fault]:
     Blocks and forms come once in a sequence. `check_groups` checks that no block is left out of a study with groups.
     """
     pages, blocks, forms = (names(document, section) for section in ("pages", "blocks", "questionnaires"))
-    apart = "rename one: sequence could not tell them apart"
+    apart = "rename one of them: sequence cannot tell them apart"
     for name in pages:
         if name in blocks:
-            yield Fault(("blocks", name), "a page has this name too", apart)
+            yield Fault(("blocks", name), "a page also has this name", apart)
     if not document.keys() & {"sequence", "sequences", "groups"}:
         hint = "list the pages and blocks of a session in their order"
         yield Fault(("sequence",), "is missing", hint, kind="missing")
@@ -127,12 +127,12 @@ def check_sequences(document: Document) -> Iterator[Fault]:
             path = (*place, index)
             yield from _unknown_name(path, name, "page or block", {*pages, *blocks, *forms})
             if name in blocks and name in seen:
-                yield Fault(path, f'block "{name}" comes twice', "give the block repetitions")
+                yield Fault(path, f'block "{name}" occurs twice', "give the block repetitions")
             elif name in forms and (name in pages or name in blocks) and name not in used:
                 other = "page" if name in pages else "block"
                 yield Fault(("questionnaires", name), f"a {other} has this name too", apart)
             elif name in forms and name in since:
-                yield Fault(path, f'form "{name}" comes twice after the same block', "put a block between the two")
+                yield Fault(path, f'form "{name}" occurs twice after the same block', "put a block between them")
             seen.add(str(name))
             since = {*(since if name not in blocks else ()), str(name)}
         used |= seen
@@ -140,7 +140,7 @@ def check_sequences(document: Document) -> Iterator[Fault]:
     unused += [("blocks", name) for name in blocks if "groups" not in document]
     for place in unused if used else ():
         if place[1] not in used:
-            yield Fault(place, "comes nowhere in sequence", "add it there, or take it out", kind="not in sequence")
+            yield Fault(place, "comes nowhere in sequence", "add it there, or remove it", kind="not in sequence")
 
 
 def check_repeats(document: Document) -> Iterator[Fault]:
@@ -159,7 +159,7 @@ def check_items(document: Document) -> Iterator[Fault]:
             continue
         text = value_at(document, (*path[:-1], "text"))
         if (path[1], name) in seen:
-            yield Fault(path, f'a second item "{name}" in this questionnaire', "every item needs its own id")
+            yield Fault(path, f'a second item "{name}" in this questionnaire', "every item needs its own ID")
         elif statements.setdefault(name, text) != text:
             yield Fault(path, f'item "{name}" has another text in another questionnaire', "give it another id")
         seen.add((path[1], name))
@@ -188,7 +188,7 @@ def _repeated_texts(located_texts: list[tuple[Path, Any]], kind: str) -> Iterato
         texts = entry if isinstance(entry, Mapping) else {"": entry}
         read = {(language, visible_text(text)) for language, text in texts.items() if isinstance(text, str)}
         if read & seen:
-            hint = "people could not tell the two apart: change one"
+            hint = "participants could not distinguish them: change one"
             yield Fault(path, f"reads as an earlier {kind} does", hint, kind="alike")
         seen |= read
 
@@ -209,13 +209,13 @@ def check_languages(document: Document) -> Iterator[Fault]:
     for path, name in written:
         if name not in LANGUAGES:
             known = f"known: {', '.join(LANGUAGES)}"
-            yield Fault(path, f'the program has no words in "{name}"', known, permitted=tuple(LANGUAGES))
+            yield Fault(path, f'the program does not have texts in "{name}"', known, permitted=tuple(LANGUAGES))
     wanted = tuple(name for _, name in written)
     texts = (texts_of_pattern for pattern in TEXTS for texts_of_pattern in entries(document, pattern)) if wanted else ()
     for path, text in texts:
         if isinstance(text, str) and len(wanted) > 1:
             listed = ", ".join(f'{language} = "…"' for language in wanted)
-            message = "is in one language, the study in several"
+            message = "is in one language, but the study is in several"
             yield Fault(path, message, f"write {{ {listed} }}", kind="one language")
         elif isinstance(text, Mapping):
             for language in wanted:
@@ -233,22 +233,24 @@ OWN = ("sequence", "sequences")
 def check_groups(document: Mapping[str, Any]) -> Iterator[Fault]:
     """Check that there are several groups, that each block is in a sequence of one, and that no sequence is unused."""
     if all(key in document for key in OWN):
-        yield Fault(("sequences",), "give either sequence or sequences, one of the two")
+        yield Fault(("sequences",), "give either sequence or sequences")
     tables = [table for _, table in entries(document, "groups.*") if isinstance(table, Mapping)]
     if not tables:
         if value_at(document, ASSIGNMENT) == "pre-existing":
-            yield Fault(ASSIGNMENT, "the study has no groups", "add groups, or leave it out", kind="surplus")
+            yield Fault(ASSIGNMENT, "the study has no groups", "add groups, or omit it", kind="surplus")
         return
     if len(names(document, "groups")) == 1:
-        yield Fault(("groups",), "there is only one group", "add another group, or leave groups out")
+        yield Fault(("groups",), "there is only one group", "add another group, or omit groups")
     own = [any(key in table for key in OWN) for table in tables]
     for key in OWN:
         if key in document and all(own):
-            yield Fault((key,), "is used by no group: each has its own", f"remove {key}, or the one of a group")
+            yield Fault((key,), "is not used: each group has its own", f"remove {key}, or omit it in a group")
     used = {step for _, steps in sequences_in(document) for step in steps if isinstance(step, str)}
     for block in names(document, "blocks"):
         if used and block not in used:
-            yield Fault(("groups",), f'block "{block}" is in no group\'s sequence', "add it to one, or take it out")
+            yield Fault(
+                ("groups",), f'block "{block}" is not in the sequence of any group', "add it to one, or remove it"
+            )
 
 
 def check_decisions(document: Document) -> Iterator[Fault]:
@@ -263,10 +265,10 @@ def check_decisions(document: Document) -> Iterator[Fault]:
     falling, named = ([name for _, name in decided[key]] for key in ("falling", "names"))
     for path, name in decided["rising"]:
         if name in falling:
-            yield Fault(path, f'"{name}" is expected to fall too', "an item rises, falls, or is in neither list")
+            yield Fault(path, f'"{name}" is expected to fall too', "an item can be in only one of the two lists")
     for path, name in entries(document, "conditions.*.label"):
         if isinstance(name, str) and name not in named:
-            yield Fault(path, f'"{name}" is not among analysis.names', "add it there, or leave the label out")
+            yield Fault(path, f'"{name}" is not among analysis.names', "add it there, or omit the label")
 
 
 def check_questions(document: Document) -> Iterator[Fault]:
@@ -279,7 +281,7 @@ def check_questions(document: Document) -> Iterator[Fault]:
     for name, scale in scales.items():
         if len(counts := {len(labels) for labels in scale.labels.values()}) > 1:
             listed = " and ".join(map(str, sorted(counts)))
-            yield Fault(("scales", name, "labels"), f"has {listed} points", "every language has the same points")
+            yield Fault(("scales", name, "labels"), f"has {listed} points", "every language must have the same points")
     language = next((name for _, name in entries(document, "study.languages.*") if isinstance(name, str)), "en")
     for path, table in entries(document, "questionnaires.*"):
         if not isinstance(table, Mapping):
@@ -289,7 +291,7 @@ def check_questions(document: Document) -> Iterator[Fault]:
         items = [item for _, item in sound]
         if any(isinstance(item, Statement) for item in items):
             if "scale" not in table:
-                message = "statements are rated on it; other items have a kind"
+                message = "the questionnaire's scale is for statements; other items have a kind"
                 yield Fault((*path, "scale"), "is missing", message, kind="missing")
             elif (scale := scales.get(str(table["scale"]))) is not None and scale.points != POINTS:
                 message = f"has {scale.points} points, and statements need {POINTS}"
@@ -301,7 +303,7 @@ def check_questions(document: Document) -> Iterator[Fault]:
         for key, answered, known in (("items", "a number", numbers), ("weights_from", "a choice", choices)):
             for place, name in entries(table, f"scores.*.{key}.*"):
                 if isinstance(name, str) and name not in known:
-                    message = f'there is no item "{name}" that is answered with {answered}'
+                    message = f'there is no item "{name}" with {answered} as answer'
                     yield unknown_name((*path, *place), message, name, known)
 
 

@@ -54,7 +54,7 @@ def check_kinds(document: Mapping[str, Any]) -> Iterator[Fault]:
                 yield unknown_name(path, f'there is no {key} "{name}"', name, {*tables, *known})
             elif needed := [of for of, field in known[name].model_fields.items() if field.is_required()]:
                 example = f'write [{section}.NAME] with kind = "{name}" and {", ".join(needed)}, and {key} = "NAME"'
-                yield Fault(path, f'the kind "{name}" has no default for {", ".join(needed)}', example)
+                yield Fault(path, f'the kind "{name}" does not have a default for {", ".join(needed)}', example)
 
 
 def check_designs(protocol: Protocol) -> Iterator[Fault]:
@@ -77,8 +77,10 @@ def check_designs(protocol: Protocol) -> Iterator[Fault]:
 def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
     design, place = design_of(protocol, block), ("blocks", block.id)
     if block.questionnaire is not None:
-        message = "a block with a design asks the design's question"
-        yield Fault((*place, "questionnaire"), message, "omit questionnaire; ask other questions in a form")
+        message = "a block with a design asks the question of its design"
+        yield Fault(
+            (*place, "questionnaire"), message, "omit questionnaire, and ask other questions in a form after the block"
+        )
     correct = has_correct_answer(design, None if block.stimulus is None else protocol.stimuli[block.stimulus])
     for key in ("until", "catch"):
         if not correct and getattr(block, key) is not None:
@@ -87,11 +89,11 @@ def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
     if not correct and design.feedback not in {None, "never"}:
         yield Fault(
             ("designs", str(block.design), "feedback"),
-            "no answer is correct, so there is nothing to report",
+            "its answers are neither correct nor incorrect, so feedback is not possible",
             'omit the key (feedback = "never" is permitted)',
         )
     if block.break_every is not None and not (order := order_of(protocol, block)).breaks:
-        message = f"is {block.break_every}, and the block has {order.trials} trials: no break would come"
+        message = f"is {block.break_every}, but the block has {order.trials} trials: there would be no break"
         yield Fault((*place, "break_every"), message)
     if fault := next(check_design_and_method(protocol, block), None):
         yield fault
@@ -99,20 +101,22 @@ def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
     if block.stimulus is None:
         if not design.has_standard:
             yield Fault(
-                (*place, "design"), "has one interval and compares nothing", 'give stimulus = "…" instead of conditions'
+                (*place, "design"),
+                "has one interval, so there is nothing to compare",
+                'give stimulus = "…" instead of conditions',
             )
         return
     if design.has_standard and standards_of(protocol, block) == (None,):
-        message = f'"{block.design}" presents a standard in noise trials, and a level that is a value has none'
+        message = f'"{block.design}" presents a standard in noise trials, but levels that are values do not have one'
         yield Fault((*place, "design"), message, 'level = "weber" or "difference"')
         return
     if not design.adaptive and method_of(protocol, block).adaptive:
-        message = f'"{block.design}" has no track: correct answers determine no level'
+        message = f'"{block.design}" cannot be used: its answers do not determine a level'
         yield Fault((*place, "method"), message, 'method = "constant"')
     elif method_of(protocol, block).adaptive and not rises(protocol.stimuli[block.stimulus], design):
         message = (
-            f'"{block.design}" at levels of values is answered correctly above and below the standard: '
-            "there is no threshold"
+            f'"{block.design}" at levels of values has correct answers above and below the standard, so a '
+            "threshold does not exist"
         )
         yield Fault((*place, "method"), message, 'method = "constant", or level = "weber" or "difference"')
     if unknown := [
@@ -154,7 +158,7 @@ def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iter
     for name in contrast.blocks:
         block, asked = protocol.blocks[name], protocol.questionnaire_of(name)
         if block.phase != "main":
-            yield Fault((*place, "blocks"), f"{name} is no main block: it is not analysed", "choose another")
+            yield Fault((*place, "blocks"), f"{name} is not a main block, so it is not analysed", "choose another")
             continue
         items = [item.id for item in asked.statements] if asked is not None else []
         known = OF_LEVELS if block.design is not None else items
@@ -168,7 +172,7 @@ def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iter
                 (*place, "conditions"), f"block {name} has no {missing[0]}", missing[0], block.conditions
             )
         if contrast.conditions is not None and block.design is not None:
-            yield Fault((*place, "conditions"), f"the results of {name} are of all its levels", "compare two blocks")
+            yield Fault((*place, "conditions"), f"the results of {name} refer to all its levels", "compare two blocks")
 
 
 def _check_varied_number(protocol: Protocol, name: str, stimulus: Stimulus) -> Iterator[Fault]:
@@ -176,14 +180,14 @@ def _check_varied_number(protocol: Protocol, name: str, stimulus: Stimulus) -> I
     place = ("stimuli", name)
     if stimulus.condition is None and len(protocol.conditions) > 1:
         listed = f"known: {', '.join(protocol.conditions)}"
-        yield Fault((*place, "condition"), "is missing, and the study has several", listed)
+        yield Fault((*place, "condition"), "is missing, but the study has several", listed)
         return
     condition = condition_of(protocol, stimulus)
     liquids = protocol.conditions[condition].liquid_ids
     if stimulus.vary in OF_CONDITION:
         return
     if len(liquids) > 1:
-        message = f"has {len(liquids)} liquids: which one's number is varied?"
+        message = f"has {len(liquids)} liquids: state which liquid to vary"
         yield Fault((*place, "condition"), message, "a condition with one liquid")
     elif protocol.liquids[liquids[0]].effects == "auto":
         message = f'the effects of "{liquids[0]}" would be selected again at every level'
@@ -193,12 +197,12 @@ def _check_varied_number(protocol: Protocol, name: str, stimulus: Stimulus) -> I
             present_value(protocol, stimulus)
         except StudyError:
             known = {*OF_CONDITION, *filter(can_vary, number_names(protocol.scene_for(condition)))}
-            message = f'there is no number "{stimulus.vary}" in condition "{condition}"'
+            message = f'there is no parameter "{stimulus.vary}" in condition "{condition}"'
             yield unknown_name((*place, "vary"), message, stimulus.vary, known, cutoff=0.6)
         else:
             if not can_vary(stimulus.vary):
-                message = f"{stimulus.vary} does not belong to a liquid: it holds for the whole session"
-                hint = f"a number of the liquid, or {', '.join(OF_CONDITION)}"
+                message = f"{stimulus.vary} is not a parameter of a liquid: it applies to the whole session"
+                hint = f"a parameter of the liquid, or {', '.join(OF_CONDITION)}"
                 yield Fault((*place, "vary"), message, hint, kind="surplus")
 
 
@@ -247,7 +251,7 @@ def _standard_fault(
     least = LEAST_MS if stimulus.vary.endswith("_ms") else LEAST_SHARE * (abs(standard) or 1.0)
     if level == 0 or stimulus.level_kind == "value" or abs(stimulus.comparison(standard, level) - standard) >= least:
         return None
-    message = f"{level:g} gives the same as the standard of {standard:g}: nothing differs"
+    message = f"{level:g} equals the standard of {standard:g}, so the intervals do not differ"
     return Fault((*place, "levels"), message, f"the comparison must differ by at least {least:g}")
 
 
@@ -281,14 +285,14 @@ def check_design_and_method(protocol: Protocol, block: Block) -> Iterator[Fault]
     design, place = design_of(protocol, block), ("blocks", block.id)
     if block.stimulus is None:
         if design.adjusts:
-            message = "adjusts a number, and the block varies none"
+            message = "adjusts a parameter, but the block does not vary one"
             yield Fault((*place, "design"), message, 'give stimulus = "…" instead of conditions')
     elif design.adjusts and not method_of(protocol, block).adjusts:
         yield Fault(
             (*place, "method"), f'levels of "{block.design}" are set by the participant', 'method = "adjustment"'
         )
     elif method_of(protocol, block).adjusts and not design.adjusts:
-        message = f'"{block.method}" needs a level that the participant sets, and "{block.design}" has none'
+        message = f'"{block.method}" needs a level that the participant sets, but "{block.design}" does not have one'
         yield Fault((*place, "method"), message, 'design = "adjustment", or method = "constant"')
 
 
@@ -312,7 +316,7 @@ def check_adjustment(protocol: Protocol, block: Block) -> Iterator[Fault]:
             yield Fault(
                 ("methods", str(block.method), "step_size"),
                 f'"{stimulus.vary}" cannot change while it is presented',
-                "vary a number that can, such as drag.coefficient, or present levels by another method",
+                "vary a parameter that can, such as drag.coefficient, or present levels by another method",
             )
             return
 

@@ -58,7 +58,7 @@ def check_paced(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS) -> Iterato
     for block in protocol.blocks.values():
         for name in protocol.conditions_in(block.id) if isinstance(protocol.tasks[block.task], Reach) else ():
             if protocol.conditions[name].ball == "hidden":
-                message = f'is hidden, but block "{block.id}" has a reaching task: it cannot be aimed'
+                message = f'is hidden, but block "{block.id}" has a reaching task: participants cannot aim the ball'
                 yield Fault(("conditions", name, "ball"), message, 'a task of kind "follow" or "explore"')
     yield from _check_estimator_lag(protocol)
     for blocks in blocks_by_stimulus(protocol):
@@ -185,7 +185,7 @@ def unpaced_clipping_warning(protocol: Protocol, blocks: Sequence[Block]) -> str
     of = f" of {_level_ranges(every, some)}" if some else ""  # a number of the condition changes no force
     by_loop = any(steady_force(scene, UNPACED_MPS).limit == "slope" for scene in scenes)
     limit = "by the slope limit" if by_loop else f"at {protocol.device.force_limit_n:g} N"
-    return f"tasks.{task}: at {UNPACED_MPS:g} m/s the force{of} is clipped {limit}: such trials are repeated: {PACED}"
+    return f"tasks.{task}: at {UNPACED_MPS:g} m/s the force{of} is clipped {limit}: such trials are repeated; {PACED}"
 
 
 def check_clipping_at_pace(protocol: Protocol, block: Block, scene: Scene, what: str, place: Path) -> Iterator[Fault]:
@@ -321,8 +321,8 @@ def _returned_energy_fault(protocol: Protocol, block: Block, stroke: Stroke) -> 
         return None
     return Fault(
         ("stimuli", str(block.stimulus), "levels"),
-        f"{damping:.3g} N·s/m delayed by {1000 * delay_s:.3g} ms returns {1000 * most_j:.1f} mJ per motion reversal; "
-        "the passivity controller removes it",
+        f"{damping:.3g} N·s/m delayed by {1000 * delay_s:.3g} ms returns {1000 * most_j:.1f} mJ per motion reversal, "
+        f"which the passivity controller removes",
         f"at most {longest_delay_ms(damping, stroke)} ms, which return {1000 * LIMIT_J:g} mJ",
     )
 

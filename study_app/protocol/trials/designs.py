@@ -47,7 +47,7 @@ class Modulus(Table):
 
     level: float = Field(description="The level that is presented.")
     number: Annotated[float, within(1e-6, 1e9, "a number that a person can name")] = Field(
-        description="The number that stands for it."
+        description="The number that represents it."
     )
 
 
@@ -66,7 +66,7 @@ class Design(Table):
     item: Id | None = Field(
         default=None, description="The answer's name in tables; default: the kind, such as choice_2ifc or yesno."
     )
-    question: Localised | None = Field(default=None, description="The question; default: the program's own words.")
+    question: Localised | None = Field(default=None, description="The question; default: the program's own text.")
     pause_s: Annotated[float, within(0.3, 10, "hands need 0.3 s to settle; memory fades within seconds")] = Field(
         default=0.6, description="Interstimulus interval: zero force between two intervals [s]."
     )
@@ -75,8 +75,9 @@ class Design(Table):
     )
     feedback: Feedback | None = Field(
         default=None,
-        description="never: the participant does not see whether an answer was correct; practice: in practice alone, "
-        'the default; always: after every answer. Where no answer is correct, "never" is the default.',
+        description="never: the participant does not see whether an answer was correct; practice: only in "
+        "practice, the default; always: after every answer. If no answer can be correct, the "
+        "default is never.",
     )
     feedback_s: Annotated[float, within(0.2, 10, "a sign needs 0.2 s to be seen")] = Field(
         default=0.6, description="How long the feedback is shown [s]."
@@ -268,7 +269,7 @@ class YesNo(Design):
 
     kind: Literal["yesno"] = "yesno"
     noise_share: Annotated[float, within(0.05, 0.5, "fewer say nothing of false alarms; half is balanced")] = Field(
-        default=0.3, description="Share of trials that present the standard."
+        default=0.3, description="Proportion of trials that present the standard."
     )
     paper_name: ClassVar = "yes–no"
     answers: ClassVar = ("yes", "no")
@@ -314,7 +315,9 @@ class Estimation(JudgementDesign):
     """How strong was it, as a number? (Stevens 1957, Psychological Review 64, 153)."""
 
     kind: Literal["estimation"] = "estimation"
-    modulus: Modulus | None = Field(default=None, description="The first trial's level and number; default: free.")
+    modulus: Modulus | None = Field(
+        default=None, description="Level and number of the first trial; default: participants choose their own scale."
+    )
     paper_name: ClassVar = "magnitude estimation"
     reply: ClassVar = "number"
     first = property(lambda self: self.modulus)
@@ -325,7 +328,7 @@ class Adjusted(JudgementDesign):
 
     kind: Literal["adjustment"] = "adjustment"
     standard: bool = Field(
-        default=True, description="Whether an interval presents the standard before the one that is adjusted."
+        default=True, description="Whether an interval with the standard precedes the adjusted interval."
     )
     paper_name: ClassVar = "the method of adjustment"
     reply: ClassVar = "setting"

@@ -94,7 +94,7 @@ class Method(Table):
 
     order: TrackOrder = Field(
         default="interleaved",
-        description="interleaved: the tracks alternate in random order; blocked: one follows another.",
+        description="interleaved: the tracks alternate in random order; blocked: one track follows another.",
     )
 
     tracks: Annotated[int, Field(ge=1, le=4)] = Field(default=1, description="How many tracks each standard has.")
@@ -187,17 +187,15 @@ class Method(Table):
         return 0
 
 
-Trials = Annotated[int, within(1, 1000, "no participant answers more in one track")]
+Trials = Annotated[int, within(1, 1000, "participants do not answer more in one track")]
 
 
 class Adaptive(Method):
     """A method that chooses each level from the answers to the levels before."""
 
-    trials: Trials = Field(
-        default=60, description="How many trials each standard has at most, divided among its tracks."
-    )
+    trials: Trials = Field(default=60, description="Maximum number of trials per standard, divided among its tracks.")
     begin: Annotated[tuple[float, ...], Field(max_length=4)] | float | None = Field(
-        default=None, description="The first level, or that of each track."
+        default=None, description="The first level, or the first level of each track."
     )
 
     def presentations(self, stimulus: Stimulus) -> int:
@@ -248,7 +246,11 @@ class Adjustment(Method):
         default=10, description="How many settings each track has."
     )
     step_size: Annotated[float, within(1e-6, 1e6, "a step is at least 1e-6 and at most 1e6")] | None = Field(
-        default=None, description="A step: a factor on log spacing, else a difference; default: a 40th of the span."
+        default=None,
+        description=(
+            "Step size: a factor if levels are spaced logarithmically, otherwise a difference; "
+            "default: a 40th of the span."
+        ),
     )
     most_s: Annotated[float, within(2, 600, "a hand needs 2 s to feel a change, and tires within minutes")] = Field(
         default=60, description="Longest time for a setting [s]."
@@ -273,7 +275,7 @@ class Adjustment(Method):
     def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
         low, high = stimulus.domain
         if stimulus.spacing == "log" and self.step_size is not None and self.step_size <= 1:
-            yield "step_size", f"is {self.step_size:g}; on log spacing a step is a factor above 1", "such as 1.05"
+            yield "step_size", f"is {self.step_size:g}; with log spacing a step is a factor above 1", "such as 1.05"
         elif self.step(stimulus) > (high - low) / 2:
             most = stimulus.level_of((high - low) / 4)
             yield "step_size", f"is {self.step_size:g}: more than half the range of levels", f"such as {most:.3g}"
@@ -366,15 +368,15 @@ class Constant(Method):
         return constant_tracks(levels, self.repetitions, observers, draws)
 
 
-Positive = Annotated[float, within(1e-6, 1e6, "a function is neither a step nor flat")]
+Positive = Annotated[float, within(1e-6, 1e6, "a psychometric function is neither a step nor flat")]
 Lapse = Annotated[float, Field(ge=0, lt=0.5)]
 
 
 class Precision(Table):
     """When a track ends early: once the threshold's 95 % interval is narrow enough."""
 
-    ratio: Annotated[float, Field(gt=1, le=1e12)] = Field(description="Its upper end over its lower end, at most.")
-    after: Trials = Field(default=30, description="After how many answers at the earliest.")
+    ratio: Annotated[float, Field(gt=1, le=1e12)] = Field(description="Largest ratio of its upper to its lower end.")
+    after: Trials = Field(default=30, description="Minimum number of answers.")
 
 
 class QuestPlus(Adaptive):
@@ -383,7 +385,7 @@ class QuestPlus(Adaptive):
     kind: Literal["questplus"] = "questplus"
     learn: Literal["threshold", "all"] = Field(
         default="threshold",
-        description="threshold: the entropy of the threshold is minimised; all: that of all parameters.",
+        description="threshold: the entropy of the threshold is minimised; all: the entropy of all parameters.",
     )
     family: Family | None = Field(
         default=None,
@@ -399,13 +401,13 @@ class QuestPlus(Adaptive):
     lapses: Annotated[tuple[Lapse, ...], Field(min_length=1, max_length=10)] = Field(
         default=LAPSES, description="Lapse rates that are considered."
     )
-    stop: Precision | None = Field(default=None, description="When a track ends early; left out: never.")
+    stop: Precision | None = Field(default=None, description="When a track ends early; default: never.")
 
     def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
         yield from super().faults(stimulus)
         if self.widths is not None and not self.widths[0] < self.widths[1]:
             low, high = self.widths
-            yield "widths", f"{low:g} and {high:g}: the first width must be the smaller", ""
+            yield "widths", f"{low:g} and {high:g}: the first width must be smaller", ""
         if self.family == "weibull" and stimulus.spacing == "linear":
             yield "family", '"weibull" is a function of the logarithm of a level', 'spacing = "log", or "normal"'
 
@@ -479,7 +481,7 @@ class Reversals(Table):
     """When a track ends early: after so many changes of direction."""
 
     reversals: Trials = Field(description="How many reversals, at least.")
-    after: Trials = Field(default=1, description="After how many answers at the earliest.")
+    after: Trials = Field(default=1, description="Minimum number of answers.")
 
 
 class UpDown(Adaptive):
@@ -488,25 +490,30 @@ class UpDown(Adaptive):
     kind: Literal["updown"] = "updown"
     rule: Literal["1down1up", "2down1up", "3down1up", "4down1up"] = Field(
         default="2down1up",
-        description="1down1up: a step down after each success; 2down1up: after 2 successes in a row; 3down1up: after "
-        "3; 4down1up: after 4.",
+        description=(
+            "1down1up: one step down after each correct answer; 2down1up: after 2 consecutive correct "
+            "answers; 3down1up: after 3; 4down1up: after 4."
+        ),
     )
     step_up: Annotated[float, within(1e-6, 1e6, "a step is at least 1e-6 and at most 1e6")] | None = Field(
         default=None,
-        description="Step after a failure: a factor on log spacing, else a difference; default: a tenth of the span.",
+        description=(
+            "Step after an incorrect answer: a factor if levels are spaced logarithmically, otherwise a "
+            "difference; default: a tenth of the span."
+        ),
     )
     ratio: Annotated[float, Field(gt=0, le=10)] | None = Field(
-        default=None, description="Step down over step up; default: that of García-Pérez for the rule."
+        default=None, description="Ratio of step down to step up; default: García-Pérez' value for the rule."
     )
     average: Annotated[int, Field(ge=2, le=100)] = Field(
-        default=8, description="How many of the last reversals are averaged at most."
+        default=8, description="Maximum number of last reversals to average."
     )
-    stop: Reversals | None = Field(default=None, description="When a track ends early; left out: never.")
+    stop: Reversals | None = Field(default=None, description="When a track ends early; default: never.")
 
     def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
         yield from super().faults(stimulus)
         if stimulus.spacing == "log" and self.step_up is not None and self.step_up <= 1:
-            yield "step_up", f"is {self.step_up:g}; on log spacing a step is a factor above 1", "such as 1.4"
+            yield "step_up", f"is {self.step_up:g}; with log spacing a step is a factor above 1", "such as 1.4"
 
     def warnings(self) -> Iterator[tuple[str, str]]:
         successes = int(self.rule[0])
@@ -514,8 +521,8 @@ class UpDown(Adaptive):
             reached, published = (100 * converges_to(successes, ratio) for ratio in (self.ratio, RATIOS[successes]))
             yield (
                 "ratio",
-                f"{self.rule} with ratio {self.ratio:g} converges to {reached:.1f} % for small steps alone: "
-                f"omit ratio: {published:.1f} % for any step",
+                f"{self.rule} with ratio {self.ratio:g} converges to {reached:.1f} % only for small steps; omit "
+                f"ratio for {published:.1f} % with any step",
             )
         if self.tracks == 1:
             yield "tracks", "participants can predict a single up–down track: choose tracks = 2"
@@ -526,8 +533,8 @@ class UpDown(Adaptive):
     @property
     def paper_name(self) -> str:
         return (
-            f"weighted up–down tracks ({self.rule}, steps down {self._ratio:.4g} of those up; García-Pérez 1998), "
-            f"which converge to {self.target_percent:.1f} %"
+            f"weighted up–down tracks ({self.rule}, steps down {self._ratio:.4g} of the steps up; García-Pérez "
+            f"1998), which converge to {self.target_percent:.1f} %"
         )
 
     target_percent = property(lambda self: 100 * converges_to(int(self.rule[0]), self._ratio))

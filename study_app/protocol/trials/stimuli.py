@@ -45,24 +45,26 @@ class Condition(Table):
     ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = (("liquid", "liquids"),)
 
     liquid: Id | None = Field(default=None, description="The liquid; or give liquids.")
-    liquids: tuple[Id, ...] = Field(default=(), description="Several liquids; where they overlap the last one counts.")
+    liquids: tuple[Id, ...] = Field(
+        default=(), description=("Several liquids; where they overlap, the last one applies.")
+    )
     delay_ms: Annotated[float, within(0, MOST_DELAY_MS, "what is seen more than a second late is no feedback")] = Field(
         default=0, description="Delay of everything drawn in the tank [ms]."
     )
     label: Id | None = Field(
-        default=None, description="The item of analysis.names that names it correctly; left out: none does."
+        default=None, description="The item of analysis.names that names it correctly; default: none."
     )
     ball: Literal["shown", "hidden"] = later(
         default="shown", description="shown: the ball is always drawn; hidden: it is drawn only during a task's lead."
     )
     force_delay_ms: Annotated[float, within(0, scene.MOST_DELAY_MS, "a later force pushes the hand")] = later(
-        default=0, description="Delay of the force [ms]; what is drawn is not delayed by it."
+        default=0, description="Delay of the force [ms]; the picture is not delayed."
     )
     force_jitter_ms: Annotated[float, within(0, scene.MOST_JITTER_MS, "networks deviate less")] = later(
         default=0, description="Largest additional delay of the force, drawn at random at every tick [ms]."
     )
     force_loss: Annotated[float, within(0, scene.MOST_LOSS, "beyond, most forces are held ones")] = later(
-        default=0, description="Share of ticks whose force is lost; the last one is held."
+        default=0, description="Proportion of ticks whose force is lost; the previous force is held."
     )
     view: str = later(
         default="tank",
@@ -105,9 +107,9 @@ class Stimulus(Table):
     itself where it is a ``value``. Levels are evenly spaced in u = log10 L or in u = L.
     """
 
-    condition: Id | None = Field(default=None, description="The condition whose number is varied; default: the only.")
+    condition: Id | None = Field(default=None, description="The condition to vary; default: the only condition.")
     vary: str = Field(
-        max_length=60, description=f"The number that is varied, as in simulate --set, or {', '.join(OF_CONDITION)}."
+        max_length=60, description=f"The parameter to vary, as in simulate --set, or {', '.join(OF_CONDITION)}."
     )
     level: LevelKind | None = Field(
         default=None,
@@ -115,11 +117,11 @@ class Stimulus(Table):
         "default for a time (…_ms); value: the comparison itself.",
     )
     standards: tuple[float, ...] = Field(
-        default=(), max_length=8, description="What comparisons are compared with; default: the present value."
+        default=(), max_length=8, description="The standard stimuli; default: the present value."
     )
     levels: tuple[float, float] = Field(description="The smallest and the largest level.")
     spacing: Literal["log", "linear"] = Field(
-        default="log", description="log: levels between them in even ratios; linear: in even steps."
+        default="log", description="log: levels in between have even ratios; linear: even steps."
     )
     steps: Annotated[int, Field(ge=2, le=LEVELS_MOST)] = Field(default=31, description="How many levels there are.")
     direction: Literal["up", "down"] = Field(
@@ -179,7 +181,7 @@ class Stimulus(Table):
     def _levels_ascend(self) -> Self:
         low, high = self.levels
         if not low < high:
-            raise invalid(f"{low:g} and {high:g}: the first level must be the smaller", "levels")
+            raise invalid(f"{low:g} and {high:g}: the first level must be smaller", "levels")
         if self.spacing == "log" and low <= 0:
             raise invalid(f"{low:g} has no logarithm", "levels", 'spacing = "linear", or a level above 0')
         if low < 0 and self.level_kind != "value":

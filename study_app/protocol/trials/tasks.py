@@ -16,7 +16,9 @@ from study_app.errors import PlugInError
 from study_app.haptics.model.ranges import within
 from study_app.protocol.table import Localised, OfKinds, Table, invalid
 
-Seconds: TypeAlias = Annotated[float, within(0.1, 3600, "a hand moves within 0.1 s, no trial takes an hour")]
+Seconds: TypeAlias = Annotated[
+    float, within(0.1, 3600, ("a hand needs 0.1 s to move, and a trial takes less than an hour"))
+]
 Radius: TypeAlias = Annotated[float, within(0.5, 100, "a hand at rest trembles by a few tenths of a millimetre")]
 Point: TypeAlias = tuple[float, float, float]
 
@@ -110,8 +112,8 @@ class Explore(Task):
     """Free motion in the tank, for ``min_s`` to ``max_s``; after ``min_s`` the participant may continue."""
 
     kind: Literal["explore"]
-    min_s: float = Field(ge=0, le=3600, description="Least time before the participant may go on [s].")
-    max_s: Seconds = Field(description="Time after which the task ends by itself [s].")
+    min_s: float = Field(ge=0, le=3600, description="Minimum time before the participant may continue [s].")
+    max_s: Seconds = Field(description="Time after which the task ends automatically [s].")
     instruction: Localised = Field(description="One sentence shown under the tank.")
 
     activity: ClassVar[str] = "free exploration"
@@ -153,13 +155,13 @@ class Follow(Task):
     frequency_hz: Annotated[float, within(0.05, 5, "a hand follows no faster swing, and a slower one is none")] = Field(
         default=1, description="Frequency of the target [Hz]."
     )
-    cycles: int = Field(default=3, ge=1, le=1000, description="Number of periods after the lead, which are judged.")
+    cycles: int = Field(default=3, ge=1, le=1000, description="Number of periods after the lead, which are evaluated.")
     radius_mm: Radius = Field(default=6, description="Radius of the target [mm].")
     lead_s: Annotated[float, within(0.1, 10, "a hand needs 0.2 s to react; nothing of the lead is judged")] = Field(
-        default=1, description="Time over which the amplitude rises before the judged periods [s]."
+        default=1, description="Time over which the amplitude rises before the evaluated periods [s]."
     )
     instruction: Localised | None = Field(
-        default=None, description="One sentence shown under the tank; default: the program's own words."
+        default=None, description="One sentence shown under the tank; default: the program's own text."
     )
 
     activity: ClassVar[str] = "following a target"
@@ -227,8 +229,10 @@ class Reach(Task):
     )
     radius_mm: Radius = Field(description="Radius of a target [mm].")
     dwell_s: float = Field(ge=0, le=10, description="How long the ball must stay in the lit target [s].")
-    count: int | None = Field(default=None, ge=1, le=1000, description="Targets to reach; or give duration_s.")
-    duration_s: Seconds | None = Field(default=None, description="Length of the task [s]; or give count.")
+    count: int | None = Field(
+        default=None, ge=1, le=1000, description=("Number of targets to reach; alternatively give duration_s.")
+    )
+    duration_s: Seconds | None = Field(default=None, description="Duration of the task [s]; alternatively give count.")
     timeout_s: Seconds = Field(default=120, description="Time after which the task ends in any case [s].")
     instruction: Localised = Field(description="One sentence shown under the tank.")
 
@@ -283,7 +287,7 @@ class Reach(Task):
         limit, targets = self.duration_s or self.timeout_s, self.count or 1
         if targets * self.dwell_s >= limit:
             subject = "a target" if targets == 1 else f"each of {targets} targets"
-            lasting_s = f"takes as long as the {limit:g} s that the task lasts at most"
+            lasting_s = f"takes as long as the whole task (at most {limit:g} s)"
             raise invalid(f"dwell_s = {self.dwell_s:g} in {subject} {lasting_s}: shorten it", "dwell_s")
         return self
 

@@ -114,7 +114,7 @@ def _table_warning(protocol: Protocol, name: str, liquid: str, delay_ms: float) 
         return None
     force_n = steady_force(protocol.scene_for(name), STIRRED.speed_mps).drag_n
     return (
-        f"with {delay_ms:.3g} ms the passivity controller withholds about {percent:.0f} % of the force from a light "
+        f"with {delay_ms:.3g} ms the passivity controller holds back about {percent:.0f} % of the force from a light "
         f"hand ({percent / 100 * force_n:.2g} of {force_n:.2g} N at {STIRRED.speed_mps:.2g} m/s): choose at most "
         f"{most_ms:g} ms"
     )
@@ -135,7 +135,7 @@ def _energy_warning(protocol: Protocol, name: str, delay_ms: float) -> str | Non
     damping = damping_nspm(scene, stroke)
     return (
         f"with {delay_ms:.3g} ms a force of {damping * stroke.speed_mps:.2g} N at {stroke.speed_mps:.2g} m/s returns "
-        f"{1000 * energy_j:.1f} mJ per motion reversal, and the passivity controller withholds part of it: choose at "
+        f"{1000 * energy_j:.1f} mJ per motion reversal, and the passivity controller holds back part of it: choose at "
         f"most {longest_returned_ms(damping, stroke)} ms"
     )
 

@@ -454,7 +454,7 @@ def imprecise(protocol: Protocol, block: Block) -> Iterator[str]:
         if clips is not None and clips.clips_standard:
             what = f"the standard{named} is"
         yield (
-            f"stimuli.{block.stimulus}.levels: ±{100 * precision:g} % cannot be measured at a threshold of "
+            f"stimuli.{block.stimulus}.levels: ±{100 * precision:g} % cannot be reached at a threshold of "
             f"{found.threshold:.2g}: {what} clipped"
         )
         return

@@ -76,8 +76,7 @@ def _similar_liquids(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[st
             seen.add(pair)
             yield (
                 f"{liquid} and {other} of block {block.id} are hard to tell apart: {felt[liquid].force_n:.2f} and "
-                f"{felt[other].force_n:.2f} N at {HAND_MPS:g} m/s of the hand, less than {TELLING:.0%} of the smaller "
-                "between them"
+                f"{felt[other].force_n:.2f} N at {HAND_MPS:g} m/s of the hand; they differ by less than {TELLING:.0%}"
             )
 
 
@@ -129,8 +128,8 @@ def _practised_liquids(protocol: Protocol) -> Iterator[str]:
         for name in used[block.id]:
             if name in judged:
                 yield (
-                    f"practice {block.id} is in {name}, which block {judged[name]} presents too: participants know it "
-                    "from the practice when they judge it"
+                    f"practice {block.id} is in {name}, which block {judged[name]} presents too: participants "
+                    "then know it from practice"
                 )
 
 
@@ -191,7 +190,7 @@ def _unpaced_blocks(protocol: Protocol, block: Block) -> Iterator[str]:
         fast_hz = fastest_hz(protocol.scene.velocity, protocol.device.rate_hz, 1 - error_percent / 100)
         yield (
             f"tasks.{block.task}: in motions above {fast_hz:.1f} Hz the velocity estimator takes more than "
-            f"{error_percent:g} % of a damper's force: such trials are repeated: {PACED}"
+            f"{error_percent:g} % of a damper's force; such trials are repeated: {PACED}"
         )
 
 
@@ -211,14 +210,18 @@ def _imperceptible_settings(protocol: Protocol, without_force: str) -> Iterator[
             gives_none = force_n(protocol.scene_for(name), stroke) < LEAST_N
             for key, place in places.items():
                 if key == DELAY and name in hides:
-                    yield f'{place}: the ball is hidden, so that nobody sees how late it is: write ball = "shown"'
+                    yield f'{place}: the ball is hidden, so participants cannot see its delay: write ball = "shown"'
                 elif key in OF_LINK and (without_force or gives_none):
                     what = f"{without_force or 'the condition'} gives no force"
-                    yield f"{place}: {what}, so that nobody feels whether it is late or lost"
+                    yield f"{place}: {what}, so participants cannot feel whether it is late or lost"
         of_liquids = protocol.compared_in(block.id) == "liquids" if vary is None else vary not in OF_CONDITION
         if without_force and of_liquids and block.phase == "main":
-            seen = ": participants see how the liquids slow the ball down, and feel nothing"
-            seen = ", and the ball is hidden: nobody perceives its liquids" if len(hides) == len(conditions) else seen
+            seen = ": participants see how the liquids slow the ball down, but do not feel it"
+            seen = (
+                ", and the ball is hidden: participants cannot perceive its liquids"
+                if len(hides) == len(conditions)
+                else seen
+            )
             yield f"blocks.{block.id}: {without_force} gives no force{seen}"
 
 
@@ -228,8 +231,9 @@ def _analysis_warnings(protocol: Protocol) -> Iterator[str]:
     for block in protocol.main_blocks:
         if block.order == "fixed" and len(block.conditions) > 1:
             yield (
-                f"blocks.{block.id}.order: all participants meet the {protocol.compared_in(block.id)} in one order: "
-                'their effect cannot be told from practice and fatigue: choose "shuffled", "latin" or "williams"'
+                f"blocks.{block.id}.order: all participants experience the {protocol.compared_in(block.id)} in "
+                "one order, so their effect is confounded with practice and fatigue: choose shuffled, latin or "
+                "williams"
             )
         yield from _forced_choice_warnings(protocol, block)
         yield from _condition_warnings(protocol, block)
@@ -237,7 +241,7 @@ def _analysis_warnings(protocol: Protocol) -> Iterator[str]:
     if decided is not None and (decided.equivalence_bound or 0.0) > half:
         yield (
             f"analysis.equivalence_bound: {decided.equivalence_bound:g} points are more than half the scale "
-            f"({half:g}): almost any answers would be called equivalent"
+            f"({half:g}): almost any answers would count as equivalent"
         )
     if protocol.format > 1 and decided is not None and decided.participants is None:
         yield (
@@ -266,7 +270,7 @@ def _repeated_pages(protocol: Protocol) -> Iterator[str]:
     for steps in (variant.protocol.steps for variant in variants(protocol)):
         for name, page in protocol.pages.items():
             if page.kind != "break" and (times := steps.count(name)) > 1:
-                yield f"pages.{name}: this page of kind {page.kind} comes {times} times in a session"
+                yield f"pages.{name}: this page of kind {page.kind} occurs {times} times in a session"
 
 
 def _block_order_warnings(protocol: Protocol) -> Iterator[str]:
@@ -274,16 +278,17 @@ def _block_order_warnings(protocol: Protocol) -> Iterator[str]:
     for number, contrast in enumerate(() if protocol.analysis is None else protocol.analysis.contrasts):
         if len(contrast.blocks) == 2 and protocol.study.block_order == "fixed" and not protocol.groups:
             yield (
-                f"analysis.contrasts.{number}: all participants have {' and '.join(contrast.blocks)} in one order: "
-                'their difference cannot be told from practice and fatigue: choose study.block_order = "balanced"'
+                f"analysis.contrasts.{number}: all participants have {' and '.join(contrast.blocks)} in one "
+                "order, so their difference is confounded with practice and fatigue: choose study.block_order "
+                '= "balanced"'
             )
     blocks = protocol.blocks_in_order
     main = [at for at, block in enumerate(blocks) if block.phase == "main"]
     for block in blocks[main[0] : main[-1]] if main and protocol.study.block_order != "fixed" else ():
         if block.phase != "main":
             yield (
-                f"study.block_order: block {block.id} ({block.phase}) stays in its place while the main blocks change: "
-                "put it before the first of them"
+                f"study.block_order: block {block.id} ({block.phase}) keeps its position while the main blocks "
+                "change: put it before the first main block"
             )
 
 
@@ -292,7 +297,10 @@ def _condition_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
     conditions = [protocol.conditions[name] for name in block.conditions]
     alone = block.design is None and block.questionnaire is not None and len(conditions) == 1
     if alone and len(protocol.main_blocks) > 1:
-        yield f"blocks.{block.id}.conditions: one condition is compared with nothing: a main block needs two"
+        yield (
+            f"blocks.{block.id}.conditions: has only one condition, so there is nothing to compare it with: a "
+            "main block needs two"
+        )
     if protocol.compared_in(block.id) == "delays":
         for delay_ms, other in pairwise(sorted({condition.delay_ms for condition in conditions})):
             if other - delay_ms < FRAME_MS:
@@ -305,7 +313,7 @@ def _condition_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
     for name in sorted(
         {*block.conditions, *(liquid for condition in conditions for liquid in condition.liquid_ids)} & title_words
     ):
-        yield f"blocks.{block.id}.setting_label: names the condition “{name}”, which participants then know"
+        yield f"blocks.{block.id}.setting_label: mentions the condition “{name}”, which participants then know"
 
 
 def _forced_choice_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
@@ -315,14 +323,14 @@ def _forced_choice_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
     design, stimulus = design_of(protocol, block), stimulus_of(protocol, block)
     if block.catch is None and has_correct_answer(design, stimulus):
         yield (
-            f"blocks.{block.id}.catch: no catch trials: participants who guess cannot be told from those with a high "
-            "threshold"
+            f"blocks.{block.id}.catch: catch trials are missing, so participants who guess cannot be "
+            "distinguished from participants with a high threshold"
         )
     factor = method_of(protocol, block).assumed(stimulus, design).width_prior[1]
     if factor < NARROW:
         yield (
-            f"methods.{block.method}.width_prior: a factor of {factor:g} lets the prior decide how steep the function "
-            f"is, and bias the threshold of everybody else: choose {NARROW:g} or more"
+            f"methods.{block.method}.width_prior: a factor of {factor:g} lets the prior determine the slope and "
+            f"bias the thresholds of other participants: choose {NARROW:g} or more"
         )
 
 
@@ -335,7 +343,7 @@ def _unbracketed_value(protocol: Protocol, number: int, published: Published) ->
     if not min(levels) <= published.value <= max(levels):
         yield (
             f"analysis.published.{number}.value: {published.value:g} is outside the levels of block {block.id}, "
-            f"{min(levels):g} to {max(levels):g}: such a threshold could not be measured"
+            f"{min(levels):g} to {max(levels):g}: such a threshold cannot be measured"
         )
 
 
@@ -346,8 +354,8 @@ def _tasks_without_target(protocol: Protocol) -> Iterator[str]:
     for name in dict.fromkeys(block.task for block in protocol.main_blocks):
         if isinstance(protocol.tasks[name], Reach):
             yield (
-                f"tasks.{name}: a trial that ends without any target reached is valid: set limits.targets_percent to "
-                "the least share of targets that counts"
+                f"tasks.{name}: a trial that ends without any target reached is valid: set "
+                "limits.targets_percent to the minimum proportion of targets"
             )
 
 
@@ -355,7 +363,10 @@ def _recalled_instruments(protocol: Protocol) -> Iterator[str]:
     for name, questionnaire in protocol.questionnaires.items():
         of = questionnaire.instrument
         if of is not None and (recalled := instrument(of).get("from_memory")) is not None:
-            yield f"questionnaires.{name}: from memory, compared with no source: {recalled}: compare it with your copy"
+            yield (
+                f"questionnaires.{name}: written from memory, not compared with a source ({recalled}): "
+                "compare it with your copy"
+            )
 
 
 def _untitled_forms(protocol: Protocol) -> Iterator[str]:

@@ -96,12 +96,15 @@ def language_name(code: str) -> str:
 
 def missing_text(path: Path, language: str) -> Fault:
     """Return the fault about a text missing in one of the study's languages."""
-    hint = f"add {language}: every text exists in every language of the study"
+    hint = f"add {language}: every text must exist in every language of the study"
     return Fault(path, f"is missing in {language_name(language)}", hint, missing_language=language)
 
 
 def words(language: str) -> Words:
     """Return the texts of a language (StudyError if there are none)."""
     if language not in LANGUAGES:
-        raise StudyError(f'no words for the participant\'s pages in "{language}" ({did_you_mean(language, LANGUAGES)})')
+        raise StudyError(
+            f'the program does not have texts for participants\' pages in "{language}" '
+            f"({did_you_mean(language, LANGUAGES)})"
+        )
     return LANGUAGES[language]

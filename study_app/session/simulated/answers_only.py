@@ -294,7 +294,7 @@ def begin_session_at_step(results: Path, study: Protocol, source: bytes, start: 
     clock = SessionClock(lambda: 0, datetime.now().astimezone() - timedelta(seconds=passed.seconds))
     with begin_session(results, study, source, start, clock=clock) as store:
         if store.key.codes != shown.codes:
-            raise SessionError(f"{results} holds sessions with another seed: use a new folder")
+            raise SessionError(f"{results} contains sessions with another seed: use a new folder")
         if step:
             text = f"Steps 1 to {step} were answered by a simulated participant, without force."
             store.append(Note(kind="note", text=text), t_s=0.0, waits=False)

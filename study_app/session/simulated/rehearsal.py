@@ -199,12 +199,12 @@ def rehearsal_rig(study: Protocol, person: str, seed: int, device: str) -> Rig:
     """Return a device with a simulated hand, and its servo on a virtual clock that only the servo advances."""
     if not descriptor_of(device).moves_by_itself:
         alone = " or ".join(device.name for device in all_devices() if device.moves_by_itself)
-        raise SessionError(f"device '{device}' waits for a person: rehearse with {alone}")
+        raise SessionError(f"device '{device}' needs a person: rehearse with {alone}")
     settings = study_settings(study, stream(seed, f"rehearsal/{person}/hand"))
     rig = open_rig(device, settings, clock=VirtualClock())
     if hand_of(rig.device) is None:
         rig.stop()
-        raise SessionError(f"device '{device}' has no hand that takes orders, so that it cannot be rehearsed on")
+        raise SessionError(f"device '{device}' does not have a simulated hand, so it cannot be used in a rehearsal")
     return rig
 
 
@@ -316,7 +316,7 @@ class RehearsedSession(SimulatedParticipant):
         self.signals.obey()
         servo = self.rig.servo
         if servo.advance(max(1, round(seconds * servo.rate_hz))) == 0 and servo.fault is None:
-            raise SessionError("the rehearsal was stopped from outside")
+            raise SessionError("another program stopped the rehearsal")
 
     def _perform_task(self, page: TaskPage) -> None:
         """Perform a task until its page is left, with every frame seen and every tick felt."""
@@ -377,7 +377,7 @@ class RehearsedSession(SimulatedParticipant):
             return operator.index(given)  # type: ignore[arg-type]  # of numpy, too
         except TypeError:
             raise SessionError(
-                f"{given!r} is not a number of steps: give a whole one, 0 where the level is set"
+                f"{given!r} is not a valid number of steps: give a whole number, or 0 to leave the level unchanged"
             ) from None
 
     def look(self, senses: SensedTrial) -> TankView | None:
@@ -402,7 +402,9 @@ class RehearsedSession(SimulatedParticipant):
         answers = {item: _plain_answer(value) for item, value in named.items()}
         if unknown := answers.keys() - {item.id for item in page.items}:
             possible = ", ".join(item.id for item in page.items)
-            raise SessionError(f"{', '.join(map(repr, sorted(unknown)))} is not asked on this page: answer {possible}")
+            raise SessionError(
+                f"{', '.join(map(repr, sorted(unknown)))} does not occur on this page: answer {possible}"
+            )
         visible = [
             item for item in page.items if item.id in shown_questions(page.items, answers) and item.id in answers
         ]
@@ -718,7 +720,7 @@ def reopen_session(
     lines = journal.read(locate_session(session_folder)[1].journal)
     begun = start_of(lines)
     if not is_rehearsal(receipt.read(locate_session(session_folder)[1].receipt)):
-        raise SessionError(f"{session_folder} is a participant's session, not a simulated one: resume it by a window")
+        raise SessionError(f"{session_folder} is a participant's session, not a simulated one: resume it in a window")
     read = partial(source_to_resume, session_folder)
     name = find_protocol(begun, read=read) if protocol is None else str(protocol)
     source = read(name)

@@ -88,7 +88,9 @@ def choose_language(state: SessionState, event: LanguageChosen) -> Result:
     if event.language == state.plan.language:
         return state, ()
     if event.language not in state.languages:
-        offered = f"choose {' or '.join(state.languages)}" if state.languages else "it is chosen before the consent"
+        offered = (
+            f"choose {' or '.join(state.languages)}" if state.languages else "the language is chosen before the consent"
+        )
         raise SessionError(f"language {event.language!r} cannot be chosen now: {offered}")
     chosen = replace(state, plan=replace(state.plan, language=event.language))
     return chosen, (Write(journal.LanguageChosen(language=event.language)), WriteTables(), show_page(chosen))
@@ -186,7 +188,7 @@ def resume_session(state: SessionState, event: ResumeRequested) -> Result:
     """Return to the interrupted phase and fade the force in if it was off; only the operator ends a held pause."""
     if state.held is not None and event.by != "operator":
         what = "the force was stopped" if state.held == "force" else "the operator paused the session"
-        raise SessionError(f"{what}: only the operator resumes it, not the {event.by}")
+        raise SessionError(f"{what}: only the operator can resume it, not the {event.by}")
     back: Commands = (Write(journal.Resumed(by=event.by)),)
     if state.force_off:
         back = (*back, Write(journal.ForceRestored(by=event.by)), FadeIn())
@@ -305,7 +307,7 @@ def stop_force_of_stalled(state: SessionState, event: ForceStopped) -> Result:
 def end_stalled_session(state: SessionState, _event: EndRequested) -> Result:
     """End without a line in the journal: the session stays unfinished, and pending writes are still tried."""
     if state.over:
-        raise SessionError("the session is over: its last lines wait for the disk")
+        raise SessionError("the session is over; its last lines are still to be written to the disk")
     ended = replace(state, stall=replace(_stall(state), before=Phase.ENDED))
     return ended, (show_page(ended),)
 

@@ -119,9 +119,9 @@ def initial_state(
     """
     if language not in protocol.study.languages:
         known = ", ".join(protocol.study.languages)
-        raise SessionError(f"language {language!r}: {protocol.study.name} is written in {known}; choose one of these")
+        raise SessionError(f"language {language!r}: {protocol.study.name} is available in {known}; choose one of these")
     if not secret and any(block.design is not None for block in protocol.blocks.values()):
-        raise SessionError("the levels of this study are drawn from the sealed key: give its secret")
+        raise SessionError("the levels of this study are drawn from the sealed key: its secret is required")
     return SessionState(plan=Plan(protocol, schedule, key, language, start, secret))
 
 
@@ -133,5 +133,7 @@ def advance(state: SessionState, event: Event) -> tuple[SessionState, tuple[Comm
             waits = f"{state.stall.reason}; the session waits until then"
             raise SessionError(f"{type(event).__name__} cannot happen while {state.phase.value}: {waits}")
         taken = ", ".join(sorted(kind.__name__ for phase, kind in TRANSITIONS if phase is state.phase))
-        raise SessionError(f"{type(event).__name__} cannot happen while {state.phase.value}: possible are {taken}")
+        raise SessionError(
+            f"{type(event).__name__} is not possible while {state.phase.value}; possible events: {taken}"
+        )
     return move(state, event)

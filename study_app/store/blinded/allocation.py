@@ -150,7 +150,7 @@ def allocation_of(study: StudyFolder, key: Key, participant: str) -> Allocation 
     if (begun := entries_begun(study).get(participant)) is not None:
         path = study.allocation(begun.entry, begun.group, None if begun.replaces is None else participant)
         raise StoreError(
-            f"{path} is missing, though participant {participant} has entry {begun.entry}: restore it from a copy"
+            f"{path} is missing, although participant {participant} has entry {begun.entry}: restore it from a copy"
         )
     return None
 
@@ -188,14 +188,15 @@ def check_choice(
     name, own = protocol.study.name, _claim_of(held, participant)
     if group is not None and not protocol.asks_group:
         why = "assigns participants to its groups at random" if protocol.groups else "has no groups"
-        raise StudyError(f"group {group!r}: {name} {why}; leave the group out")
+        raise StudyError(f"group {group!r}: {name} {why}; omit the group")
     permitted = ", ".join(protocol.groups)
     if protocol.asks_group and group is None and own is None:
         raise StudyError(
-            f"group is missing: {name} has pre-existing groups; give --group with that of {participant}: {permitted}"
+            f"group is missing: {name} has pre-existing groups; give --group with the group of {participant}: "
+            f"{permitted}"
         )
     if group is not None and group not in protocol.groups:
-        raise StudyError(f"group {group!r}: {name} has no such group; permitted: {permitted}")
+        raise StudyError(f"group {group!r}: {name} does not have this group; permitted: {permitted}")
     if protocol.asks_group and own is not None and own.group not in protocol.groups:
         raise StudyError(f"participant {participant} is recorded in group {own.group}, which {name} no longer has")
     if own is not None and group not in (None, own.group):
@@ -211,8 +212,8 @@ def _check_replaced(
     if not has_counted_places(held):
         if enrolment_number(row_of) is None:
             raise StudyError(
-                f"row of {row_of!r}: an earlier version began this folder, where the number in the ID assigns rows; "
-                "give an ID with a number, such as P007"
+                f"row of {row_of!r}: an earlier version began this folder, in which the number in the ID "
+                "assigns rows; give an ID with a number, such as P007"
             )
     elif own is not None:
         if own.replaces != row_of:
@@ -220,8 +221,7 @@ def _check_replaced(
             raise StudyError(f"row of {row_of!r}: participant {participant} replaces {now} since the first session")
     elif replaced is None:
         raise StudyError(
-            f"row of {row_of!r}: no participant of this folder has this ID; give the ID of the participant who is "
-            "replaced"
+            f"row of {row_of!r}: this ID does not exist in this folder; give the ID of the participant to be replaced"
         )
     elif replaced.group != group:
         raise StudyError(
@@ -263,7 +263,9 @@ def session_protocol(study: StudyFolder, protocol: Protocol, participant: str, s
         return own_protocol(protocol, None, session)
     allocation = allocation_of(study, read_key(study.path), participant)
     if allocation is None:
-        raise StoreError(f"participant {participant} has no entry in {study.allocated}: restore it from a copy")
+        raise StoreError(
+            f"participant {participant} does not have an entry in {study.allocated}: restore it from a copy"
+        )
     return own_protocol(protocol, allocation.group, session)
 
 

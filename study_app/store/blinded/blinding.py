@@ -137,9 +137,9 @@ def check_conditions(folder: Path, protocol: Protocol) -> None:
 def _refuse_other_conditions(study: StudyFolder, key: Key, protocol: Protocol) -> None:
     if key.tables_hash != _tables_hash(protocol):
         raise StoreError(
-            f"{study.key} was sealed for other conditions than those of this protocol (its liquids, conditions, "
-            "stimuli, blocks or groups were changed): undo that change to continue the study, or give the changed "
-            "protocol another study.name or results folder"
+            f"{study.key} was sealed for conditions that differ from this protocol (its liquids, conditions, "
+            "stimuli, blocks or groups were changed): undo that change to continue the study, or give the "
+            "changed protocol another study.name or results folder"
         )
 
 
@@ -156,11 +156,11 @@ def reveal(folder: Path, by: str, reason: str) -> Codes:
     StoreError
         ``by`` or ``reason`` is empty, or the key is missing, unreadable or not the one the sessions ran under.
     """
-    by, reason = check_name_and_reason(by, reason, "opening the key is recorded with a name and a reason")
+    by, reason = check_name_and_reason(by, reason, "opening the key requires a name and a reason, which are recorded")
     study = StudyFolder(folder)
     if not is_there(study.key) and not study.sessions():
         raise StoreError(
-            f"{folder} is not a study folder (it has no {study.key.name}): name one such as results/rek2024"
+            f"{folder} is not a study folder ({study.key.name} is missing): give one such as results/rek2024"
         )
     key = verified_key(study)
     record = {
@@ -349,8 +349,8 @@ def _refuse_if_lost(study: StudyFolder) -> None:
     under = [session for session in study.sessions() if is_there(session.receipt)]
     if under and not is_there(study.key):  # checked again: another program may have drawn the key in the meantime
         raise StoreError(
-            f"{study.key} is missing, though {len(under)} sessions ran under it: restore it from a copy; without it no "
-            "code can be translated"
+            f"{study.key} is missing, although {len(under)} sessions ran under it: restore it from a copy; "
+            "without it codes cannot be assigned to conditions"
         )
 
 
@@ -512,7 +512,8 @@ def protocol_errors(receipt: Path) -> Iterator[None]:
         raise StoreError(f"{receipt} lacks {lacking}: restore it from a copy") from lacking
     except (AttributeError, TypeError, ValueError):  # the reason is omitted, since it could reveal conditions
         raise StoreError(
-            f"{receipt} and the study's key give no protocol that this version can run: restore them from a copy"
+            f"{receipt} and the study's key do not determine a protocol that this version can run: restore them "
+            "from a copy"
         ) from None
 
 

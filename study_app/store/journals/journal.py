@@ -149,7 +149,7 @@ def scan(path: Path) -> Contents:
         version = line.get("version", version)
         wrong = line_problem(line)
         if wrong is None and version == study_app.__version__ and line["event"] not in EVENTS:
-            wrong = f"has an event {shorten_value(line['event'])}, which version {version} does not write"
+            wrong = f"contains an event {shorten_value(line['event'])}, which version {version} does not write"
         if wrong is not None:
             damage = f"{path}, line {number} {wrong}: it was changed; restore it from a copy"
             return Contents(lines, whole_bytes, damage=damage)
@@ -179,9 +179,9 @@ def _chain_error(line: Mapping[str, Any], before: str, *, chained: bool) -> str 
         needed = chained or (first and line.get("format", 1) > 1)
         return "lacks previous: it was changed; restore it from a copy" if needed else None
     if hash_before != before:
-        return "was written after another line than the one before it, which was changed: restore it from a copy"
+        return "does not continue the previous line, which was changed: restore it from a copy"
     if not (chained or first or line["event"] == "session_resumed"):
-        return "has previous, and the lines before it lack it: they were changed; restore it from a copy"
+        return "has previous, but earlier lines do not: they were changed; restore it from a copy"
     return None
 
 
@@ -266,7 +266,7 @@ class Journal:
             if file.seek(0, os.SEEK_END) != contents.whole_bytes:
                 file.close()
                 raise StoreError(
-                    f"{path} has changed while it was opened: close the other program that writes it, and try again"
+                    f"{path} changed while it was being opened: close the other program that writes it, and try again"
                 )
         except OSError as error:
             raise cannot_write(path, error) from error
@@ -290,7 +290,7 @@ class Journal:
         """
         if self.file.closed:
             raise StoreError(
-                f"{self.path} is closed: {event.event!r} came after the session's end and was not recorded"
+                f"{self.path} is closed: {event.event!r} occurred after the end of the session and was not recorded"
             )
         line = line_of(event, self._lines + 1, self.clock, t_s, previous=self._hash.hexdigest())
         if (wrong := line_problem(line)) is not None:

@@ -304,20 +304,19 @@ class UsedIds:
             raise StoreError(f"session number {number} cannot be used: it must be from 1 to {MAX_SESSION}")
         if participant.lower() in (used.lower() for used in self.withdrawn):
             raise StoreError(
-                f"participant {participant} withdrew, so the id is not used again: use another id (next free: "
-                f"{self.suggested()})"
+                f"participant {participant} withdrew, so the ID cannot be used again: use another ID (next "
+                f"free: {self.suggested()})"
             )
         for used in self.ids:
             if used != participant and used.lower() == participant.lower():
                 raise StoreError(
-                    f"participant id {participant!r} differs from the used {used!r} only in capitalisation: use "
-                    f"{used!r} "
-                    "with a new session number, or another id"
+                    f"participant ID {participant!r} differs from the existing {used!r} only in capitalisation: "
+                    f"use {used!r} with a new session number, or another ID"
                 )
         if participant not in self.ids and (what := read_as(participant)):
             raise StoreError(
-                f"participant id {participant!r} cannot be used: spreadsheets and statistics programs read it as "
-                f"{what}; use another id, such as {self.suggested()}"
+                f"participant ID {participant!r} cannot be used: spreadsheets and statistics programs read it "
+                f"as {what}; use another ID, such as {self.suggested()}"
             )
         if (participant, number) in self.held:
             raise self.refusal(participant, number)
@@ -327,7 +326,8 @@ class UsedIds:
         free = max(self.numbers(participant), default=number)
         return StoreError(
             f"participant {participant} already has session {number} in {self.path}: use a new session number "
-            f"({free + 1}), resume that session, or use another id (next free: {self.suggested()}); nothing was changed"
+            f"({free + 1}), resume that session, or use another ID (next free: {self.suggested()}); nothing was "
+            "changed"
         )
 
 
@@ -350,13 +350,13 @@ def check_participant(participant: str, *, pilot: bool = False) -> None:
     """
     if not ID_PATTERN.fullmatch(participant) or len(participant) > MAX_ID_LENGTH:
         raise StoreError(
-            f"participant id {participant!r} cannot be used: only letters A-Z, a-z and digits 0-9 are permitted, "
-            f"at most {MAX_ID_LENGTH}, no dash, space or underscore; for example P007"
+            f"participant ID {participant!r} cannot be used: only letters A-Z, a-z and digits 0-9 are "
+            f"permitted, at most {MAX_ID_LENGTH}, without dashes, spaces or underscores; for example P007"
         )
     if not pilot and participant.lower() in RESERVED_IDS:
         raise StoreError(
-            f"participant id {participant!r} is reserved for pilot sessions, which are stored separately: use an id "
-            "such as P007"
+            f"participant ID {participant!r} is reserved for pilot sessions, which are stored separately: use "
+            "an ID such as P007"
         )
 
 

@@ -244,16 +244,16 @@ def files_beyond_journal(place: Place, lines: Sequence[events.Event]) -> Iterato
     if not ended and (status := held.get("status", receipt.UNFINISHED)) != receipt.UNFINISHED:
         yield folder.receipt, f"its status is {status!r}, the journal's {receipt.UNFINISHED!r}"
     if len(held.get("resumed", ())) > sum(isinstance(line, events.SessionResumed) for line in lines):
-        yield folder.receipt, "says that the session was resumed more often than the journal does"
+        yield folder.receipt, "states more resumptions of the session than the journal"
     if ended:
         return
     if is_there(folder.checksums):
-        yield folder.checksums, "was written after the session ended, but the journal has no end"
+        yield folder.checksums, "was written after the session ended, but the end is missing in the journal"
     rows = session_tables.SessionRows(lines)
     for name, spare in (("responses", 0), ("trials", 1), ("intervals", 1)):
         path, given = folder.table(place.study, name), len(rows.table(name))
         if (row_count := _count_rows(path, place.study_folder.path)) > given + spare:
-            yield path, f"has {row_count} rows, and the journal gives {given}"
+            yield path, f"has {row_count} rows, but the journal has {given}"
 
 
 def _ended_or_recorded(place: Place, lines: Sequence[events.Event]) -> Iterator[tuple[Path, str]]:
@@ -262,11 +262,11 @@ def _ended_or_recorded(place: Place, lines: Sequence[events.Event]) -> Iterator[
     if isinstance(lines[-1], events.SessionEnded):
         return
     if place_of(study, folder) in {session for _, session in read_list(study.fingerprints)}:
-        yield study.fingerprints, f"lists {place_of(study, folder)} as ended, but its journal has no end"
+        yield study.fingerprints, f"lists {place_of(study, folder)} as ended, but the end is missing in its journal"
     of_trials = {path for which in recordable(lines) for path in recording_files(folder.recordings, *which)}
     for path in paths_in(folder.recordings):
         if path not in of_trials and RECORDING_NAME.fullmatch(path.relative_to(folder.path).as_posix()):
-            yield path, "is of a trial that the journal never started"
+            yield path, "belongs to a trial that never started in the journal"
 
 
 def _count_rows(path: Path, root: Path) -> int:
@@ -308,7 +308,7 @@ def _unfinished(folder: SessionFolder, lines: list[events.Event]) -> events.Sess
     """Return the first line of a session that can be resumed."""
     if not lines:
         raise StoreError(
-            f"{folder.journal} has no line: the program ended before the session began; use a new session number"
+            f"{folder.journal} is empty: the program ended before the session began; use a new session number"
         )
     refuse_finished(folder, progress_of(lines))
     return events.start_of(lines)

@@ -81,7 +81,7 @@ def merge_sites(given: Mapping[str, Path], to: Path) -> Merged:
     present = () if merged is None else tuple(_read_source(name, merged.folder(name)) for name in merged.names)
     new = tuple(_read_source(name, path) for name, path in given.items())
     if empty := next((name for name, source in zip(given, new, strict=True) if not source.begun), None):
-        raise StoreError(f"site {empty}: {given[empty]} holds no sessions: merge it when it does")
+        raise StoreError(f"site {empty}: {given[empty]} does not contain sessions yet: merge it later")
     ran = new[0].protocol_hash if merged is None else merged.protocol_hash
     _check_alike((*present, *new), ran)
     _check_sessions((*present, *new))
@@ -96,14 +96,14 @@ def merge_sites(given: Mapping[str, Path], to: Path) -> Merged:
         made = Merged(to, merged.study, merged.protocol_hash, (*merged.sites, *sites))
         with lock_folder(to):
             if read_merged(to) != merged:
-                raise StoreError(f"{to} was changed by another program meanwhile: merge again")
+                raise StoreError(f"{to} was changed by another program during the merge: merge again")
             _add_sites(made, new)
     return made
 
 
 def _check_names(given: Mapping[str, Path], merged: Merged | None) -> None:
     if not given:
-        raise StoreError("no site is given: name each as A=DIR")
+        raise StoreError("sites are missing: give each as A=DIR")
     used = {} if merged is None else {name.lower(): name for name in merged.names}
     for name in given:
         if not ID_PATTERN.fullmatch(name) or len(name) > MAX_SITE_LENGTH:
@@ -113,23 +113,23 @@ def _check_names(given: Mapping[str, Path], merged: Merged | None) -> None:
             )
         if (other := used.get(name.lower())) is not None:
             held = "is merged already" if merged is not None and other in merged.names else "is given twice"
-            raise StoreError(f"site {name!r} {held} (capitals make no difference): use another name")
+            raise StoreError(f"site {name!r} {held} (capitals are ignored): use another name")
         used[name.lower()] = name
 
 
 def _check_places(given: Mapping[str, Path], to: Path, merged: Merged | None) -> None:
     target = to.resolve()
     if merged is None and is_there(to) and (not to.is_dir() or any(to.iterdir())):
-        raise StoreError(f"{to} is not a merged study and not empty: name a new folder with --to")
+        raise StoreError(f"{to} is not a merged study and is not empty: give a new folder with --to")
     for above in (target, *target.parents):
         if described_study(StudyFolder(above)) is not None:
-            raise StoreError(f"{to} is, or lies within, the results folder {above}: name a folder outside of it")
+            raise StoreError(f"{to} is, or lies within, the results folder {above}: give a folder outside it")
     for name, path in given.items():
         if read_merged(path) is not None or merged_above(path) is not None:
-            raise StoreError(f"site {name}: {path} belongs to a merged study: name the folder of the site itself")
+            raise StoreError(f"site {name}: {path} belongs to a merged study: give the folder of the site itself")
         place = path.resolve()
         if place.is_relative_to(target):
-            raise StoreError(f"site {name}: {path} lies within {to}: name a folder outside of it with --to")
+            raise StoreError(f"site {name}: {path} lies within {to}: give a folder outside it with --to")
 
 
 def _read_source(name: str, path: Path) -> _Source:
@@ -138,8 +138,8 @@ def _read_source(name: str, path: Path) -> _Source:
     described = described_study(study)
     if described is None:
         raise StoreError(
-            f"site {name}: {path} is not the results folder of a study (no {study.description.name}): name one such as "
-            "results/rek2024"
+            f"site {name}: {path} is not the results folder of a study ({study.description.name} is missing): "
+            "give one such as results/rek2024"
         )
     refuse_special_files(path.resolve())
     try:
@@ -154,8 +154,8 @@ def _read_source(name: str, path: Path) -> _Source:
     hashes = dict.fromkeys(str(held["protocol_hash"]) for held in receipts)
     if len(hashes) > 1:
         raise StoreError(
-            f"site {name}: sessions in {path} ran under {len(hashes)} protocols (SHA-256 {', '.join(hashes)}): only "
-            "sites of one protocol, unchanged to the byte, can be merged"
+            f"site {name}: sessions in {path} ran under {len(hashes)} protocols (SHA-256 {', '.join(hashes)}): "
+            "only sites with exactly the same protocol can be merged"
         )
     return _Source(
         name=name,
@@ -176,8 +176,8 @@ def _check_alike(sources: tuple[_Source, ...], protocol_hash: str) -> None:
         if other.study != first.study or other.protocol_hash not in ("", protocol_hash):
             raise StoreError(
                 f"site {other.name} ran the protocol {other.study} with SHA-256 {other.protocol_hash}, site "
-                f"{first.name} {first.study} with SHA-256 {protocol_hash}: only sites of one protocol, unchanged "
-                "to the byte, can be merged"
+                f"{first.name} {first.study} with SHA-256 {protocol_hash}: only sites with exactly the same "
+                "protocol can be merged"
             )
         if other.key.drawn != first.key.drawn or other.pilot not in (None, first.pilot):
             raise StoreError(
@@ -197,7 +197,7 @@ def _check_sessions(sources: tuple[_Source, ...]) -> None:
         for begun, path in source.begun.items():
             if (other := seen.get(begun)) is not None:
                 raise StoreError(
-                    f"{path} is a copy of {other}, and would count twice: name only one of the two folders"
+                    f"{path} is a copy of {other}, so its data would be counted twice: give only one of the two folders"
                 )
             seen[begun] = path
 

@@ -21,7 +21,7 @@ SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
     (
         "Responses, format 2",
         "subject-…_description-responses_data.csv",
-        "one row per response, if the protocol has format 2",
+        "one row per response, for a protocol of format 2",
         RESPONSES_2,
     ),
     ("Trials", "subject-…_description-trials_data.csv", "one row per presentation of a trial", TRIALS),
@@ -35,13 +35,13 @@ SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
     (
         "Trials and participants, format 2",
         "…_description-trials_data.csv, …_description-participants_data.csv",
-        "what differs in trials if the protocol has format 2; participants have the group, too",
+        "differences in trials for a protocol of format 2; participants also have the group",
         tuple(column for column in TRIALS_2 if column not in TRIALS),
     ),
     (
         "Participants, trials of intervals",
         "study-…_description-participants_data.csv",
-        "what differs in a study with trials of intervals",
+        "differences in a study with trials of intervals",
         tuple(column for column in with_missing_trials(PARTICIPANTS) if column not in PARTICIPANTS),
     ),
     ("Exclusions", "exclusions.csv", "one row per excluded session or trial", EXCLUSIONS),
@@ -63,7 +63,7 @@ def table_markdown(title: str, file: str, row: str, columns: Sequence[Column]) -
         f"{column.variable['description']}{' **Sealed until unblinding.**' if column.sealed else ''} |"
         for column in columns
     ]
-    return _section(title, file, row, ("| column | a cell is | meaning |", "| --- | --- | --- |", *rows))
+    return _section(title, file, row, ("| column | value | meaning |", "| --- | --- | --- |", *rows))
 
 
 def _section(title: str, file: str, row: str, lines: Sequence[str]) -> str:

@@ -123,8 +123,8 @@ class SessionRows:
         trial = self.trials[self._places[which]]
         if trial.get("intervals") is None:
             raise StoreError(
-                f"the journal's line {line.n} is an interval of trial {line.trial}, which has none: "
-                "restore it from a copy"
+                f"the journal's line {line.n} is an interval of trial {line.trial}, which does not have "
+                "intervals: restore it from a copy"
             )
         trial["intervals"] += 1
         self.intervals.append(_interval_row(trial, self._started[which], line, earlier))
@@ -200,7 +200,9 @@ def _interval_row(trial: Row, started: events.TrialStarted, line: events.Interva
     ended_s = None if before is None else before["ended_s"]
     arrangement = started.arrangement
     if arrangement is not None and not (0 < number <= len(arrangement) and set(arrangement) <= set(_PRESENTED)):
-        raise StoreError(f"the journal's line {line.n} is of an interval that its trial lacks: restore it from a copy")
+        raise StoreError(
+            f"the journal's line {line.n} belongs to an interval that its trial does not have: restore it from a copy"
+        )
     return row | {
         "interval": number,
         "interval_started_s": line.t_s,

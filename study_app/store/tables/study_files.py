@@ -261,10 +261,10 @@ def check_study(folder: StudyFolder, study: str) -> None:
         return
     for above in folder.path.absolute().parents:
         if is_there(StudyFolder(above).key):
-            raise StoreError(f"{folder.path} lies within {above}, which is a study's folder: use one outside of it")
+            raise StoreError(f"{folder.path} lies within {above}, which is a study's folder: use a folder outside it")
     if within := sorted(path.name for path in folder.path.glob("*") if is_there(StudyFolder(path).key)):
         raise StoreError(
-            f"{folder.path} holds folders of studies ({', '.join(within[:3])}{' ...' if within[3:] else ''}): use "
+            f"{folder.path} contains study folders ({', '.join(within[:3])}{' ...' if within[3:] else ''}): use "
             f"one of these or a new one next to them, such as {folder.path / study}"
         )
 

@@ -49,7 +49,7 @@ def proof_lines(study: StudyFolder) -> str:
     """Return the lines that prove the current state of a study."""
     lines = [checked_line(*proof) for proof in (*read_list(study.fingerprints), *record_proofs(study))]
     if not lines:
-        raise StoreError(f"{study.path} has no session that ended: there is nothing to prove yet")
+        raise StoreError(f"{study.path} does not contain an ended session: there is nothing to prove yet")
     return "".join(f"{line}\n" for line in lines)
 
 
@@ -70,7 +70,7 @@ def read_proof(path: Path) -> Proof:
         lines.
     """
     if not path.is_file():
-        raise StoreError(f"{path} is not a file: name a copy of a study's fingerprints.txt")
+        raise StoreError(f"{path} is not a file: give a copy of a study's fingerprints.txt")
     text = (read_if_there(path) or b"").decode("utf-8-sig", "replace").replace("\r\n", "\n")
     above, told = "", list[str]()
     for number, line in enumerate(text.splitlines(keepends=True), start=1):
@@ -130,7 +130,9 @@ def _signing_key(*, draws: bool) -> Any:
     except optional_library("keyring.errors").KeyringError as error:
         if not draws:
             return None
-        raise StoreError(f"the system's key store cannot be used ({error}): unlock it, or sign no proof") from error
+        raise StoreError(
+            f"the system's key store cannot be used ({error}): unlock it, or do not sign the proof"
+        ) from error
     return None if held is None else ed25519.Ed25519PrivateKey.from_private_bytes(base64.b64decode(held))
 
 
@@ -141,7 +143,7 @@ def _check_signature(path: Path, lines: str, public: str, signature: str) -> str
         key = ed25519.Ed25519PublicKey.from_public_bytes(base64.b64decode(public))
         key.verify(base64.b64decode(signature), lines.encode())
     except (wrong, ValueError) as error:
-        raise StoreError(f"{path} is not what was signed: it was changed") from error
+        raise StoreError(f"{path} was changed after it was signed") from error
     own = _signing_key(draws=False)
     if own is not None and own.public_key().public_bytes_raw() != key.public_bytes_raw():
         raise StoreError(f"{path} is signed with another key ({public}) than this computer's: it was replaced")

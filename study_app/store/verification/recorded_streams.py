@@ -63,13 +63,11 @@ def check_recording(file: Path, folder: Path, findings: Findings) -> list[str]:
             said += [*of, f"clock of '{name}': {clock_drift(stream)}"]
         except (ArithmeticError, LookupError, TypeError, ValueError) as error:
             why = f"{type(error).__name__}: {error}"
-            raise StoreError(
-                f"{file} holds a stream '{name}' that is damaged ({why}): restore it from a copy"
-            ) from error
+            raise StoreError(f"{file} contains a damaged stream '{name}' ({why}): restore it from a copy") from error
     markers = [text for name, stream in ours if name == MARKERS for text in _texts(stream)]
     sent = {text for texts in expected.values() for text in texts}
     if any(name == MARKERS for name, _ in ours) and sent.isdisjoint(markers):
-        findings.errors += (Finding(file.name, "it has no marker of this study's sessions"),)
+        findings.errors += (Finding(file.name, "it does not contain markers of this study's sessions"),)
     return said
 
 
@@ -84,7 +82,7 @@ def _read(file: Path) -> list[Any]:
         raise StoreError("reading an XDF file needs pyxdf: pip install 'liquid-study[lsl]'") from error
     logging.getLogger("pyxdf").setLevel(logging.CRITICAL)
     if not file.is_file():
-        raise StoreError(f"{file} is not a file: give --xdf a recording, such as of LabRecorder")
+        raise StoreError(f"{file} is not a file: give --xdf a recording, for example from LabRecorder")
     try:
         with gzip.open(file) if file.suffix in {".gz", ".xdfz"} else file.open("rb") as opened:
             streams, _ = pyxdf.load_xdf(opened, synchronize_clocks=False, dejitter_timestamps=False)
@@ -118,7 +116,7 @@ def _check_markers(
         span = texts[min(at.values()) : max(at.values()) + 1]
         if added := [text for text in span if text not in known and not text.startswith(_TARGET)]:
             what = f"{file.name} has {counted(len(added), 'marker')} that its journal lacks; the first: {added[0]}"
-            findings.error(session.path, f"{what}. The journal was changed, or another program sent them")
+            findings.error(session.path, f"{what}. Either the journal was changed, or another program sent them")
             unknown -= len(added)
         if outside := len(sent) - 1 - (last - first):
             when = f"{first} before the recording and {len(sent) - 1 - last} after it"
@@ -126,7 +124,9 @@ def _check_markers(
         counts = f"{len(known_numbers)} of {len(sent)} recorded, {len(lost)} lost"
         yield f"markers of {name}: {counts}; time within {_error_ms(session, stream, at):.2g} ms"
     if unknown:
-        findings.warnings += (Finding(file.name, f"{counted(unknown, 'marker')} of no session of this study"),)
+        findings.warnings += (
+            Finding(file.name, (f"{counted(unknown, 'marker')} that do not belong to a session of this study")),
+        )
 
 
 def _texts(stream: Mapping[str, Any]) -> list[str]:
@@ -150,7 +150,7 @@ def _check_samples(file: Path, stream: Mapping[str, Any], findings: Findings) ->
     stamps_s = np.asarray(stream["time_stamps"], float)
     labels = [channel["label"][0] for channel in stream["info"]["desc"][0]["channels"][0]["channel"]]
     if "tick" not in labels:
-        yield f"samples: {len(stamps_s)} recorded; this version sent no tick numbers, by which losses are found"
+        yield f"samples: {len(stamps_s)} recorded; this version did not send tick numbers, which reveal lost samples"
         return
     if len(stamps_s) == 0:
         yield "samples: none recorded"

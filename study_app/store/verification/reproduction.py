@@ -59,7 +59,8 @@ def reproduce_session(session_folder: Path) -> Reproduced:
         recorded = recorded_trials(open_events(lines, key) if lines and events.start_of(lines).own_codes else lines)
     except (KeyError, TypeError, AttributeError, ValueError):  # the reason could reveal a condition
         raise StoreError(
-            f"{folder.path}: receipt, key and journal do not give the session: verify the study's folder"
+            f"{folder.path}: the receipt, the key and the journal do not determine the session: verify the study's "
+            f"folder"
         ) from None
     reproduction = Reproduced([*reproduce(protocol, seed, participant, recorded, complete=complete, place=place)])
     if lines and events.start_of(lines).intervals:
@@ -68,8 +69,8 @@ def reproduce_session(session_folder: Path) -> Reproduced:
         versions = ran["versions"]  # here receipts of 0.2.1 may have the rules as a text
         if compared.differences and str(ran.get("level_rules", versions.get("level rules"))) != str(LEVEL_RULES):
             reproduction.followed.append(
-                f"liquid-study {versions.get('liquid-study')} ran the session and chose levels by other rules: run "
-                "reproduce of that version"
+                f"liquid-study {versions.get('liquid-study')} ran the session and used other rules to choose levels: "
+                f"run reproduce in that version"
             )
     return reproduction
 
@@ -86,12 +87,14 @@ def _compare_levels(
         reproduction.differences.append(f"levels cannot be compared: {error}")
         return
     except (KeyError, TypeError, AttributeError, ValueError, StopIteration):  # the reason could reveal a level
-        reproduction.differences.append("levels cannot be compared: receipt, key and journal do not give the levels")
+        reproduction.differences.append(
+            "levels cannot be compared: the receipt, the key and the journal do not contain the levels"
+        )
         return
     reproduction.differences += compared.differences
     for block, trials in compared.trials.items():
         follows = sum(trials.values())
-        reproduction.followed.append(f"{block}: {follows} of {len(trials)} levels follow from the answers")
+        reproduction.followed.append(f"{block}: {follows} of {len(trials)} levels agree with the answers")
 
 
 class _Compared:
@@ -118,7 +121,7 @@ class _Compared:
         due = next_level(self._protocol, self._key, self._schedule, trial, trial_results(self._protocol, before))
         if isinstance(line, events.PassedOver):
             if due is not None:
-                self.differences.append(f"trial {trial.number}: passed over, though it was due by the answers")
+                self.differences.append(f"trial {trial.number}: skipped, although the answers required it")
             return
         presented = (line.level, line.standard, line.arrangement, bool(line.catch))
         follows = due is not None and presented == (
@@ -129,7 +132,9 @@ class _Compared:
         )
         if not follows:
             what = (
-                "presented, though it was to be passed over" if due is None else "another level or arrangement was due"
+                "presented, although it should have been skipped"
+                if due is None
+                else ("the answers require another level or arrangement")
             )
             self.differences.append(f"trial {trial.number}, attempt {line.attempt}: {what}")
         self._note(block, trial.number, follows)

@@ -42,7 +42,7 @@ def request_stamp(lines: str, server: str) -> str:
     client = optional_library("rfc3161_client")
     request = client.TimestampRequestBuilder().data(lines.encode()).build()
     if not server.startswith(("http://", "https://")):
-        raise StoreError(f"{without_login(server)} is not a server of time stamps: give a URL such as {_EXAMPLE}")
+        raise StoreError(f"{without_login(server)} is not a time-stamp server: give a URL such as {_EXAMPLE}")
     answers = queue.SimpleQueue[bytes | Exception]()
     threading.Thread(target=_post_request, args=(server, request.as_bytes(), answers), daemon=True).start()
     try:
@@ -56,7 +56,7 @@ def request_stamp(lines: str, server: str) -> str:
     except (client.VerificationError, ValueError, OSError) as error:
         answer = error
     if isinstance(answer, Exception):
-        reason = f"{without_login(server)} gave no time stamp ({str(answer)[:100]!r}): try again later"
+        reason = f"{without_login(server)} did not return a time stamp ({str(answer)[:100]!r}): try again later"
         raise StoreError(reason) from answer
     return f"stamp {base64.b64encode(answer).decode()}\n"
 
@@ -75,9 +75,9 @@ def check_granted(answer: bytes, request: Any) -> None:
         raise ValueError(f"the server refused: status {response.status} {' '.join(response.status_string)}".strip())
     token = response.tst_info
     if token.message_imprint.message != request.message_imprint.message:
-        raise ValueError("the token is of another text")
+        raise ValueError("the token belongs to another text")
     if token.nonce != request.nonce:
-        raise ValueError("the token answers another request")
+        raise ValueError("the token belongs to another request")
 
 
 def _post_request(server: str, question: bytes, answers: queue.SimpleQueue[bytes | Exception]) -> None:
@@ -104,11 +104,13 @@ def checked_stamp(path: Path, lines: str, token: str) -> str:
     """Return a text with the time of a file's stamp; raise StoreError if the stamp does not match its lines."""
     client = optional_library("rfc3161_client")
     if workstation.load_or_default()[0].stamp_root is None:
-        raise StoreError(f"{path} is stamped: name the server's root certificate, liquid-study proof --root FILE")
+        raise StoreError(f"{path} is stamped: give the server's root certificate, liquid-study proof --root FILE")
     try:
         answer = _verify_stamp(base64.b64decode(token), lines)
     except (client.VerificationError, ValueError, OSError) as error:
-        raise StoreError(f"{path} is not what was stamped, or by another server ({error}): it was changed") from error
+        raise StoreError(
+            f"{path} was changed after it was stamped, or was stamped by another server ({error})"
+        ) from error
     return f"was stamped at {answer.tst_info.gen_time.isoformat()}"
 
 

@@ -147,9 +147,9 @@ def _check_files(
         findings.warning(folder.path, "is open in another program")
     else:
         for path in (*temporary_files(folder.path), *temporary_files(folder.recordings)):
-            findings.warning(path, "is an incomplete file of a program that was ended; rebuild removes it")
+            findings.warning(path, "is an incomplete file left by a program that was killed; rebuild removes it")
         if is_there(folder.crash) and folder.crash.stat().st_size:
-            findings.warning(folder.crash, "shows where the program crashed: send it to the developers")
+            findings.warning(folder.crash, "shows how the program crashed: send it to the developers")
     contents = _check_journal(folder, findings, running=running)
     lines = contents.lines
     if not running:
@@ -160,7 +160,7 @@ def _check_files(
     expected = {"participant": folder.participant, "session": folder.number, "study": place.study}
     for name, value in expected.items():
         if (told := getattr(start, name)) != value:
-            findings.error(folder.journal, f"is of {name} {told!r}, but is stored with those of {value!r}")
+            findings.error(folder.journal, f"is of {name} {told!r}, but is stored with the files of {value!r}")
     told = lines
     with findings.reading(folder.journal):
         told = open_events(lines, key)
@@ -227,7 +227,7 @@ def _check_journal(folder: SessionFolder, findings: Findings, *, running: bool) 
             findings.error(folder.journal, f"has no complete line, {_BEGUN}")
         return nothing
     for name in events.unknown_events(contents.lines):
-        findings.warning(folder.journal, f"has events {name!r}, which this version does not know")
+        findings.warning(folder.journal, f"contains events {name!r}, which this version does not know")
     try:
         done = progress_of(contents.lines)
     except StoreError as error:
@@ -240,7 +240,7 @@ def _check_journal(folder: SessionFolder, findings: Findings, *, running: bool) 
         findings.error(folder.journal, f"its status is {done.ended!r}, though {missing or 'no trial is missing'}")
     if done.ended is None:
         if not running:
-            findings.warning(folder.path, "is unfinished: resume it, or leave it unfinished")
+            findings.warning(folder.path, "is unfinished: you can resume it")
     elif not isinstance(contents.lines[-1], events.SessionEnded):
         findings.error(folder.journal, "lines follow the session's end")
     return contents
@@ -267,7 +267,7 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
     differing = [name for name in compared if held.get(name) != getattr(start, name)]
     differing += _differing_fields(held, lines)
     if not differing and start.receipt_hash not in (None, receipt.digest(held)):
-        differing = ["what the session began with"]
+        differing = ["the settings with which the session began"]
     if differing:
         findings.error(path, f"{', '.join(differing)}: differ from the journal")
     told = {str(entry.get("at")) for entry in held.get("resumed", ()) if isinstance(entry, dict)}
@@ -275,8 +275,10 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
     if lacking := [at for at in again if at not in told]:
         findings.warning(
             path,
-            f"lacks what the session was resumed with at {', '.join(lacking)}: the program was ended meanwhile, or it "
-            "was removed",
+            (
+                f"lacks what the session was resumed with at {', '.join(lacking)}: the program was killed at "
+                "that time, or the entry was removed"
+            ),
         )
     if key is not None and not _is_protocol(held, start, key):
         findings.error(path, "its protocol was changed: restore it from a copy")
@@ -286,7 +288,9 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
         )
     last = lines[-1]
     if isinstance(last, events.SessionEnded) and held.get("status") != last.status:
-        findings.error(path, f"its status is {held.get('status')!r}, the journal's {last.status!r}; rebuild renews it")
+        findings.error(
+            path, (f"its status is {held.get('status')!r}, the journal's {last.status!r}; rebuild corrects it")
+        )
     sequence = protocol.get("sequence") if isinstance(protocol := held.get("protocol"), dict) else None
     steps = sequence if isinstance(sequence, list) else []
     left = sum(isinstance(line, events.PageLeft) and line.page in steps[-1:] for line in lines)
@@ -295,7 +299,9 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
     breaks = [block.get("break_page") for block in tables if isinstance(block, dict)]
     was_last = bool(steps) and steps[-1] not in breaks and left >= steps.count(steps[-1])
     if isinstance(last, events.SessionEnded) and last.status not in events.REACHED_END and was_last:
-        findings.error(folder.journal, f"its status is {last.status!r}, though the last page was left: it was changed")
+        findings.error(
+            folder.journal, (f"its status is {last.status!r}, although the last page was completed: it was changed")
+        )
 
 
 def _differing_fields(held: Mapping[str, Any], lines: Sequence[events.Event]) -> list[str]:
@@ -366,7 +372,7 @@ def wrong_responses(lines: Sequence[events.Event]) -> Iterator[str]:
             hides = any(row.kind is not None for row in line.items)  # format 2: a question may have been hidden again
             for row in line.items:
                 if not _same_answer(row, chosen.pop(row.item, events.Answer())):
-                    wrong = "another answer than was chosen before: it was changed"
+                    wrong = "differs from the answer chosen before: it was changed"
                     yield f"{line_name} has for {row.item!r} in {where} {wrong}"
             for item, answer in chosen.items():
                 if answer.given or not hides:
@@ -411,7 +417,7 @@ def check_table(
     try:
         content = read_regular(path)
     except OSError:
-        findings.error(path, "is missing or cannot be read; rebuild makes it again")
+        findings.error(path, "is missing or cannot be read; rebuild creates it again")
         return
     expected, columns = csv_files.align_columns(content, expected, columns)
     pairs = zip_longest(content.split(b"\n"), expected.split(b"\n"))
@@ -419,7 +425,7 @@ def check_table(
     follows = all(map(may_differ, differing))
     if differing:
         report = findings.warning if follows else findings.error
-        report(path, f"differs from the journal, from line {differing[0]} on; rebuild renews it")
+        report(path, f"differs from the journal, from line {differing[0]}; rebuild creates it again")
     if not (differing and follows):  # a row may be partly written: earlier versions wrote in place
         for problem in csv_files.table_problems(content, columns):
             findings.error(path, problem)
@@ -512,7 +518,7 @@ def _check_recordings(
         for planned in recordable(lines)[: None if ended else -1]:
             if planned not in known:
                 findings.warning(
-                    folder.recordings, f"{attempt_name(*planned)} has none, and the journal gives no reason"
+                    folder.recordings, f"{attempt_name(*planned)} does not have one, and the journal does not say why"
                 )
     of_trials = {
         path.relative_to(folder.path).as_posix()
@@ -524,7 +530,7 @@ def _check_recordings(
             findings.error(folder.path / name, "is of a trial that the journal never started")
         else:
             then = "" if ended else "; resuming the session adds it"
-            findings.warning(folder.path / name, f"is in no line of the journal{then}")
+            findings.warning(folder.path / name, f"does not appear in the journal{then}")
 
 
 def _check_facts(

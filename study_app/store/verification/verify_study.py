@@ -94,7 +94,7 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findi
     name = described_study(study)
     if name is None:
         raise StoreError(
-            f"{folder} is not a study folder (no {study.description.name}): name one such as results/rek2024"
+            f"{folder} is not a study folder ({study.description.name} is missing): give one such as results/rek2024"
         )
     key = None
     with findings.reading(study.key):
@@ -117,7 +117,7 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findi
     check_allocation(study, key, withdrawn, findings)
     _check_blinding(study, key, findings)
     for path in (*temporary_files(folder), *temporary_files(study.data)):
-        findings.warning(path, "is an incomplete file of a program that was ended, or is being written")
+        findings.warning(path, "is an incomplete file left by a killed program, or is being written")
     return sessions
 
 
@@ -131,7 +131,7 @@ def _check_plug_ins(study: StudyFolder, findings: Findings) -> None:
             name for name, (kind, _, own) in asked.items() if kind in IN_FILES and own not in registry(kind)
         ]:
             what = f"sessions used {', '.join(missing)} of {package}, which is not installed"
-            findings.warning(study.data, f"{what}: what only the plug-in can tell was not checked")
+            findings.warning(study.data, f"{what}: checks that need the plug-in were skipped")
 
 
 def _check_contents(study: StudyFolder, findings: Findings) -> None:
@@ -162,7 +162,7 @@ def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[
             if claim.path.lstat().st_size:
                 findings.error(claim.path, "was changed: restore it from a copy")
             else:
-                findings.warning(claim.path, "was claimed by a program that ended before it wrote it; it stays unused")
+                findings.warning(claim.path, "was reserved by a program that ended before it wrote it; it stays unused")
             continue
         if not is_unchanged(claim, key):
             findings.error(claim.path, "was changed: restore it from a copy")
@@ -174,16 +174,16 @@ def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[
         holders.setdefault(claim.participant, claim)
     for claim in holders.values():
         if claim.replaces is not None and not _same_entry(claim, holders.get(claim.replaces)):
-            findings.error(claim.path, f"replaces participant {claim.replaces}, who has no such entry")
+            findings.error(claim.path, f"replaces participant {claim.replaces}, who does not have such an entry")
     shared = Counter((own.group, own.entry) for own in begun.values() if own.replaces is None)
     for participant, own in begun.items():
         path = study.allocation(own.entry, own.group, None if own.replaces is None else participant)
         if not is_there(path):
-            findings.error(path, f"is missing, though participant {participant} has entry {own.entry}")
+            findings.error(path, f"is missing, although participant {participant} has entry {own.entry}")
         elif (holder := holders.get(participant)) is None or holder.path != path or holder.replaces != own.replaces:
-            findings.error(path, f"is not of participant {participant}, whose journal has entry {own.entry}")
+            findings.error(path, f"does not belong to participant {participant}, whose journal has entry {own.entry}")
         if shared[own.group, own.entry] > 1 and own.replaces is None:
-            what = f"entry {own.entry} of participant {participant} is another participant's, too"
+            what = f"entry {own.entry} of participant {participant} also belongs to another participant"
             findings.error(study.allocated, what)
 
 
@@ -374,13 +374,16 @@ def _check_reveals(study: StudyFolder, key: Key | None, findings: Findings) -> N
         for number, torn in blinding.unreadable_reveals(study.path):
             if torn:
                 findings.warning(
-                    study.reveals, f"line {number} is not a reveal: it is incomplete after a power failure"
+                    study.reveals, f"line {number} is not a complete record of an unblinding (power failure)"
                 )
             else:
-                findings.error(study.reveals, f"line {number} is not a reveal: it was changed; restore it from a copy")
+                findings.error(
+                    study.reveals,
+                    (f"line {number} is not a record of an unblinding: it was changed; restore it from a copy"),
+                )
         for number, record in enumerate(blinding.reveals(study.path), start=1):
             if key is not None and record["key_hash"] != key.hash:
-                findings.error(study.reveals, f"reveal {number} was of another key")
+                findings.error(study.reveals, f"reveal {number} was with another key")
 
 
 def _check_blinding(study: StudyFolder, key: Key | None, findings: Findings) -> None:
@@ -406,7 +409,7 @@ def _check_sites(merged: Merged, findings: Findings) -> None:
         folder = merged.folder(site.name)
         if not folder.is_dir():
             lists = f"{merged.manifest.name} lists site {site.name}"
-            findings.error(folder, f"is missing, but {lists}: restore it from a copy")
+            findings.error(folder, f"is missing, although {lists}: restore it from a copy")
             continue
         if sealed_hash(folder) != site.key_hash:
             key = StudyFolder(folder).key
@@ -415,17 +418,17 @@ def _check_sites(merged: Merged, findings: Findings) -> None:
         for session in StudyFolder(folder).sessions():
             with contextlib.suppress(StoreError):  # said when the site is checked
                 if (other := receipt.read(session.receipt)["protocol_hash"]) != merged.protocol_hash:
-                    findings.error(session.receipt, f"is of protocol {other}, not of {merged.protocol_hash} as merged")
+                    findings.error(session.receipt, f"has protocol {other}, not {merged.protocol_hash} as merged")
             begun = describe_session(session).begun
             if begun and (twin := seen.get(begun)) is not None:
                 findings.error(
-                    session.path, f"is a copy of {twin.relative_to(merged.path).as_posix()}: it counts twice"
+                    session.path, f"is a copy of {twin.relative_to(merged.path).as_posix()}: its data are counted twice"
                 )
             seen[begun] = session.path
     for path in stray_entries(merged):
-        findings.warning(path, f"is not a site that {merged.manifest.name} lists, so it is ignored")
+        findings.warning(path, f"is not listed as a site in {merged.manifest.name}, so it is ignored")
     for path in temporary_files(merged.path):
-        findings.warning(path, "is an incomplete file of a program that was ended, or is being written")
+        findings.warning(path, "is an incomplete file left by a killed program, or is being written")
 
 
 def _check_site(merged: Merged, site: Site, findings: Findings) -> None:

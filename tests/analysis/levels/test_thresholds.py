@@ -188,7 +188,7 @@ def test_answers_of_two_sessions_tell_more_about_a_person_than_those_of_one() ->
 
 
 def tracks_of_staircases(method: UpDown, trials: int) -> pd.DataFrame:
-    """Return rows of two interleaved tracks of one participant, whose levels follow from the answers before."""
+    """Return rows of two interleaved tracks of one participant, whose levels agree with the answers before."""
     draw, heard = np.random.default_rng(9), {1: list[TrialResult](), 2: list[TrialResult]()}
     found = []
     for trial in range(1, trials + 1):

@@ -57,7 +57,9 @@ def test_a_table_changed_by_hand_is_named_with_what_mends_it(copy: StudyFolder) 
     session = copy.sessions()[1]
     path = another_answer(session)
     (line,) = told(copy)
-    assert line.startswith(f"{path} differs from the journal, from line 2 on; rebuild renews it: liquid-study verify")
+    assert line.startswith(
+        f"{path} differs from the journal, from line 2; rebuild creates it again: liquid-study verify"
+    )
     rebuild_session(session.path)
     assert told(copy) == []
 
@@ -74,7 +76,7 @@ def test_a_changed_journal_is_not_to_be_rebuilt_from(copy: StudyFolder) -> None:
 @pytest.mark.parametrize(
     ("harm", "says"),
     [
-        (lambda session: session.journal.unlink(), "is missing, but receipt, tables"),
+        (lambda session: session.journal.unlink(), "is missing, although receipt, tables"),
         (lambda session: change(session.journal, b"\n", b"garbage\n"), "line 1: damaged"),
         (lambda session: change(session.journal, b'"n":2,', b'"n":3,'), "line 2: its n is 3"),
         (lambda session: session.journal.write_bytes(b""), "has no complete line, but receipt"),
@@ -115,7 +117,7 @@ def test_the_commands_go_on_and_say_so_in_a_line_and_beside_what_they_write(
     name = path.relative_to(copy.path).as_posix()
     if command == "export":
         codebook = json.loads((tmp_path / "out" / "codebook.json").read_text(encoding="utf-8"))
-        what = "differs from the journal, from line 2 on; rebuild renews it"
+        what = "differs from the journal, from line 2; rebuild creates it again"
         assert codebook["doubts"] == [{"file": name, "what": what}]
     else:
         caption = (tmp_path / "out" / "liquids.txt").read_text(encoding="utf-8")

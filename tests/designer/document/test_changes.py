@@ -149,8 +149,8 @@ def study() -> Study:
     [
         ((2000,), "2000 is not permitted: Visual delay is at most 1000"),
         ((-5, 30), "-5 is not permitted: Visual delay is at least 0"),
-        ((30, 30.0), "30 is there twice, or is the value of the original"),
-        ((30, 0), "0 is there twice, or is the value of the original"),
+        ((30, 30.0), "30 is listed twice, or is the value of the original"),
+        ((30, 0), "0 is listed twice, or is the value of the original"),
         ((), "a series has 1 to 24 copies"),
         (tuple(range(1, 26)), "a series has 1 to 24 copies"),
     ],

@@ -127,7 +127,7 @@ def test_a_draft_that_cannot_be_written_stays_due(tmp_path: Path, monkeypatch: p
     keeper.note_edit("x", (), 0.0)
     monkeypatch.setenv("LIQUID_STUDY_DATA", str(tmp_path / "file"))
     (tmp_path / "file").write_text("in the way")
-    with pytest.raises(StoreError, match="a file is where a folder is needed"):
+    with pytest.raises(StoreError, match="a file is in the place of a folder"):
         keeper.write()
     (tmp_path / "file").unlink()
     assert keeper.write()

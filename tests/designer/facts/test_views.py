@@ -60,7 +60,7 @@ def measures(view: MeasuresView) -> dict[str, Any]:
 def test_the_outline_shows_each_element_once_with_its_name(name: str) -> None:
     ((_, study),) = studies((name,))
     rows = outline_rows(study, facts(study).steps_s)
-    parts = rows[next(at for at, row in enumerate(rows) if row.title == "Parts it is made of") :]
+    parts = rows[next(at for at, row in enumerate(rows) if row.title == "Elements") :]
     shown, in_parts = Counter(row.path for row in rows), Counter(row.path for row in parts)
     for path in elements(study.document):
         if len(path) == 1 and path[0] in {*SINGLE} & {*study.document}:

@@ -45,7 +45,7 @@ def test_slow_numbers_come_are_given_up_and_are_kept(qtbot: Any, designer: Any, 
     shown(qtbot, designer, 1, "± 26")
     shown(qtbot, designer, 2, "93")
     assert designer.place.header.problems.words == "1 warning"  # that of the precision takes simulated observers
-    assert page.function.plot.accessibleDescription().startswith("Share of answers that are correct")
+    assert page.function.plot.accessibleDescription().startswith("Proportion of answers that are correct")
     assert "19 %" in page.track.plot.accessibleDescription()
     assert page.forces.plot.accessibleDescription().startswith("Force at 31 levels")
     assert not page.grid.isVisible()  # its cards stay below other tabs

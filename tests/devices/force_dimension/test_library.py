@@ -111,7 +111,7 @@ class TestOpening:
 
     def test_a_serial_number_chooses_the_device(self, standin: StandIn) -> None:
         opened(standin, "force-dimension:10233").close()
-        with pytest.raises(DeviceNotFound, match="the library opens no such device"):
+        with pytest.raises(DeviceNotFound, match="the library cannot open the device"):
             opened(standin, "force-dimension:10234")
         with pytest.raises(DeviceError, match="'left' is not a serial number"):
             opened(standin, "force-dimension:left")

@@ -1,4 +1,4 @@
-"""What accuracy costs in time: a reduced table and its signs."""
+"""Accuracy and computation time: a reduced table and its signs."""
 
 import pytest
 

@@ -75,5 +75,5 @@ def test_a_zip_for_whoever_helps_is_saved_with_the_report_and_a_failure_is_a_sen
     asked.fileSelected.emit(str(tmp_path / "help.zip"))
     asked.close()
     with zipfile.ZipFile(tmp_path / "help.zip") as packed:
-        assert "this account may not open it" in packed.read("diagnosis.txt").decode()
+        assert "this account does not have permission to open it" in packed.read("diagnosis.txt").decode()
     assert str(tmp_path / "help.zip") in dialog.saved.text()

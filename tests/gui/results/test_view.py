@@ -130,7 +130,7 @@ def test_outputs_say_that_settings_appear_as_codes_while_the_key_is_sealed_and_w
         click(qtbot, button)
         said = [one.text() for one in place.writing.findChildren(QLabel)]
         (explanation,) = (text for text in said if "very " in text)
-        assert explanation.endswith("Settings appear as codes because the key is sealed.") is sealed
+        assert explanation.endswith("Conditions appear as codes because the study is blinded.") is sealed
         if button is place.export:
             assert not place.writing.editors["sav"].control.isEnabled()
             assert NO_SAV in said

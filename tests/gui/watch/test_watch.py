@@ -182,7 +182,7 @@ def test_without_its_frames_a_trial_is_shown_and_one_line_says_what_is_missing(o
     window = opened(study)
     assert window.stage.forces.sent.yData.max() > 0.1
     assert (window.lacking.isVisible(), window.seen.isVisible()) == (True, False)
-    assert window.lacking.text().startswith(f"Without the frames of the participant's screen: {frames}")
+    assert window.lacking.text().startswith(f"The frames of the participant's screen are missing: {frames}")
     assert "\n" not in window.lacking.text()
     window.step("frame", 1)
     assert window.stage.at_s > window.stage.shown.begins_s

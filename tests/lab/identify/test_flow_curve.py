@@ -1,4 +1,4 @@
-"""Flow curves of a rheometer, and strokes in non-Newtonian liquids: planted parameters are recovered."""
+"""Flow curves from a rheometer, and strokes in non-Newtonian liquids: planted parameters are recovered."""
 
 import numpy as np
 import pytest
@@ -100,7 +100,7 @@ def test_a_narrow_range_of_shear_rates_does_not_separate_the_parameters():
         begun("ketchup"), "ketchup", list(STARTS["ketchup"]), measured("ketchup", rates=np.geomspace(8, 12, 25))
     )
     assert any("cannot be distinguished by these shear rates" in warning for warning in found.warnings)
-    assert any("or measure a wider range of them" in warning for warning in found.warnings)
+    assert any("or measure a wider range of shear rates" in warning for warning in found.warnings)
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_a_narrow_range_of_shear_rates_does_not_separate_the_parameters():
             25,
             "density_kg_m3 does not change a flow curve: fit parameters of the table non_newtonian",
         ),
-        (["yield_stress"], 25, "no parameter is called 'yield_stress': did you mean 'yield_stress_pa'"),
+        (["yield_stress"], 25, "unknown parameter 'yield_stress': did you mean 'yield_stress_pa'"),
         (["yield_stress_pa", "flow_index"], 2, "2 shear rates are too few for 2 parameters"),
     ],
 )
@@ -153,7 +153,7 @@ def test_from_a_rheometer_file_to_a_preset(tmp_path):
     [
         ("shear_rate_per_s,shear_stress_pa\n1,0\n", "row 1 has shear_stress_pa 0: it must be above 0"),
         ("shear_rate_per_s,shear_stress_pa\n1,5\n-2,6\n", "row 2 has shear_rate_per_s -2: it must be above 0"),
-        ("shear_rate_per_s,viscosity_pa_s\n1,5\n", "or shear_rate_per_s,shear_stress_pa of a rheometer"),
+        ("shear_rate_per_s,viscosity_pa_s\n1,5\n", "or shear_rate_per_s,shear_stress_pa from a rheometer"),
     ],
 )
 def test_a_flow_curve_that_cannot_be_used_is_one_line(tmp_path, text, said):
@@ -190,7 +190,7 @@ def test_a_fit_does_not_depend_on_the_order_of_rows(gap):
 
 def test_branches_that_differ_are_named_with_their_gap():
     found = fit_curve(begun("ketchup"), "ketchup", list(STARTS["ketchup"]), loop(gap=0.2))
-    said = "the greatest and the least stress at repeated shear rates differ by 25 % of the stress"
+    said = "the greatest and the smallest stress at repeated shear rates differ by 25 % of the stress"
     assert any(warning.startswith(said) for warning in found.warnings)
     low, high = found.intervals["yield_stress_pa"]
     assert 1 < low < high < 30

@@ -167,9 +167,9 @@ def test_a_sharp_turn_that_velocities_from_places_blur_is_doubted():
         (["drag_coeficient"], "did you mean 'drag_coefficient'"),
         (["viscosity_pa_s"], "has no initial value of viscosity_pa_s"),
         (["breaking_angle_deg"], "is a threshold"),
-        (["alpha"], "no parameter is called 'alpha'"),
-        (["axes"], "no parameter is called 'axes'"),
-        (["reach_m"], "no parameter is called 'reach_m'"),
+        (["alpha"], "unknown parameter 'alpha'"),
+        (["axes"], "unknown parameter 'axes'"),
+        (["reach_m"], "unknown parameter 'reach_m'"),
         (["length", "wake.length"], "are the same parameter"),
     ],
 )

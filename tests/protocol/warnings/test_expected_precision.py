@@ -97,7 +97,7 @@ def test_where_limits_clip_the_levels_no_precision_is_expected():
         clipped, faults = validate_document(read_document(text.encode(), "clipped.toml")[0])
         assert faults
         assert list(imprecise(clipped, clipped.blocks["thicker"])) == [
-            f"stimuli.damping.levels: ±15 % cannot be measured at a threshold of 0.11: {what} clipped"
+            f"stimuli.damping.levels: ±15 % cannot be reached at a threshold of 0.11: {what} clipped"
         ]
         assert dict(precision_rows(clipped, clipped.blocks["thicker"])) == {
             "Expected precision": "none: the levels of most thresholds are clipped"

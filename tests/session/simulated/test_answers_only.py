@@ -58,7 +58,9 @@ def test_a_receipt_that_was_changed_with_its_proofs_differs_from_the_journal(twe
     path = study / "data/sub-P001/ses-01/receipt.json"
     receipt.write(path, receipt.read(path) | {"screens": {}})
     cover_up(study)
-    assert "what the session began with: differ from the journal" in "\n".join(map(str, verify_study(study).errors))
+    assert ("the settings with which the session began: differ from the journal") in "\n".join(
+        map(str, verify_study(study).errors)
+    )
 
 
 def test_the_same_call_gives_the_same_answers_and_another_seed_others(twelve: Path, tmp_path: Path) -> None:

@@ -117,7 +117,9 @@ def test_a_preexisting_group_is_recorded_and_never_inferred(tmp_path: Path) -> N
     source, study = source_of(PREEXISTING), StudyFolder(tmp_path / "s")
     with pytest.raises(StudyError, match=r"group is missing: .* that of P001: experts, novices"):
         begun(study.path, source, "P001")
-    with pytest.raises(StudyError, match="group 'expert': grouped has no such group; permitted: experts, novices"):
+    with pytest.raises(
+        StudyError, match="group 'expert': grouped does not have this group; permitted: experts, novices"
+    ):
         begun(study.path, source, "P001", group="expert")
     assert not study.path.exists()
     with begun(study.path, source, "P001", group="novices") as store:
@@ -198,16 +200,16 @@ def test_verify_names_an_entry_that_was_changed(tmp_path: Path, edits: tuple[tup
     first, second = study.allocated / f"{stem}.json", study.allocated / f"{stem}-P002.json"
     whole = second.read_text()
     second.write_text(whole.replace('"replaces": "P001"', '"replaces": "P003"'))
-    assert f"{second.name}: replaces participant P003, who has no such entry" in _errors(study)
+    assert f"{second.name}: replaces participant P003, who does not have such an entry" in _errors(study)
     second.write_text(whole.replace('"entry": 1', '"entry": 2'))
     assert f"{second.name}: was changed" in _errors(study)
     second.unlink()
-    assert f"{second.name}: is missing, though participant P002 has entry 1" in _errors(study)
+    assert f"{second.name}: is missing, although participant P002 has entry 1" in _errors(study)
     second.write_text(whole)
     assert _errors(study) == ""
     if edits:
         first.rename(study.allocated / "novices-001.json")
-        assert "experts-001.json: is missing, though participant P001 has entry 1" in _errors(study)
+        assert "experts-001.json: is missing, although participant P001 has entry 1" in _errors(study)
 
 
 def _errors(study: StudyFolder) -> str:

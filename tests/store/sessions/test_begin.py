@@ -90,7 +90,7 @@ def test_the_receipt_holds_what_reproduces_the_session(start: Start) -> None:
     ("again", "sentence"),
     [
         ({}, "participant P007 already has session 1"),
-        ({"participant": "p007"}, "differs from the used 'P007' only in capitalisation"),
+        ({"participant": "p007"}, "differs from the existing 'P007' only in capitalisation"),
         ({"participant": "P-007"}, "only letters A-Z, a-z and digits 0-9"),
         ({"participant": "test"}, "is reserved for pilot sessions"),
         ({"participant": "P008", "session": 0}, "it must be from 1 to 99"),
@@ -112,7 +112,7 @@ def test_an_unwritable_results_folder_is_one_line(tmp_path: Path, start: Start) 
     (tmp_path / "file").write_text("no folder")
     with pytest.raises(StoreError) as refusal:
         start(results=tmp_path / "file" / "study")
-    assert "file/study cannot be written (a file is where a folder is needed)" in str(refusal.value)
+    assert "file/study cannot be written (a file is in the place of a folder)" in str(refusal.value)
     assert "\n" not in str(refusal.value)
     assert names_in(tmp_path) == ["file"]
 
@@ -148,8 +148,8 @@ CHANGED = {
 def test_an_id_that_other_programs_change_is_refused(tmp_path: Path, read_as: str, participant: str) -> None:
     with pytest.raises(StoreError) as refused:
         used_ids(StudyFolder(tmp_path)).check_unused(participant, 1)
-    assert f"participant id '{participant}' cannot be used" in str(refused.value)
-    assert f"read it as {read_as}; use another id, such as P001" in str(refused.value)
+    assert f"participant ID '{participant}' cannot be used" in str(refused.value)
+    assert f"read it as {read_as}; use another ID, such as P001" in str(refused.value)
 
 
 KEPT = ("P1", "P007", "7", "101", "S01", "Anna", "NA1", "E5", "1A", "March", "TRUE1", "X0")

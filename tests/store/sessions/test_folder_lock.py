@@ -160,7 +160,7 @@ def test_a_used_session_is_refused_with_three_ways_to_go_on(tmp_path: Path) -> N
         used_ids(folder).check_unused("P002", 1)
     message = str(refusal.value)
     assert "participant P002 already has session 1" in message
-    assert "use a new session number (3), resume that session, or use another id (next free: P003)" in message
+    assert "use a new session number (3), resume that session, or use another ID (next free: P003)" in message
     assert "nothing was changed" in message
     used_ids(folder).check_unused("P002", 3)
     used_ids(folder).check_unused("P004", 1)

@@ -22,7 +22,7 @@ from study_app.store.tables.study_files import check_study, write_description
         "| `force_peak_n` | a number of at least 0 or n/a [N] | Largest magnitude of the force sent to the device. "
         "**Sealed until unblinding.** |",
         "| `page_shown` | `page` | A page of text was shown. |",
-        "| `due_ns` | a whole number [ns] | Time when the tick was due; its lateness is time_ns - due_ns. |",
+        "| `due_ns` | a whole number [ns] | Time at which the tick was due; its lateness is time_ns - due_ns. |",
     ],
 )
 def test_a_line_says_kind_unit_range_and_meaning(line: str) -> None:

@@ -110,7 +110,7 @@ def test_a_signature_tells_a_changed_copy_and_another_key(study: Path, key_store
     assert f"{kept} is signed with the key of this computer" in "\n".join(map(str, found.warnings))
     whole = kept.read_text()
     kept.write_text("".join(whole.splitlines(keepends=True)[1:]))
-    with pytest.raises(StoreError, match="is not what was signed: it was changed"):
+    with pytest.raises(StoreError, match="was changed after it was signed"):
         verify_study(study, kept)
     key_store.unlink()
     kept.write_text(whole)
@@ -202,7 +202,7 @@ def test_a_stamp_tells_when_the_study_was_so_and_leaves_by_itself(
         verify_study(study, kept)
     workstation.save_settings(workstation.load_settings().model_copy(update={"stamp_root": None}))
     kept.write_text(whole)
-    with pytest.raises(StoreError, match=r"is stamped: name the server's root certificate"):
+    with pytest.raises(StoreError, match=r"is stamped: give the server's root certificate"):
         verify_study(study, kept)
 
 
@@ -213,7 +213,13 @@ def test_a_server_that_gives_no_stamp_is_named_and_the_program_goes_on(study: Pa
     write_proof(StudyFolder(study), said.append)
     wait_for_proofs()
     (line,) = said
-    assert re.search(r"proof.txt: http://127.0.0.1:9 gave no time stamp \(.*refused.*\): try again later", line)
+    assert re.search(
+        (
+            r"proof.txt: http://127.0.0.1:9 did not return a time stamp \(.*refused.*\): try again "
+            r"later"
+        ),
+        line,
+    )
 
 
 @pytest.mark.parametrize(
@@ -248,12 +254,12 @@ def test_an_answer_that_grants_no_stamp_is_refused_at_once(
         with pytest.raises(StoreError) as refused:
             time_stamps.request_stamp("a line\n", f"http://127.0.0.1:{port}/")
         serving.shutdown()
-    assert re.match(rf"http://127.0.0.1:{port}/ gave no time stamp \(.*{reason}", str(refused.value))
+    assert re.match(rf"http://127.0.0.1:{port}/ did not return a time stamp \(.*{reason}", str(refused.value))
 
 
 def test_a_message_shows_no_login_of_a_server() -> None:
     pytest.importorskip("rfc3161_client", reason="the optional extra proofs is not installed")
-    with pytest.raises(StoreError, match=r"^http://127.0.0.1:9/tsr gave no time stamp"):
+    with pytest.raises(StoreError, match=r"^http://127.0.0.1:9/tsr did not return a time stamp"):
         time_stamps.request_stamp("a line\n", "http://lab:secret@127.0.0.1:9/tsr")
 
 
@@ -278,5 +284,5 @@ def test_no_other_program_in_place_of_a_server_of_stamps_is_waited_for(monkeypat
         return str(refused.value)
 
     said = ends_with_each(client)
-    line = r"http://127.0.0.1:\d+/ gave no time stamp \([^\n]{1,200}\): try again later$"
+    line = r"http://127.0.0.1:\d+/ did not return a time stamp \([^\n]{1,200}\): try again later$"
     assert [one for one in said.items() if not re.match(line, one[1])] == []

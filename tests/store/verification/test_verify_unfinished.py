@@ -42,16 +42,16 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Start) -> None:
     findings = verify_study(study)
     open_one.close()
     for sentence in (
-        "sub-P009/ses-01: is unfinished: resume it, or leave it unfinished",
+        "sub-P009/ses-01: is unfinished: you can resume it",
         "sub-P009/ses-01/journal.jsonl: it ends with an incomplete line of 5 bytes",
         "sub-P009/ses-01/journal.jsonl: has events 'weather', which this version does not know",
         "sub-P009/ses-01/.receipt.json.0123abcd.tmp: is an incomplete file",
         "sub-P009/ses-01/recordings: trial 1, attempt 1 has none: No space left on device",
-        "sub-P009/ses-01/recordings/trial-002.parquet: is in no line of the journal",
+        "sub-P009/ses-01/recordings/trial-002.parquet: does not appear in the journal",
         "sub-P007/ses-01/crash.txt: shows where the program crashed",
         "sub-P010/ses-01: was created, but the program ended before it wrote a journal",
         "sub-P011/ses-01: is open in another program",
-        "data/.x.csv.0123abcd.tmp: is an incomplete file of a program that was ended, or is being written",
+        "data/.x.csv.0123abcd.tmp: is an incomplete file left by a killed program, or is being written",
     ):
         assert sentence in warned(findings)
     assert told(findings) == ""
@@ -74,8 +74,8 @@ def test_what_a_running_session_is_just_recording_is_not_said_to_be_left(study: 
     store.close()
     left = warned(verify_study(study))
     assert ".trial-002.parquet.0123abcd.tmp: is an incomplete file" in left
-    assert "trial-001.parquet: is in no line of the journal; resuming the session adds it" in left
-    assert "recordings: trial 1, attempt 1 has none, and the journal gives no reason" in left
+    assert "trial-001.parquet: does not appear in the journal; resuming the session adds it" in left
+    assert "recordings: trial 1, attempt 1 does not have one, and the journal does not say why" in left
 
 
 @pytest.mark.slow
@@ -90,7 +90,7 @@ def test_tables_of_a_session_that_has_not_ended_may_be_behind_its_journal(
     findings = verify_study(study)
     assert findings.errors == ()
     for path in (PARTICIPANTS, "sub-P000/ses-01/subject-P000_session-01_task-brackish_description-trials_data.csv"):
-        assert f"{path}: differs from the journal, from line 2 on; rebuild renews it" in warned(findings)
+        assert f"{path}: differs from the journal, from line 2; rebuild creates it again" in warned(findings)
     Files(study).replace(PARTICIPANTS, "withdrawn", "completed")
     assert f"{PARTICIPANTS}: differs from the journal" in told(verify_study(study))
 

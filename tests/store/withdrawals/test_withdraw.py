@@ -162,7 +162,7 @@ def test_an_export_among_the_copies_is_listed_and_not_changed(study: Path, resul
     done = erase(study, also=[tmp_path])
     assert done.folders == (study,)
     assert done.left == tuple(
-        f"{one} is an export with data of {PERSON}: delete it, and make it again" for one in (named, shared)
+        f"{one} is an export with data of {PERSON}: delete it, and create it again" for one in (named, shared)
     )
     assert contents(shared) == before
 
@@ -181,7 +181,7 @@ def test_a_link_and_a_pipe_are_named_before_anything_is_written(study: Path, tmp
     pipe.unlink()
     pipe.symlink_to(tmp_path)
     for act in (lambda: erase(study), lambda: merge_sites({"A": study}, tmp_path / "pooled")):
-        with pytest.raises(StoreError, match=f"^{pipe} is a link to {tmp_path}: replace the link by what it leads to$"):
+        with pytest.raises(StoreError, match=f"^{pipe} is a link to {tmp_path}: replace the link by its target$"):
             act()
     pipe.unlink()
     person.rename(tmp_path / "elsewhere")

@@ -32,7 +32,7 @@ class AddedMass(Frozen):
     ] = 0.5
     filter_s: Smoothing | None = Field(
         default=None,
-        description="Time over which the acceleration is smoothed [s]; default: as suits the velocity estimator.",
+        description="Time over which the acceleration is smoothed [s]; the default depends on the velocity estimator.",
     )
 
 

@@ -45,7 +45,7 @@ class History(Frozen):
     ] = 0.05
     smoothing_s: Smoothing | None = Field(
         default=None,
-        description="Time over which velocities are smoothed first [s]; default: as suits the velocity estimator.",
+        description="Time over which velocities are smoothed first [s]; the default depends on the velocity estimator.",
     )
 
 

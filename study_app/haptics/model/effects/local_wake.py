@@ -22,10 +22,13 @@ class LocalWake(Frozen):
     exponent: Exponent = 1.0
     decay: Decay = 0.999975
     axes: Literal["xz", "xyz"] = Field(
-        default="xz", description="xz: vertical motion does not enter the tail; xyz: it does."
+        default="xz", description="xz: the wake ignores vertical motion; xyz: it includes vertical motion."
     )
     reach_m: Extent | None = Field(
-        default=None, description="Distance from a place within which it acts [m]; default: one diameter of the body."
+        default=None,
+        description=(
+            "Radius around a point of the wake within which that point acts [m]; default: one diameter of the body."
+        ),
     )
     spreading_m2ps: Annotated[
         float,

@@ -178,7 +178,7 @@ RIGHTS = (
     'for real-time priority write "USER - rtprio 70" and "USER - memlock unlimited", with your user\'s name, into '
     "/etc/security/limits.d/liquid-study.conf and log in again, or install rtkit"
 )
-MEMORY = 'to lock it write "USER - memlock unlimited" into /etc/security/limits.d/liquid-study.conf and log in anew'
+MEMORY = 'to lock it write "USER - memlock unlimited" into /etc/security/limits.d/liquid-study.conf and log in again'
 
 
 def open_clock(spin_ns: int) -> Any:
@@ -232,7 +232,7 @@ def raise_priority(*, real_time: bool = True) -> Grant:
             return Grant("real-time", f"SCHED_FIFO {priority}")
     thread = threading.get_native_id()
     with suppress(OSError, ValueError):
-        return Grant("real-time", f"SCHED_RR {make_real_time(thread)}, by the desktop's service")
+        return Grant("real-time", f"SCHED_RR {make_real_time(thread)}, through the desktop's service")
     with suppress(OSError):
         os.setpriority(os.PRIO_PROCESS, thread, _NICE)
         return Grant("raised", f"nice {_NICE}", advice=(RIGHTS,))
