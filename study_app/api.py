@@ -192,7 +192,7 @@ def fit(
         raise AnalysisError(f"design {design!r} has no threshold that can be fitted: give one of {', '.join(kinds)}")
     given = trials["level"]
     if not (pd.api.types.is_numeric_dtype(given) and given.between(0.0, float("inf"), inclusive="left").all()):
-        raise AnalysisError("column level holds what is no level: give finite numbers from 0 on")
+        raise AnalysisError("column level contains an invalid level: give finite numbers that are not negative")
     if trials.empty or not trials["success"].isin([True, False]).all():
         raise AnalysisError("column success holds what is neither true nor false, or no trial: give at least one")
     kind = "difference" if distances else "value"

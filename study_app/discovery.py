@@ -164,7 +164,7 @@ class Registry(Mapping[str, T], Generic[T]):
             if not re.fullmatch(rf"{begins}[a-z][a-z0-9_]*", str(name)):
                 raise StudyError(f"its kind is {name!r}: call it '{begins}' and small letters, digits or underscores")
         if not isinstance(name, str) or not name:
-            raise StudyError(f"{place} has no {self._key}: give it one")
+            raise StudyError(f"{place} does not have {self._key}: add it")
         if name in self.own or name in others:
             raise StudyError(f"{self.kind} '{name}' exists already: rename it")
         return name

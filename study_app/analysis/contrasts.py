@@ -44,18 +44,19 @@ RATIOS: Final = ("threshold", "pse")
 """Measures that are compared as ratios where the levels of all blocks are spaced by ratios."""
 
 LEFT_OUT: Final = (
-    "Every participant with both numbers is included, also with a threshold beyond the levels; the report names those "
-    "left out, with the reason."
+    "Every participant with both numbers is included, also if a threshold lies beyond the levels; the report "
+    "lists excluded participants with the reason."
 )
 """Who is compared, in power, preregistration and report."""
 WEIGHTED: Final = (
-    "Thresholds are weighted as in the group mean. Thresholds of two blocks with the same levels and design are "
-    "estimated with a common width of the psychometric function, so their ratio may differ from that of the tables. "
+    "Thresholds are weighted as in the group mean. Thresholds of two blocks with the same levels and design "
+    "are estimated with a common width of the psychometric function, so their ratio may differ from the ratio "
+    "in the tables. "
 )
 MOST_NAMED: Final = 20
 
-TOO_FEW: Final = "fewer than two participants have the numbers that are compared"
-ALIKE: Final = "the numbers do not vary between participants, so that no t test exists"
+TOO_FEW: Final = "fewer than two participants have both numbers"
+ALIKE: Final = "the numbers do not vary between participants, so a t test is not possible"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -320,7 +321,7 @@ def answer(one: ContrastResult) -> str:
     elif one.equivalent is not None:
         sentences.append("The mean is not shown to lie within the bound.")
     if one.left_out:
-        sentences.append(f"Left out: {left_out_words(one)}.")
+        sentences.append(f"Excluded: {left_out_words(one)}.")
     return " ".join(sentences)
 
 
@@ -375,7 +376,7 @@ def contrast_methods(results: Results) -> Iterator[str]:
             "the mean by the bound."
         )
     if gone := {f"{question(one)}: {left_out_words(one)}": None for one in contrasts if one.left_out}:
-        yield f"Participants were left out of a hypothesis because a number is missing ({'; '.join(gone)})."
+        yield f"Some participants were excluded from a hypothesis because a number is missing ({'; '.join(gone)})."
 
 
 def left_out_words(one: ContrastResult) -> str:
@@ -409,11 +410,11 @@ def contrast_section(results: Results) -> Iterator[str]:
     )
     weighted = any(one.contrast.measure == "threshold" for one in results.contrasts)
     yield paragraph(
-        "The study file states these hypotheses. Each was tested on one number of each participant by a t test "
-        "together with a bootstrap that adds a participant like the most extreme one; adjusted p is the larger p, "
-        f"adjusted by Holm over {number_text.counted(len(results.contrasts), 'test')}. Equivalent: both tests show, "
-        "with enough participants, that the mean lies within the stated bound, adjusted by Holm over the bounds. "
-        f"{WEIGHTED if weighted else ''}{LEFT_OUT}",
+        "The study file states these hypotheses. Each was tested on one number per participant by a t test "
+        "together with a bootstrap that adds a participant like the most extreme one; adjusted p is the larger "
+        f"p, adjusted by Holm over {number_text.counted(len(results.contrasts), 'test')}. “Equivalent” means "
+        "that both tests show, with enough participants, that the mean lies within the stated bound, adjusted "
+        f"by Holm over the bounds. {WEIGHTED if weighted else ''}{LEFT_OUT}",
         "soft",
     )
     if rows := [one for one in results.contrasts if one.left_out]:

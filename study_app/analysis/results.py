@@ -376,9 +376,9 @@ def enough(alpha: float, bound: float) -> str:
     """Return how many participants equivalence of statements needs at least, and why."""
     share = minority(bound, STEPS)
     return (
-        f"{least(alpha, bound)}, because a smaller sample has more than a {percent(alpha)} chance of including nobody "
-        f"from a minority of {percent(share)} of all people whose answers differ by {significant(bound / share)} "
-        "points, which shifts the mean by the bound"
+        f"{least(alpha, bound)}, because a smaller sample has more than a {percent(alpha)} chance of including "
+        f"nobody from a minority of {percent(share)} of all people if their answers differ by "
+        f"{significant(bound / share)} points, which shifts the mean by the bound"
     )
 
 

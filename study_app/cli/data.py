@@ -110,7 +110,7 @@ def plot(results: Path, to: Path) -> None:
 def report(results: Path, to: Path) -> None:
     """Write the report of a study: tests, figures, tables, conclusions and limitations, and how to reproduce it.
 
-    Ends with exit code 3 if a section could not be computed: the report names it and contains everything else.
+    Ends with exit code 3 if a section could not be computed: the report states which and contains everything else.
     """
     gc.set_threshold(50_000, 20, 100)  # collections took a tenth of the time of a report of 12
     from study_app.analysis.report.write_report import report as write_report
@@ -218,7 +218,7 @@ def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[
         click.echo(f"nothing to erase: participant {participant} withdrew at {done.tombstone.at}")
     for output in done.elsewhere:
         state = "delete it, and create it again" if output.paths else "no longer there"
-        click.echo(f"warning: output of {output.at} outside the results folder: {output.to} ({state})", err=True)
+        click.echo(f"warning: output of {output.at} outside the results folder ({state}): {output.to}", err=True)
     for sentence in done.left:
         click.echo(f"warning: {sentence}", err=True)
 

@@ -27,8 +27,8 @@ UNSEEN_PLATFORMS: Final = ("offscreen", "minimal", "minimalegl")
 def demo(context: click.Context, *, no_window: bool) -> None:
     """Run the demo study with two simulated participants on an emulated Falcon, report it, and show the results.
 
-    Uses the session runner, the servo, and the Falcon's own driver on an emulated device. Needs no display; if there is
-    one, the program opens on the results. If it was interrupted, run it again to finish.
+    Uses the session runner, the servo, and the Falcon's own driver on an emulated device. Does not need a display; if
+    there is one, the program opens on the results. If it was interrupted, run it again to finish.
     """
     from study_app.workspace import workspace
 

@@ -227,7 +227,7 @@ def _falcon_and_emulator(name: str, firmware: Path | None, grams: float | None) 
     request = OpenRequest(argument=name.partition(":")[2], options=options, progress=click.echo)
     device = framed_device(name, request)
     if not isinstance(device, FalconDevice):
-        raise DeviceError(f"'{name}' has no motors to calibrate: only a Falcon has motors")
+        raise DeviceError(f"'{name}' cannot be calibrated: only a Falcon has motors to calibrate")
     if not isinstance(device, EmulatedFalcon):
         return device, None
     if grams is None:
@@ -317,7 +317,7 @@ def _ask_emulator(emulator: Emulator, weight_n: float) -> Ask:
     help="Samples over LSL; single-blind: not in double-blind studies.",
 )
 @click.option(
-    "--triggers", metavar="PORT", help=("Trigger codes on a port, such as serial:/dev/ttyUSB0; off sends none.")
+    "--triggers", metavar="PORT", help=("Trigger codes on a port, such as serial:/dev/ttyUSB0; off disables them.")
 )
 def outlets(markers: str | None, samples: str | None, triggers: str | None) -> None:
     """Print what sessions on this machine send to other programs; with options, change it."""

@@ -78,8 +78,8 @@ REAL = "physical2"
     "every",
     is_flag=True,
     help=(
-        "Compare the liquids of FILE (default: physical2) instead, each with its own model: error of the force, "
-        "speed range, and computation time of a tick."
+        "Compare the liquids of FILE (default: physical2) instead, each with its own model (error of the force, "
+        "speed range, computation time of a tick)."
     ),
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for table and figure; default: print.")
@@ -118,7 +118,7 @@ def _print_survey(file: str | None, to: Path | None) -> None:
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
         errors = survey(load_scenes(file or REAL), show)
     if not errors:
-        raise click.UsageError(f"{file}: none of the liquids has a viscosity, so there is no physical reference")
+        raise click.UsageError(f"{file}: its liquids do not have a viscosity, so there is no physical reference")
     present_evidence(evidence(errors), to, with_text=False)
 
 

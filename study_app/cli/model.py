@@ -103,7 +103,8 @@ def figures(to: Path) -> None:
     type=click.Choice(["centred", "scene"]),
     default="centred",
     show_default=True,
-    help="If the CSV has no velocities: estimate them without lag (centred), or with the scene's filter (scene).",
+    help="How to estimate velocities that are missing in the CSV: without lag (centred), or with the scene's "
+    "filter (scene).",
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for preset, residuals and figure.")
 def identify(

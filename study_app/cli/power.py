@@ -114,7 +114,7 @@ def power(
     stated = click.get_current_context().get_parameter_source("sizes") is not ParameterSource.DEFAULT
     if looks := () if study.analysis is None else study.analysis.looks:
         if stated:
-            raise click.UsageError(f"--sizes: the study plans looks at {', '.join(map(str, looks))}: omit --sizes")
+            raise click.UsageError(f"--sizes: the study plans looks at {', '.join(map(str, looks))}; omit --sizes")
         sizes = looks
     elif study.analysis is not None and not stated and 1 < (study.analysis.participants or 0) <= MOST:
         sizes = tuple(sorted({*sizes, study.analysis.participants or 0}))

@@ -205,7 +205,7 @@ class DesignerController(QObject):
             return
         numbers = number_rows(opened.study.document, path)
         if not numbers or opened.read_only:
-            why = opened.read_only or "This element has no numeric field."
+            why = opened.read_only or "This element does not have numeric fields."
             self.place.message.emit("A series of this element is not possible", why)
             return
         self.editing.select(path)

@@ -136,7 +136,7 @@ class PlayDevices:
 
 def device_question(title: str, step: str, *, has_force: bool) -> Notice:
     """Return the question before a device other than the simulated hand is used."""
-    force = "The force fades in when a trial begins; hold" if has_force else "This device has no force. Hold"
+    force = "The force fades in when a trial begins; hold" if has_force else "This device does not produce force. Hold"
     question = f"Play from {step}, with the device {title}? {force} Esc to stop."
     return Notice(question, (("play", "Play"), ("close", "Cancel")), "warn", "device")
 

@@ -440,8 +440,8 @@ class Renaming(QObject):
 
     def _ask_to_unlock(self) -> None:
         path = self.editing.selected
-        title, why = f"Change the id “{self._item_id(path)}”?", f"{self._lock_reason(path)} With another id:"
-        card = ConfirmCard(title, why, "Change the id", breaks=BREAKS)
+        title, why = f"Change the ID “{self._item_id(path)}”?", f"{self._lock_reason(path)} With another ID:"
+        card = ConfirmCard(title, why, "Change the ID", breaks=BREAKS)
         card.answered.connect(lambda _action: self._unlock(path))
         self.place.show_prompt(card, card.first)
 

@@ -95,7 +95,7 @@ DEVICES: Final = (
         "emulators.force_dimension:EmulatedForceDimension",
         "force_dimension.library:FAILURES",
         ("force_dimension.library:probe",),
-        "simulated hand; the Force Dimension driver with emulated library functions; needs no C compiler",
+        "simulated hand; the Force Dimension driver with emulated library functions; does not need a C compiler",
         options=(DHD_LIBRARY,),
     ),
     *_felt_and_emulated(

@@ -80,7 +80,8 @@ def open_device(name: str, **request: Any) -> Device:
     if not hasattr(opened, "failure"):  # a plug-in made for an earlier version
         opened.close()
         raise DeviceError(
-            f"device '{name}' has no 'failure': let {type(opened).__name__} inherit study_app.devices.base.Device"
+            f"device '{name}' does not have 'failure': let {type(opened).__name__} inherit "
+            "study_app.devices.base.Device"
         )
     return opened
 
@@ -98,9 +99,7 @@ def doctor_of(name: str) -> Doctor:
     doctor = descriptor_of(name).doctor
     if doctor is None:
         examined = ", ".join(device.usage for device in all_devices() if device.doctor is not None)
-        raise DeviceError(
-            f"the doctor looks at {examined}, and '{name}' is none of these: see 'liquid-study devices list'"
-        )
+        raise DeviceError(f"the doctor cannot examine '{name}', only {examined}: see 'liquid-study devices list'")
     return doctor
 
 

@@ -120,7 +120,7 @@ def figure_6() -> ThesisFigure:
         6,
         "Steps alternating by 90°",
         "The body moves toward −z in steps that alternate along x. With a breaking angle of 45° every step begins a "
-        "segment of its own, their directions partly cancel, and the wake stays limited. With 100° the whole path is "
+        "new segment, the directions partly cancel, and the wake stays limited. With 100° the whole path is "
         "one segment that always follows the newest direction, one tick late at each turn, and the force falls toward "
         "zero.",
         tuple(Run(f"breaking angle {angle}°", tank(breaking_angle_deg=angle), motion) for angle in (45, 100)),

@@ -328,7 +328,7 @@ def _question_lines(protocol: Protocol, name: str, language: str) -> Iterable[st
             item.id,
             *(() if title.startswith("Statements") else (_question_kind(item, context),)),
             protocol.text(item.text, language),
-            "" if item.required else "(may be left out)",
+            "" if item.required else "(optional)",
         )
         for item in questionnaire.items
     ]

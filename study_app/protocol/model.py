@@ -251,7 +251,8 @@ class Limits(Table):
         default=25, description="95th percentile of achieved − requested delay [ms]."
     )
     frame_gap_ms: Annotated[float, within(1, 1000, "no screen is faster, and 1 s is a failure")] = Field(
-        default=250, description="Longest time before the first frame or between two, or before the trial's end [ms]."
+        default=250,
+        description="Longest time before the first frame, between two frames, or before the end of the trial [ms].",
     )
     withheld_percent: Annotated[float, within(0.01, 100, "a share of the force; none withheld at all is rare")] = Field(
         default=5,
@@ -264,7 +265,7 @@ class Limits(Table):
         default=None, description="Error of an interval's delivered level [%]; default: 2."
     )
     level_error_ms: Annotated[float, within(0.1, 100, "frames of 120 Hz last 8 ms")] | None = later(
-        default=None, description="Error of a trial's delivered difference of delays [ms]; default: 2."
+        default=None, description="Error of the delay difference delivered in a trial [ms]; default: 2."
     )
     pace_error_percent: Annotated[float, within(1, 1000, "no hand keeps a pace to 1 %")] | None = later(
         default=None, description="Error of the hand's RMS speed relative to the followed target [%]; default: 40."
@@ -343,8 +344,8 @@ class Contrast(Table):
     )
     bound: Annotated[float, within(1e-9, 1e9, "no larger difference is published")] | None = Field(
         default=None,
-        description="Largest difference that would not matter (for thresholds the largest ratio, such as 1.25); left "
-        "out: equivalence is not tested.",
+        description="Largest difference that would not matter (for thresholds the largest ratio, such as "
+        "1.25); default: equivalence is not tested.",
     )
 
     @model_validator(mode="after")
@@ -401,7 +402,7 @@ class Analysis(Table):
     )
     names: tuple[Id, ...] = Field(
         default=(),
-        description="Items that name a liquid; the single highest answer is the liquid that the participant named.",
+        description="Items that name a liquid; the item with the single highest answer is the participant's choice.",
     )
     rising: tuple[Id, ...] = Field(default=(), description="Items whose answers are expected to increase with delay.")
     falling: tuple[Id, ...] = Field(default=(), description="Items whose answers are expected to decrease with delay.")
@@ -424,7 +425,7 @@ class Analysis(Table):
     looks: tuple[Annotated[int, Field(ge=2, le=100_000)], ...] = later(
         default=(),
         description="Numbers of participants at which the key is opened and all hypotheses are tested; the "
-        "last equals participants. Left out: once, at the end.",
+        "last equals participants; default: once, at the end.",
     )
     spending: Literal["obrien-fleming", "pocock"] = later(
         default="obrien-fleming",
@@ -448,22 +449,23 @@ class Analysis(Table):
         """Yield a row for each decision; ``named_by`` maps conditions to the items that name them."""
         bound = self.equivalence_bound
         points = "point" if bound == 1 else "points"
-        yield "Significant", f"p of at most {self.alpha:g}"
+        yield "Significance level", f"{self.alpha:g}"
         yield (
             "Equivalent",
-            "not tested" if bound is None else f"answers as without delay, to within {bound:g} {points} of the scale",
+            "not tested" if bound is None else f"mean answers within {bound:g} {points} of the answers without delay",
         )
         yield "Primary", ", ".join(self.primary) or "all statements"
-        yield "Names", ", ".join(self.names) or "none"
+        yield "Recognition", ", ".join(self.names) or "none"
         if named_by:
             yield "Recognised", ", ".join(named_by)
-        yield "Rise with delay", ", ".join(self.rising) or "none"
-        yield "Fall with delay", ", ".join(self.falling) or "none"
-        yield "Noticed", "not asked" if self.noticed is None else f"{self.noticed} from 5 on"
+        yield "Increase with delay", ", ".join(self.rising) or "none"
+        yield "Decrease with delay", ", ".join(self.falling) or "none"
+        yield "Detection", "not asked" if self.noticed is None else f"{self.noticed} of at least 5"
         if self.participants is not None:
             yield "Participants", f"{self.participants} planned"
         if self.looks:
-            yield "Looks", f"at {', '.join(map(str, self.looks))} participants; alpha is shared by {self.spending}"
+            looks = ", ".join(map(str, self.looks))
+            yield "Interim analyses", f"at {looks} participants; alpha spending {self.spending}"
         if self.precision is not None:
             yield "Precision", f"group mean ±{100 * self.precision:g} % (half its 95 % interval)"
         yield from (("Hypothesis", contrast.described()) for contrast in self.contrasts)
@@ -501,7 +503,7 @@ class Protocol(Table):
     methods: dict[Kind, AnyMethod] = later(default_factory=dict, description="How the levels of a stimulus are chosen.")
     blocks: Named[Block] = Field(min_length=1)
     sequence: Steps = Field(default=(), min_length=1, description="Pages, blocks and forms in order, in every session.")
-    sequences: Sequences = later(default=(), min_length=1, description="The steps of session 1, 2 … where they differ.")
+    sequences: Sequences = later(default=(), min_length=1, description="The steps of session 1, 2 … if they differ.")
     groups: dict[Id, Group] = later(default_factory=dict)
     limits: Limits = Field(default_factory=Limits)
     analysis: Analysis | None = Field(

@@ -79,9 +79,9 @@ class Questionnaire(Table):
 
     title: Localised | None = Field(default=None, description="Heading; default: the name of the setting.")
     intro: Localised = Field(description="The question above the statements.")
-    scale: Id | None = Field(default=None, description="The scale of all statements; left out where there are none.")
+    scale: Id | None = Field(default=None, description="The scale of all statements; omit it without statements.")
     item_order: Literal["fixed", "shuffled"] = Field(
-        default="fixed", description="fixed: as written; shuffled: anew in every trial."
+        default="fixed", description="fixed: as written; shuffled: a new order in every trial."
     )
     items: tuple[AnyQuestion, ...] = Field(
         min_length=1, description="The questions; one without kind is a statement on the questionnaire's scale."
@@ -206,7 +206,7 @@ def _fill_in(
             whole["scale"] = scale_name(of, item["scale"])
         kind = item.get("kind", STATEMENT)
         if whole.get("kind", kind) != kind:
-            faults.append(Fault((*place, *(path or ()), "kind"), f'is "{kind}" in {of}: leave it out', kind="surplus"))
+            faults.append(Fault((*place, *(path or ()), "kind"), f'is "{kind}" in {of}: omit it', kind="surplus"))
             whole["kind"] = kind
         fields = KINDS[kind].model_fields
         ask(path, name, whole, *(key for key in ("text", "low", "high") if key in fields))

@@ -261,7 +261,7 @@ class Rated(Question):
         if answer is None:
             if scale.cannot_judge is not None:
                 return None
-            return "this questionnaire has no answer off the scale: choose one of its points"
+            return "this questionnaire does not have an answer off the scale: choose one of its points"
         if isinstance(answer, int) and 1 <= answer <= scale.points:
             return None
         return f"answer {answer} is not on the scale: choose 1 to {scale.points}"

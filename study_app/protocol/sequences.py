@@ -67,7 +67,7 @@ class Constraint:
             possible = "one condition only 1" if codes == 1 else f"{codes} conditions only 1 to {codes}"
             return "min_distance", f"is {self.min_distance}, but with {possible} is possible"
         if self.max_repeats is not None and codes == 1 and self.max_repeats < repetitions:
-            possible = f"there is one condition {repetitions} times only {repetitions} or more"
+            possible = f"one condition {repetitions} times only {repetitions} or more"
             return "max_repeats", f"is {self.max_repeats}, but with {possible} is possible"
         return None
 

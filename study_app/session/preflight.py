@@ -217,8 +217,8 @@ def _servo_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     late_ms, gap_ms = facts.timing.lateness_p99_s * 1e3, facts.timing.worst_gap_s * 1e3
     worst = max(late_ms / limits.lateness_ms, gap_ms / limits.worst_gap_ms)
     about = (
-        f"99 % of ticks, limit {limits.lateness_ms:g} ms; largest gap {gap_ms:.1f} of {limits.worst_gap_ms:g} "
-        f"ms, {facts.timing.overruns} overruns"
+        f"for 99 % of ticks (limit {limits.lateness_ms:g} ms); largest gap {gap_ms:.1f} of "
+        f"{limits.worst_gap_ms:g} ms, {facts.timing.overruns} overruns"
     )
     advice = "Trials would be invalid: close other programs."
     yield _warning_unless("Servo lateness", f"{late_ms:.2f} ms", about, advice, well=worst <= 1, share=worst)

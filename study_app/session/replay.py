@@ -223,7 +223,7 @@ def replay(session_folder: Path) -> Replayed:
         name = attempt_name(*which)
         if not isinstance(line, events.Recorded):
             why = "the journal does not say why" if line is None else line.reason
-            replayed.uncompared += (f"{name}: has no recording: {why}",)
+            replayed.uncompared += (f"{name}: the recording is missing ({why})",)
             continue
         path = session.path / line.recording
         if not is_there(path):
@@ -360,7 +360,7 @@ def _run_steps(
 def _compare_recording(replayed: Replayed, name: str, samples: Any, again: _Before, checks: recordings.Checks) -> None:
     """Compare one recording's checks with those of the recomputed forces."""
     if len(samples) == 0:
-        replayed.uncompared += (f"{name}: holds no sample",)
+        replayed.uncompared += (f"{name}: the recording is empty",)
         return
     if not again.knows_its_start:
         replayed.uncompared += (f"{name}: continues from the force of a recording that is missing or has a gap",)

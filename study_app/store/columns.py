@@ -207,7 +207,7 @@ TRIALS: tuple[Column, ...] = (
         sealed=True,
     ),
     _count("targets_reached", "Number of targets reached.", sealed=True),
-    _count("targets", "Number of targets to reach; n/a if the task has none or no fixed number."),
+    _count("targets", "Number of targets to reach; n/a if the task does not have a fixed number of targets."),
     _count("ticks", "Ticks of the servo during the trial.", sealed=True),
     _measure("tick_rate_hz", "Achieved rate of the servo.", "Hz", of_trial="mean"),
     _measure("lateness_p99_ms", "Lateness of the servo's ticks, 99th percentile.", "ms", of_trial="max"),
@@ -388,7 +388,11 @@ INTERVALS: tuple[Column, ...] = (
 TRIALS_2: tuple[Column, ...] = (
     *_TRIALS_BY_NAME.values(),
     *VIDEO,
-    _count("intervals", "Number of intervals that this attempt presented; n/a if its block has no design.", later=True),
+    _count(
+        "intervals",
+        "Number of intervals that this attempt presented; n/a if its block does not have a design.",
+        later=True,
+    ),
     GROUP,
 )
 """Columns of trials in a study whose protocol has format 2."""

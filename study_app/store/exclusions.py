@@ -170,7 +170,7 @@ def exclusions(folder: Path) -> tuple[Exclusion, ...]:
     except csv.Error as error:
         raise StoreError(f"{path} is not CSV ({error}): save it as CSV in UTF-8, with commas") from error
     if (separator := separator_of(text.partition("\n")[0], columns)) != ",":
-        raise StoreError(f"{path} separates its columns by {separator!r}: save it as CSV with commas")
+        raise StoreError(f"{path} separates its columns with {separator!r}: save it as CSV with commas")
     if tuple(names[1]) != columns:
         raise StoreError(f"{path}: its columns must be {', '.join(columns)}, but are {', '.join(names[1])}")
     return tuple(_parse_exclusion(path, line, row) for line, row in rows)

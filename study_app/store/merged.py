@@ -156,8 +156,8 @@ def locate_participant(folder: Path, participant: str) -> tuple[Path, str]:
     if (place := folders.get(f"{site}{dash}")) is None or not own:
         known = ", ".join(name.removesuffix(DASH) for name in folders)
         raise StoreError(
-            f"{folder} contains several sites ({known}), and {participant!r} names none of them: give SITE-ID, "
-            f"such as {next(iter(folders))}P007"
+            f"{folder} contains several sites ({known}), and {participant!r} does not state the site: give "
+            f"SITE-ID, such as {next(iter(folders))}P007"
         )
     return place, own
 

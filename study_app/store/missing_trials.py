@@ -15,7 +15,7 @@ REASONS: Final[Mapping[str, str]] = {
     "worst_gap_ms": "the servo missed ticks",
     "delay_error_ms": "the visual delay deviated too much",
     "frame_gap_ms": "frames were late or missing",
-    "withheld_percent": "the safety layer withheld too much force",
+    "withheld_percent": "the safety layer held back too much force",
     "targets_percent": "too few targets were reached",
     "level_error_percent": "the force was not as requested",
     "level_error_ms": "the delays did not differ as requested",
@@ -80,7 +80,7 @@ class MissingTrials:
 
 
 def missing_sentence(count: int, asked: int, reasons: Mapping[str, int], limits: Mapping[str, float]) -> str:
-    """Return "26 of 40 trials were not delivered: the safety layer withheld too much force (limit 25 %)".
+    """Return "26 of 40 trials were not delivered: the safety layer held back too much force (limit 25 %)".
 
     Parameters
     ----------

@@ -212,7 +212,7 @@ class Recorder:
             self._process_queue()
         except BaseException as error:
             with self.changed:
-                self._lose_all(f"its thread ended: {type(error).__name__}: {error}")
+                self._lose_all(f"its thread ended ({type(error).__name__}: {error})")
             raise
 
     def _lose_all(self, reason: str) -> None:

@@ -257,7 +257,7 @@ def _tombstone(study: StudyFolder, participant: str, at: str, by: str, reason: s
     sessions = _sessions(study, participant)
     if not sessions:
         held = ", ".join(study.ids()) or "none"
-        raise StoreError(f"{study.path} has no participant {participant!r}; participants: {held}")
+        raise StoreError(f"{study.path} does not contain participant {participant!r}; participants: {held}")
     return Tombstone(
         participant=participant, at=at, by=by, reason=reason, sessions=tuple(map(describe_session, sessions))
     )

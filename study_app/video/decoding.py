@@ -50,7 +50,7 @@ def open_video(source: str, *, kind: str | None = None, timeout: Any = None, **o
         raise VideoError("its format is not accepted" if refused else failure_reason(error)) from error
     if not container.streams.video:
         container.close()
-        raise VideoError("it holds no video")
+        raise VideoError("it does not contain a video")
     if (codec := container.streams.video[0].codec_context) is None:
         container.close()
         raise VideoError("its codec is unknown, or the file is damaged")

@@ -234,7 +234,7 @@ class Footage:
                 stream = container.streams.video[0]
                 self._period_ns = period_ns(stream)
                 if (first := next(container.decode(stream), None)) is None:
-                    raise VideoError("it holds no frame")  # noqa: TRY301 - said with the file's name below
+                    raise VideoError("it does not contain frames")  # noqa: TRY301 - said with the file's name below
                 self._start_s = first.time or 0.0
                 self.size = (stream.width, stream.height)
         except Exception as error:
@@ -340,7 +340,7 @@ class Footage:
                     )
                 number += 1
             if end_ns == 0:
-                raise VideoError("it holds no frame")
+                raise VideoError("it does not contain frames")
             offset_ns += end_ns
 
     def _put(self, frame: VideoFrame, play: int) -> bool:

@@ -302,8 +302,8 @@ def test_power_plans_differences_and_equality_within_people(
     )
     half, least = (spread * end for end in detectable(40, tail=0.05))
     ends = f"±{half:.2f} | ±{least:.2f}" if edits else f"×/÷ {math.exp(half):.2f} | ×/÷ {math.exp(least):.2f}"
-    assert ("SD, as a share of a mean d′ of 1: of one" if edits else "SD: of one") in told
-    assert "Equality takes at least 14 participants, at α = 0.05. Every participant with both numbers" in told
+    assert ("SD, relative to a mean d′ of 1: of one" if edits else "SD: of one") in told
+    assert "Equivalence requires at least 14 participants, at α = 0.05. Every participant with both numbers" in told
     assert "| smallest difference | shown within the bound if truly equal |" in told
     assert told.strip().endswith(f"| {spread:.0%} | {ends} | {shown_equal(bound / spread, 40, alpha=0.05):.0%} |")
 

@@ -57,7 +57,7 @@ def test_check_warns_of_what_the_device_of_this_computer_cannot_give(
 ) -> None:
     if device:
         save_settings(MachineSettings(device=device))
-    assert liquid_study("check", "forcedelay").stdout.count("Mouse gives no force") == warned
+    assert liquid_study("check", "forcedelay").stdout.count("Mouse does not produce force") == warned
 
 
 def test_check_notes_how_many_texts_are_still_to_translate(tmp_path: Path, liquid_study: Run) -> None:

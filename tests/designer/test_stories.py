@@ -310,7 +310,7 @@ def versions(story: Story) -> None:
     assert not designer.place.form.head.id.isEnabled() or designer.place.form.head.id.isReadOnly()
     story.act("unlock", designer.place.form.head.unlock.click)
     story.act("confirm", prompt().go_on.click)
-    story.expect(at="Id")
+    story.expect(at="ID")
     story.play("'difficult' Return")
     story.expect(undo="Rename to difficult")
     story.has('id = "difficult"')
@@ -353,7 +353,7 @@ def names(story: Story) -> None:
     story.expect(undo="", selected="liquids.thin")
     assert "thick" in form.head.refusal.text()
     story.play("@pages.thanks F2 'goodbye' Return")
-    story.expect("1 place updated", selected="pages.goodbye", at="Id", undo="Rename to goodbye, 1 place updated")
+    story.expect("1 place updated", selected="pages.goodbye", at="ID", undo="Rename to goodbye, 1 place updated")
     story.has('sequence = ["welcome", "liquids", "reaching", "delays", "goodbye"]', "[pages.goodbye]")
     story.ask(AddElement(("blocks",)))
     story.expect(selected="blocks.block", undo="Add block", at="Title")
@@ -495,7 +495,7 @@ def adaptive(story: Story) -> None:
     named = {
         "liquids.damper.drag.damping_nspm": "Viscosity (damping)",
         "stimuli.damping.vary": "Varied quantity",
-        "blocks.viscosity.catch.wrong_most": "Most wrong catch trials",
+        "blocks.viscosity.catch.wrong_most": "Maximum wrong catch trials",
     }
     for path, at in named.items():
         story.play(f"@{'.'.join(path.split('.')[:2])} :{path}")
@@ -740,7 +740,7 @@ def menu(story: Story) -> None:
     story.act("menu: Delete", actions["Delete"].trigger)
     assert story.designer.place.prompt.isVisible(), "it is used"
     story.act("menu: Rename", actions["Rename"].trigger)
-    story.expect(at="Id", selected="liquids.thick", undo="Move A first look down")
+    story.expect(at="ID", selected="liquids.thick", undo="Move A first look down")
 
 
 def asked_when(story: Story) -> None:

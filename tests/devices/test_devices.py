@@ -28,7 +28,7 @@ def test_a_device_without_failure_is_closed_and_named(monkeypatch: pytest.Monkey
 
     bare: Any = Bare()
     monkeypatch.setattr(registry, "descriptor_of", lambda _: replace(descriptor_of("mouse"), open=lambda _: bare))
-    with pytest.raises(DeviceError, match="device 'mouse' has no 'failure': let Bare inherit"):
+    with pytest.raises(DeviceError, match="device 'mouse' does not have 'failure': let Bare inherit"):
         open_device("mouse")
     assert bare.closed
 

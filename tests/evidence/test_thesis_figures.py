@@ -107,6 +107,6 @@ def test_every_figure_has_its_number_title_and_caption():
 def test_a_folder_that_cannot_be_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(
-        StoreError, match=r"below cannot be written \(a file is where a folder is needed\): .*choose another folder"
+        StoreError, match=r"below cannot be written \(a file is in the place of a folder\): .*choose another folder"
     ):
         thesis_figures.figures(tmp_path / "file" / "below")

@@ -46,11 +46,11 @@ def missing_after(*trials: list[Event], **limits: float) -> MissingTrials:
         ([answered(1), answered(2)], ""),
         (
             [failed(1, "withheld_percent"), answered(2)],
-            "1 of 2 trials was not delivered: the safety layer withheld too much force (limit 25 %)",
+            "1 of 2 trials was not delivered: the safety layer held back too much force (limit 25 %)",
         ),
         (
             [failed(1, "withheld_percent")],
-            "1 of 1 trial was not delivered: the safety layer withheld too much force (limit 25 %)",
+            "1 of 1 trial was not delivered: the safety layer held back too much force (limit 25 %)",
         ),
         (
             [failed(1, "frame_gap_ms"), failed(2, "frame_gap_ms"), answered(3)],
@@ -58,7 +58,7 @@ def missing_after(*trials: list[Event], **limits: float) -> MissingTrials:
         ),
         (
             [failed(1, "withheld_percent"), failed(2, "force_limit_n"), failed(3, "withheld_percent")],
-            "3 of 3 trials were not delivered: the safety layer withheld too much force (limit 25 %) in 2, "
+            "3 of 3 trials were not delivered: the safety layer held back too much force (limit 25 %) in 2, "
             "the force limit was reached in 1",
         ),
     ],

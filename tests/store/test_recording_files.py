@@ -92,7 +92,7 @@ def test_recordings_of_format_2_are_read_and_one_that_lacks_a_column_is_damaged(
     assert not read["measured"].any()
     assert np.array_equal(read["position_m"], samples_of(100)["position_m"])
     rewrite(whole.drop_columns("gripper_m"), facts)
-    with pytest.raises(StoreError, match="its columns differ from those of samples"):
+    with pytest.raises(StoreError, match="its columns are not the columns of samples"):
         read_samples(path)
     rewrite(whole, facts | {"format": 5})
     with pytest.raises(StoreError, match="has format 5, this version reads 1 to 4: use a newer version"):
@@ -143,7 +143,7 @@ def test_any_reader_of_parquet_finds_columns_with_unit_and_meaning(tmp_path: Pat
         assert all(field.metadata[b"description"] for field in parquet.read_schema(path))
     schema = parquet.read_schema(written.path)
     for name, unit, description in (
-        ("position_y_m", b"m", b"Position of the hand, exact, up."),
+        ("position_y_m", b"m", b"Exact position of the hand, up."),
         ("velocity_x_mps", b"m/s", b"Velocity in the scene from which the force was computed; resolution 1/4096 m/s,"),
         ("device_force_z_n", b"N", b"Force that the device applied to the hand; resolution 1/16384 N, toward the"),
     ):

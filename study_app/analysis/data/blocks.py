@@ -480,8 +480,8 @@ def read_decided(tables: Sequence[Mapping[str, Any] | None]) -> Decided:
         )
     except (KeyError, TypeError, ValueError) as error:
         raise AnalysisError(
-            f"a receipt does not say what was decided about the analysis ({type(error).__name__}: {error}): it was "
-            "changed, or written by another version of the program; restore it from a copy"
+            f"a receipt does not contain the decisions about the analysis ({type(error).__name__}: {error}): it "
+            "was changed, or written by another version of the program; restore it from a copy"
         ) from error
 
 
@@ -610,6 +610,6 @@ def _question(table: Mapping[str, Any], where: QuestionPlace) -> Question:
         return question_of(table)
     except (KeyError, ValueError) as error:
         raise AnalysisError(
-            f"question {table.get('id')!r} of {where.id!r} is of no kind that this version knows "
+            f"question {table.get('id')!r} of {where.id!r} has a kind that this version does not know "
             f"({table.get('kind')}): use the version that ran the study"
         ) from error

@@ -34,9 +34,10 @@ SHORTEST: Final = 32
 """So many samples are needed to be filtered; a shorter reach is one submovement."""
 
 REACH_DEFINITIONS: Final = {
-    "movement_time_s": "from the lighting of a target to the entry that was held; the dwell itself is not in it",
+    "movement_time_s": "from the lighting of a target to the final entry, excluding the dwell time",
     "path_mm": "length of the hand's path in that time",
-    "overshoot_mm": "farthest place beyond the far edge of the target, along the line between the targets; 0: never",
+    "overshoot_mm": "largest distance beyond the far edge of the target, along the line between the targets; "
+    "0: no overshoot",
     "submovements": "peaks of the hand's speed until the target was reached "
     f"(low-pass {CUTOFF_HZ:g} Hz) that stand out by {100 * PROMINENCE:g} % of the highest; 1 is one smooth movement",
 }
@@ -144,11 +145,11 @@ def _overshoot_m(way: Array, targets: Targets, target: int) -> float:
 OF_TRIALS: Final = ("duration_s", "path_m", "force_mean_n", "force_peak_n", "at_limit_percent")
 OF_REACHES: Final = ("movement_time_s", "path_mm", "overshoot_mm", "submovements")
 TRIAL_DEFINITIONS: Final = {
-    "duration_s": "from the trial's beginning to its end",
+    "duration_s": "from the start of the trial to its end",
     "path_m": "length of the hand's path in the trial",
     "force_mean_n": "mean force on the hand in the trial",
     "force_peak_n": "largest force on the hand in the trial",
-    "at_limit_percent": "share of the trial's ticks in which the force was cut to the force limit",
+    "at_limit_percent": "proportion of the trial's ticks in which the force was cut to the force limit",
 }
 
 
@@ -285,9 +286,9 @@ def _reached(folder: Path, row: Mapping[Any, Any], targets: Targets) -> Reached 
 
 def _why_not(folder: Path, row: Mapping[Any, Any]) -> str:
     if pd.isna(row["recording"]):
-        return "no recording was kept"
+        return "a recording was not stored"
     if pd.isna(row["duration_s"]):
-        return "the trial has no duration"
+        return "the duration of the trial is zero"
     return "" if _file(folder, row).is_file() else "recording is not in the folder"
 
 

@@ -93,7 +93,7 @@ def _values(column: Column, texts: Sequence[str], known: dict[str, Any], path: P
 
 
 def _again(path: Path) -> str:
-    return f"make it again from the journal: liquid-study rebuild {path.parent}"
+    return f"create it again from the journal: liquid-study rebuild {path.parent}"
 
 
 def document(path: Path) -> dict[str, Any]:
@@ -105,7 +105,7 @@ def document(path: Path) -> dict[str, Any]:
     except ValueError as error:
         raise AnalysisError(f"{path} is damaged ({error}): restore it from a copy") from error
     if not isinstance(found, dict):
-        raise AnalysisError(f"{path} is damaged (no JSON object): restore it from a copy")
+        raise AnalysisError(f"{path} is damaged (it does not contain a JSON object): restore it from a copy")
     return found
 
 
@@ -192,7 +192,7 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
         levels = like.levels if like is not None and alike else level_blocks(protocol, key)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise AnalysisError(
-            f"{folder.receipt} does not describe the session ({type(error).__name__}: {error}): it was changed, or "
+            f"{folder.receipt} does not describe the session ({type(error).__name__}, {error}): it was changed, or "
             "written by another version of the program; restore it from a copy"
         ) from error
     return Session(
@@ -283,7 +283,8 @@ def _check_own(sessions: Sequence[Session], paths: Sequence[Path], table: pd.Dat
             which, row = _place(lengths, int(foreign[0]))
             raise AnalysisError(
                 f"{paths[which]}, row {row}, column {column}: {str(found[foreign[0]])!r} instead of "
-                f"{str(values[which])!r}: the file belongs elsewhere; restore this session's own from a copy"
+                f"{str(values[which])!r}: the file belongs to another session; restore this session's file from "
+                "a copy"
             )
 
 
@@ -300,9 +301,9 @@ def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd
         if (block, code, item) not in asked:
             which, row = _place(lengths, int(index))
             raise AnalysisError(
-                f"{paths[which]}, row {row}: the receipt knows no statement {item!r} on a setting {code!r} in block "
-                f"{block!r}: the file was changed or belongs to another study; make it again from the journal: "
-                f"liquid-study rebuild {sessions[which].folder.path}"
+                f"{paths[which]}, row {row}: the receipt does not contain statement {item!r} for code {code!r} in "
+                f"block {block!r}: the file was changed or belongs to another study; create it again from the "
+                f"journal: liquid-study rebuild {sessions[which].folder.path}"
             )
     which_one = [
         name for name in ("participant", "session", "form", "after_block", "trial", "attempt", "item") if name in table
@@ -312,8 +313,9 @@ def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd
         which, row = _place(lengths, int(twice[0]))
         answer = table.iloc[int(twice[0])]
         raise AnalysisError(
-            f"{paths[which]}, row {row}: the answer to {answer['item']!r} in trial {answer['trial']} stands there "
-            f"twice; make the table again from the journal: liquid-study rebuild {sessions[which].folder.path}"
+            f"{paths[which]}, row {row}: the answer to {answer['item']!r} in trial {answer['trial']} occurs "
+            "twice; create the table again from the journal: liquid-study rebuild "
+            f"{sessions[which].folder.path}"
         )
 
 

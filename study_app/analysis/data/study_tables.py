@@ -260,7 +260,7 @@ class Study:
         if warn is None:
             return
         for doubt in self.doubts:
-            warn(f"warning: {doubt}; used here as it is")
+            warn(f"warning: {doubt}; it is used here without correction")
 
     def blocks_of(self, kind: Kind) -> tuple[Block, ...]:
         """Return the blocks that compare liquids, delays or views."""
@@ -344,7 +344,7 @@ def _load_sites(merged: Merged) -> Study:
     opened = has_opened_keys(merged.path)
     sites = {name: _load(place.path, sealed=not opened) for name, place in places.items() if place.sessions()}
     if not sites:
-        raise AnalysisError(f"{merged.path} holds no sessions: all participants of its sites withdrew")
+        raise AnalysisError(f"{merged.path} does not contain sessions: all participants of its sites withdrew")
     return pooled(merged.path, sites, sum(len(tombstones(place)) for place in places.values()))
 
 
@@ -496,17 +496,20 @@ def _no_sessions(path: Path) -> str:
         )
     inside = sorted(found.name for found in path.iterdir() if found.is_dir() and StudyFolder(found).sessions())
     if inside:
-        return f"{path} holds no sessions itself, but studies that do ({', '.join(inside)}): give {path / inside[0]}"
+        return (
+            f"{path} does not contain sessions itself, but contains studies that do ({', '.join(inside)}): "
+            f"give {path / inside[0]}"
+        )
     return (
-        f"{path} holds no sessions (data/sub-…/ses-…): give a study's folder, such as results/rek2024, in which at "
-        "least one session was begun"
+        f"{path} does not contain sessions (data/sub-…/ses-…): give a study's folder, such as results/rek2024, "
+        "with at least one session"
     )
 
 
 def _other_study(other: Session, first: Session) -> str:
     return (
-        f"{other.folder.path} is of the study {other.study!r}, {first.folder.path} of {first.study!r}: keep each study "
-        "in a folder of its own"
+        f"{other.folder.path} is of the study {other.study!r}, {first.folder.path} of {first.study!r}: keep "
+        "each study in a separate folder"
     )
 
 
@@ -516,13 +519,13 @@ def _check_alike(first: Session, other: Session) -> None:
         raise AnalysisError(_other_study(other, first))
     if other.visit["key_hash"] != first.visit["key_hash"]:
         raise AnalysisError(
-            f"{other.folder.path} and {first.folder.path} ran under different sealed keys, so that one code does not "
-            "mean one thing: keep them in folders of their own"
+            f"{other.folder.path} and {first.folder.path} ran under different sealed keys, so the same code may "
+            "stand for different conditions: keep them in separate folders"
         )
     if other.questionnaire != first.questionnaire:
         raise AnalysisError(
-            f"{other.folder.path} (version {other.version}) was asked other statements than {first.folder.path} "
-            f"(version {first.version}): keep the versions of a study in folders of their own"
+            f"{other.folder.path} (version {other.version}) has other statements than {first.folder.path} "
+            f"(version {first.version}): keep the versions of a study in separate folders"
         )
 
 

@@ -101,9 +101,9 @@ def _is_of(study: str, file: Path) -> bool:
 
 
 def _why_missing(path: Path | None) -> str:
-    """Return why footage is not shared; ``path`` is None where it lies outside of the study's folder."""
+    """Return why footage is not shared; ``path`` is None where it lies outside the study's folder."""
     if path is None:
-        return "outside of the study's folder"
+        return "outside the study's folder"
     try:
         with open_regular(path) as file:
             file.read(1)
@@ -215,8 +215,8 @@ def _json(content: Any) -> bytes:
 
 def _readme(study: Study, tables: Mapping[str, bytes], report: Mapping[str, bytes], missing: Sequence[str]) -> bytes:
     simulated = "**All participants are simulated.** " if study.simulated else ""
-    blinded = "Settings are named." if study.revealed else "Settings are codes: the key is sealed."
-    script = f"; `Rscript analysis/{SCRIPT} data results` computes its main numbers again" if SCRIPT in report else ""
+    blinded = "Settings are named." if study.revealed else ("Conditions appear as codes, because the study is blinded.")
+    script = f"; `Rscript analysis/{SCRIPT} data results` recomputes its main numbers" if SCRIPT in report else ""
     lines = [
         f"# {study.title}",
         "",

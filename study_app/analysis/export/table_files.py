@@ -98,9 +98,9 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
         "measures": {
             "quartiles": QUARTILES,
             "agree_percent": f"levels {AGREEMENT[0]} to {AGREEMENT[-1]}, of the valid answers",
-            "repeated": "of a participant's repeated answers the median, except where single answers are used: the "
-            "detection threshold, and the counts of levels",
-            "counted": "main trials of completed sessions; of a repeated trial the last attempt; nothing excluded",
+            "repeated": "the median of a participant's repeated answers; the detection threshold and the "
+            "counts of levels use single answers",
+            "counted": "main trials of completed sessions that are not excluded; the last attempt of a repeated trial",
         },
         "files": files,
     }
@@ -246,7 +246,7 @@ def credit_lines(study: Study) -> tuple[str, str, str]:
     lines = (
         f"Authors: {', '.join(stated.get('author', [])) or 'not stated'}.",
         f"Licence: {stated.get('license', 'not stated; ask the authors before you use the data')}.",
-        f"How to cite: {stated.get('citation', 'not stated; name the study, its version and its authors')}.",
+        f"How to cite: {stated.get('citation', 'not stated; cite the study, its version and its authors')}.",
     )
     authors, licence, citation = (" ".join(line.split()) for line in lines)
     return authors, licence, citation

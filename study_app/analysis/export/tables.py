@@ -33,7 +33,7 @@ class Delivered:
     frame: pd.DataFrame
 
 
-SITE: Final = Column("site", "text", "The site whose participant this is: the part of the ID before the dash.")
+SITE: Final = Column("site", "text", "The participant's site: the part of the ID before the dash.")
 
 
 def with_site(study: Study, table: Delivered) -> Delivered:
@@ -108,27 +108,27 @@ _BY_NAME: Final = {column.name: column for column in (*TRIALS_2, *RESPONSES)}
 
 _QUARTILE: Final = f"quartiles {QUARTILES}"
 MEASURED: Final = (
-    Column("item", "text", "Id of the statement; its words are in the codebook."),
-    Column("short", "text", "A few words for the statement."),
-    Column("participants", "integer", "Participants who gave a valid answer.", minimum=0),
-    Column("presented", "integer", "Presentations after which the statement was to be answered.", minimum=0),
+    Column("item", "text", "ID of the statement; its text is in the codebook."),
+    Column("short", "text", "Short label of the statement."),
+    Column("participants", "integer", "Number of participants with a valid answer.", minimum=0),
+    Column("presented", "integer", "Number of presentations after which the statement was asked.", minimum=0),
     Column(
         "presented_excluded",
         "integer",
-        "Presentations besides these that exclusions.csv leaves out one by one, with their answers.",
+        "Number of further presentations that exclusions.csv excludes individually, with their answers.",
         minimum=0,
     ),
     Column("n", "integer", "Valid answers.", minimum=0),
-    Column("cannot_judge", "integer", "Answers off the scale.", minimum=0),
-    Column("missing", "integer", "Presentations without any answer.", minimum=0),
-    *(Column(f"count_{level}", "integer", f"Answers at level {level}.", minimum=0) for level in LEVELS),
+    Column("cannot_judge", "integer", "Number of “cannot judge” answers.", minimum=0),
+    Column("missing", "integer", "Number of presentations without an answer.", minimum=0),
+    *(Column(f"count_{level}", "integer", f"Number of answers at level {level}.", minimum=0) for level in LEVELS),
     optional("median", "number", "Median of the valid answers.", minimum=1, maximum=7),
     optional("q1", "number", f"Lower quartile; {_QUARTILE}.", minimum=1, maximum=7),
     optional("q3", "number", f"Upper quartile; {_QUARTILE}.", minimum=1, maximum=7),
     optional(
         "agree_percent",
         "number",
-        f"Share of the valid answers that agree (levels {AGREEMENT[0]} to {AGREEMENT[-1]}).",
+        f"Proportion of the valid answers that agree (levels {AGREEMENT[0]} to {AGREEMENT[-1]}).",
         unit="%",
         minimum=0,
         maximum=100,

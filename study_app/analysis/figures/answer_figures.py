@@ -146,7 +146,7 @@ def line_words(participants: int) -> str:
     """Return whom the thin lines are, for a caption."""
     if participants <= MOST_LINES:
         return "participants"
-    return f"{MOST_LINES} of the {participants} participants, evenly chosen in the order of their ids"
+    return f"{MOST_LINES} of the {participants} participants, evenly chosen in the order of their IDs"
 
 
 def _lowest(sheet: Sheet, axes: Axes, lowest_ms: float | None, middle_ms: float) -> None:
@@ -266,7 +266,7 @@ FILES: Final = 3
 def title(block: Block) -> str:
     """Return the heading of a block's figure."""
     if block.kind == "delays":
-        return "Answers over added delay" if block.revealed else "Answers by delay setting"
+        return "Answers against added delay" if block.revealed else "Answers by delay setting"
     return f"Agreement for each {_noun(block)}"
 
 
@@ -301,7 +301,7 @@ def caption(study: Study, block: Block) -> str:
 
 
 def _sentences(study: Study, block: Block) -> Iterator[str]:
-    simulated = "SIMULATED participants, not people; " if study.simulated else ""
+    simulated = "simulated participants, not people; " if study.simulated else ""
     yield (
         f"{'Pilot. ' if study.pilot else ''}Agreement with {counted(len(block.items), 'statement')} on "
         f"{counted(len(block.settings), _noun(block))} ({simulated}{counts(study, block)[0]})."
@@ -309,45 +309,45 @@ def _sentences(study: Study, block: Block) -> Iterator[str]:
     over_delay = block.kind == "delays" and block.revealed
     yield from _marks_of_delays(study, block) if over_delay else _marks_of_bars(block)
     if not study.revealed:
-        yield "Settings are shown by code in the order of the codes, since the key is sealed; the order says nothing."
+        yield "Conditions appear as codes because the study is blinded; their order has no meaning."
     trials = _counted_trials(study, block)
     errors = trials["delay_error_mean_ms"].dropna()
     if block.kind == "delays" and block.revealed and len(errors):
         yield (
-            "The axis shows the delay asked for; the delay achieved differed from it by "
-            f"{errors.mean():+.1f} ms on average (trials: {errors.min():+.1f} to {errors.max():+.1f} ms)."
+            f"The axis shows the requested delay; the achieved delay differed from it by {errors.mean():+.1f} "
+            f"ms on average (trials: {errors.min():+.1f} to {errors.max():+.1f} ms)."
         ).replace("-", "−")
     table = study.aggregate(block)
     yield f"Cannot judge: {table['cannot_judge'].sum()}; not answered: {table['missing'].sum()}."
     if study.left_out:
-        yield f"{counted(study.left_out, 'session is', 'sessions are')} left out, not having been completed."
+        yield f"{counted(study.left_out, 'session is', 'sessions are')} excluded because it was not completed."
     if len(rows := study.excluded_sessions):
         yield f"{counted(len(rows), 'session is', 'sessions are')} excluded."
     if len(rows := study.excluded_trials(block)):
         which = counted(len(rows), "trial is excluded, its answers", "trials are excluded, their answers")
         yield f"{which} missing here."
     if invalid := int((~trials["valid"].fillna(value=True)).sum()):
-        yield f"{invalid} of {len(trials)} trials exceeded the protocol's limits of timing and are included."
+        yield f"{invalid} of {len(trials)} trials exceeded the protocol's timing limits and are included."
     if study.doubts:
         names = sorted({doubt.path.relative_to(study.folder).as_posix() for doubt in study.doubts})
         more = f" and {len(names) - FILES} more" if len(names) > FILES else ""
         files = counted(len(names), "file is", "files are")
-        yield f"{files} not as recorded, and used as found: {', '.join(names[:FILES])}{more}."
+        yield f"{files} changed since recording, but used: {', '.join(names[:FILES])}{more}."
 
 
 def _marks_of_bars(block: Block) -> Iterator[str]:
     yield (
-        "Bars: number of answers, disagreement left and agreement right of the line; neutral answers apart in grey, on "
-        "the same scale. Numbers: counts of answers; a segment too narrow for its number carries none (all counts are "
-        "in the exported aggregate table). n next to a bar: valid answers where some are missing. "
-        f"Levels, from 1 to 7: {', '.join(block.labels)}."
+        "Bars show the number of answers, disagreement to the left and agreement to the right of the line; "
+        "neutral answers are shown separately in grey, on the same scale. Narrow segments are unlabelled (the "
+        "exported aggregate table contains all counts). n next to a bar is the number of valid answers if some "
+        f"are missing. Levels, from 1 to 7: {', '.join(block.labels)}."
     )
 
 
 def _marks_of_delays(study: Study, block: Block) -> Iterator[str]:
     yield (
-        f"Thin lines: {line_words(len(set(study.answers(block)['participant'])))}, slightly apart in height where "
-        f"they coincide; thick line: median; band: the middle half of the answers; quartiles {QUARTILES}."
+        f"Thin lines: {line_words(len(set(study.answers(block)['participant'])))}, slightly shifted if they "
+        f"coincide; thick line: median; band: interquartile range; quartiles {QUARTILES}."
     )
     yield f"Answers from 1 ({block.labels[0]}) to 7 ({block.labels[-1]})."
 
@@ -546,14 +546,14 @@ def answers_picture(
             for participant, session, status, excluded in study.participants[columns].head(5).itertuples(index=False)
         )
         raise AnalysisError(
-            f"{study.folder}: no completed session with answers in {block.id!r} yet ({states}): figures are drawn from "
-            "completed sessions; export writes what there is"
+            f"{study.folder}: no completed session with answers in {block.id!r} yet ({states}): figures need "
+            "completed sessions; export writes all available data"
         )
     words = caption(study, block)
     if lowest:
         words += (
-            " Dashed: lowest delay at which stepping down still shows a trend, with the error rate held over all "
-            "statements; an upper bound of the delay that is noticed."
+            " Dashed: lowest delay with a trend (step-down test, error rate controlled over all statements), "
+            "an upper bound of the noticeable delay."
         )
     draw = partial(draw_block, study, block, lowest)
     return picture_of(study, block.id, name, title(block), words, draw, forms, counts(study, block))
@@ -614,7 +614,7 @@ def draw_recognition(
             _cell(sheet, axes, row, counts[place], sum(counts), right=right[row] == place)
     for number, name in enumerate(settings):
         sheet.text(left - 6, top + height * (number + 0.5) + 2.6, name, size=7.5, ha="right")
-    foot = "Counts, with the share of the row. Framed: the name that is right."
+    foot = "Counts, with the percentage of the row. Framed: the correct name."
     sheet.text(MARGIN_PT, sheet.height_pt - 6, foot, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 

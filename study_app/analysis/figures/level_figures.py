@@ -148,7 +148,7 @@ def level_picture(study: Study, found: LevelsResult, forms: Sequence[str], name:
     """Draw the answers over levels of a block."""
     bands = _bands(study, found)
     own = len(people(found)) - MOST_PEOPLE
-    left_out = f" {counted(own, 'more participant')} in the table alone." if own > 0 else ""
+    left_out = f" {counted(own, 'more participant')} only in the table." if own > 0 else ""
     chance = "" if found.guess_rate is None else f" Dashed: chance ({100 * found.guess_rate:.0f} %)."
     caption = (
         f"{found.title}: {summary_words(found)} at each level. {_panels(found, bool(bands))}{chance}{left_out} "
@@ -170,13 +170,13 @@ def _panels(found: LevelsResult, banded: bool) -> str:
     crosses = "; crosses: catch trials" if any(one.catch for one in Answers.of(found)) else ""
     if Thresholds.own(found):
         return (
-            f"Curves: psychometric functions at the posterior medians{band}; bars: 95 % intervals of the thresholds, "
-            "those of several standards one below another; "
-            f"circles: answers at each level, area by their number{crosses}. First panel: all participants."
+            f"Curves: psychometric functions at the posterior medians{band}; bars: 95 % intervals of the "
+            "thresholds, stacked for several standards; circles: answers at each level, area proportional to "
+            f"their number{crosses}. First panel: all participants."
         )
-    units = ", without the unit that each chose" if found.own_units else ""
+    units = ", without each participant's unit" if found.own_units else ""
     return (
-        f"First panel: {mean_words(found)} over the participants, bars: its 95 % interval (Student's t); thin: "
+        f"First panel: {mean_words(found)} over the participants with its 95 % interval (Student's t); thin lines show "
         f"participants{units}. Other panels: each participant with the 95 % interval of the answers{crosses}."
     )
 
@@ -374,10 +374,11 @@ def track_picture(study: Study, found: LevelsResult, forms: Sequence[str], name:
     success = "correct" if found.counts == "correct" else f"“{found.counts}”"
     marks = " Colours: tracks." if any(one.tracks.max() > 1 for one in shown) else ""
     marks += " Rings: reversals." if any(one.reversals.any() for one in shown) else ""
-    marks += " × and +: catch trials, answered correctly and not." if any(one.catches.any() for one in shown) else ""
+    marks += " ×: catch trials answered correctly; +: incorrectly." if any(one.catches.any() for one in shown) else ""
     caption = (
-        f"{found.title}: the level of each trial. Filled: {success}; hollow: not.{marks} Band: 95 % interval of "
-        f"the threshold from the answers so far.{left_out} {sample_words(study, len(people(found)))}"
+        f"{found.title}: the level of each trial. Filled: {success}; hollow: otherwise.{marks} Band: 95 % "
+        f"interval of the threshold from the answers so far.{left_out} "
+        f"{sample_words(study, len(people(found)))}"
     )
     return picture_of(
         study, found.block, name, f"{found.title}: tracks", caption, partial(_draw_tracks, found, shown), forms
@@ -439,7 +440,7 @@ def settings_picture(study: Study, found: LevelsResult, forms: Sequence[str], na
     compared = any(one.constant_error is not None for one in Settings.own(found))
     standard = " Dashed: standard." if compared else ""
     caption = (
-        f"{found.title}: the levels that participants set, in their order. Filled: started high; hollow: started low. "
+        f"{found.title}: the levels set by participants, in order. Filled: started high; hollow: started low. "
         f"Line and band: point of subjective equality with its 95 % interval (Student's t).{standard}{left_out} "
         f"{sample_words(study, len(people(found)))}"
     )
@@ -531,8 +532,9 @@ def weber_picture(study: Study, found: LevelsResult, forms: Sequence[str], name:
     listed = "; ".join(published_words(one) for one in found.published)
     published = f" Open circles and dotted lines: published values, {listed}." if published_fractions(found) else ""
     caption = (
-        f"{found.title}: Weber fraction of {found.quantity}{_at(found)}, over the standard. Thin: participants; thick: "
-        f"random-effects mean with its 95 % interval.{published} {sample_words(study, len(people(found)))}"
+        f"{found.title}: Weber fraction of {found.quantity}{_at(found)}, against the standard. Thin: "
+        f"participants; thick: random-effects mean with its 95 % interval.{published} "
+        f"{sample_words(study, len(people(found)))}"
     )
     return picture_of(
         study,

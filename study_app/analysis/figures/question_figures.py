@@ -102,9 +102,7 @@ def draw_distribution(asked: PlacedQuestion, found: QuestionResult, look: Look) 
 
 
 DISTRIBUTION: Final = QuestionFigure(
-    "distribution",
-    draw_distribution,
-    "Every answer is a dot; line: median; band: from the lower to the upper quartile.",
+    "distribution", draw_distribution, "Each dot is an answer; line: median; band: interquartile range."
 )
 
 
@@ -130,7 +128,9 @@ def draw_options(asked: PlacedQuestion, found: QuestionResult, look: Look) -> Sh
     return sheet
 
 
-OPTIONS: Final = QuestionFigure("counts", draw_options, "How often each option was chosen; grey: all who answered.")
+OPTIONS: Final = QuestionFigure(
+    "counts", draw_options, "Number of participants who chose each option; grey: all who answered."
+)
 
 
 RATING_PT: Final = 26.0
@@ -182,7 +182,9 @@ def _legend(sheet: Sheet, names: list[str], inks: list[str]) -> None:
         x += SWATCH_PT
 
 
-RATINGS: Final = QuestionFigure("rating", draw_ratings, "Counts of the answers at each point, as shares of each bar.")
+RATINGS: Final = QuestionFigure(
+    "rating", draw_ratings, "Each bar shows the proportions of answers at each point, labelled with counts."
+)
 
 
 FIGURES: Final = {one.id: one for one in (RATINGS, OPTIONS, DISTRIBUTION)}

@@ -134,10 +134,10 @@ class Settings(LevelStatistic[SettingEstimate]):
         in_u = "logarithm of the level" if self.found.spacing == "log" else "level"
         error = " constant error: PSE − standard;" if self._are_compared else ""
         return (
-            f"Settings as levels ({level_words(self.found)}). PSE, the point of subjective equality: mean of the "
-            f"{in_u}, with Student’s 95 % interval; JND, the just-noticeable difference: standard deviation;{error} "
-            "hysteresis: settings that started high − settings that started low. The group has the means over "
-            "participants, and the interval of its PSE is that over participants."
+            f"Settings as levels ({level_words(self.found)}). PSE, the point of subjective equality: mean of "
+            f"the {in_u}, with Student’s 95 % interval; JND, the just-noticeable difference: standard "
+            f"deviation;{error} hysteresis: settings that started high − settings that started low. Group "
+            "values are means over participants, with the interval over participants for the PSE."
         )
 
     def compares(self, measure: str) -> bool:
@@ -148,11 +148,11 @@ class Settings(LevelStatistic[SettingEstimate]):
         if not (own := self.own(self.found)):
             return
         yield (
-            f"{title}: settings depend on how a participant decides that two are equal: their scatter is not a "
-            "threshold free of a criterion."
+            f"{title}: settings depend on how a participant decides that two stimuli are equal, so their "
+            "scatter is not a criterion-free threshold."
         )
         if few := [str(one.participant) for one in own if one.hysteresis is None]:
-            words = "settings started near one end alone, so that hysteresis is not known"
+            words = "all settings started near the same end, so hysteresis is unknown"
             yield f"{title}: {words} ({listed(few[:MOST_NAMED])})."
         yield f"{title}: {MOTORS}"
 
@@ -172,10 +172,10 @@ class Settings(LevelStatistic[SettingEstimate]):
         if any(map(cls.of, blocks)):
             yield (
                 "The point of subjective equality is the mean of a participant’s settings, the just-noticeable "
-                "difference their standard deviation, the constant error the difference of mean and standard, and the "
-                "hysteresis that of settings that started high and low, all of the logarithm of the level where levels "
-                "are spaced so (Gescheider 1997). Group values are means over participants with Student’s 95 % "
-                "interval."
+                "difference their standard deviation, the constant error the difference between mean and "
+                "standard, and the hysteresis the difference between settings that started high and low; all "
+                "use the logarithm of the level if levels are spaced logarithmically (Gescheider 1997). Group "
+                "values are means over participants with Student’s 95 % interval."
             )
 
 
@@ -333,12 +333,13 @@ class Answers(LevelStatistic[LevelAnswers]):
         if not found.adaptive:
             yield self._of_group()
             units = (
-                " The interval leaves out that each participant chose a unit: ln answers less the participant's mean."
+                " The interval ignores each participant's choice of unit: it uses ln answers minus the "
+                "participant's mean."
             )
             yield paragraph(
-                f"{mean_words(found).capitalize()} over the participants, with the 95 % interval by Student's t where "
-                "at least two participants differ. Below: each participant, with the number of answers."
-                + (units if found.own_units else ""),
+                f"{mean_words(found).capitalize()} over the participants, with Student's 95 % interval if at "
+                "least two participants differ. The rows below show each participant with the number of "
+                "answers." + (units if found.own_units else ""),
                 "soft",
             )
         yield from drawn(self.pictures, f"levels-{found.block}")

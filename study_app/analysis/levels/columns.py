@@ -15,68 +15,72 @@ _STATUS: Final = next(column for column in with_missing_trials(PARTICIPANTS) if 
 
 JUDGED: Final = (
     Column("session_status", "text", "How the row's session ended.", levels=_STATUS.levels),
-    Column("excluded", "flag", "true where exclusions.csv leaves out the row's session or trial."),
-    optional("exclusion_reason", "text", "Why it is left out."),
+    Column("excluded", "flag", "true if exclusions.csv excludes the row's session or trial."),
+    optional("exclusion_reason", "text", "Reason for the exclusion."),
     Column(
         "counted",
         "flag",
-        "true where the row is in the aggregate and the figures: main trial, session that reached its end, "
-        "last attempt, not excluded; valid or not.",
+        "true if the row is included in the aggregate and the figures: last attempt of a main trial in a "
+        "completed session that is not excluded, whether valid or not.",
     ),
 )
 
 OPENED: Final = (
-    Column("condition", "text", "Id of the condition that the code stands for."),
-    Column("liquid", "text", "Id of the liquid that was presented."),
-    Column("delay_ms", "number", "Requested visual delay; n/a where a stimulus varies it.", unit="ms", minimum=0),
+    Column("condition", "text", "ID of the condition that the code stands for."),
+    Column("liquid", "text", "ID of the liquid presented."),
+    Column("delay_ms", "number", "Requested visual delay; n/a if a stimulus varies it.", unit="ms", minimum=0),
 )
 ACHIEVED: Final = optional(
-    "delay_achieved_ms", "number", "Visual delay that was achieved: asked for, plus the trial's mean error.", unit="ms"
+    "delay_achieved_ms", "number", "Achieved visual delay: the requested delay plus the trial's mean error.", unit="ms"
 )
 
 _INTERVALS: Final = {column.name: column for column in INTERVALS}
 _BLOCK: Final = Column("block", "text", "Id of the block.")
 _STANDARD: Final = optional(
-    "standard", "number", "The standard, in the unit of the varied number; n/a where there is none."
+    "standard", "number", "The standard, in the unit of the varied number; n/a if there is none."
 )
 
 OF_TRACKS: Final[tuple[Column, ...]] = (
-    Column("analysed", "flag", "true where the row counts and does not present the modulus of a magnitude estimation."),
-    Column("track", "text", "What the code stands for: standard and number of the track (8/1), or the condition."),
-    Column("slot", "integer", "Position of the trial among those of its code in the session, from 1.", minimum=1),
+    Column(
+        "analysed", "flag", "true if the row is analysed and does not present the modulus of a magnitude estimation."
+    ),
+    Column("track", "text", "Meaning of the code: standard and number of the track (8/1), or the condition."),
+    Column(
+        "slot", "integer", "Position of the trial among the trials with its code in the session, from 1.", minimum=1
+    ),
     _INTERVALS["catch"],
     _INTERVALS["standard"],
     replace(_INTERVALS["level"], name="level_asked"),
     optional(
         "level_delivered",
         "number",
-        "The level at which the hand met the comparison: from the delivered values, and for a visual delay from the "
-        "mean errors of the frames; n/a where it was not measured.",
+        "The level of the comparison as delivered to the hand, from the delivered values (for a visual delay "
+        "from the mean errors of the frames); n/a if it was not measured.",
     ),
     optional(
         "comparison",
         "number",
-        "The comparison at this level, in the unit of the varied number; n/a where conditions are compared.",
+        "The comparison at this level, in the unit of the varied number; n/a if conditions are compared.",
     ),
     optional(
-        "arrangement",
-        "text",
-        "What the intervals presented, in order: S the standard, C the comparison; n/a if none was presented.",
+        "arrangement", "text", "Order of the intervals: S is the standard, C the comparison; n/a if none was presented."
     ),
     optional(
         "comparison_interval",
         "integer",
-        "The interval that alone presented the comparison, from 1; n/a where there is none.",
+        "The only interval with the comparison, from 1; n/a if there is none.",
         minimum=1,
     ),
-    optional("response", "text", "The answer; n/a without one."),
-    optional("value", "number", "The answer as a number, where it is one."),
-    optional("right", "flag", "true if the answer was correct; n/a where no answer is."),
+    optional("response", "text", "The answer; n/a without an answer."),
+    optional("value", "number", "The answer as a number, if it is a number."),
+    optional("right", "flag", "true if the answer was correct; n/a if answers are neither correct nor incorrect."),
     optional("response_s", "number", "Time from the question to the first choice of an answer.", unit="s", minimum=0),
     optional(
-        "reversal", "flag", "true if the up–down track changed its direction here; n/a where the method has no steps."
+        "reversal",
+        "flag",
+        "true if the up–down track changed its direction here; n/a if the method does not use steps.",
     ),
-    replace(_INTERVALS["setting"], description="The level that the participant set, from level_asked on."),
+    replace(_INTERVALS["setting"], description="The level that the participant set, starting from level_asked."),
 )
 
 
@@ -84,25 +88,34 @@ SETTINGS: Final[tuple[Column, ...]] = (
     _BLOCK,
     _STANDARD,
     Column("n", "integer", "Settings that count.", minimum=0),
-    Column("pse", "number", "Point of subjective equality, a level: the mean of the settings in u."),
+    Column(
+        "pse",
+        "number",
+        "Point of subjective equality, a level: the mean of the settings (of their "
+        "logarithms if levels are spaced logarithmically).",
+    ),
     optional("low", "number", "Lower end of the 95 % interval of the PSE (Student's t)."),
     optional("high", "number", "Upper end of the 95 % interval of the PSE (Student's t)."),
     optional(
         "jnd",
         "number",
-        "Just-noticeable difference: the standard deviation of the settings, in u (decades where levels are spaced by "
-        "their logarithm, else in the unit of the levels).",
+        "Just-noticeable difference: the standard deviation of the settings (in decades if levels are spaced "
+        "logarithmically, otherwise in the unit of the levels).",
         minimum=0,
     ),
-    optional("constant_error", "number", "PSE minus standard, in u; n/a where no standard was presented."),
     optional(
-        "hysteresis", "number", "Mean of the settings that started high minus mean of those that started low, in u."
+        "constant_error", "number", "PSE minus standard, in the unit of the JND; n/a if a standard was not presented."
+    ),
+    optional(
+        "hysteresis",
+        "number",
+        "Mean of the settings that started high minus mean of the settings that started low, in the unit of the JND.",
     ),
 )
 
 EXPONENTS: Final[tuple[Column, ...]] = (
     _BLOCK,
-    Column("levels", "integer", "Levels with answers that count.", minimum=2),
+    Column("levels", "integer", "Number of levels with analysed answers.", minimum=2),
     Column(
         "exponent",
         "number",
@@ -113,55 +126,57 @@ EXPONENTS: Final[tuple[Column, ...]] = (
 THRESHOLDS: Final[tuple[Column, ...]] = (
     _BLOCK,
     _STANDARD,
-    optional("condition", "text", "The condition that was compared; n/a in a block of levels."),
+    optional("condition", "text", "The compared condition; n/a in a block of levels."),
     Column("n", "integer", "Answers that count.", minimum=0),
     optional(
         "threshold",
         "number",
-        "Level at which the psychometric function is half-way between guesses and lapses: posterior median, in the "
-        "unit of the stimulus' levels; n/a where the answers enter no such function.",
+        "Level halfway between guess rate and one minus lapse rate on the psychometric function (posterior "
+        "median, in the unit of the stimulus' levels); n/a if a psychometric function is not fitted.",
     ),
     optional("low", "number", "Lower end of the threshold's equal-tailed 95 % interval."),
     optional("high", "number", "Upper end of the threshold's equal-tailed 95 % interval."),
     optional(
         "beyond",
         "text",
-        "Whether the threshold lies beyond the levels of the stimulus; n/a: within them.",
+        "Whether the threshold lies beyond the levels of the stimulus; n/a: within the levels.",
         levels=(("above", "above the highest"), ("below", "below the lowest")),
     ),
     optional(
         "width",
         "number",
-        "Posterior median of the function's width, from 5 to 95 % of its rise: in decades where levels are spaced by "
-        "their logarithm, else in the unit of the levels.",
+        "Posterior median of the function's width, from 5 to 95 % of its rise, in decades if levels are spaced "
+        "logarithmically, otherwise in the unit of the levels.",
         minimum=0,
     ),
     optional("lapse", "number", "Posterior median of the lapse rate.", minimum=0, maximum=1),
     optional(
         "weber_exponent",
         "number",
-        "Slope of ln JND on ln standard over the participant's standards: the same in each of these rows; n/a with "
-        "fewer than two standards.",
+        "Slope of ln JND on ln standard over the participant's standards; identical in each of these rows; n/a "
+        "with fewer than two standards.",
     ),
     optional("flat_width_threshold", "number", "The threshold under a flat prior on the width."),
     optional(
         "reversal_mean",
         "number",
-        "Mean of the last reversals of the up–down tracks; n/a for other methods and with too few.",
+        "Mean of the last reversals of the up–down tracks; n/a for other methods and if there are too few reversals.",
     ),
     optional(
         "target_percent",
         "number",
-        "Percentage of successes to which the rule of the up–down tracks converges.",
+        "Percentage of correct answers to which the rule of the up–down tracks converges.",
         unit="%",
         minimum=0,
         maximum=100,
     ),
-    optional("d_prime", "number", "Sensitivity over all levels presented; n/a where no answer is correct."),
+    optional(
+        "d_prime", "number", "Sensitivity over all levels presented; n/a if answers are neither correct nor incorrect."
+    ),
     optional(
         "d_prime_model",
         "text",
-        "The model of d_prime, where the design has two.",
+        "The model of d_prime, if the design has two models.",
         levels=(
             ("differencing", "intervals are compared with each other"),
             ("independent", "each interval is compared with known alternatives"),
@@ -174,7 +189,11 @@ THRESHOLDS: Final[tuple[Column, ...]] = (
         "c of yes–no and of two-interval forced choice, k of the differencing model of same–different.",
     ),
     optional(
-        "share_first", "number", "Share of the first of the answers, such as “first” or “yes”.", minimum=0, maximum=1
+        "share_first",
+        "number",
+        "Proportion of the first answer category, such as “first” or “yes”.",
+        minimum=0,
+        maximum=1,
     ),
     optional(
         "fit_p",
@@ -187,7 +206,7 @@ THRESHOLDS: Final[tuple[Column, ...]] = (
     optional(
         "change",
         "number",
-        "Change of the threshold from first to last trial, as a share of it; 0: none beyond two standard errors.",
+        "Relative change of the threshold from the first to the last trial; 0 if it is within two standard errors.",
     ),
 )
 
@@ -212,12 +231,12 @@ RESULTS: Final = {
 def dictionary_markdown() -> str:
     """Return the columns of these tables as Markdown: a heading and a table for each."""
     added = (
-        "what `export` adds to responses, trials and intervals; `trials_missing` in studies with trials of intervals, "
-        "the last four after unblinding"
+        "columns that `export` adds to responses, trials and intervals; `trials_missing` in studies with "
+        "trials of intervals, the last four after unblinding"
     )
     of_tracks = (
-        "one row per trial with a design, after unblinding; what it has besides IDs and condition of the trial, and "
-        "force_mean_n and mean_speed_mps of each interval (…_1, …_2)"
+        "one row per trial with a design, after unblinding; its columns in addition to IDs and condition of "
+        "the trial, and force_mean_n and mean_speed_mps of each interval (…_1, …_2)"
     )
     tables = {"tracks": Results(of_tracks, OF_TRACKS), **RESULTS}
     return "\n".join(

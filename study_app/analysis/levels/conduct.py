@@ -130,12 +130,14 @@ class Delivery(LevelStatistic[Row]):
             for name, count in reasons.most_common()
         ]
         with_estimator = f", with the velocity estimator {self.estimator}" if self.estimator else ""
-        kept = f"Limits that intervals did not keep: {listed(named)}." if reasons else "Every interval kept its limits."
+        kept = (
+            f"Limits that intervals exceeded: {listed(named)}." if reasons else "All intervals were within the limits."
+        )
         mass = f" Apparent mass: least-squares fit of F = −b v − m a to the force sent{with_estimator}."
         mass = mass if any(one["apparent_mass_kg"] is not None for one in self.rows) else ""
         return (
-            "Level error: delivered less requested level, from the recorded samples (delays: from the frames); fits "
-            f"take delivered levels.{mass} {kept}"
+            "Level error is the delivered minus the requested level, from the recorded samples (for delays "
+            f"from the frames); fits use delivered levels.{mass} {kept}"
         )
 
 
@@ -164,7 +166,7 @@ class CatchTrials(LevelStatistic[Row]):
         )
 
     def explained(self) -> str:
-        return "Catch trials present the largest level; they enter the fit of the threshold."
+        return "Catch trials present the largest level; the fit of the threshold includes them."
 
 
 class Withheld(LevelStatistic[Row]):
@@ -173,7 +175,7 @@ class Withheld(LevelStatistic[Row]):
     key = "withheld"
     place = 8
     since = 2
-    title = "Force withheld by safety"
+    title = "Force held back by safety"
 
     compute = staticmethod(lambda block, _opened, study, _found: _withheld(block, study.intervals))
 
@@ -188,10 +190,10 @@ class Withheld(LevelStatistic[Row]):
 
     def explained(self) -> str:
         return (
-            f"{' '.join(self._up_to())} Share of the requested force that limits, passivity controller and device "
-            "withheld in the comparisons, those of trials that were presented again included: a late force pushes the "
-            "hand, and the passivity controller limits the energy that it returns. What is withheld is not the force "
-            "that the study is about."
+            f"{' '.join(self._up_to())} The table shows the proportion of the requested force that limits, "
+            "passivity controller and device held back in the comparisons, including repeated trials. A "
+            "delayed force pushes the hand, and the passivity controller limits the energy that it returns; "
+            "the force held back is then missing from the stimulus."
         )
 
     def _up_to(self) -> Iterator[str]:
@@ -202,4 +204,4 @@ class Withheld(LevelStatistic[Row]):
             kept = list(takewhile(lambda one: one["most_percent"] <= WITHHELD_PERCENT, rows))
             at = "" if standard is None else f" at the standard of {standard:.4g}{of}"
             until = f"up to {kept[-1]['high']:.3g}{of}" if kept else "at no level presented"
-            yield f"At most {WITHHELD_PERCENT:g} % was withheld in every comparison {until}{at}."
+            yield f"At most {WITHHELD_PERCENT:g} % was held back in every comparison {until}{at}."

@@ -25,10 +25,7 @@ READ: Final = (
 )
 """The columns of tracks that statistics read."""
 
-SEALED: Final = (
-    "Not yet revealed: standards, levels, what each interval presented, and which answers were correct. They appear "
-    "here after unblinding."
-)
+SEALED: Final = "Standards, levels, contents of each interval and correct answers appear here after unblinding."
 
 
 def level_results(study: Study, rows: pd.DataFrame | None = None) -> tuple[LevelsResult, ...]:
@@ -106,7 +103,7 @@ def level_section(found: LevelsResult, pictures: Sequence[Picture], estimator: s
         yield paragraph(SEALED)
         return
     if not Settings.of(found) and not Answers.of(found):
-        yield paragraph("No answer counts yet.")
+        yield paragraph("There are no answers to analyse yet.")
         return
     for one in (Settings,) if Settings.of(found) else statistics():
         yield from one(found, {picture.name: picture for picture in pictures}, estimator).section()

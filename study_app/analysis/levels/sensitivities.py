@@ -32,21 +32,22 @@ from study_app.psychophysics.detection import Model, Sensitivity, d_prime_at, ra
 from study_app.psychophysics.grid import Z_95
 
 MODELS: Final = {
-    "differencing": " d′ is that of the differencing model, since standards vary from trial to trial.",
-    "independent": " d′ is that of independent observations; the exported table thresholds has that of the "
-    "differencing model, in the column d_prime_other.",
+    "differencing": " d′ uses the differencing model, because standards vary from trial to trial.",
+    "independent": " d′ uses the model of independent observations; the exported table thresholds gives the "
+    "differencing model in the column d_prime_other.",
 }
 FROM_SHARE_CORRECT: Final = ("abx", "oddity", "3ifc", "4ifc")
 """Designs whose d′ follows from the share of correct answers alone."""
 BIASES: Final = {
-    "2ifc": " c is above 0 where the second interval is preferred.",
-    "yesno": " c is above 0 where “no” is preferred.",
+    "2ifc": " c is above 0 if the second interval is preferred.",
+    "yesno": " c is above 0 if “no” is preferred.",
     "samedifferent": " k is the difference above which the answer is “different”.",
     **dict.fromkeys(
         FROM_SHARE_CORRECT,
-        " d′ is computed from the share of correct answers, and assumes that no answer is preferred: a preference, "
-        "which shows in unequal shares of the answers, makes d′ too small. Intervals of participants: d′ at the ends "
-        "of the Clopper–Pearson interval of the share correct; none if all answers are correct.",
+        " d′ is computed from the proportion correct and assumes that participants do not prefer an answer; a "
+        "preference, visible in unequal proportions of the answers, makes d′ too small. Participants' "
+        "intervals are d′ at the ends of the Clopper–Pearson interval for the proportion correct; there is "
+        "none if all answers are correct.",
     ),
 }
 
@@ -236,12 +237,12 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
         if biased := preferences(self.own(self.found)):
             people = listed([f"{person} ({number(criterion)})" for person, criterion in biased.items()])
             yield (
-                f"{self.found.title}: one interval is preferred by {people}: the criterion c is further from 0 than "
-                f"{BIASED:g} and than twice its standard error. The fits of their thresholds allow for it."
+                f"{self.found.title}: {people} preferred one interval (the criterion c is beyond ±{BIASED:g} and "
+                f"twice its standard error). The fits of their thresholds allow for this."
             )
 
     def explained(self) -> str:
-        shares = "Percentages are shares of the answers." if self.rows[0].shares else ""
+        shares = "Percentages refer to the answers." if self.rows[0].shares else ""
         if all(one.d_prime is None for one in self.rows):
             return shares
         over = "over all levels presented" if self.found.vary is not None else "for each comparison"
@@ -249,8 +250,8 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
             over = "of each level against the lowest, as d_a from the area under the ROC curve"
         bias, model = BIASES.get(self.found.design, ""), MODELS.get(self.rows[0].model or "", "")
         return (
-            f"d′ {over}, from rates with the log-linear correction (Hautus 1995; Macmillan & Creelman 2005); that of "
-            f"the group is the mean over participants with Student’s interval.{model}{bias} {shares}"
+            f"d′ {over}, from rates with the log-linear correction (Hautus 1995; Macmillan & Creelman 2005); "
+            f"the group value is the mean over participants with Student’s interval.{model}{bias} {shares}"
         ).rstrip()
 
     @classmethod

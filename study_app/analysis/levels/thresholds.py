@@ -465,7 +465,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
     def explained(self) -> str:
         found, percent, compared = self.found, self._target_percent(), percent_compared(self.found)
         at = "" if found.guess_rate is None else f" ({50 * (1 + found.guess_rate):.3g} % {found.counts})"
-        catch = ", those to catch trials included" if any(one.catch for one in Answers.of(found)) else ""
+        catch = ", including answers to catch trials" if any(one.catch for one in Answers.of(found)) else ""
         reversals = (
             ""
             if percent is None
@@ -477,18 +477,18 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         )
         function = FAMILIES[found.family or ""]
         return (
-            f"A threshold is the level ({level_words(found)}) at which the {function} function is half-way between "
-            f"guesses and lapses{at}: posterior median with an equal-tailed 95 % interval, from all counted answers, "
-            f"at the levels delivered to the hand. The width, from 5 to 95 % of the rise, has a log-normal prior; "
-            f"the next column is the threshold under a flat one. “Above” and “below” mark thresholds beyond the "
-            "levels of the stimulus. Intervals include that a person’s threshold differs between sessions by a factor "
-            f"of {10**SESSION_SD:.2f} (one standard deviation), and a change over the trials. The group is the "
-            "random-effects mean (Paule–Mandel), with the interval of Hartung and Knapp from three participants on. A "
-            "variance counts as its geometric mean with their median."
-            f"{level}{reversals} Fit: p of the deviance among {SETS} simulated sets of answers. Drift: correlation of "
-            f"trial number and deviance residual, with “!” where the threshold changes over the trials by more than "
-            f"{BEYOND_CHANCE:g} standard errors. n counts answers{catch}."
-            + (f" {REMOVED.format('is', 'is')}" if found.design == "2ifc" else "")
+            f"A threshold is the level ({level_words(found)}) at which the {function} function is halfway "
+            f"between guess rate and one minus lapse rate{at}: posterior median with an equal-tailed 95 % "
+            "interval, from all counted answers, at the levels delivered to the hand. The width, from 5 to 95 "
+            "% of the rise, has a log-normal prior; the next column is the threshold under a flat prior. "
+            "“Above” and “below” mark thresholds beyond the levels of the stimulus. Intervals include that a "
+            f"person’s threshold differs between sessions by a factor of {10**SESSION_SD:.2f} (one standard "
+            "deviation), and a change over the trials. The group is the random-effects mean (Paule–Mandel), "
+            "with the interval of Hartung and Knapp from three participants on. A variance counts as its "
+            f"geometric mean with their median.{level}{reversals} Fit: p of the deviance among {SETS} simulated "
+            "sets of answers. Drift: correlation of trial number and deviance residual, with “!” if the "
+            f"threshold changes over the trials by more than {BEYOND_CHANCE:g} standard errors. n counts "
+            f"answers{catch}." + (f" {REMOVED.format('is', 'is')}" if found.design == "2ifc" else "")
         )
 
     def compares(self, measure: str) -> bool:
@@ -519,14 +519,14 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             (shifted, f"the prior of the width shifts a threshold by more than {100 * SHIFT:.0f} %: too few answers"),
             (
                 lambda one: one.beyond == "above",
-                "a threshold lies above the highest level of the stimulus; how far is not known",
+                "a threshold lies above the highest level of the stimulus; the distance is unknown",
             ),
             (
                 lambda one: one.beyond == "below",
-                "a threshold lies below the lowest level of the stimulus; how far is not known",
+                "a threshold lies below the lowest level of the stimulus; the distance is unknown",
             ),
-            (lambda one: not one.fits, "the function does not fit the answers, so that a threshold may be biased"),
-            (lambda one: one.n < FEW_ANSWERS, f"fewer than {FEW_ANSWERS} answers, so that intervals are wide"),
+            (lambda one: not one.fits, "the function does not fit the answers, so a threshold may be biased"),
+            (lambda one: one.n < FEW_ANSWERS, f"fewer than {FEW_ANSWERS} answers, so intervals are wide"),
         )
         for applies, words in kinds:
             if some := [one for one in own if applies(one)]:
@@ -539,8 +539,8 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             )
         if (people := len({one.participant for one in own})) < FEWEST:
             yield (
-                f"{title}: {counted(people, 'participant')}; below {FEWEST} the group has no interval, since "
-                "differences between people are not known."
+                f"{title}: {counted(people, 'participant')}; at least {FEWEST} are needed for a group interval, "
+                "because differences between people are otherwise unknown."
             )
         if self.found.level_kind == "weber":
             yield self._limit_of_device()
@@ -551,24 +551,24 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         found, own = self.found, self.found.device
         if own is None:
             return (
-                f"{found.title}: the device's own damping, friction and mass are unknown, since they were not "
-                "measured; Weber fractions are of what the motors delivered, and smaller ones of the sum with the "
-                "device's own."
+                f"{found.title}: the device's own damping, friction and mass are unknown, because they were not "
+                "measured. Weber fractions refer to the force that the motors delivered; relative to the sum "
+                "with the device's own they are smaller."
             )
         where = "" if own.sessions == own.of else f" (measured for {own.sessions} of {own.of} sessions)"
         words = (
             f"{found.title}: the device's own damping of {own.damping_nspm:.2g} N·s/m, friction of "
-            f"{own.friction_n:.2g} N and mass of {own.mass_kg:.2g} kg{where} add to what the motors delivered; Weber "
-            "fractions are of the latter"
+            f"{own.friction_n:.2g} N and mass of {own.mass_kg:.2g} kg{where} add to the force that the motors "
+            "delivered; Weber fractions refer to the motors' force"
         )
         shares = [
-            f"{share:.3g} in place of {one.threshold:.3g} at {one.standard:g} {found.unit}"
+            f"{share:.3g} instead of {one.threshold:.3g} at {one.standard:g} {found.unit}"
             for one in self.rows
             if one.participant is None and (share := with_device(found, one)) is not None
         ]
         if not shares:
             return f"{words}."
-        return f"{words}. With the device's damping in the standard, those of the group are {listed(shares)}."
+        return f"{words}. With the device's damping in the standard, the group values are {listed(shares)}."
 
     def methods(self, block: LevelBlock) -> Iterator[str]:
         if not self.rows or block.assumed is None or block.stimulus is None:
@@ -588,20 +588,19 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
     def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterator[str]:
         if any(map(cls.of, blocks)):
             yield (
-                "Thresholds are posterior medians over a grid with equal-tailed 95 % intervals, from all counted "
-                "answers at the levels delivered to the hand. The deviance was compared with that of "
-                f"{SETS} simulated sets of answers, and drift is the correlation of trial number and deviance residual "
-                "(Wichmann & Hill 2001). Intervals include that a person’s threshold differs between sessions by a "
-                f"factor of {10**SESSION_SD:.2f} (one standard deviation; from data of Jäkel & Wichmann 2006), and "
-                f"how far it changed over the trials where that exceeded {BEYOND_CHANCE:g} standard errors. The most "
-                f"probable change (prior: a factor of {CHANGE_PRIOR:g}) was removed: the threshold is that in the "
-                "middle of the trials. Of the standard "
-                f"deviation of log widths {100 * ALIKE:.0f} % was taken to be between participants, so that each "
-                "participant’s width follows from the answers of all. Group means are "
-                "random-effects means, each variance as its geometric mean with the median of all, with the "
-                "between-person variance of Paule and Mandel (1982) and, from "
-                f"{FEWEST} participants on, the interval of Hartung and Knapp (2001), widened by the uncertainty of "
-                "the width that all have in common."
+                "Thresholds are posterior medians over a grid with equal-tailed 95 % intervals, from all "
+                f"counted answers at the levels delivered to the hand. The deviance was compared with {SETS} "
+                "simulated sets of answers, and drift is the correlation between trial number and deviance "
+                "residual (Wichmann & Hill 2001). Intervals include that a person’s threshold differs between "
+                f"sessions by a factor of {10**SESSION_SD:.2f} (one standard deviation; from data of Jäkel & "
+                f"Wichmann 2006), and how far it changed over the trials if this exceeded {BEYOND_CHANCE:g} "
+                f"standard errors. The most probable change (prior: a factor of {CHANGE_PRIOR:g}) was removed, "
+                f"so the threshold refers to the middle of the trials. We assumed that {100 * ALIKE:.0f} % of "
+                "the standard deviation of log widths is common to participants, so each width depends on the "
+                "answers of all. Group means are random-effects means, with each variance replaced by its "
+                "geometric mean with the median variance, the between-person variance of Paule and Mandel "
+                f"(1982) and, with at least {FEWEST} participants, the interval of Hartung and Knapp (2001), "
+                "widened by the uncertainty of the width that all have in common."
             )
 
 
@@ -733,15 +732,16 @@ class Exponents(LevelStatistic[ExponentEstimate]):
     def explained(self) -> str:
         if Thresholds.of(self.found):
             return (
-                "The exponent is the least-squares slope of ln JND on ln standard over the standards of a participant; "
-                "the just-noticeable difference (JND) is the threshold in the unit of the standard. 1 is Weber’s law "
-                "(the JND is proportional to the standard), 0 a constant JND. That of the group is the mean over "
-                "participants with Student’s interval."
+                "The exponent is the least-squares slope of ln JND on ln standard over the standards of a "
+                "participant; the just-noticeable difference (JND) is the threshold in the unit of the "
+                "standard. 1 is Weber’s law (the JND is proportional to the standard), 0 a constant JND. The "
+                "group value is the mean over participants with Student’s interval."
             )
         return (
-            "The exponent n of answer ∝ levelⁿ (Stevens 1957) is the least-squares slope of a participant’s mean ln "
-            "answer at each level on ln level, at the levels delivered to the hand; it does not depend on the unit "
-            "that a participant chose. That of the group is the mean over participants with Student’s interval."
+            "The exponent n of answer ∝ levelⁿ (Stevens 1957) is the least-squares slope of a participant’s "
+            "mean ln answer at each level on ln level, at the levels delivered to the hand; it does not depend "
+            "on the unit that a participant chose. The group value is the mean over participants with "
+            "Student’s interval."
         )
 
     def compares(self, measure: str) -> bool:

@@ -281,8 +281,8 @@ def _equivalence_curves(block: Planned, counts: Counts, studies: int) -> Iterato
 
 OF_BLOCK: Final = (
     Column("study", "text", "Short name of the study, from its protocol."),
-    Column("simulated", "flag", "true: all of these answers come from a model, none from people."),
-    Column("block", "text", "Id of the block of trials."),
+    Column("simulated", "flag", "true: all answers come from a model, not from people."),
+    Column("block", "text", "ID of the block of trials."),
 )
 OF_STUDIES: Final = (
     Column("participants", "integer", "Participants of each study.", minimum=2),
@@ -293,18 +293,24 @@ OF_STUDIES: Final = (
 COLUMNS: Final = (
     *OF_BLOCK,
     Column("question", "text", "What is tested."),
-    optional("item", "text", "Id of the statement; n/a where the test is over several."),
-    optional("over", "text", "Over what, where not over one statement."),
-    optional("setting", "text", "The delay that the test is about; n/a where it is about all."),
+    optional("item", "text", "ID of the statement; n/a if the test is over several."),
+    optional("over", "text", "Scope of the test, if it covers more than one statement."),
+    optional("setting", "text", "The delay tested; n/a if the test is about all delays."),
     Column("people", "text", "Kind of the simulated participants."),
     *OF_STUDIES,
-    Column("power", "number", "Share of the studies that show it, under the answer model.", minimum=0, maximum=1),
-    Column("power_low", "number", "Lower end of the 95 % interval of that share (Wilson).", minimum=0, maximum=1),
-    Column("power_high", "number", "Upper end of it.", minimum=0, maximum=1),
+    Column(
+        "power",
+        "number",
+        "Proportion of the studies that detect the effect, under the answer model.",
+        minimum=0,
+        maximum=1,
+    ),
+    Column("power_low", "number", "Lower end of the 95 % interval of that proportion (Wilson).", minimum=0, maximum=1),
+    Column("power_high", "number", "Upper end of that interval.", minimum=0, maximum=1),
     optional(
         "without_effect",
         "number",
-        "The same share where settings do not differ at all: false alarms; of equivalence, its power.",
+        "The same proportion if conditions do not differ: false positives; for equivalence, the power.",
         minimum=0,
         maximum=1,
     ),
@@ -312,14 +318,14 @@ COLUMNS: Final = (
     optional(
         "detectable_points",
         "number",
-        "The smallest difference of mean answers that 80 % of such studies show, in points.",
+        "The smallest difference of mean answers that 80 % of such studies detect, in points.",
     ),
 )
 
 _HEADS: Final[dict[Question, tuple[str, str]]] = {
-    "settings differ": ("Do the settings differ?", "statement"),
-    "trend": ("Do answers follow the delay?", "statement"),
-    "lowest delay": ("Is a trend shown up to this delay, or a shorter one?", "statement, delay"),
+    "settings differ": ("Do the conditions differ?", "statement"),
+    "trend": ("Do answers change with the delay?", "statement"),
+    "lowest delay": ("Is a trend shown up to this delay, or up to a shorter delay?", "statement, delay"),
     "equivalence": ("Is a delay shown to be equivalent to the shortest?", "statement, delay"),
     "contrast": ("Is the hypothesis shown?", "hypothesis"),
 }
@@ -365,7 +371,7 @@ def power_markdown(found: Powers) -> str:
                 lines += ["", f"## {block.title}: {head[:1].lower()}{head[1:]}", "", *_explained(question, found), ""]
                 lines += _markdown_table(curves, found, first, lambda curve, at: f"{curve.power[at]:.0%}", needed=True)
             if any(one.detectable for one in curves):
-                lines += ["", "The smallest difference of mean answers that 80 % of studies show, in points:", ""]
+                lines += ["", "The smallest difference of mean answers that 80 % of studies detect, in points:", ""]
                 lines += _markdown_table(
                     [one for one in curves if one.detectable],
                     found,
@@ -379,19 +385,20 @@ def _preface(found: Powers) -> list[str]:
     decided = found.plan.decided
     low, high = interval(WANTED, found.studies)
     of_looks = ", ".join(f"{n}: {level:.2g}" for n, level in zip(decided.looks, decided.alphas, strict=False))
-    looks = f" of all looks ({of_looks}), found at a look or an earlier one" if of_looks else ""
+    looks = f" of all looks ({of_looks}), detected at a look or an earlier look" if of_looks else ""
     lines = [
-        f"**SIMULATED.** {found.studies} studies of each size were answered by the rehearsals' answer model (seed "
-        f"{found.seed}, liquid-study {__version__}), whose effects are plausible and not measured: real "
-        "effects may be smaller. Read the tables of the smallest detectable difference together with those of power.",
+        f"**SIMULATED.** {found.studies} studies of each size were simulated with the rehearsals' answer model "
+        f"(seed {found.seed}, liquid-study {__version__}), whose effects are plausible but not measured: real "
+        "effects may be smaller. Read the tables of the smallest detectable difference together with the tables of "
+        "power.",
         "",
-        f"Tests at α = {decided.alpha:g}{looks}; p from {PLANNED_DRAWS} random rearrangements of each participant's "
-        "answers. Statements that the protocol calls primary are corrected by Holm, the others by Benjamini and "
-        f"Hochberg. Effects of {EFFECTS[1]:g} to {EFFECTS[-1]:g} times the model's were tried. A power of 80 % is "
-        f"uncertain by ±{50 * (high - low):.1f} percentage points.",
+        f"Tests at α = {decided.alpha:g}{looks}; p values use {PLANNED_DRAWS} random permutations of each "
+        "participant's answers. Primary statements are corrected by Holm, the others by Benjamini and "
+        f"Hochberg. Effects of {EFFECTS[1]:g} to {EFFECTS[-1]:g} times the model's were tried. A power of 80 % "
+        f"is uncertain by ±{50 * (high - low):.1f} percentage points.",
         "",
-        f"Numbers are for {_people(next(iter(found.kinds)))}, and in parentheses the lowest and the highest of all "
-        "kinds of people: "
+        f"Numbers are for {_people(next(iter(found.kinds)))}, with the lowest and the highest over all kinds of "
+        "people in parentheses: "
         + "; ".join(f"**{kind}**: {people.described()}" for kind, people in found.plan.kinds.items())
         + f". {SOURCES}",
     ]
@@ -399,25 +406,25 @@ def _preface(found: Powers) -> list[str]:
         lines += ["", f"**Ended early: {found.studies} of {found.asked} studies.**"]
     if found.plan.unknown:
         named = ", ".join(found.plan.unknown)
-        lines += ["", f"The model knows nothing of {named}: no effect is simulated there, and what is found is chance."]
+        lines += ["", f"The model does not know {named}: effects are not simulated there, so detections are chance."]
     lines += [
         line
         for block in found.plan.blocks
         if block.groups
         for line in (
             "",
-            f"{block.title}: n counts participants of {' and '.join(block.groups)}; no other group has it.",
+            f"{block.title}: n counts participants of {' and '.join(block.groups)}; other groups do not have it.",
         )
     ]
     return lines
 
 
 SOURCES: Final = (
-    "Consistent, typical and noisy people have values from published ratings, in points of a seven-point scale: a "
-    "trained panel (data TVbo, R package lmerTest, Kuznetsova, Brockhoff and Christensen 2017; medians over 15 "
-    "attributes); panelists who rated chocolates (data sensochoc, R package SensoMineR, Lê and Husson 2008; medians "
-    "over 14 descriptors); and the largest of the latter 14 values. Noise: SD between equal trials; slopes: SD between "
-    "people of their effects, as a share of the mean effect."
+    "Consistent, typical and noisy people have values from published ratings, in points of a seven-point "
+    "scale: a trained panel (data TVbo, R package lmerTest, Kuznetsova, Brockhoff and Christensen 2017; "
+    "medians over 15 attributes); panelists who rated chocolates (data sensochoc, R package SensoMineR, Lê and "
+    "Husson 2008; medians over 14 descriptors); and the largest of the latter 14 values. Noise: SD between "
+    "equal trials; slopes: SD between people of their effects, relative to the mean effect."
 )
 """Where the values of `raters.PUBLISHED` come from."""
 BEYOND: Final = "beyond"
@@ -445,8 +452,8 @@ def _summary(found: Powers) -> Iterator[str]:
             shares = dict(zip(found.kinds, (one.power[place] for one in found.among_kinds(curve)), strict=True))
             about = "" if curve.question == "contrast" else f" ({HEADS[curve.question]})"
             lines.append(
-                f"- {_name(curve, found).strip('*')}{about}: {shares[CONSISTENT]:.0%} of studies find it if people are "
-                f"{CONSISTENT}, {shares[main]:.0%} if {main}, and {shares[NOISY]:.0%} if {NOISY}."
+                f"- {_name(curve, found).strip('*')}{about}: {shares[CONSISTENT]:.0%} of studies detect it if "
+                f"people are {CONSISTENT}, {shares[main]:.0%} if {main}, and {shares[NOISY]:.0%} if {NOISY}."
             )
     if lines:
         yield from ("", f"## Power with {planned}{sizes[place]} participants", "", *lines)
@@ -500,7 +507,7 @@ def smallest_differences(
     difference of a participant that the scale permits, None without a limit.
     """
     equal = [] if bound is None else [f"shown within the bound {IF_EQUAL}"]
-    heads = (first, "participants", "SD", "half the 95 % interval", "smallest difference", *equal)
+    heads = (first, "participants", "SD", "half width of the 95 % interval", "smallest difference", *equal)
     sides, strictest = "two-sided" if one.expected is None else "one-sided", alpha / members
     corrected = "" if members == 1 else f" ({alpha:.2g} over {members} hypotheses)"
     both = "" if shares is None else f" Of the participants {shares[0]:.0%} and {shares[1]:.0%} are in the two groups."
@@ -509,8 +516,8 @@ def smallest_differences(
     within = (
         ""
         if bound is None
-        else f" Equality takes at least {fewest(alpha / bounds, bound, largest)} participants"
-        f"{' in each group' if shares else ''}, at α = {alpha / bounds:.2g}."
+        else f" Equivalence requires at least {fewest(alpha / bounds, bound, largest)} "
+        f"participants{' in each group' if shares else ''}, at α = {alpha / bounds:.2g}."
     )
     yield f"{said}{both} Smallest difference: what {WANTED:.0%} of studies show {at}.{within} {LEFT_OUT}"
     yield from ("", f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|")
@@ -582,26 +589,27 @@ def _truly_equal(curves: Sequence[Curve]) -> list[Curve]:
 def _explained(question: Question, found: Powers) -> list[str]:
     match question:
         case "settings differ":
-            return ["Friedman's permutation test, or signed ranks where two settings are compared."]
+            return ["Friedman's permutation test, or Wilcoxon's signed-rank test for two conditions."]
         case "trend":
             by = TRENDS[found.plan.decided.trends]
-            return [f"A trend by {by}, one-sided where the protocol states a direction."]
+            return [f"A trend by {by}, one-sided if the protocol states a direction."]
         case "lowest delay":
             return [
-                "Rank correlations are tested again without the longest delay, as long as a trend shows: what is found "
-                "bounds the noticeable delay from above."
+                "Rank correlations are tested again without the longest delay while there is a trend; the "
+                "result is an upper bound of the noticeable delay."
             ]
         case "equivalence":
             bound = found.plan.decided.equivalence_bound or STEPS
             return [
                 f"Two one-sided t tests within ±{bound} points, with which the bootstrap must agree, and with "
-                f"{enough(found.plan.decided.alphas[-1], bound)}. Where the model's difference is near the bound or "
-                "beyond it, finding equivalence would be wrong, and few should."
+                f"{enough(found.plan.decided.alphas[-1], bound)}. If the model's difference is near the bound "
+                "or beyond it, a finding of equivalence is wrong, so few studies should find it."
             ]
         case "contrast":
             return [
-                "Paired t tests of each participant's mean answers, with which the bootstrap must agree, by Holm over "
-                f"the hypotheses; equality by the report's tests of equivalence. {LEFT_OUT}"
+                "Paired t tests of each participant's mean answers, with which the bootstrap must agree, "
+                "corrected by Holm over the hypotheses; equivalence by the report's equivalence tests. "
+                f"{LEFT_OUT}"
             ]
 
 

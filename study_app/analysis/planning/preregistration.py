@@ -213,17 +213,19 @@ def analyses(protocol: Protocol) -> Iterator[str]:
             )
             if plan.standards > 1:
                 yield (
-                    f"Block {block.id}, exponent: the slope of ln JND over ln standard of each participant, with "
+                    f"Block {block.id}, exponent: the slope of ln JND on ln standard for each participant, with "
                     "Student's interval."
                 )
         elif block.design is not None and block.stimulus is not None:
             yield (
-                f"Block {block.id}: we report the mean over participants of their mean answers at each level, with "
-                "Student's 95 % interval (of logarithms if numbers are estimated; the exponent is the slope over the "
-                "logarithm of the level)."
+                f"Block {block.id}: we report the mean over participants of their mean answers at each level, "
+                "with Student's 95 % interval (of logarithms if numbers are estimated; the exponent is the "
+                "slope on the logarithm of the level)."
             )
             if design_of(protocol, block).reply == "rating":
-                yield f"Block {block.id}: d_a of each level against the lowest, from the area under the ROC curve."
+                yield (
+                    f"Block {block.id}: d_a of each level relative to the lowest, from the area under the ROC curve."
+                )
         elif block.design is not None:
             yield f"Block {block.id}: d′ of each participant, from rates with the log-linear correction."
     asked = [block for block in protocol.main_blocks if block.design is None and block.questionnaire is not None]
@@ -278,7 +280,7 @@ def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = 
         f"# Preregistration: {text_in(study.title, language)}",
         "",
         f"Study {study.name}, version {study.version}; protocol file with SHA-256 `{protocol_hash}`. Written by "
-        f"liquid-study {__version__} from this file alone. Register it before the first session.",
+        f"liquid-study {__version__} only from this file. Register it before the first session.",
         "",
         "## Hypotheses and questions",
         "",
@@ -364,7 +366,7 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
     wanted = (
         ""
         if one.precision is None
-        else f" The aim is a 95 % interval of the group mean within ±{percent(one.precision)}."
+        else f" The goal is a 95 % interval of the group mean within ±{percent(one.precision)}."
     )
     yield planned + wanted
     reasons = []
@@ -378,7 +380,7 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
             people = number_text.counted(one.participants, "participant")
             reached = f" With {people} the expected precision is ±{half:.0f} %."
         needed = None if one.precision is None else found.participants_for(one.precision)
-        enough = "" if needed is None else f" The aim needs at least {number_text.counted(needed, 'participant')}."
+        enough = "" if needed is None else f" This goal needs at least {number_text.counted(needed, 'participant')}."
         reasons.append(
             f"- Block {block.id}: we simulated {found.trials} trials{plan.per}, with thresholds that differ between "
             f"people by a factor of {BETWEEN_PEOPLE:g}.{reached}{enough}"
@@ -450,11 +452,14 @@ def _differences(study: Study, sites: Mapping[str, Commitment | None], committed
     """Yield where a study, or a site's preregistration, differs from what was committed to."""
     for site, own in sites.items():
         if own is None:
-            yield f"site {site} has no {FILE}"
+            yield f"site {site} does not have {FILE}"
         elif own != committed:
-            yield f"the preregistration of site {site} is another one than that of the first site, used here"
+            yield (
+                f"the preregistration of site {site} differs from the preregistration of the first site, "
+                "which is used here"
+            )
     if study.name != committed.study:
-        yield f"the preregistration is that of another study, {committed.study}"
+        yield f"the preregistration belongs to another study, {committed.study}"
     rows = study.participants
     other = rows[rows["counted"] & (rows["protocol_hash"] != committed.protocol_hash)]
     if len(other):
@@ -468,9 +473,11 @@ def _differences(study: Study, sites: Mapping[str, Commitment | None], committed
     yield from _other_participants(study, committed.participants)
     by_person = [one for one in study.exclusions if one.rule_or_person not in committed.rules]
     for one in by_person[:SHOWN]:
-        yield f"an exclusion by no preregistered rule: {describe_exclusion(one)}: {one.reason} ({one.rule_or_person})"
+        yield (
+            f"an exclusion without a preregistered rule ({describe_exclusion(one)}; {one.reason}; {one.rule_or_person})"
+        )
     if len(by_person) > SHOWN:
-        yield f"{len(by_person) - SHOWN} more exclusions by no preregistered rule, in report.json"
+        yield f"{len(by_person) - SHOWN} more exclusions without a preregistered rule are in report.json"
     if study.decided.changed:
         yield "the decisions about the analysis differ between sessions: all results are exploratory"
 
@@ -489,7 +496,8 @@ def deviations_section(study: Study) -> Iterator[str]:
     yield heading(2, "Preregistration")
     if (committed := compared.commitment) is None:
         yield paragraph(
-            f"The study's folder has no {FILE}. Compared with the protocol's planned number of participants:"
+            f"The study's folder does not contain {FILE}. Comparison with the protocol's planned number of "
+            "participants:"
         )
     else:
         yield paragraph(
@@ -497,11 +505,11 @@ def deviations_section(study: Study) -> Iterator[str]:
             f"{committed.protocol_hash}."
         )
     if compared.found:
-        yield paragraph("The study differs from it in:")
+        yield paragraph("The study differs from the preregistration in:")
         yield bullets(compared.found)
     else:
         yield paragraph(
-            "No difference was found in protocol, number of participants, exclusions or decisions."
+            "There was no difference in protocol, number of participants, exclusions or decisions."
             if compared.commitment is not None
             else "As many participants as planned."
         )

@@ -58,9 +58,9 @@ class PrecisionResult:
     """What studies of one block found with so many trials for each standard.
 
     ``errors`` are of each study the errors of the participants' thresholds, (people, standards), in natural logarithms;
-    as shares of the threshold on linear spacing, of the mean d′, d_a or exponent. ``halves`` are half the group's 95 %
-    interval as a share of the mean, (sizes,); NaN below three participants, infinite where limits clip the levels above
-    the mean threshold.
+    as shares of the threshold on linear spacing, of the mean d′, d_a or exponent. ``halves`` are half the
+    group's 95 % interval as a share of the mean, (sizes,); NaN below three participants, infinite where limits clip
+    the levels above the mean threshold.
     """
 
     errors: list[Array] = field(default_factory=list)
@@ -216,26 +216,26 @@ COLUMNS: Final = (
     Column(
         "trials",
         "integer",
-        "Trials of each standard, comparison or rated level; of magnitude estimation, all.",
+        "Number of trials per standard, comparison or rated level; for magnitude estimation, of all trials.",
         minimum=1,
     ),
     *OF_STUDIES,
     optional(
         "spread",
         "number",
-        "Standard deviation of the logarithm of one participant's threshold; of d′, d_a and exponents, as a share of "
-        "them; empty where limits clip the levels.",
+        "Standard deviation of the logarithm of one participant's threshold; for d′, d_a and exponents, "
+        "relative to their value; empty if limits clip the levels.",
         minimum=0,
     ),
     optional(
         "half_interval",
         "number",
-        "Half the 95 % interval of the group's mean, as a share of it: median of the studies.",
+        "Half width of the 95 % interval of the group mean, relative to the mean (median of the studies).",
         minimum=0,
     ),
-    optional("precision", "number", "The planned half interval; n/a: none.", minimum=0),
-    optional("within", "number", "Share of the studies that reach it.", minimum=0, maximum=1),
-    optional("within_low", "number", "Lower end of the share's 95 % interval.", minimum=0, maximum=1),
+    optional("precision", "number", "The planned half width; n/a if none is planned.", minimum=0),
+    optional("within", "number", "Proportion of the studies that reach it.", minimum=0, maximum=1),
+    optional("within_low", "number", "Lower end of the proportion's 95 % interval.", minimum=0, maximum=1),
     optional("within_high", "number", "Upper end of it.", minimum=0, maximum=1),
 )
 
@@ -303,7 +303,7 @@ def threshold_markdown(precisions: Precisions) -> str:
     if precisions.studies < precisions.asked:
         lines += ["", f"**Ended early: {precisions.studies} of {precisions.asked} studies.**"]
     wanted = [] if precision is None else [f"studies within ±{100 * precision:g} %"]
-    heads = ["participants", "SD of one participant", "half the group's 95 % interval", *wanted]
+    heads = ["participants", "SD of one participant", "half width of the group's 95 % interval", *wanted]
     planned = plans(precisions.protocol, ())
     blocks = precisions.protocol.blocks
     for block in dict.fromkeys(block for block, _ in precisions.found):
@@ -359,10 +359,10 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
         if not rows:
             continue
         what = one.measure.replace("d_prime", "d′")
-        share = "" if isinstance(first, ThresholdPlan) else f", as a share of a mean {what} of {first.value:g}"
-        whose = f"one participant's {what}, from the error of the estimate and from people, who differ"
+        share = "" if isinstance(first, ThresholdPlan) else f", relative to a mean {what} of {first.value:g}"
+        whose = f"one participant's {what}, from the error of the estimate and differences between people"
         if one.groups is None:
-            whose = "one participant's difference, from the errors of both estimates and from people, who differ in it"
+            whose = "one participant's difference, from the errors of both estimates and differences between people"
         yield from smallest_differences(
             one, precisions.sizes, decisions(precisions.protocol).alphas[-1], len(decided.contrasts), rows,
             f"trials{first.per}",
@@ -399,21 +399,21 @@ def _assumed(plans_of_block: Mapping[int, Plan]) -> str:
     plan = next(iter(plans_of_block.values()))
     if isinstance(plan, ThresholdPlan):
         return (
-            "The people of a study are of one kind; kinds take turns: psychometric functions as wide as the prior's "
-            "median, half, 1.5 and 2.5 times as wide, 2 or 5 % of answers at random, "
-            f"{'a preference for an interval or for the last answer, ' if plan.two_intervals else ''}thresholds that "
-            "fall or rise. The mean of their thresholds is in the middle half of the levels. The group's interval is "
-            "that of the mean over all standards (Hartung–Knapp)."
+            "Each study has people of one kind, and kinds alternate: psychometric functions as wide as the "
+            "prior's median, half, 1.5 and 2.5 times as wide, 2 or 5 % of answers at random, "
+            f"{'a preference for an interval or for the last answer, ' if plan.two_intervals else ''}thresholds "
+            "that fall or rise. The mean of their thresholds is in the middle half of the levels. The group "
+            "interval is the Hartung–Knapp interval for the mean over all standards."
         )
-    group = "The group's interval is that of the mean (Student)."
+    group = "The group interval is Student's t interval for the mean."
     if isinstance(plan, SensitivityPlan):
-        return f"Observers are unbiased, with a mean d′ of {plan.value:g}; SD as a share of it. {group}"
+        return f"Observers are unbiased, with a mean d′ of {plan.value:g}; the SD is relative to it. {group}"
     if isinstance(plan, RatingPlan):
         return (
-            f"Observers have a mean d_a of {plan.value:g} between a level and the lowest, and use all {plan.points} "
-            f"points of the scale about equally often; SD as a share of d_a. {group}"
+            f"Observers have a mean d_a of {plan.value:g} between a level and the lowest, and use all "
+            f"{plan.points} points of the scale about equally often; the SD is relative to d_a. {group}"
         )
     return (
-        f"Observers follow a power law with a mean exponent of {plan.value:g}; ln answers have a standard deviation of "
-        f"{ESTIMATE_NOISE:g}; SD as a share of the exponent. {group}"
+        f"Observers follow a power law with a mean exponent of {plan.value:g}; ln answers have a standard "
+        f"deviation of {ESTIMATE_NOISE:g}; the SD is relative to the exponent. {group}"
     )

@@ -92,7 +92,9 @@ def tost(
         Largest difference of a participant that the scale permits, in points.
     """
     if not (bound > 0.0 and math.isfinite(bound)):
-        raise AnalysisError(f"a bound of equivalence of {bound} means nothing; give one above 0 in points of the scale")
+        raise AnalysisError(
+            f"an equivalence bound of {bound} is not meaningful; give a bound above 0 in points of the scale"
+        )
     array = checked(differences, "participants")
     kept = np.sort(array[~np.isnan(array)])
     found = _compared(tuple(kept.tolist()), float(bound), alpha, seed, largest)
@@ -165,7 +167,7 @@ def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: 
         agrees = by_bootstrap <= alpha, float(further.p_bootstrap(bound)[0]) <= alpha
         found = replace(found, checks_agree=agrees == (max(p_lower, p_upper) <= alpha, beyond))
     verdict: Verdict = "out of reach" if unseen > alpha else "equivalent" if by_tests else "inconclusive"
-    few = f"too few participants to call it equivalent: {fewest(alpha, bound, largest)} are needed"
+    few = f"too few participants to call it equivalent: {fewest(alpha, bound, largest)}are needed"
     note = "" if verdict == "equivalent" else few if by_tests else "equivalence is not shown"
     return replace(
         found,
@@ -190,7 +192,7 @@ def _described(kept: Array, bound: float, alpha: float, largest: float) -> Equiv
     """Return what can be said before any test."""
     n = len(kept)
     people = f"{counted(n, 'participant')}: no spread"
-    reason = f"all {n} differences are equal: no spread for an interval" if n > 1 else people
+    reason = f"all {n} differences are equal, so an interval cannot be computed" if n > 1 else people
     return Equivalence(
         test="equivalence, two one-sided t tests",
         n=n,

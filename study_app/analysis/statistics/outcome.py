@@ -35,8 +35,8 @@ SAMPLES: Final = 1999
 FEW: Final = 10
 """Below so many participants there is no percentile bootstrap interval and no test of slopes."""
 
-TOO_FEW: Final = f"no interval below {FEW} participants: resampling so few covers far less than it claims"
-NO_VARIATION: Final = "no variation: every participant answered alike under all settings"
+TOO_FEW: Final = f"no interval below {FEW} participants: resampling so few has far too low coverage"
+NO_VARIATION: Final = "no variation: every participant gave the same answer in all conditions"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +81,7 @@ def checked(values: ArrayLike, axes: str) -> Array:
     if array.ndim != wanted:
         raise AnalysisError(f"answers of shape {array.shape} cannot be tested; give {wanted} axes: {axes}")
     if np.isinf(array).any():
-        raise AnalysisError("an answer is infinite; give numbers, and NaN for what is missing")
+        raise AnalysisError("an answer is infinite; give numbers, and NaN for missing answers")
     return array
 
 
@@ -182,7 +182,7 @@ def bootstrap(n: int, seed: int | None, sampled: Callable[[Whole], Array], alike
     places (draws, n), NaN where there is none; ``alike`` says why there is no interval where all draws give the same.
     """
     if seed is None:
-        return None, "no interval: none was asked for"
+        return None, "an interval was not requested"
     if n < FEW:
         return None, TOO_FEW
     rng = np.random.default_rng(seed)
@@ -310,5 +310,5 @@ def _known(ps: Sequence[float | None]) -> dict[int, float]:
     known = {member: p for member, p in enumerate(ps) if p is not None}
     for p in known.values():
         if not 0.0 <= p <= 1.0:
-            raise AnalysisError(f"p = {p} cannot be adjusted; give a p between 0 and 1, or None where a test gave none")
+            raise AnalysisError(f"p = {p} cannot be adjusted; give a p between 0 and 1, or None if a test gave none")
     return known

@@ -125,7 +125,7 @@ def recognition(names: ArrayLike, truth: Sequence[int | None], labels: int, *, s
         statistic=float(hits) if n else None,
         p=chance.at_least(hits) if n else None,
         smallest_p=chance.highest if n else None,
-        method="exact permutation of the settings within participants, one-sided",
+        method="exact permutation of the conditions within participants, one-sided",
         effect_name="Cohen's kappa of decided answers",
         effect=effect,
         interval=interval,
@@ -146,7 +146,7 @@ def _names(names: ArrayLike, truth: Sequence[int | None], labels: int) -> Whole:
         raise AnalysisError(f"{given.shape[1]} settings with names, {len(truth)} true names; give as many, 2 to {MOST}")
     if not np.isin(given, _columns(labels)).all() or not {*truth} <= {None, *range(labels)}:
         raise AnalysisError(
-            f"a name is none of {labels} labels; give places 0 to {labels - 1}, -1 undecided, -2 missing"
+            f"a name is not among the {labels} labels; give positions 0 to {labels - 1}, -1 undecided, -2 missing"
         )
     return given.astype(np.int64)
 
@@ -180,13 +180,13 @@ def _kappa(given: Whole, right: Whole, labels: int, seed: int | None) -> tuple[f
     tables = tables[used.any(axis=1)]
     whole = float(kappa(tables.sum(axis=0)))
     if math.isnan(whole):
-        why = "no variation: always the same name for the same thing" if used.any() else "nothing was named"
+        why = "no variation: always the same name for the same liquid" if used.any() else "nothing was named"
         return None, None, f"no interval: {why}"
 
     if seed is None:
         return whole, None, "no interval: none was asked for"
     if (n := len(tables)) < 2:
-        return whole, None, "no interval: the answers of one participant"
+        return whole, None, "no interval: there is only one participant"
     correct, decided = np.trace(tables, axis1=1, axis2=2), tables.sum(axis=(1, 2))
     weights = np.random.default_rng(seed).standard_exponential((SAMPLES, n + 1))
     further = weights[:, n] * decided.max()
@@ -197,7 +197,10 @@ def _kappa(given: Whole, right: Whole, labels: int, seed: int | None) -> tuple[f
         (float(np.quantile(shares / all_decided, end)) - expected) / (1.0 - expected)
         for shares, end in ((lowest, 0.025), (highest, 0.975))
     )
-    method = "bootstrap over participants with a further one who is always incorrect, or always correct (Gaffke 2005)"
+    method = (
+        "bootstrap over participants with one additional participant who is always incorrect, or always "
+        "correct (Gaffke 2005)"
+    )
     return whole, Interval(low=low, high=high, level=0.95, method=method), ""
 
 
@@ -243,9 +246,9 @@ def _p_more_often(named: Flags, named_other: Flags, answered: Flags) -> float:
 
 def _note(n: int, undecided: int, smallest: float) -> str:
     if n == 0:
-        return "no participant rated all labels of a setting"
+        return "none of the participants rated all labels in any condition"
     if smallest == 1.0:
-        return "no variation: every participant gave all settings the same name or none"
+        return "no variation: every participant gave all conditions the same name or none"
     if undecided:
         return f"{undecided} undecided answer{'s count' if undecided > 1 else ' counts'} as incorrect"
     return ""

@@ -102,7 +102,10 @@ def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
         interval = None
         if lower is not None and upper is not None:
             interval = Interval(
-                low=lower, high=upper, level=SURE, method="posterior density, scaled for participants who differ"
+                low=lower,
+                high=upper,
+                level=SURE,
+                method="posterior density, scaled for differences between participants",
             )
         note = "; ".join(_remarks(order, lower, upper, len(yes), dispersion))
         found = {
@@ -138,8 +141,8 @@ def _impossible(levels: Array, yes: Array, asked: Array) -> str:
     if len(levels) < 3:
         return "fewer than three levels were answered"
     if not yes.any():
-        return f"no participant noticed anything up to {levels.max():g}: the threshold lies above, or there is none"
-    return "everybody noticed something at every level" if (yes == asked).all() else ""
+        return f"no participant noticed anything up to {levels.max():g}: the threshold lies above it, or does not exist"
+    return "all participants noticed something at every level" if (yes == asked).all() else ""
 
 
 def _pooled(levels: Array, yes: Array, asked: Array) -> tuple[Posterior, float, tuple[float | None, float | None]]:
@@ -215,26 +218,29 @@ def _outside(levels: Array, threshold: float, lower: float | None, upper: float 
     if not low <= threshold <= high:
         return f"the fitted threshold lies outside the levels that were presented ({low:g} to {high:g})"
     if not any(end is not None and low <= end <= high for end in (lower, upper)):
-        return f"no end of the interval of the threshold lies among the levels presented ({low:g} to {high:g})"
+        return f"both ends of the threshold's interval lie outside the levels presented ({low:g} to {high:g})"
     return ""
 
 
 def _remarks(levels: Array, lower: float | None, upper: float | None, people: int, dispersion: float) -> Iterator[str]:
     """Yield what must be said with a threshold."""
     if any(end is not None and not levels[0] <= end <= levels[-1] for end in (lower, upper)):
-        yield "the interval reaches beyond the levels that were presented, where the function's shape alone gives it"
+        yield (
+            "the interval reaches beyond the levels that were presented, where it depends only on the shape "
+            "of the function"
+        )
     if people == 1:
-        yield "the answers of one participant: the interval is about this person alone"
+        yield "the answers come from one participant, so the interval applies only to this person"
     else:
         yield (
-            "answers of all participants are pooled, and the interval includes how far participants differ (they vary "
-            f"{dispersion:.1f} times as much as independent answers)"
+            "answers of all participants are pooled, and the interval includes differences between "
+            f"participants (they vary {dispersion:.1f} times as much as independent answers)"
         )
 
 
 def _open(lower: float | None, upper: float | None) -> str:
     side = "on both sides" if lower is None and upper is None else "below" if lower is None else "above"
-    return f"no interval: the answers leave it open {side}"
+    return f"no interval: the answers do not bound it {side}"
 
 
 SETS: Final = 999

@@ -99,7 +99,7 @@ def trend(values: ArrayLike, direction: Direction | None = "increasing", *, seed
         direction=direction,
     )
     if not n or (ranks == k + 1).all():
-        note = "no participant answered under all settings" if n == 0 else NO_VARIATION
+        note = "none of the participants answered in all conditions" if n == 0 else NO_VARIATION
         return replace(found, no_interval=note, note=note)
     side: Alternative = "two-sided" if direction is None else "greater"
     away = scores - middle
@@ -116,7 +116,9 @@ def trend(values: ArrayLike, direction: Direction | None = "increasing", *, seed
         effect=float(correlations.mean()),
         interval=interval,
         no_interval=reason,
-        note="" if p_page is None else f"Page's p, of no participant having a trend: {p_value(p_page)}",
+        note=""
+        if p_page is None
+        else f"Page's p for the hypothesis that no participant has a trend: {p_value(p_page)}",
         p_page=p_page,
     )
 
@@ -133,7 +135,7 @@ def step_down(
     array = checked(values, "participants, delays")
     if len(delays_ms) != array.shape[1] or any(a >= b for a, b in pairwise(delays_ms)):
         raise AnalysisError(
-            f"delays {list(delays_ms)} ms do not go up one by one for {array.shape[1]} columns of answers"
+            f"delays {list(delays_ms)} ms do not increase one by one for {array.shape[1]} columns of answers"
         )
     rows, dropped = complete(array, at_least=2, why=" for a trend")
     steps: list[Step] = []
@@ -151,11 +153,11 @@ def _note(first: Step, lowest: float | None) -> str:
     if lowest is None:
         return (
             f"no trend was shown up to {first.longest_ms:g} ms with {counted(first.trend.n, 'participant')}; "
-            "that is not evidence that there is none"
+            "this does not show that there is none"
         )
     return (
         f"{lowest:g} ms is an upper bound: the lowest delay at which the answers of "
-        f"{counted(first.trend.n, 'participant')} show a trend; shorter delays may be noticed too"
+        f"{counted(first.trend.n, 'participant')} show a trend; participants may also notice shorter delays"
     )
 
 

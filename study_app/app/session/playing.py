@@ -86,7 +86,7 @@ class PlayedSession(LiveSession):
             if not bridge.runner.finished:
                 bridge.runner.post(EndRequested(bridge.parts.clock(), "aborted", STOPPED))
         except StudyError as error:  # it stays unfinished
-            log.warning("the played session has no end: %s", error)
+            log.warning("the played session does not have an end: %s", error)
         finally:
             bridge.leave_without_asking()
 

@@ -12,6 +12,7 @@ from study_app.designer.document.fields import (
     counted_elements,
     element_noun,
     label_of,
+    name_label,
     named_at,
     refused_at,
     row_at,
@@ -92,7 +93,7 @@ def title_of(document: Mapping[str, Any], path: Path) -> str:
     if isinstance(path[-1], int) and "id" not in value:
         texts = [text for held in value.values() for text in (held if isinstance(held, tuple | list) else (held,))]
         return ", ".join([text for text in texts if isinstance(text, str)][:NAMED]) or str(path[-1] + 1)
-    return label_of(str(value.get("id", path[-1])))
+    return name_label(str(value.get("id", path[-1])))
 
 
 def study_title(document: Mapping[str, Any]) -> str:

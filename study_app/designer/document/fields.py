@@ -371,31 +371,91 @@ _OF_LENGTHS: Final = {
 _SENTENCES: Final = re.compile(r"((?:[a-z_0-9-]+, )*[a-z_0-9-]+): ([^;]+?)(?:; |\.?\Z)")
 
 
+KIND_LABELS: Final = {
+    "2ifc": "2IFC",
+    "3ifc": "3IFC",
+    "4ifc": "4IFC",
+    "abx": "ABX",
+    "estimation": "Magnitude estimation",
+    "questplus": "QUEST+",
+    "samedifferent": "Same–different",
+    "updown": "Up–down staircase",
+    "yesno": "Yes/no",
+}
+"""Labels of designs and methods, also of elements named after them."""
 LABELS: Final = {
+    **KIND_LABELS,
+    "1down1up": "1-down 1-up",
+    "2down1up": "2-down 1-up",
+    "3down1up": "3-down 1-up",
+    "4down1up": "4-down 1-up",
+    "alpha": "Significance level (alpha)",
+    "begin": "First level",
     "between_s": "Between trials",
     "bias_sd": "Response bias (SD)",
     "block_order": "Order of blocks",
     "break_every": "Trials between breaks",
+    "catch": "Catch trials",
     "code_prefix": "Letter of blind codes",
     "contrasts": "Hypotheses",
+    "count": "Number of targets",
     "damping_nspm": "Viscosity (damping)",
     "delay_ms": "Visual delay",
     "design": "Trial design",  # a study has a design, too
     "designs": "Trial designs",
+    "double": "Double-blind",
+    "dwell_s": "Dwell time",
+    "ewma": "EWMA",
+    "expected": "Expected direction",
+    "fade_s": "Fade-in",
+    "falling": "Decreasing with delay",
     "feedback_s": "Feedback duration",
+    "go_on": "Continue",
     "group_assignment": "Assignment to groups",
+    "id": "ID",
+    "intro": "Introduction",
+    "latin": "Latin square",
+    "lead_s": "Lead-in",
     "level_error_ms": "Level error of delays",
+    "log": "Logarithmic",
+    "looks": "Interim analyses",
+    "max_repeats": "Maximum repeats in a row",
+    "max_s": "Maximum duration",
+    "min_distance": "Minimum distance between repeats",
+    "min_s": "Minimum duration",
+    "missed": "If not reached",
+    "missing_percent": "Missing trials",
+    "most_s": "Maximum duration",
+    "names": "Recognition questions",
     "noise_sd": "Noise (SD)",
+    "noise_share": "Noise trials",
+    "non_newtonian": "Non-Newtonian",
+    "noticed": "Detection question",
     "obrien-fleming": "O’Brien–Fleming",
     "participants": "Participants planned",
+    "primary": "Primary questions",
+    "pse": "PSE",
     "replicates": "Equal conditions as one",
+    "rising": "Increasing with delay",
     "sequence": "Session order",
     "setting_label": "Neutral name of trials",
+    "short": "Short label",
+    "show_if": "Display condition",
+    "single": "Single-blind",
     "slope_sd": "Slopes (SD)",
+    "spending": "Alpha spending",
+    "stop": "Stopping rule",
+    "trends": "Trend test",
+    "until": "Criterion",
+    "url": "URL",
     "vary": "Varied quantity",
-    "wrong_most": "Most wrong catch trials",
+    "weber": "Weber fraction",
+    "whole": "Whole numbers only",
+    "williams": "Williams design",
+    "withheld_percent": "Force held back",
+    "wrong_most": "Maximum wrong catch trials",
 }
-"""Labels of keys and values whose names are unclear or ambiguous, without their unit."""
+"""Labels of keys and values whose names are unclear, without their unit; sources in `docs/glossary.md`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -594,6 +654,11 @@ def label_of(step: str | int) -> str:
     return plain.replace("_", " ").strip().capitalize()
 
 
+def name_label(name: str) -> str:
+    """Return an ID in words: "Thick honey" for ``thick_honey``."""
+    return KIND_LABELS.get(name, name.replace("_", " ").strip().capitalize())
+
+
 def unit_of(key: str) -> str:
     """Return the unit at the end of a key, "" if it has none."""
     return UNITS.get(_unit_suffix(key), "")
@@ -696,7 +761,7 @@ def _initial_text(document: Mapping[str, Any], path: Path, node: Node, *, locali
         used = {letter for _, letter in entries(document, f"{path[0]}.*.{path[-1]}")}
         return next((letter for letter in string.ascii_uppercase if letter not in used), "Z")
     name = around.get("id", path[-2]) if isinstance(around, Mapping) else path[-2]
-    text = new_text(path[-3]) if isinstance(name, int) else f"New {label_of(str(name)).lower()}"
+    text = new_text(path[-3]) if isinstance(name, int) else f"New {name_label(str(name)).lower()}"
     return _in_languages(document, text) if localised else text
 
 

@@ -414,7 +414,7 @@ class FormHead(QWidget):
         self.ask.hide()
         self.asks = QMenu(self)
         self.asks.setFont(font("label"))
-        self.id = TypedLine("Id")
+        self.id = TypedLine("ID")
         self.id.setMinimumWidth(110)
         self.id.setMaximumWidth(230)
         self.id.rests = False
@@ -440,7 +440,7 @@ class FormHead(QWidget):
             grid, hbox(self.ask, self.feel, self.series, self.up, self.down, self.copy, self.delete, spacing=8), 0, 2
         )
         self.id_line = QWidget()
-        words_of_id = label("Id", "label")
+        words_of_id = label("ID", "label")
         words_of_id.setFixedWidth(LABEL_PX)
         parts = (words_of_id, (self.id, 8), self.unlock, (self.used, 1))
         hbox(*parts, spacing=8, margins=(0, 4, 0, 0), parent=self.id_line)

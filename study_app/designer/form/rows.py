@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Final
 
-from study_app.designer.document.fields import Choice, Row, element_noun, label_of
+from study_app.designer.document.fields import Choice, Row, element_noun, label_of, name_label
 from study_app.designer.document.steps import Request
 from study_app.designer.document.study import Study
 from study_app.protocol.source.document import Path, value_at
@@ -75,7 +75,7 @@ def _show_if_note(item: Mapping[str, Any], numbers: Mapping[str, int]) -> str:
     if not isinstance(rule, Mapping):
         return ""
     name, values = str(rule.get("item")), rule.get("is", ())
-    labels = [label_of(str(value)) for value in (values if isinstance(values, tuple) else (values,))]
+    labels = [name_label(str(value)) for value in (values if isinstance(values, tuple) else (values,))]
     limits = [f"{label_of(key).lower()} {rule[key]:g}" for key in ("at_least", "at_most")
               if isinstance(rule.get(key), int | float)]  # fmt: skip
     return f"shown if {numbers.get(name, name)} is {' or '.join(labels) if labels else ' and '.join(limits)}"

@@ -355,7 +355,7 @@ class Feeling(QObject):
             return
         names = _liquids(protocol, path)
         if not names:
-            self.place.message.emit("It cannot be opened in the lab", "It has no liquid.")
+            self.place.message.emit("It cannot be opened in the lab", "It does not contain a liquid.")
             return
         titled = [
             (title_of(study.document, ("liquids", name)), protocol.scene_of(name)) for name in (names[0], names[-1])

@@ -112,7 +112,7 @@ class LivePage(Coloured, QGraphicsView):
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setRenderHints(QPainter.RenderHint.SmoothPixmapTransform | QPainter.RenderHint.TextAntialiasing)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAccessibleDescription(f"{LEAVES}, and so does Tab after its last control.")
+        self.setAccessibleDescription(f"{LEAVES}; Tab after the last control does the same.")
         self.setMinimumHeight(120)
         self.setTransformationAnchor(QGraphicsView.ViewportAnchor.NoAnchor)
         self.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)

@@ -213,8 +213,8 @@ def _measure_damping(
 def _measure_gain(stand: Stand, lasts: Durations, ask: Ask, progress: Callable[[str], object]) -> Gain | None:
     """Push down on a scale, and ask for its reading."""
     request = (
-        "Rest the handle on a kitchen scale, near the middle of its range, and set the scale to zero. If you have no "
-        "scale, type 'no'."
+        "Rest the handle on a kitchen scale, near the middle of its range, and set the scale to zero. Without "
+        "a scale, type 'no'."
     )
     if _wait_for_answer(stand, ask("scale", request)).lower().startswith("n"):
         progress("Force against a scale: omitted.")

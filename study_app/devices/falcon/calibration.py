@@ -138,7 +138,9 @@ def _solve(geometry: mechanics.Geometry, offset_rad: float, counts: Any, pulled_
         mechanics.angles(mechanism, count, theta)
         place_m[:] = mechanics.START_M
         if mechanics.forward(mechanism, theta, place_m) != mechanics.REACHED:
-            raise DeviceError(f"pose {row + 1}: encoders {count.astype(int).tolist()} are no pose of {geometry.name!r}")
+            raise DeviceError(
+                f"pose {row + 1}: encoders {count.astype(int).tolist()} are not a possible pose of {geometry.name!r}"
+            )
         mechanics.jacobian(mechanism, theta, place_m, rates)
         pushed[row] = -rates.T @ held[row]
     down = np.tile([0.0, -1.0, 0.0], len(counts))

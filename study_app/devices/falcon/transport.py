@@ -466,10 +466,10 @@ def probe(usb: Any = None, platform: str = sys.platform) -> Backend:
 
 def probe_ftdi(d2xx: Any = None, platform: str = sys.platform) -> Backend:
     """Return whether FTDI's driver can be used on a platform, with its library or the one that loads."""
-    can = "the same, where FTDI's or Novint's driver is bound to it; taken by itself where libusb may not open it"
+    can = "the same, if FTDI's or Novint's driver is bound to it; used automatically if libusb cannot open it"
     if platform != "win32":
         return Backend(
-            "falcon", "ftd2xx", state=NOT_AVAILABLE, can=can, why="for Windows alone, where drivers keep libusb out"
+            "falcon", "ftd2xx", state=NOT_AVAILABLE, can=can, why="only for Windows, if drivers block libusb"
         )
     try:
         load_d2xx() if d2xx is None else d2xx

@@ -126,8 +126,8 @@ CANNOT_OPEN: Final = {
     "win32": "another program holds it: close it, and 3DxWare",
 }
 _NO_MOTION_INTERFACE: Final = (
-    "is connected, but has no interface that reports motion (usage page 1, usage 8): switch the mouse itself on and "
-    "pair it, or use its cable"
+    "is connected, but does not have an interface that reports motion (usage page 1, usage 8): switch the "
+    "mouse itself on and pair it, or use its cable"
 )
 
 

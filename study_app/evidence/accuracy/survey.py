@@ -159,13 +159,13 @@ _HEADINGS: Final = (
     "drag laws differ by", "strokes, known velocity", "strokes, estimated velocity", "ns per tick",
 )  # fmt: skip
 _WHAT: Final = (
-    "Errors: RMS of the error over RMS of the force, the greatest of several references, with velocities known. "
-    "Creeping flow: at Re 0.01. Steady drag: against experiments. Fluid solver: at 1 kHz; unsteady drag meets each "
-    "motion with constants that are fitted to the other motions. Solved up to: the speed at Re {:.3g}, the greatest of "
-    f"a solved motion, or the scene's greatest speed. Above Re {NO_REFERENCE_REYNOLDS:g} there is no reference for "
-    "unsteady motion, and steady drag is as uncertain as published laws of it differ. "
-    "Strokes: at the scene's greatest speed and acceleration, against the laws themselves, with velocities known and "
-    "with those of the scene's estimator from encoder counts, after limits. Below, drag coefficients by each law."
+    "Errors are the RMS error divided by the RMS force, for the worst of several references, at known velocities. The "
+    "references are creeping flow at Re 0.01, experiments on steady drag, and a fluid solver at 1 kHz; unsteady drag "
+    "predicts each motion with constants fitted to the other motions. Motions are solved up to Re {:.3g}, or up to the "
+    f"scene's greatest speed. Above Re {NO_REFERENCE_REYNOLDS:g} there is no reference for unsteady motion, and the "
+    "uncertainty of steady drag is the difference between its published laws. "
+    "Strokes are compared with the laws at the scene's greatest speed and acceleration, with known velocities and "
+    "with velocities of the scene's estimator from encoder counts, after limits. Below, drag coefficients by each law."
 )
 
 

@@ -123,7 +123,7 @@ def motions(folder: Path | None = None, only: str = "") -> tuple[Motion, ...]:
                 raise EngineError(f"{path} is not the published table: its checksum is not in {SUMS}")
             found.append(_motion(path.stem, content.decode("utf-8"), fitted=fitted))
     if not found:
-        raise EngineError(f"{folder} has no motion with '{only}' in its name")
+        raise EngineError(f"{folder} does not contain a motion with '{only}' in its name")
     return tuple(found)
 
 

@@ -44,7 +44,9 @@ class VirtualPort:
 
     def __init__(self) -> None:
         if not hasattr(os, "openpty"):
-            raise StudyError("this system has no virtual ports: give the address of a real one, such as serial:COM3")
+            raise StudyError(
+                "this system does not provide virtual ports: give the address of a real one, such as serial:COM3"
+            )
         import tty  # noqa: PLC0415 - not on Windows
 
         ours, self._theirs = os.openpty()

@@ -181,8 +181,8 @@ class Rate:
     def __str__(self) -> str:
         low, high = (100 * end for end in self.interval)
         return (
-            f"{self.cell}, n = {self.participants}: {self.what}: {self.hits} of {self.studies}, "
-            f"{100 * self.share:.1f} % ({low:.1f} to {high:.1f}), {self.limit}: {self.holds}"
+            f"{self.cell}, n = {self.participants}, {self.what}: {self.hits} of {self.studies}, "
+            f"{100 * self.share:.1f} % ({low:.1f} to {high:.1f}), {self.limit} {self.holds}"
         )
 
     @property

@@ -192,7 +192,7 @@ class SoakResult:
             "",
             "counters",
             f"  overruns {self.overruns:,}; dropped samples {self.dropped:,}; latest tick {latest_ms:.3f} ms late",
-            f"  readings refused {counts.refused:,}; stale faults {counts.stale:,}; recoveries {self.recoveries:,}",
+            f"  readings rejected {counts.refused:,}; stale faults {counts.stale:,}; recoveries {self.recoveries:,}",
             f"  scenes presented {self.loads:,}; force stopped by the host {self.stops:,} times",
             f"  limiters: {', '.join(f'{name} {ticks:,}' for name, ticks in limiters)}",
             "",

@@ -226,7 +226,7 @@ def _measuring(less: int) -> Callable[[Case], Case | None]:
 CHANGES: Final[Mapping[str, Callable[[Case], Case | None]]] = {
     "delay believed one tick too short": _believing(1),
     "delay believed one tick too long": _believing(-1),
-    "device slower by a tick from 0.5 s on": lambda case: (
+    "device slower by a tick after 0.5 s": lambda case: (
         dataclasses.replace(case, slows_to=case.delay + 1) if case.delay < 4 else None
     ),
     "delay two ticks too short, measured": _measuring(2),

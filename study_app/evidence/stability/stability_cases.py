@@ -200,7 +200,7 @@ def parse(line: str) -> Case:
     for word in line.split():
         name, separator, value = word.partition("=")
         if not separator:
-            raise StudyError(f'a case is made of words such as "scale=10"; {word!r} is none')
+            raise StudyError(f'a case consists of words such as "scale=10", not {word!r}')
         if name not in kinds:
             near = difflib.get_close_matches(name, kinds, n=1)
             meant = f"did you mean {near[0]!r}? " if near else ""
@@ -224,7 +224,7 @@ def parse(line: str) -> Case:
         ("plant", (*PLANTS, FALCON)),
     ):
         if getattr(case, name) not in permitted:
-            raise StudyError(f"{name}={getattr(case, name)} is none of {', '.join(permitted)}")
+            raise StudyError(f"{name}={getattr(case, name)} is not permitted: choose {', '.join(permitted)}")
     if not _link_of(case).fits(case.rate_hz):
         raise StudyError(too_long_delay(case.rate_hz))
     return case

@@ -173,11 +173,12 @@ def draw(found: Compared) -> Figure:
 
 
 CAPTION: Final = (
-    "Simulated people answer two questions about the delay of the picture. Left: share correct of the forced choice of "
-    f"{FORCED_CHOICE} (dashed) and share of agreement with “different” in {LIKERT} (dots with fitted curves), for mean "
-    "criteria of 60, 95, 130 and 165 ms. Right: both thresholds over the criterion, with 95 % intervals; the forced "
-    "choice does not depend on it. Diamond: people to whom a delay of 30 ms has become the usual one. A criterion of "
-    f"{1000 * MEAN_CRITERION_S:.0f} ms is that of the answer model, chosen to agree with the thesis."
+    "Simulated people answer two questions about the delay of the picture. Left: proportion correct in the "
+    f"forced choice of {FORCED_CHOICE} (dashed) and proportion of agreement with “different” in {LIKERT} (dots "
+    "with fitted curves), for mean criteria of 60, 95, 130 and 165 ms. Right: both thresholds against the "
+    "criterion, with 95 % intervals; the forced choice does not depend on it. Diamond: people who have adapted "
+    f"to a delay of 30 ms. The answer model has a criterion of {1000 * MEAN_CRITERION_S:.0f} ms, chosen to "
+    "agree with the thesis."
 )
 
 

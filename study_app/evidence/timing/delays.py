@@ -132,8 +132,8 @@ class Delayed:
         tail = max(one.percentile_ms(TAIL_PERCENT) / one.frame_ms for one in trials)
         means_ms = [one.mean_ms for one in trials]
         return (
-            f"{screen}, {BESIDE[load]}: mean error at most {mean:.2f} of a frame (limit: {MEAN_FRAMES:g}), "
-            f"99th percentile at most {tail:.2f} (limit: {TAIL_FRAMES:g}), "
+            f"{screen}, {BESIDE[load]}: mean error at most {mean:.2f} of a frame (limit {MEAN_FRAMES:g}), "
+            f"99th percentile at most {tail:.2f} (limit {TAIL_FRAMES:g}), "
             f"means within {max(means_ms) - min(means_ms):.2f} ms of each other: "
             f"{'met' if all(one.held for one in trials) else 'missed'}"
         )

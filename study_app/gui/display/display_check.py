@@ -18,7 +18,7 @@ PACKAGES = (
     "libegl1 libgl1 libglib2.0-0 libfontconfig1 libdbus-1-3 libxkbcommon-x11-0 libxcb-cursor0 libxcb-icccm4 "
     "libxcb-image0 libxcb-keysyms1 libxcb-randr0 libxcb-render-util0 libxcb-shape0 libxcb-xinerama0 libxcb-xkb1"
 )
-NEEDS_NO_DISPLAY = "liquid-study rehearse, check, export and plot need no display"
+NEEDS_NO_DISPLAY = "liquid-study rehearse, check, export and plot do not need a display"
 
 
 def check_display(environment: Mapping[str, str] = os.environ, platform: str = sys.platform) -> None:

@@ -224,8 +224,8 @@ class ForceFigures:
 
 def force_rows(protocol: Protocol, forces: ForceFigures | None) -> tuple[tuple[str, str], ...]:
     """Return share of the limit, limiters and withheld force, or that they are hidden; equally many rows."""
-    share, limiters = f"Force, share of {protocol.device.force_limit_n:g} N", "Limiters acted"
-    withheld = f"Force withheld, limit {protocol.limits.withheld_percent:g}{THIN_SPACE}%"
+    share, limiters = f"Force relative to {protocol.device.force_limit_n:g} N", "Limiters acted"
+    withheld = f"Force held back, limit {protocol.limits.withheld_percent:g}{THIN_SPACE}%"
     if protocol.study.blinding == "double":
         return (share, "hidden"), (limiters, "hidden"), (withheld, "hidden")
     if forces is None:

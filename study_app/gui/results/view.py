@@ -679,7 +679,10 @@ class ResultsPlace(Place):
             case StudyFound() if newest:
                 self._blocks = answer.blocks
                 nothing = Trouble(
-                    title="No figures", sentence="This study has no questionnaire.", button="Refresh", remedy="again"
+                    title="No figures",
+                    sentence="This study does not have a questionnaire.",
+                    button="Refresh",
+                    remedy="again",
                 )
                 self._update_view(
                     trials=answer.trials,

@@ -66,7 +66,9 @@ LIMITERS: Final = (
         label="Passivity controller",
         meaning="the passivity controller changed the force",
     ),
-    Limiter(bit=LIMITER_STALE, name="stale", label="Stale sample", meaning="the device had no new sample in time"),
+    Limiter(
+        bit=LIMITER_STALE, name="stale", label="Stale sample", meaning="the device did not provide a new sample in time"
+    ),
     Limiter(bit=LIMITER_GLITCH, name="glitch", label="Rejected sample", meaning="a sample was rejected as implausible"),
     Limiter(
         bit=LIMITER_NON_FINITE,
@@ -229,7 +231,7 @@ SAMPLE_FIELDS: Final = (
         since=2,
         before=ASSUMED_TICKS,
     ),  # in writes
-    _CODE("scene", "Number of the presented scene; 0 is none.", minimum=0),
+    _CODE("scene", "Number of the presented scene; 0 without a scene.", minimum=0),
     _CODE(
         "status",
         "State of the servo.",

@@ -122,7 +122,7 @@ def _places(tables: Tables, name: str) -> list[tuple[dict[str, Any], str]]:
     known = sorted(leaves - _FIXED - {"kind"} - tables.keys())
     near = difflib.get_close_matches(field, known, n=1)
     meant = f"did you mean {near[0]!r}? " if near else ""
-    raise StudyError(f"this scene has no parameter {_shown(name)!r}: {meant}it has {', '.join(known)}")
+    raise StudyError(f"this scene does not have the parameter {_shown(name)!r}: {meant}it has {', '.join(known)}")
 
 
 def _set_field(table: dict[str, Any], field: str, value: object) -> None:

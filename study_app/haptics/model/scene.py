@@ -173,7 +173,7 @@ __all__ = [
     "Withdrawn",
 ]
 RateHz: TypeAlias = Annotated[
-    float, within(50, 5000, ("a slower servo is never stable; a faster servo has no time for a tick"))
+    float, within(50, 5000, ("a slower servo is never stable; a faster servo cannot finish a tick"))
 ]
 SceneScale: TypeAlias = Annotated[float, within(0.01, 100, "a stroke of 60 mm is then 0.6 mm to 6 m in the scene")]
 FADE_S = 0.05
@@ -327,7 +327,7 @@ class Scene(Frozen):
     def _liquids_are_told_apart(self) -> Self:
         names = [liquid.id for liquid in self.liquids]
         if len(set(names)) < len(names):
-            raise ValueError(f"two liquids share an id in {names}")
+            raise ValueError(f"two liquids share an ID in {names}")
         return self
 
     @model_validator(mode="after")

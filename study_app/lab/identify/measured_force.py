@@ -109,7 +109,7 @@ def read(path: Path) -> Measured | FlowCurve:
     if names == PLACES + FORCES and {*VELOCITIES} <= {*table.names}:
         names += VELOCITIES
     if lacking := [name for name in names if name not in table.names]:
-        raise StudyError(f"{path} has no column {', '.join(lacking)}: the first line must contain {HEADER}")
+        raise StudyError(f"{path} does not have the column {', '.join(lacking)}: the first line must contain {HEADER}")
     if twice := [name for name in names if table.names.count(name) > 1]:
         raise StudyError(f"{path} has two columns {twice[0]}: remove one of them")
     if not table.lines:

@@ -92,7 +92,7 @@ def _liquid(scene: Scene, liquid_id: str) -> Liquid:
         if liquid.id == liquid_id:
             return liquid
     liquids = ", ".join(liquid.id for liquid in scene.liquids) or "none"
-    raise StudyError(f"the scene has no liquid {liquid_id!r}: there is {liquids}")
+    raise StudyError(f"the scene does not contain liquid {liquid_id!r}; its liquids: {liquids}")
 
 
 def _tables(scene: Scene, liquid: Liquid) -> Iterator[tuple[str, BaseModel]]:

@@ -245,7 +245,7 @@ def check_comparisons(parts: Draft) -> Iterator[Fault]:
             yield Fault(("blocks", name, "conditions"), message, "vary only one of them, or use a block for each")
         elif block.compares is not None and varied not in ([], [block.compares]):
             message = f'is "{block.compares}", but its conditions differ in {compared(presented)}'
-            yield Fault(("blocks", name, "compares"), message, "correct it, or leave it out")
+            yield Fault(("blocks", name, "compares"), message, "correct it, or omit it")
 
 
 def check_blocks(parts: Draft) -> Iterator[Fault]:

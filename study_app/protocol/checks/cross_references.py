@@ -140,7 +140,7 @@ def check_sequences(document: Document) -> Iterator[Fault]:
     unused += [("blocks", name) for name in blocks if "groups" not in document]
     for place in unused if used else ():
         if place[1] not in used:
-            yield Fault(place, "comes nowhere in sequence", "add it there, or remove it", kind="not in sequence")
+            yield Fault(place, "does not occur in sequence", "add it there, or remove it", kind="not in sequence")
 
 
 def check_repeats(document: Document) -> Iterator[Fault]:
@@ -237,7 +237,7 @@ def check_groups(document: Mapping[str, Any]) -> Iterator[Fault]:
     tables = [table for _, table in entries(document, "groups.*") if isinstance(table, Mapping)]
     if not tables:
         if value_at(document, ASSIGNMENT) == "pre-existing":
-            yield Fault(ASSIGNMENT, "the study has no groups", "add groups, or omit it", kind="surplus")
+            yield Fault(ASSIGNMENT, "the study does not have groups", "add groups, or omit it", kind="surplus")
         return
     if len(names(document, "groups")) == 1:
         yield Fault(("groups",), "there is only one group", "add another group, or omit groups")
@@ -265,7 +265,7 @@ def check_decisions(document: Document) -> Iterator[Fault]:
     falling, named = ([name for _, name in decided[key]] for key in ("falling", "names"))
     for path, name in decided["rising"]:
         if name in falling:
-            yield Fault(path, f'"{name}" is expected to fall too', "an item can be in only one of the two lists")
+            yield Fault(path, f'"{name}" is also expected to decrease', "an item can be in only one of the two lists")
     for path, name in entries(document, "conditions.*.label"):
         if isinstance(name, str) and name not in named:
             yield Fault(path, f'"{name}" is not among analysis.names', "add it there, or omit the label")

@@ -85,7 +85,7 @@ def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
     for key in ("until", "catch"):
         if not correct and getattr(block, key) is not None:
             what = "a forced choice at levels of values" if design.has_correct_answer else f'a design "{block.design}"'
-            yield Fault((*place, key), f"{what} has no correct answer", "omit the key")
+            yield Fault((*place, key), f"{what} does not have a correct answer", "omit the key")
     if not correct and design.feedback not in {None, "never"}:
         yield Fault(
             ("designs", str(block.design), "feedback"),
@@ -123,7 +123,11 @@ def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
         standard for standard in block.standards if standard not in protocol.stimuli[block.stimulus].standards
     ]:
         listed = ", ".join(f"{standard:g}" for standard in protocol.stimuli[block.stimulus].standards)
-        yield Fault((*place, "standards"), f"the stimulus has no standard {unknown[0]:g}", f"these: {listed or 'none'}")
+        yield Fault(
+            (*place, "standards"),
+            f"the stimulus does not have the standard {unknown[0]:g}",
+            f"these: {listed or 'none'}",
+        )
     if design.first is not None and len(tracks_of(protocol, block)) > 1:
         yield Fault((*place, "design"), "a modulus needs a single standard", "omit it, or use one block per standard")
     yield from _check_levels(protocol, block)
@@ -143,7 +147,7 @@ def _check_published(protocol: Protocol, published: Published, place: Path) -> I
     ]
     if published.standard is not None and published.standard not in standards:
         listed = f"these: {', '.join(f'{standard:g}' for standard in standards)}" if standards else "omit it"
-        yield Fault((*place, "standard"), f"the block has no standard {published.standard:g}", listed)
+        yield Fault((*place, "standard"), f"the block does not have the standard {published.standard:g}", listed)
     ends = (
         published.value if published.low is None else published.low,
         published.value,
@@ -164,12 +168,12 @@ def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iter
         known = OF_LEVELS if block.design is not None else items
         if contrast.measure not in known:
             yield unknown_name(
-                (*place, "measure"), f'block "{name}" has no {contrast.measure}', contrast.measure, known
+                (*place, "measure"), f'block "{name}" does not measure {contrast.measure}', contrast.measure, known
             )
         missing = [condition for condition in contrast.conditions or () if condition not in block.conditions]
         if missing:
             yield unknown_name(
-                (*place, "conditions"), f"block {name} has no {missing[0]}", missing[0], block.conditions
+                (*place, "conditions"), f"block {name} does not have {missing[0]}", missing[0], block.conditions
             )
         if contrast.conditions is not None and block.design is not None:
             yield Fault((*place, "conditions"), f"the results of {name} refer to all its levels", "compare two blocks")

@@ -88,7 +88,9 @@ def numbered_participants(count: int, first: str = "P001") -> tuple[str, ...]:
     """Return so many participant ids from ``first`` on; StudyError if that does not end in a number."""
     match = re.fullmatch(r"([A-Za-z0-9]*?)([0-9]+)", first)
     if match is None:
-        raise StudyError(f"{first!r} is no first participant: give letters and digits that end in a number, as P061")
+        raise StudyError(
+            f"{first!r} cannot be the first participant: give letters and digits that end in a number, such as P061"
+        )
     return tuple(f"{match[1]}{int(match[2]) + more:0{len(match[2])}d}" for more in range(count))
 
 
@@ -200,7 +202,7 @@ def block_order_words(protocol: Protocol, planned: int | None, *, in_group: bool
     by, of = ("place in the group", " per group") if in_group else ("number in the participant's id", "")
     text = f"balanced: {rows} orders, by the {by}"
     if planned is None or order_evenness is None:
-        return f"{text}; any multiple of {rows} participants{of} is even"
+        return f"{text}; any multiple of {rows} participants{of} is balanced"
     counts = [count for line in order_evenness.positions for count in line]
     even = _times_text(counts[0]) if order_evenness.positions_even else _range_text(counts)
     more = "" if order_evenness.balanced else f"; {planned + -planned % rows} would be even"
@@ -269,9 +271,12 @@ def _advice(block: BlockBalance) -> Iterator[str]:
     codes, repetitions = len(block.evenness.codes), block.repetitions
     match block.order:
         case "fixed":
-            yield "Everyone gets the same order: effects of condition and of position cannot be separated."
+            yield "Everyone gets the same order, so effects of condition and position cannot be separated."
         case "shuffled" | "constrained":
-            yield "Drawn anew in every session: even on average only, and every seed gives other tables."
+            yield (
+                "Drawn again in every session, so orders are balanced only on average; each seed gives "
+                "different tables."
+            )
             if repetitions == 1:
                 rows = row_count("williams", codes)
                 yield f'order = "williams" would be even exactly, for every {rows} participants.'
@@ -281,14 +286,17 @@ def _advice(block: BlockBalance) -> Iterator[str]:
                 enough = next(more for more in count(repetitions) if has_even_borders(codes, more))
                 yield f"From one repetition to the next carry-over cannot be even; with {enough} repetitions it can."
             if square == "latin" and codes > 2:
-                yield 'A Latin square evens out positions alone; order = "williams" evens out carry-over too.'
+                yield 'A Latin square balances only positions; order = "williams" also balances carry-over.'
 
 
 def _round_lines(block: BlockBalance, rows: int) -> Iterator[str]:
     """Yield whether the participants complete rounds of rows, and how many would."""
     codes, people = len(block.evenness.codes), block.evenness.orders
     if block.unnumbered:
-        yield f"No number in the id: {', '.join(block.unnumbered)}. Their rows are drawn, even on average only."
+        yield (
+            f"IDs without a number: {', '.join(block.unnumbered)}. Their rows are drawn, so they are balanced "
+            "only on average."
+        )
     elif people % rows == 0 and block.evenness.positions_even:
         rounds = people // rows
         yield f"{people} participants are {'a full round' if rounds == 1 else f'{rounds} full rounds'} of {rows} rows."

@@ -271,7 +271,7 @@ def reproduce(
 def _trial_differences(planned: Trial | None, run: RecordedTrial) -> Iterator[str]:
     """Yield the differences between a recorded trial and the planned one with its number."""
     if planned is None:
-        yield f"trial {run.number}: recorded, but the seed gives no such trial"
+        yield f"trial {run.number}: recorded, but the seed does not produce this trial"
         return
     for name in _TOLD:
         ours, theirs = getattr(planned, name), getattr(run, name)
@@ -300,7 +300,7 @@ def _progress_differences(
         again = {first[planned[number].block] for number in due & planned.keys()} if blocks else set()
         if number not in due | again:
             after = f"after trial {before}" if before else "first"
-            yield f"trial {number}: came {after}, where trial {before + 1} was due"
+            yield f"trial {number} came {after}, but trial {before + 1} was due"
         before = number
     last = len(planned)
     if complete and before < last:

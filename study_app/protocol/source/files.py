@@ -203,7 +203,7 @@ def protocol_file(name_or_path: str | Path) -> Path:
     if path.is_dir():
         raise _not_found(name_or_path, "is a folder, not a protocol file", "give one of the .toml files in it")
     if path.exists():
-        raise _not_found(name_or_path, "is a pipe or a device, not a protocol file", "name a .toml file")
+        raise _not_found(name_or_path, "is a pipe or a device, not a protocol file", "give a .toml file")
     raise _not_found(name_or_path, "no such file", f"or a name: {', '.join(shipped())}")
 
 

@@ -48,9 +48,9 @@ class Condition(Table):
     liquids: tuple[Id, ...] = Field(
         default=(), description=("Several liquids; where they overlap, the last one applies.")
     )
-    delay_ms: Annotated[float, within(0, MOST_DELAY_MS, "what is seen more than a second late is no feedback")] = Field(
-        default=0, description="Delay of everything drawn in the tank [ms]."
-    )
+    delay_ms: Annotated[
+        float, within(0, MOST_DELAY_MS, "a picture that is more than a second late is not feedback")
+    ] = Field(default=0, description="Delay of everything drawn in the tank [ms].")
     label: Id | None = Field(
         default=None, description="The item of analysis.names that names it correctly; default: none."
     )
@@ -183,7 +183,7 @@ class Stimulus(Table):
         if not low < high:
             raise invalid(f"{low:g} and {high:g}: the first level must be smaller", "levels")
         if self.spacing == "log" and low <= 0:
-            raise invalid(f"{low:g} has no logarithm", "levels", 'spacing = "linear", or a level above 0')
+            raise invalid(f"{low:g} does not have a logarithm", "levels", 'spacing = "linear", or a level above 0')
         if low < 0 and self.level_kind != "value":
             raise invalid(f"{low:g} is below 0", "levels", 'direction = "down" for comparisons below the standard')
         return self

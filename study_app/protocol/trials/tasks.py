@@ -152,9 +152,9 @@ class Follow(Task):
     amplitude_mm: Annotated[float, within(1, 250, "the tank is 10 to 1000 mm wide, and a hand trembles")] = Field(
         default=20, description="From the middle to either end, hand frame [mm]."
     )
-    frequency_hz: Annotated[float, within(0.05, 5, "a hand follows no faster swing, and a slower one is none")] = Field(
-        default=1, description="Frequency of the target [Hz]."
-    )
+    frequency_hz: Annotated[
+        float, within(0.05, 5, "a hand cannot follow a faster motion, and a slower one is hardly a motion")
+    ] = Field(default=1, description="Frequency of the target [Hz].")
     cycles: int = Field(default=3, ge=1, le=1000, description="Number of periods after the lead, which are evaluated.")
     radius_mm: Radius = Field(default=6, description="Radius of the target [mm].")
     lead_s: Annotated[float, within(0.1, 10, "a hand needs 0.2 s to react; nothing of the lead is judged")] = Field(

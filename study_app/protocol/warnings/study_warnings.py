@@ -108,7 +108,7 @@ def _ignoring_viscosity(protocol: Protocol, felt: dict[str, Steady]) -> Iterator
         if "drag" in liquid.effects and liquid.drag.law == "constant":
             why, instead = "its constant drag coefficient ignores it", f'drag = {{ law = "{REFERENCE}" }}'
         elif felt[name].drag_n == 0.0:
-            named_n, why, instead = 0.0, "its effects leave out drag", 'name "drag" among them'
+            named_n, why, instead = 0.0, "its effects omit drag", 'name "drag" among them'
         else:
             continue
         if abs(named_n - true_n) > max(scene.accuracy.relative * true_n, scene.accuracy.absolute_n):
@@ -157,20 +157,20 @@ def _design_warnings(protocol: Protocol, block: Block, simulates: bool) -> Itera
     if not design.has_noise and trials % count:  # not every arrangement comes equally often
         place = f"blocks.{block.id}.repetitions" if block.stimulus is None else f"methods.{block.method}"
         wanted = "an even number" if count == 2 else f"a multiple of {count}"
-        yield f"{place}: {trials} trials cannot balance {count} arrangements: choose {wanted}"
+        yield f"{place}: {trials} trials cannot balance {count} arrangements; choose {wanted}"
     if block.stimulus is not None:
         for key, sentence in method_of(protocol, block).warnings():
             yield f"methods.{block.method}.{key}: {sentence}"
     if block.catch is not None and not track.catch:
         share = math.ceil(100 / track.slots) / 100
         yield (
-            f"blocks.{block.id}.catch.share: {block.catch.share:g} of {track.slots} trials gives no catch trial: "
-            f"choose {share:g}"
+            f"blocks.{block.id}.catch.share: {block.catch.share:g} of {track.slots} trials is less than one "
+            f"catch trial; choose {share:g}"
         )
     if design.feedback == "always" and protocol.study.blinding == "double":
         yield (
-            f'designs.{block.design}.feedback: "always" in a double-blind study: anyone who sees the participant\'s '
-            'screen sees which answers were correct: choose feedback = "practice"'
+            f'designs.{block.design}.feedback: "always" in a double-blind study shows the correct answers to '
+            'anyone who sees the participant\'s screen; choose feedback = "practice"'
         )
     yield from _unpaced_blocks(protocol, block)
     if simulates:
@@ -190,7 +190,7 @@ def _unpaced_blocks(protocol: Protocol, block: Block) -> Iterator[str]:
         fast_hz = fastest_hz(protocol.scene.velocity, protocol.device.rate_hz, 1 - error_percent / 100)
         yield (
             f"tasks.{block.task}: in motions above {fast_hz:.1f} Hz the velocity estimator takes more than "
-            f"{error_percent:g} % of a damper's force; such trials are repeated: {PACED}"
+            f"{error_percent:g} % of a damper's force; such trials are repeated; {PACED}"
         )
 
 
@@ -210,9 +210,9 @@ def _imperceptible_settings(protocol: Protocol, without_force: str) -> Iterator[
             gives_none = force_n(protocol.scene_for(name), stroke) < LEAST_N
             for key, place in places.items():
                 if key == DELAY and name in hides:
-                    yield f'{place}: the ball is hidden, so participants cannot see its delay: write ball = "shown"'
+                    yield f'{place}: the ball is hidden, so participants cannot see its delay; write ball = "shown"'
                 elif key in OF_LINK and (without_force or gives_none):
-                    what = f"{without_force or 'the condition'} gives no force"
+                    what = f"{without_force or 'the condition'} does not produce force"
                     yield f"{place}: {what}, so participants cannot feel whether it is late or lost"
         of_liquids = protocol.compared_in(block.id) == "liquids" if vary is None else vary not in OF_CONDITION
         if without_force and of_liquids and block.phase == "main":
@@ -222,7 +222,7 @@ def _imperceptible_settings(protocol: Protocol, without_force: str) -> Iterator[
                 if len(hides) == len(conditions)
                 else seen
             )
-            yield f"blocks.{block.id}: {without_force} gives no force{seen}"
+            yield f"blocks.{block.id}: {without_force} does not produce force{seen}"
 
 
 def _analysis_warnings(protocol: Protocol) -> Iterator[str]:
@@ -232,7 +232,7 @@ def _analysis_warnings(protocol: Protocol) -> Iterator[str]:
         if block.order == "fixed" and len(block.conditions) > 1:
             yield (
                 f"blocks.{block.id}.order: all participants experience the {protocol.compared_in(block.id)} in "
-                "one order, so their effect is confounded with practice and fatigue: choose shuffled, latin or "
+                "one order, so their effect is confounded with practice and fatigue; choose shuffled, latin or "
                 "williams"
             )
         yield from _forced_choice_warnings(protocol, block)
@@ -241,12 +241,12 @@ def _analysis_warnings(protocol: Protocol) -> Iterator[str]:
     if decided is not None and (decided.equivalence_bound or 0.0) > half:
         yield (
             f"analysis.equivalence_bound: {decided.equivalence_bound:g} points are more than half the scale "
-            f"({half:g}): almost any answers would count as equivalent"
+            f"({half:g}), so almost any answers would count as equivalent"
         )
     if protocol.format > 1 and decided is not None and decided.participants is None:
         yield (
-            "analysis.participants: is missing: a study that ends at the first significant result has more false "
-            "positives than alpha"
+            "analysis.participants is missing: a study that ends at the first significant result has more "
+            "false positives than alpha"
         )
     yield from _attribute_groups(protocol)
     yield from _block_order_warnings(protocol)
@@ -261,7 +261,7 @@ def _attribute_groups(protocol: Protocol) -> Iterator[str]:
         if suggests_attribute(name):
             yield (
                 f"groups.{name}: the name suggests an attribute that participants already have, but groups are "
-                'randomised: if so, choose study.group_assignment = "pre-existing"'
+                'randomised; if so, choose study.group_assignment = "pre-existing"'
             )
 
 
@@ -279,7 +279,7 @@ def _block_order_warnings(protocol: Protocol) -> Iterator[str]:
         if len(contrast.blocks) == 2 and protocol.study.block_order == "fixed" and not protocol.groups:
             yield (
                 f"analysis.contrasts.{number}: all participants have {' and '.join(contrast.blocks)} in one "
-                "order, so their difference is confounded with practice and fatigue: choose study.block_order "
+                "order, so their difference is confounded with practice and fatigue; choose study.block_order "
                 '= "balanced"'
             )
     blocks = protocol.blocks_in_order
@@ -288,7 +288,7 @@ def _block_order_warnings(protocol: Protocol) -> Iterator[str]:
         if block.phase != "main":
             yield (
                 f"study.block_order: block {block.id} ({block.phase}) keeps its position while the main blocks "
-                "change: put it before the first main block"
+                "change; put it before the first main block"
             )
 
 
@@ -298,15 +298,15 @@ def _condition_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
     alone = block.design is None and block.questionnaire is not None and len(conditions) == 1
     if alone and len(protocol.main_blocks) > 1:
         yield (
-            f"blocks.{block.id}.conditions: has only one condition, so there is nothing to compare it with: a "
+            f"blocks.{block.id}.conditions: has only one condition, so there is nothing to compare it with; a "
             "main block needs two"
         )
     if protocol.compared_in(block.id) == "delays":
         for delay_ms, other in pairwise(sorted({condition.delay_ms for condition in conditions})):
             if other - delay_ms < FRAME_MS:
                 yield (
-                    f"blocks.{block.id}.conditions: delays of {delay_ms:g} and {other:g} ms differ by less than a "
-                    f"frame of {FRAME_MS:g} ms: the screen cannot show the difference"
+                    f"blocks.{block.id}.conditions: delays of {delay_ms:g} and {other:g} ms differ by less than "
+                    f"a frame of {FRAME_MS:g} ms, which the screen cannot show"
                 )
     texts = [block.setting_label] if isinstance(block.setting_label, str) else list(block.setting_label.values())
     title_words = {word for text in texts for word in re.findall(r"\w+", text.casefold())}
@@ -330,7 +330,7 @@ def _forced_choice_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
     if factor < NARROW:
         yield (
             f"methods.{block.method}.width_prior: a factor of {factor:g} lets the prior determine the slope and "
-            f"bias the thresholds of other participants: choose {NARROW:g} or more"
+            f"bias the thresholds of other participants; choose {NARROW:g} or more"
         )
 
 
@@ -343,7 +343,7 @@ def _unbracketed_value(protocol: Protocol, number: int, published: Published) ->
     if not min(levels) <= published.value <= max(levels):
         yield (
             f"analysis.published.{number}.value: {published.value:g} is outside the levels of block {block.id}, "
-            f"{min(levels):g} to {max(levels):g}: such a threshold cannot be measured"
+            f"{min(levels):g} to {max(levels):g}; such a threshold cannot be measured"
         )
 
 
@@ -354,7 +354,7 @@ def _tasks_without_target(protocol: Protocol) -> Iterator[str]:
     for name in dict.fromkeys(block.task for block in protocol.main_blocks):
         if isinstance(protocol.tasks[name], Reach):
             yield (
-                f"tasks.{name}: a trial that ends without any target reached is valid: set "
+                f"tasks.{name}: a trial that ends without any target reached is valid; set "
                 "limits.targets_percent to the minimum proportion of targets"
             )
 
@@ -364,8 +364,8 @@ def _recalled_instruments(protocol: Protocol) -> Iterator[str]:
         of = questionnaire.instrument
         if of is not None and (recalled := instrument(of).get("from_memory")) is not None:
             yield (
-                f"questionnaires.{name}: written from memory, not compared with a source ({recalled}): "
-                "compare it with your copy"
+                f"questionnaires.{name}: written from memory, not compared with a source ({recalled}); compare "
+                "it with your copy"
             )
 
 

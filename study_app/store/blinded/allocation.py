@@ -187,7 +187,7 @@ def check_choice(
     """Raise StudyError if the group or replaced participant contradicts the protocol or the ``held`` claims."""
     name, own = protocol.study.name, _claim_of(held, participant)
     if group is not None and not protocol.asks_group:
-        why = "assigns participants to its groups at random" if protocol.groups else "has no groups"
+        why = "assigns participants to its groups at random" if protocol.groups else "does not have groups"
         raise StudyError(f"group {group!r}: {name} {why}; omit the group")
     permitted = ", ".join(protocol.groups)
     if protocol.asks_group and group is None and own is None:

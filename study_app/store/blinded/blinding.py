@@ -86,7 +86,7 @@ class Key:
             return self.codes[block][code]
         except KeyError:
             raise StoreError(
-                f"the sealed key has no code {code!r} of block {block!r}: it belongs to another study"
+                f"the sealed key does not contain code {code!r} of block {block!r}: it belongs to another study"
             ) from None
 
 

@@ -629,7 +629,7 @@ def line_problem(line: Mapping[str, Any]) -> str | None:
     """
     event = line.get("event")
     if not isinstance(event, str):
-        return "it names no event"
+        return "the event is missing"
     kind = EVENTS.get(event, UnknownEvent)
     if lacking := [name for name in ("n", "event", "t_s", "at", *kind.required) if name not in line]:
         return f"({event}) lacks {', '.join(lacking)}"

@@ -225,8 +225,8 @@ def refuse_truncated_journal(place: Place, lines: Sequence[events.Event]) -> Non
     """Raise an error if the journal has less information than the session's other files, which would be replaced."""
     for name in events.unknown_events(lines):
         raise StoreError(
-            f"{place.folder.journal} has events {name!r}, which this version does not know: use the version that wrote "
-            "them"
+            f"{place.folder.journal} contains events {name!r}, which this version does not know: use the "
+            "version that wrote them"
         )
     for path, what in (*files_beyond_journal(place, lines), *_ended_or_recorded(place, lines)):
         raise StoreError(f"{path} {what}: {RESTORE}")
@@ -394,7 +394,7 @@ def _renew_proof(place: Place, lines: list[events.Event], rewritten: list[Path])
     has_none = lines[-1].previous is not None and place_of(study, folder) not in listed_places
     noted = [folder.rebuilt] if has_none else []
     if has_none:
-        note_rebuilt(folder, f"{study.fingerprints.name} had no fingerprint of the session")
+        note_rebuilt(folder, f"{study.fingerprints.name} did not contain the fingerprint of the session")
     if not renew_checksums(folder, [*rewritten, *noted]):
         return []
     if has_none:

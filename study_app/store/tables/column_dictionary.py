@@ -72,8 +72,9 @@ def _section(title: str, file: str, row: str, lines: Sequence[str]) -> str:
 
 def _journal() -> str:
     head = (
-        "Every line has `n` (from 1, without a gap), `event`, `t_s` (on the session's clock), `at` (ISO 8601) and "
-        "`previous` (SHA-256 of all bytes before it). `session_started` has `format` 2; format 1 has no `previous`.",
+        "Every line has `n` (from 1, without a gap), `event`, `t_s` (on the session's clock), `at` (ISO 8601) "
+        "and `previous` (SHA-256 of all bytes before it). `session_started` has `format` 2; in format 1 "
+        "`previous` is missing.",
         "",
         "| event | fields | meaning |",
         "| --- | --- | --- |",

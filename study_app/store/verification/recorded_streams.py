@@ -42,7 +42,7 @@ def check_recording(file: Path, folder: Path, findings: Findings) -> list[str]:
     ours = [(name, it) for name, it in streams if name in {MARKERS, SAMPLES}]
     if not ours:
         names = ", ".join(repr(name) for name, _ in streams) or "none"
-        raise StoreError(f"{file} has no stream '{MARKERS}' or '{SAMPLES}'; its streams: {names}")
+        raise StoreError(f"{file} does not contain a stream '{MARKERS}' or '{SAMPLES}'; its streams: {names}")
     merged = read_merged(folder)
     places = [folder] if merged is None else [it for it in map(merged.folder, merged.names) if it.is_dir()]
     sessions = [session for place in places for session in StudyFolder(place).sessions()]

@@ -72,7 +72,9 @@ def check_granted(answer: bytes, request: Any) -> None:
     client = optional_library("rfc3161_client")
     response = client.decode_timestamp_response(answer)
     if response.status != client.PKIStatus.GRANTED:
-        raise ValueError(f"the server refused: status {response.status} {' '.join(response.status_string)}".strip())
+        raise ValueError(
+            f"the server rejected the request: status {response.status} {' '.join(response.status_string)}".strip()
+        )
     token = response.tst_info
     if token.message_imprint.message != request.message_imprint.message:
         raise ValueError("the token belongs to another text")

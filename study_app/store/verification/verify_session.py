@@ -222,9 +222,9 @@ def _check_journal(folder: SessionFolder, findings: Findings, *, running: bool) 
     if not contents.lines:
         if running or is_never_begun(folder.path):
             if not running:
-                findings.warning(folder.journal, "has no complete line: nothing was recorded")
+                findings.warning(folder.journal, "does not contain a complete line: there are no recorded data")
         elif contents.damage is None:
-            findings.error(folder.journal, f"has no complete line, {_BEGUN}")
+            findings.error(folder.journal, f"does not contain a complete line, {_BEGUN}")
         return nothing
     for name in events.unknown_events(contents.lines):
         findings.warning(folder.journal, f"contains events {name!r}, which this version does not know")
@@ -398,7 +398,7 @@ def _check_tables(place: Place, lines: list[events.Event], findings: Findings, *
     try:
         expected = table_files(place, lines, opened_key(place.study_folder))
     except StoreError as error:
-        findings.error(place.folder.journal, f"gives no tables: {error}")
+        findings.error(place.folder.journal, f"does not produce tables: {error}")
         return
     columns = table_columns(lines, opened=True)
     for (path, content), name in zip(expected, columns, strict=True):

@@ -82,7 +82,7 @@ def verify_study(folder: Path, fingerprints: Path | None = None) -> Findings:
                 sessions += _verify_study(site, None, findings)
     else:
         raise StoreError(
-            f"{folder} holds several sites: compare each with the copy of its own fingerprints, such as {fingerprints} "
+            f"{folder} holds several sites: compare each with a copy of its fingerprints, such as {fingerprints} "
             f"with {merged.folder(merged.names[0])}"
         )
     findings.sessions, findings.running = len(sessions), sum(session.running for session in sessions)
@@ -170,7 +170,7 @@ def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[
             first = holders[claim.participant].path.stem
             findings.error(claim.path, f"is a second entry of participant {claim.participant}, who has entry {first}")
         elif claim.participant not in begun and claim.participant not in withdrawn:
-            findings.warning(claim.path, f"belongs to participant {claim.participant}, who has no session yet")
+            findings.warning(claim.path, f"belongs to participant {claim.participant}, who does not have a session yet")
         holders.setdefault(claim.participant, claim)
     for claim in holders.values():
         if claim.replaces is not None and not _same_entry(claim, holders.get(claim.replaces)):

@@ -103,7 +103,7 @@ def test_the_people_of_the_study_file_come_first_and_the_range_encloses_them() -
     assert first == consistent  # equal values, equal people
     assert [one.power for one in noisy] != [one.power for one in first]
     told = power_markdown(found)
-    assert "% of studies find it if people are consistent, " in told
+    assert "% of studies detect it if people are consistent, " in told
     assert power_csv(found).count(b",noisy,") == len(noisy)
 
 

@@ -54,7 +54,7 @@ def test_a_study_of_thresholds_states_levels_sample_size_and_catch_rule() -> Non
     assert "exponent 1, Weber's law" in text
     assert "weber 0.19, at 71 % correct, n = 10" in text
     assert "We plan 20 participants. The study ends when as many valid sessions are complete" in text
-    assert "anything tested. The aim is a 95 % interval of the group mean within ±15 %." in text
+    assert "anything tested. The goal is a 95 % interval of the group mean within ±15 %." in text
     assert "we simulated 50 trials per standard" in text
     assert 'Rule "catch": a session with more than 25 % incorrect answers' in text
     assert "presented again, up to 3 times" in text
@@ -66,7 +66,7 @@ def test_a_study_of_ratings_states_d_a_and_how_precise_it_is_expected_to_be() ->
     more = FIVE_POINTS + '\n[blocks.rate]\ntask = "stir"\nstimulus = "value"\ndesign = "rated"\nmethod = "few"\n'
     edits = [('sequence = ["viscosity"]', 'sequence = ["viscosity", "rate"]'), ("[0.2, 0.4, 0.8]", "[0.5, 0.6, 0.8]")]
     text = preregistration(study(*edits, ("part = 1\n", ""), ('code_prefix = "V"\n', ""), more=more), "0" * 64)
-    assert "- Block rate: d_a of each level against the lowest, from the area under the ROC curve." in text
+    assert "- Block rate: d_a of each level relative to the lowest, from the area under the ROC curve." in text
     assert "Block viscosity: d_a" not in text
     assert "at d_a = 1: one participant ±" in text
 

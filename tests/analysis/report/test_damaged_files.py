@@ -79,7 +79,7 @@ def test_a_changed_journal_is_not_to_be_rebuilt_from(copy: StudyFolder) -> None:
         (lambda session: session.journal.unlink(), "is missing, although receipt, tables"),
         (lambda session: change(session.journal, b"\n", b"garbage\n"), "line 1: damaged"),
         (lambda session: change(session.journal, b'"n":2,', b'"n":3,'), "line 2: its n is 3"),
-        (lambda session: session.journal.write_bytes(b""), "has no complete line, but receipt"),
+        (lambda session: session.journal.write_bytes(b""), "does not contain a complete line, but receipt"),
         (lambda session: cut_last_line(session.journal), "but the journal has no end"),
         (lambda session: change(session.receipt, b'"version"', b'"version" '), "has changed since the session ended"),
         (lambda session: session.checksums.unlink(), "is missing: was the program killed"),
@@ -121,7 +121,7 @@ def test_the_commands_go_on_and_say_so_in_a_line_and_beside_what_they_write(
         assert codebook["doubts"] == [{"file": name, "what": what}]
     else:
         caption = (tmp_path / "out" / "liquids.txt").read_text(encoding="utf-8")
-        assert f"1 file is not as recorded, and used as found: {name}." in caption
+        assert f"1 file is changed since recording, but used: {name}." in caption
 
 
 @pytest.mark.slow

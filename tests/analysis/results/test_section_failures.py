@@ -84,7 +84,7 @@ def test_a_report_with_failures_is_written_and_ends_with_three(
     for one in told["failures"]:
         assert one["what"] in done.output
     for title in (
-        "Do answers follow the delay?",
+        "Do answers change with the delay?",
         "Lowest delay",
         "How it was run",
         "Not there: its computation failed",

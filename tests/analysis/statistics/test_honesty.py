@@ -159,7 +159,7 @@ def test_kappa_has_an_interval() -> None:
     assert result.effect is not None
     assert result.interval.low < result.effect < result.interval.high
     assert result == recognition(names, [0, 1, 2], 3)
-    assert recognition(names[:1], [0, 1, 2], 3).no_interval == "no interval: the answers of one participant"
+    assert recognition(names[:1], [0, 1, 2], 3).no_interval == "no interval: there is only one participant"
 
 
 @pytest.mark.parametrize("n", [3, 12, 30])

@@ -158,7 +158,7 @@ def pushes(world: World, count: int = 400) -> Any:
 def test_the_operator_sees_forces_in_a_single_blind_study_alone_and_the_participant_the_same_in_both(
     make: Any, world: World
 ) -> None:
-    names = ("Force, share of 6 N", "Limiters acted", "Force withheld, limit 5\u2009%")
+    names = ("Force relative to 6 N", "Limiters acted", "Force held back, limit 5\u2009%")
     told, seen = {}, []
     for blinding, limit_n in (("single", 6.0), ("double", None)):
         bridge = make(blinding=blinding, force_limit_n=limit_n)

@@ -107,7 +107,7 @@ class Tasks:
         """A liquid renamed, another one deleted with all that needs it, both undone."""
         user = self.user
         user.select("Water", "Liquids")
-        user.write("Id", "sea")
+        user.write("ID", "sea")
         user.select("Honey", "Liquids")
         user.shortcut("Delete", "Delete")
         user.press("Delete them too")

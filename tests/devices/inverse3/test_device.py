@@ -101,7 +101,7 @@ class TestOpening:
         message = service.inventory()
         message["inverse3"][0]["device_id"] = device_id
         monkeypatch.setattr(service, "inventory", lambda: message)
-        words = rf"id .* has {len(device_id)} characters; 1 to 64 .* permitted"
+        words = rf"ID .* has {len(device_id)} characters; 1 to 64 .* permitted"
         with pytest.raises(DeviceError, match=words) as refused:
             EmulatedInverse3(service=service).open()
         assert "\n" not in str(refused.value)
@@ -126,7 +126,7 @@ class TestOpening:
         assert "\n" not in str(refused.value)
 
     def test_a_workspace_beyond_its_reach_is_refused(self) -> None:
-        with pytest.raises(DeviceError, match="a workspace of 200 x 60 x 60 mm is more than an Inverse3 reaches"):
+        with pytest.raises(DeviceError, match="a workspace of 200 x 60 x 60 mm exceeds the reach of an Inverse3"):
             EmulatedInverse3(workspace_m=(0.1, 0.03, 0.03))
 
     def test_an_address_names_host_port_and_device(self) -> None:

@@ -131,7 +131,7 @@ def test_a_blinded_study_is_shown_by_code_and_by_name_once_unblinding_is_recorde
     assert (record["by"], record["reason"]) == ("AK", "collection closed")
     assert shown.chips[1].endswith("by AK: collection closed")
     assert not shown.place.unblind.isVisible()
-    assert shown.titles[:2] == ["Agreement for each liquid", "Answers over added delay"]
+    assert shown.titles[:2] == ["Agreement for each liquid", "Answers against added delay"]
     assert b">Thick<" in shown.place.figures.cards[0].figure.svg
     for table in (results / "demo").rglob("*trials_data.csv"):
         assert b",force_mean_n," in table.read_bytes()

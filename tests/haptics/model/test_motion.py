@@ -108,6 +108,6 @@ def test_a_motion_checks_itself(t_s, position_m, velocity_mps, message):
 
 def test_a_device_is_not_read(tmp_path):
     """One such as /dev/zero has no end; a bad value is repeated in part."""
-    with pytest.raises(StudyError, match="it is a device, which may have no end"):
+    with pytest.raises(StudyError, match="it is a device, which may never end"):
         read_motion(Path("/dev/null"))
     assert len("".join(problems(tmp_path, "x" * 5000 + ",0,0,0"))) < 300

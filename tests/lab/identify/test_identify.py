@@ -178,7 +178,7 @@ def test_what_cannot_be_fitted_is_said(names, said):
         fit(TANK, "tank", names, REVERSE, force_of(TANK, REVERSE))
     with pytest.raises(StudyError, match="no liquid 'lake': there is tank"):
         fit(TANK, "lake", ["drag_coefficient"], REVERSE, force_of(TANK, REVERSE))
-    with pytest.raises(StudyError, match="it is a device, which may have no end"):
+    with pytest.raises(StudyError, match="it is a device, which may never end"):
         measured_force.read(Path("/dev/null"))  # /dev/zero would fill the memory
 
 

@@ -12,10 +12,16 @@ from study_app.protocol.warnings.study_warnings import warnings
     [
         ("viscosityjnd", 'ball = "hidden"', 'ball = "hidden"\ndelay_ms = 50', "", "conditions.damper.delay_ms"),
         ("delaydetect", "[conditions.water]", "[conditions.water]", "Mouse", ""),
-        ("forcedelay", "format = 2", "format = 2", "Mouse", "stimuli.delay.vary: Mouse gives no force"),
+        ("forcedelay", "format = 2", "format = 2", "Mouse", "stimuli.delay.vary: Mouse does not produce force"),
         ("forcedelay", "damping_nspm = 4", "damping_nspm = 0.01", "", "stimuli.delay.vary: the condition gives no"),
-        ("demo", "format = 1", "format = 1", "Mouse", "blocks.liquids: Mouse gives no force: participants see"),
-        ("viscosityjnd", "format = 2", "format = 2", "Mouse", "blocks.viscosity: Mouse gives no force, and the"),
+        ("demo", "format = 1", "format = 1", "Mouse", "blocks.liquids: Mouse does not produce force: participants see"),
+        (
+            "viscosityjnd",
+            "format = 2",
+            "format = 2",
+            "Mouse",
+            "blocks.viscosity: Mouse does not produce force, and the",
+        ),
     ],
 )
 def test_a_condition_that_nobody_can_perceive_is_warned_of(
@@ -24,6 +30,6 @@ def test_a_condition_that_nobody_can_perceive_is_warned_of(
     text = source_bytes(study).decode()
     assert old in text
     found = warnings(parse(text.replace(old, new, 1).encode(), study), simulates=False, without_force=device)
-    perceived = [one for one in found if "gives no force" in one or "ball is hidden" in one]
+    perceived = [one for one in found if "does not produce force" in one or "ball is hidden" in one]
     assert [one for one in perceived if one.startswith(place)] if place else perceived == []
     assert not [one for one in warnings(load(study), simulates=False) if one in perceived]

@@ -73,10 +73,10 @@ def test_a_study_inherits_what_is_known_of_an_instrument_and_is_asked_for_the_re
     assert [fault.missing_language for fault in faults] == lacking
     for fault in faults:
         assert all(item["id"] in fault.message for item in source["items"])
-        words = (
-            f"the program does not include {name} in" if source["languages"] else f"the texts of {name} may not be passed on"
+        included = f"the program does not include {name} in"
+        assert fault.message.startswith(
+            included if source["languages"] else f"the texts of {name} may not be passed on"
         )
-        assert fault.message.startswith(words)
 
     table, scales = begin(name, languages)
     for _ in range(3):

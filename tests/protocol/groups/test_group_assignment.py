@@ -64,7 +64,7 @@ def test_an_assignment_without_groups_is_refused() -> None:
     edit = ('format = 2\nstudy.name = "grouped"\n', f'format = 2\n{PREEXISTING}study.name = "grouped"\n')
     with pytest.raises(ProtocolError) as refused:
         grouped(edit, groups='sequence = ["hello", "thin", "thick"]\n')
-    assert "the study has no groups" in str(refused.value.problems)
+    assert "the study does not have groups" in str(refused.value.problems)
 
 
 def test_check_states_the_balance_of_each_group() -> None:

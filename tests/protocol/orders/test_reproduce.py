@@ -52,12 +52,12 @@ def test_an_untouched_session_is_reproduced(seed: int, participant: str, order: 
         (lambda trials: [*trials[:1], replace(trials[1], items=()), *trials[2:]],
          "trial 2: items none recorded, the seed gives warm, cold"),
         (lambda trials: [*trials, replace(trials[-1], number=8)],
-         "trial 8: recorded, but the seed gives no such trial"),
+         "trial 8: recorded, but the seed does not produce this trial"),
         (lambda trials: trials[:-1], "trial 7 was not recorded, though the session is complete"),
         (lambda trials: trials[:-3], "trials 5 to 7 were not recorded, though the session is complete"),
         (lambda trials: [], "trials 1 to 7 were not recorded, though the session is complete"),
-        (lambda trials: trials[:2] + trials[3:], "trial 4: came after trial 2, where trial 3 was due"),
-        (lambda trials: trials[1:], "trial 2: came first, where trial 1 was due"),
+        (lambda trials: trials[:2] + trials[3:], "trial 4: came after trial 2, but trial 3 was due"),
+        (lambda trials: trials[1:], "trial 2: came first, but trial 1 was due"),
     ],
 )  # fmt: skip
 def test_whatever_was_changed_is_named(change: Callable[[list[RecordedTrial]], list[RecordedTrial]], expected: str):

@@ -1,4 +1,4 @@
-"""With a device that gives no force, no page of a shipped study speaks of feeling; its file and statements stay."""
+"""With a device without force, no page of a shipped study speaks of feeling; its file and statements stay."""
 
 import re
 import string

@@ -45,7 +45,7 @@ def test_the_key_gives_every_code_its_condition(tmp_path: Path, tables_of_study:
     assert {key.condition("delays", code) for code in ("D1", "D2")} == {"see_prompt", "see_tardy"}
     assert key.condition("practice", "practice") == "learn"
     assert key.tables["conditions"]["see_tardy"]["delay_ms"] == 137
-    with pytest.raises(StoreError, match="has no code 'L9' of block 'liquids'"):
+    with pytest.raises(StoreError, match="does not contain code 'L9' of block 'liquids'"):
         key.condition("liquids", "L9")
 
 
@@ -119,7 +119,7 @@ def test_a_block_with_another_of_the_studys_methods_has_other_conditions(tmp_pat
     many = '\n[methods.many]\nkind = "constant"\nlevels = [0.1, 0.8]\nrepetitions = 8\n'
     open_or_draw_key(tmp_path, study(more=many))
     check_conditions(tmp_path, study(more=many))
-    with pytest.raises(StoreError, match="was sealed for other conditions"):
+    with pytest.raises(StoreError, match="was sealed for conditions that differ"):
         check_conditions(tmp_path, study(('method = "few"', 'method = "many"'), more=many))
 
 

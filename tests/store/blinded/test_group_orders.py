@@ -115,7 +115,7 @@ def test_sixteen_participants_have_each_order_four_times_in_each_group(tmp_path:
 
 def test_a_preexisting_group_is_recorded_and_never_inferred(tmp_path: Path) -> None:
     source, study = source_of(PREEXISTING), StudyFolder(tmp_path / "s")
-    with pytest.raises(StudyError, match=r"group is missing: .* that of P001: experts, novices"):
+    with pytest.raises(StudyError, match=r"group is missing: .* the group of P001: experts, novices"):
         begun(study.path, source, "P001")
     with pytest.raises(
         StudyError, match="group 'expert': grouped does not have this group; permitted: experts, novices"
@@ -150,7 +150,7 @@ def _written(folder: Path, source: bytes) -> str:
 def test_a_group_is_refused_where_groups_are_randomised_or_there_are_none(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match="group 'experts': grouped assigns participants to its groups at random"):
         begun(tmp_path / "s", source_of(), "P001", group="experts")
-    with pytest.raises(StudyError, match="group 'experts': demo has no groups"):
+    with pytest.raises(StudyError, match="group 'experts': demo does not have groups"):
         studies.begun(tmp_path / "demo", "P001", "demo", group="experts")
     assert not (tmp_path / "s").exists()
     assert not (tmp_path / "demo").exists()
@@ -161,7 +161,7 @@ def test_a_replacement_needs_a_participant_of_the_same_group(tmp_path: Path) -> 
     begun(folder, source, "P001", group="experts").close()
     with pytest.raises(StudyError, match="P001 is in group experts, P002 in group novices"):
         begun(folder, source, "P002", group="novices", row_of="P001")
-    with pytest.raises(StudyError, match="row of 'P009': no participant of this folder has this ID"):
+    with pytest.raises(StudyError, match="row of 'P009': this ID does not exist in this folder"):
         begun(folder, source, "P002", group="novices", row_of="P009")
     begun(folder, source, "P002", group="experts", row_of="P001").close()
     with pytest.raises(StudyError, match="participant P002 replaces P001 since the first session"):

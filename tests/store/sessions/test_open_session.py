@@ -37,7 +37,7 @@ def test_after_its_end_a_session_takes_nothing(start: Start) -> None:
     store = start()
     store.finish("completed")
     for late in (lambda: store.append(journal_events.Note(kind="note", text="late")), lambda: store.finish("aborted")):
-        with pytest.raises(StoreError, match="came after the session's end"):
+        with pytest.raises(StoreError, match="occurred after the end of the session"):
             late()
     assert receipt.read(store.folder.receipt)["status"] == "completed"
 

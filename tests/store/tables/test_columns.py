@@ -51,7 +51,7 @@ def test_no_study_is_begun_around_or_within_others(tmp_path: Path, protocol: Pro
     open_or_draw_key(study.path, protocol)
     check_study(study, "brackish")
     check_study(StudyFolder(results.path / "other"), "other")
-    with pytest.raises(StoreError, match=r"holds folders of studies \(brackish\).*results.brackish"):
+    with pytest.raises(StoreError, match=r"contains study folders \(brackish\).*results.brackish"):
         check_study(results, "brackish")
     for within in (study.data, study.path / "new" / "deep"):
         with pytest.raises(StoreError, match="which is a study's folder"):

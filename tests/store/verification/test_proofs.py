@@ -225,7 +225,7 @@ def test_a_server_that_gives_no_stamp_is_named_and_the_program_goes_on(study: Pa
 @pytest.mark.parametrize(
     ("status", "headers", "answer", "reason"),
     [
-        (200, {}, bytes.fromhex("30053003020102"), "the server refused: status 2"),
+        (200, {}, bytes.fromhex("30053003020102"), "the server rejected the request: status 2"),
         (200, {}, bytes.fromhex("30053003020100"), "Missing"),
         (200, {}, b"<html>no</html>", ""),
         (302, {"Location": "http://127.0.0.2/"}, b"", "HTTP Error 302"),

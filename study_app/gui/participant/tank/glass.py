@@ -185,7 +185,7 @@ def _paint_caustics(painter: QPainter, quad: QPolygonF) -> None:
     square = QPolygonF([QPointF(0, 0), QPointF(columns, 0), QPointF(columns, rows), QPointF(0, rows)])
     warp = QTransform()
     if not QTransform.quadToQuad(square, quad, warp):
-        raise ValueError("the floor of the tank has no area on the screen")
+        raise ValueError("the floor of the tank is not visible on the screen")
     painter.save()
     painter.setTransform(warp, combine=True)
     painter.setOpacity(0.16)

@@ -48,7 +48,7 @@ class Grant:
 
 REFUSED = "the system grants no more"
 NOT_ASKED = Grant("normal", "no more was requested")
-NO_THREAD = Grant("none", "not in a thread of its own")
+NO_THREAD = Grant("none", "not in a separate thread")
 
 
 SUSPENDING: Final = ("SIGTSTP", "SIGTTIN", "SIGTTOU")

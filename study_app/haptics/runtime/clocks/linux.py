@@ -88,7 +88,7 @@ class _Bus:
         while not said.endswith(b"\r\n"):
             said += self._receive(1)
         if not said.startswith(b"OK "):
-            raise PermissionError(f"the bus refuses this user: {said.decode(errors='replace').strip()}")
+            raise PermissionError(f"the bus rejects this user: {said.decode(errors='replace').strip()}")
         self._socket.sendall(b"BEGIN\r\n")
         self.call(BUS, "/org/freedesktop/DBus", BUS, "Hello")
 
@@ -121,7 +121,7 @@ class _Bus:
         while True:
             kind_of_answer, answer = self._next()
             if kind_of_answer == _ERROR:
-                raise PermissionError(f"the real-time service refuses {member}")
+                raise PermissionError(f"the real-time service rejects {member}")
             if kind_of_answer == _RETURN:
                 return answer
 
