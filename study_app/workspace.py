@@ -37,7 +37,7 @@ class Workspace:
 
     def own_protocols(self) -> tuple[Path, ...]:
         """Return the files in ``protocols/``, sorted."""
-        return tuple(sorted(self.protocols.glob("*.toml")))
+        return tuple(sorted(self.protocols.glob("[!.]*.toml")))
 
 
 def workspace() -> Workspace:

@@ -50,7 +50,7 @@ def available_liquids(folders: tuple[Path, ...] | None = None, saved: tuple[str,
     A broken file has none; a file in ``folders`` with the name of a shipped one replaces it.
     """
     folders = (workspace().protocols,) if folders is None else folders
-    own = [str(path) for folder in folders for path in sorted(folder.glob("*.toml")) if path.stem not in shipped()]
+    own = [str(path) for folder in folders for path in sorted(folder.glob("[!.]*.toml")) if path.stem not in shipped()]
     choices: list[Choice] = []
     for source in dict.fromkeys([*shipped(), *own, *saved]):
         with suppress(ProtocolError):

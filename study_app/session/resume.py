@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from study_app.errors import ProtocolError, SessionError
-from study_app.protocol.load import known_protocols, parse, protocol_hash, source_bytes
+from study_app.protocol.load import known_protocols, parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial, build_schedule
+from study_app.protocol.source.files import has_hash
 from study_app.protocol.trials.methods import TrialResult
 from study_app.store.blinded.blinding import Key, open_events, place_number
 from study_app.store.journals.journal_events import Event, SessionStarted
@@ -97,7 +98,7 @@ def find_protocol(
         with contextlib.suppress(ProtocolError):  # an unreadable file is not a candidate
             sources[name] = read(name)
     for name, source in sources.items():
-        if protocol_hash(source) == start.protocol_hash:
+        if has_hash(source, start.protocol_hash):
             return name
     for name, source in sources.items():
         with contextlib.suppress(ProtocolError):

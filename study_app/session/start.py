@@ -15,11 +15,11 @@ from study_app.devices.registry import check_options, descriptor_of
 from study_app.devices.rig import Rig
 from study_app.errors import SessionError
 from study_app.outlets.session_outlets import Outlets, OutletStatus
-from study_app.protocol.load import parse, protocol_hash, read_document, source_bytes
+from study_app.protocol.load import parse, read_document, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.sequences import enrolment_number
-from study_app.protocol.source.files import protocol_file
+from study_app.protocol.source.files import has_hash, protocol_file
 from study_app.protocol.warnings.untranslated import check_translated, untranslated_on_pages
 from study_app.session.preflight import Masking, Measurements, Screen
 from study_app.session.resume import find_protocol, source_to_resume
@@ -260,10 +260,10 @@ def participant_with_other_contents(chosen: NewSession) -> str:
     if chosen.resumes is not None:
         return ""
     source = chosen.read_source()
-    version, own = parse(source, chosen.source).study.version, protocol_hash(source)
+    version = parse(source, chosen.source).study.version
     for session in StudyFolder(chosen.results).sessions():
         ran = run_of(session.receipt)
-        if ran is not None and ran.version == version and ran.hash != own:
+        if ran is not None and ran.version == version and not has_hash(source, ran.hash):
             return session.participant
     return ""
 

@@ -30,13 +30,19 @@ from study_app.store.folders import REBUILT, SessionFolder, StudyFolder
 from study_app.store.journals.journal_events import Event, Recorded
 
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
+_OWN = re.compile(
+    r"journal\.jsonl|receipt\.json|checksums\.sha256|rebuilt\.txt|crash\.txt|subject-[A-Za-z0-9]+_session-\d\d_task-"
+    r"[a-z0-9]+_description-[a-z]+_data\.csv|trial-\d{3,}(_attempt-\d+)?(_interval-\d+)?(_frames)?\.\w+"
+)
 _SYSTEM = re.compile(
-    r"desktop\.ini|(?:eh)?thumbs(?:_vista)?\.db|icon\r|~\$.*|~syncthing~.*|.*\.sync-conflict-\d{8}-\d{6}-\w+(?:\..*)?|"
+    r"desktop\.ini|(?:eh)?thumbs(?:_vista)?\.db(?::.*)?|folder\.jpg|icon\r|~\$.*|~syncthing~.*|~wr[a-z]\d+\.tmp|"
     r".*\(.*conflicted copy.*\).*|.*(?-i:-(?:DESKTOP|LAPTOP)-[A-Z0-9]{4,12})(?:-\d+)?\..*|@eaDir|__MACOSX|"
-    r"\$RECYCLE\.BIN|System Volume Information",
+    r"\$RECYCLE\.BIN|System Volume Information|lost\+found|"
+    r"(?:journal|receipt|checksums|rebuilt|crash|subject-.*_data|trial-\d{3,}\w*)(?:[ .(\[~-]|_conflict).*",
     re.IGNORECASE,
 )
-"""Files and folders of Windows, macOS, Office, Dropbox, Syncthing, OneDrive and Synology, besides hidden ones."""
+"""Files of Windows, macOS, Office and programs that share files, and copies of a session's own files, such as "journal
+(1).jsonl" or "receipt-HOST.json"; hidden files besides."""
 _FINGERPRINT = re.compile(
     r"([a-z2-7]{4}-[a-z2-7]{4}-[a-z2-7]{4})(?:-([a-z2-7]{2}))?\s+(data/sub-[A-Za-z0-9]{1,32}/ses-[0-9]{2}|"
     r"(?:withdrawals\.jsonl|exclusions\.csv)/sub-[A-Za-z0-9]{1,32}|reveals\.jsonl)\s*"
@@ -107,7 +113,7 @@ def file_hash(session: SessionFolder, name: str) -> str:
 
 def read_checksums(session: SessionFolder) -> dict[str, str]:
     """Read the list; return path in the folder → SHA-256."""
-    text = read_own(session.checksums, study_root(session.checksums)).decode("utf-8", "surrogateescape")
+    text = read_own(session.checksums, study_root(session.checksums)).decode("utf-8-sig", "surrogateescape")
     checksums: dict[str, str] = {}
     for line in text.splitlines():
         match = _LINE.fullmatch(line)
@@ -122,12 +128,12 @@ def read_checksums(session: SessionFolder) -> dict[str, str]:
 def session_files(session: SessionFolder) -> tuple[str, ...]:
     """Return the paths of the session's files in its folder, without the list itself, crash traces and system files."""
     left_out = {session.checksums.name, session.crash.name}
-    return tuple(name.as_posix() for name in _paths(session) if name.name not in left_out and not _is_system_file(name))
+    return tuple(name.as_posix() for name in _paths(session) if name.name not in left_out and not is_system_file(name))
 
 
 def system_files(session: SessionFolder) -> tuple[str, ...]:
     """Return the paths of visible files that operating systems or file-sharing programs left in the folder."""
-    return tuple(name.as_posix() for name in _paths(session) if _is_system_file(name) and not _is_hidden(name))
+    return tuple(name.as_posix() for name in _paths(session) if is_system_file(name) and not _is_hidden(name))
 
 
 def _paths(session: SessionFolder) -> list[Path]:
@@ -139,7 +145,10 @@ def _is_hidden(name: Path) -> bool:
     return any(part.startswith(".") for part in name.parts)
 
 
-def _is_system_file(name: Path) -> bool:
+def is_system_file(name: Path) -> bool:
+    """Return whether a relative path is of an operating system, a program that shares files, or a copy they made."""
+    if _OWN.fullmatch(name.name) and len(name.parts) <= 2:
+        return False
     return _is_hidden(name) or any(_SYSTEM.fullmatch(part) for part in name.parts)
 
 

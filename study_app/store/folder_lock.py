@@ -35,6 +35,7 @@ from study_app.store.atomic import (
     temporary_files,
     write_file,
 )
+from study_app.store.checksums import is_system_file
 from study_app.store.journals import journal
 
 _MARKER = re.compile(r"\.open-[0-9a-f]{8}\.json")
@@ -133,7 +134,8 @@ def is_never_begun(path: Path) -> bool:
         return False
     try:
         early = {path / name for name in _BEFORE_THE_FIRST_LINE}
-        if set(path.iterdir()) - early - {*markers(path), *temporary_files(path)}:
+        files = {entry for entry in path.iterdir() if not is_system_file(Path(entry.name))}
+        if files - early - {*markers(path), *temporary_files(path)}:
             return False
     except OSError as error:
         raise cannot_read(path, error) from error

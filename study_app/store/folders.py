@@ -118,15 +118,16 @@ class StudyFolder:
         return SessionFolder(self.data / f"sub-{participant}" / f"ses-{number:02d}", participant, number)
 
     def sessions(self) -> tuple[SessionFolder, ...]:
-        """Return the sessions that were begun, by participant and number."""
+        """Return the sessions that were begun, by participant and number; copies with other names are none."""
         try:
             paths = list(self.data.glob("sub-*/ses-*"))
         except FileNotFoundError:  # a participant was withdrawn in the meantime
             return self.sessions()
         sessions = [
-            SessionFolder(path, path.parent.name.removeprefix("sub-"), int(match[1]))
+            SessionFolder(path, participant, int(match[1]))
             for path in paths
             if (match := _SESSION_FOLDER.fullmatch(path.name))
+            and PARTICIPANT_ID.fullmatch(participant := path.parent.name.removeprefix("sub-"))
         ]
         return tuple(sorted(sessions, key=lambda session: (session.participant, session.number)))
 

@@ -1,5 +1,6 @@
 """Results in folders that operating systems, git and programs that share files also write to."""
 
+import hashlib
 import os
 import shutil
 import subprocess
@@ -12,14 +13,20 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
+from study_app.protocol.source.files import has_hash, protocol_hash, shipped_file
 from study_app.session.simulated.rehearsal import rehearse
+from study_app.store.exclusions import exclude, include
+from study_app.store.unblinding import unblind
 from study_app.store.verification.verify_study import verify_study
 
 pytestmark = pytest.mark.slow
 
 OF_SYSTEMS = (
     "desktop.ini", "Thumbs.db", "~$x.xlsx", "x (AB's conflicted copy 2026-01-02).csv", "x (conflicted copy).csv",
-    "receipt.sync-conflict-20260101-101010-ABCDEFG.json", "receipt-DESKTOP-AB12CD3.json",
+    "receipt.sync-conflict-20260101-101010-ABCDEFG.json", "receipt-DESKTOP-AB12CD3.json", "journal (1).jsonl",
+    "journal (Konfliktkopie von AB).jsonl", "journal_conflict-20260102-101010.jsonl", "receipt-Anna's Mac.json",
+    "journal 2.jsonl", "journal.jsonl.bak", "journal.jsonl~", "journal - Kopie.jsonl", "~WRL0001.tmp", "Icon\r",
+    "recordings/trial-001 (1).parquet", "recordings/trial-001_frames (SFConflict ab 2026).parquet",
 )  # fmt: skip
 HIDDEN = (".DS_Store", "._journal.jsonl", ".dropbox.attr", ".~lock.x.csv#")
 
@@ -43,9 +50,24 @@ def test_files_of_systems_are_noted_and_leave_the_fingerprint(study: Path) -> No
         (session_of(study) / name).write_bytes(b"\0")
     found = verify_study(study)
     assert found.errors == ()
-    assert {Path(one.place).name for one in found.warnings} == set(OF_SYSTEMS)
-    (session_of(study) / "more.csv").write_bytes(b"1\n")
-    assert any(one.place.endswith("more.csv") and "was added" in one.message for one in verify_study(study).errors)
+    assert {Path(one.place).name for one in found.warnings} == {Path(name).name for name in OF_SYSTEMS}
+    added = ("more.csv", "recordings/trial-099.parquet", "recordings/trial-001_attempt-2.parquet")
+    for name in added:
+        (session_of(study) / name).write_bytes(b"1\n")
+    said = {one.place: one.message for one in verify_study(study).errors}
+    assert all(any(place.endswith(name) for place in said) for name in added)
+    assert not any("fingerprints.txt" in message for message in said.values())
+
+
+def test_copies_of_sessions_are_no_sessions(study: Path) -> None:
+    shutil.copytree(session_of(study).parent, study / "data" / "sub-P001 (AB's conflicted copy 2026-01-02)")
+    shutil.copytree(session_of(study), session_of(study).parent / "ses-01 (1)")
+    found = verify_study(study)
+    assert found.errors == ()
+    assert [one.message for one in found.warnings] == [
+        "is not the folder of a session, so it is ignored: a copy of one?"
+    ] * 2
+    assert found.sessions == 1
 
 
 def test_a_file_of_a_system_that_the_list_has_belongs_to_the_fingerprint(tmp_path: Path) -> None:
@@ -64,6 +86,49 @@ def test_line_endings_that_git_changed_are_named(study: Path) -> None:
     said = [one.message for one in verify_study(study).errors]
     assert any("line endings were changed to CR LF, as git does with core.autocrlf" in message for message in said)
     assert not any("another line" in message for message in said)
+
+
+NOTED = {
+    "exclusions.csv", "exclusions_reversed.jsonl", "fingerprints.txt", "key.sealed", "reveals.jsonl",
+    "checksums.sha256", "dataset_description.json",
+}  # fmt: skip
+"""Files that are read with changed line endings or a byte order mark, as spreadsheets and editors write them."""
+
+
+@pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"], ids=["CR LF", "byte order mark"])
+def test_each_file_that_an_editor_saved_otherwise_is_read_or_named(study: Path, mark: bytes) -> None:
+    def errors_with(path: Path, content: bytes) -> list[str]:
+        before = path.read_bytes()
+        path.write_bytes(content)
+        said = [one.message for one in verify_study(study).errors if Path(one.place).name == path.name]
+        path.write_bytes(before)
+        return said
+
+    exclude(study, "P001", 1, by="AB", reason="x")
+    include(study, "P001", 1, by="AB", reason="x")
+    exclude(study, "P001", 1, by="AB", reason="x")
+    unblind(study, by="AB", reason="x")
+    files = [
+        path for path in study.rglob("*") if path.suffix in {".csv", ".json", ".jsonl", ".txt", ".sealed", ".sha256"}
+    ]
+    assert {path.name for path in files} >= set(NOTED)
+    for path in files:
+        content = path.read_bytes()
+        said = errors_with(path, mark + content if mark else content.replace(b"\n", b"\r\n"))
+        named = "byte order mark" if mark else "line endings"
+        if path.name in NOTED:
+            assert said == [], path
+        else:
+            assert said, path
+            assert all(named in message for message in said), (path, said)
+
+
+def test_a_study_has_one_hash_with_any_line_endings() -> None:
+    source = shipped_file("demo").read_bytes()
+    windows = source.replace(b"\n", b"\r\n")
+    assert protocol_hash(windows) == protocol_hash(source) == hashlib.sha256(source).hexdigest()
+    assert all(has_hash(text, hashlib.sha256(windows).hexdigest()) for text in (source, windows))
+    assert not has_hash(source + b"#", protocol_hash(source))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="paths are Unicode")

@@ -15,9 +15,9 @@ from study_app.errors import ProtocolError
 from study_app.protocol.source.files import (
     bundle,
     file_hash,
+    has_hash,
     known_protocols,
     protocol_file,
-    protocol_hash,
     source_bytes,
     unbundle,
     without_byte_order_mark,
@@ -80,7 +80,7 @@ def _study_file(study: str, hashes: set[str], footage: dict[str, str]) -> tuple[
         except ProtocolError:  # of another study, perhaps: what cannot be read cannot be shared
             continue
         content, liquids = unbundle(source)
-        if protocol_hash(bundle(content, liquids.get, footage)) in hashes:
+        if any(has_hash(bundle(content, liquids.get, footage), digest) for digest in hashes):
             return file, content, liquids
     return None
 

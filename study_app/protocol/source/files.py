@@ -230,5 +230,15 @@ def check_size(source: bytes, name: str) -> None:
 
 
 def protocol_hash(source: bytes) -> str:
-    """Return the SHA-256 of a protocol's source in hexadecimal: its file and liquid files."""
-    return hashlib.sha256(source).hexdigest()
+    """Return the SHA-256 of a protocol's source in hexadecimal: its file and liquid files, with LF line endings."""
+    return hashlib.sha256(_with_line_feeds(source)).hexdigest()
+
+
+def has_hash(source: bytes, digest: str) -> bool:
+    """Return whether a protocol's source has this hash, by any line endings: earlier versions hashed those it has."""
+    unix = _with_line_feeds(source)
+    return digest in {hashlib.sha256(text).hexdigest() for text in (source, unix, unix.replace(b"\n", b"\r\n"))}
+
+
+def _with_line_feeds(source: bytes) -> bytes:
+    return source.replace(b"\r\n", b"\n")

@@ -304,7 +304,7 @@ def read_key(folder: Path) -> Key:
         It is missing or not a key.
     """
     path = StudyFolder(folder).key
-    sealed = read_own(path, folder)
+    sealed = journal.as_written(read_own(path, folder))
     try:
         content = parse_json(base64.b64decode(b"".join(sealed.split()), validate=True))
         if content["format"] not in _FORMATS:

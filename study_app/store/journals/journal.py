@@ -27,6 +27,7 @@ from typing import Any, BinaryIO
 
 import study_app
 from study_app.errors import StoreError
+from study_app.protocol.source.files import without_byte_order_mark
 from study_app.store.atomic import (
     cannot_write,
     parse_json,
@@ -45,8 +46,19 @@ OTHER_LINE_ENDINGS = (
     "“* -text” in the repository's .gitattributes"
 )
 """Of the journal and the receipt; since 2 the lines have ``previous``."""
+BYTE_ORDER_MARK = "begins with a byte order mark, which an editor added: restore it from a copy"
 RETRY_S = 1.0
 """Time after which the background thread repeats a failed flush [s]."""
+
+
+def as_written(content: bytes) -> bytes:
+    """Return the content of a text file as this program writes it, with LF and without a byte order mark."""
+    return without_byte_order_mark(content).replace(b"\r\n", b"\n")
+
+
+def notation_change(content: bytes) -> str:
+    """Return how the notation of a file was changed whose text is `as_written`."""
+    return OTHER_LINE_ENDINGS if b"\r\n" in content else BYTE_ORDER_MARK
 
 
 class SessionClock:
@@ -154,8 +166,9 @@ def scan(path: Path) -> Contents:
             damage = f"{path}, line {number} {wrong}: it was changed; restore it from a copy"
             return Contents(lines, whole_bytes, damage=damage)
         if (wrong := _chain_error(line, hashed.hexdigest(), chained=chained)) is not None:
-            if pieces[0].endswith(b"\r"):
-                return Contents(lines[:-1], whole_bytes, damage=f"{path}, line 1: {OTHER_LINE_ENDINGS}")
+            first = pieces[0] + b"\n"
+            if first != as_written(first):
+                return Contents(lines[:-1], whole_bytes, damage=f"{path}, line 1: {notation_change(first)}")
             return Contents(lines[:-1], whole_bytes, damage=f"{path}, line {number} {wrong}")
         lines.append(read_event(line))
         whole_bytes += len(piece) + 1

@@ -17,10 +17,9 @@ from typing import Any
 import study_app
 from study_app.errors import StoreError
 from study_app.protocol.differences import CONDITIONS_DIFFER, differences
-from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
-from study_app.protocol.source.files import bundle, hashes_in, unbundle
+from study_app.protocol.source.files import bundle, has_hash, hashes_in, unbundle
 from study_app.store import receipt
 from study_app.store.atomic import is_there, paths_in, read_own, remove_temporary_files, write_file
 from study_app.store.blinded.blinding import Key, has_same_conditions, open_or_draw_key, opened_key, read_key
@@ -327,7 +326,7 @@ def _same_protocol(
     place: Place, first: Mapping[str, Any], start: events.SessionStarted, protocol: Protocol, source: bytes
 ) -> None:
     """Raise an error that lists the differences if the protocol's file is not the one that the session began with."""
-    if protocol_hash(source) == start.protocol_hash:
+    if has_hash(source, start.protocol_hash):
         return
     changes = list(differences(first["protocol"], json.loads(json.dumps(receipt.without_conditions(protocol)))))
     if not has_same_conditions(place.study_folder.path, protocol):

@@ -29,6 +29,7 @@ from study_app.store.atomic import (
     write_file,
 )
 from study_app.store.blinded.blinding import Key, verified_key
+from study_app.store.checksums import is_system_file
 from study_app.store.folder_lock import create_locked_folder, is_never_begun, is_open, lock_folder, refuse_if_open
 from study_app.store.folders import ID_PATTERN, StudyFolder
 from study_app.store.merged import FOLDER, Merged, Site, merged_above, read_merged
@@ -119,7 +120,7 @@ def _check_names(given: Mapping[str, Path], merged: Merged | None) -> None:
 
 def _check_places(given: Mapping[str, Path], to: Path, merged: Merged | None) -> None:
     target = to.resolve()
-    if merged is None and is_there(to) and (not to.is_dir() or any(to.iterdir())):
+    if merged is None and is_there(to) and (not to.is_dir() or _entries(to)):
         raise StoreError(f"{to} is not a merged study and is not empty: give a new folder with --to")
     for above in (target, *target.parents):
         if described_study(StudyFolder(above)) is not None:
@@ -281,4 +282,10 @@ def _copy_file(source: str, to: str, *, follow_symlinks: bool = True) -> str:
 def stray_entries(merged: Merged) -> tuple[Path, ...]:
     """Return the entries next to the sites that are not listed, left by an interrupted merge or added by hand."""
     place = merged.path / FOLDER
-    return tuple(sorted(path for path in place.iterdir() if path.name not in merged.names)) if place.is_dir() else ()
+    return tuple(path for path in _entries(place) if path.name not in merged.names)
+
+
+def _entries(folder: Path) -> list[Path]:
+    """Return what is in a folder, if it exists, without files of operating systems and sharing programs."""
+    paths = sorted(folder.iterdir()) if folder.is_dir() else []
+    return [path for path in paths if not is_system_file(Path(path.name))]

@@ -30,7 +30,7 @@ from study_app.store.folder_lock import is_never_begun, is_open
 from study_app.store.folders import FINGERPRINTS, SessionFolder
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
-from study_app.store.journals.journal import OTHER_LINE_ENDINGS, Contents
+from study_app.store.journals.journal import Contents
 from study_app.store.progress import Progress, attempt_name, progress_of, recordable
 from study_app.store.recorder import recording_files
 from study_app.store.sessions.open_session import Place, table_files
@@ -169,7 +169,7 @@ def _check_files(
     ended = isinstance(lines[-1], events.SessionEnded)
     hashes = {}
     if ended or not running:
-        names = (*session_files(folder), *_listed_system_files(folder))
+        names = {*session_files(folder), *(_checksums(folder).keys() & set(system_files(folder)))}
         hashes = {name: _hash(folder, name) for name in names if recordings or not name.endswith(".parquet")}
     if not running:
         _check_tables(place, lines, findings, ended=ended)
@@ -179,7 +179,7 @@ def _check_files(
             _check_recordings(folder, told, key, hashes, findings, ended=ended)
     for name in system_files(folder):
         if name not in hashes:
-            findings.warning(folder.path / name, "is a file of an operating system or of a program that shares files")
+            findings.warning(folder.path / name, "is of an operating system, or a copy by a program that shares files")
     if is_there(folder.rebuilt):
         with findings.reading(folder.rebuilt):
             for line in read_own(folder.rebuilt, study_root(folder.rebuilt)).decode("utf-8", "replace").splitlines():
@@ -193,7 +193,7 @@ def _check_files(
         chained=lines[-1].previous is not None,
         row=row_from(folder, contents, opened_or_none(place.study_folder)),
         trials=frozenset(progress_of(lines).presented),
-        fingerprint=fingerprint(hashes, lines) if ended and recordings else "",
+        fingerprint=fingerprint(_listed(folder, hashes), lines) if ended and recordings else "",
     )
 
 
@@ -419,6 +419,10 @@ def check_table(
     except OSError:
         findings.error(path, "is missing or cannot be read; rebuild creates it again")
         return
+    written = journal.as_written(content)
+    if content != written == csv_files.align_columns(written, expected, columns)[0]:
+        findings.error(path, journal.notation_change(content))
+        return
     expected, columns = csv_files.align_columns(content, expected, columns)
     pairs = zip_longest(content.split(b"\n"), expected.split(b"\n"))
     differing = [number for number, (held, whole) in enumerate(pairs, start=1) if held != whole]
@@ -439,12 +443,18 @@ def _hash(folder: SessionFolder, name: str) -> str:
         return ""
 
 
-def _listed_system_files(folder: SessionFolder) -> Iterator[str]:
-    """Yield the system files that existed when the session ended, so that its list includes them."""
-    if names := system_files(folder):
-        with contextlib.suppress(StoreError):
-            listed = read_checksums(folder)
-            yield from (name for name in names if name in listed)
+def _checksums(folder: SessionFolder) -> dict[str, str]:
+    """Return the session's list of checksums, empty if it cannot be read."""
+    try:
+        return read_checksums(folder)
+    except StoreError:
+        return {}
+
+
+def _listed(folder: SessionFolder, hashes: Mapping[str, str]) -> Mapping[str, str]:
+    """Return the present hashes of the files that the session's list names, all without a list."""
+    names = _checksums(folder)
+    return {name: hashes[name] for name in hashes if name in names} if names else hashes
 
 
 def _check_checksums(
@@ -478,8 +488,9 @@ def _check_checksums(
             elif hashes[name] == opened_hashes.get(listed[name]):
                 findings.warning(path, "was opened by an unblinding that did not finish: unblind again")
             elif hashes[name] != listed[name]:
-                unchanged = hashlib.sha256(read_regular(path).replace(b"\r\n", b"\n")).hexdigest() == listed[name]
-                findings.error(path, OTHER_LINE_ENDINGS if unchanged else CHANGED)
+                content = read_regular(path)
+                same_text = hashlib.sha256(journal.as_written(content)).hexdigest() == listed[name]
+                findings.error(path, journal.notation_change(content) if same_text else CHANGED)
 
 
 def _check_recordings(

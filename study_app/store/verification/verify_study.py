@@ -116,6 +116,10 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findi
     _check_reveals(study, key, findings)
     check_allocation(study, key, withdrawn, findings)
     _check_blinding(study, key, findings)
+    places = {place for session in study.sessions() for place in (session.path, session.path.parent)}
+    for path in {*study.data.glob("sub-*"), *study.data.glob("sub-*/ses-*")} - places:
+        if path.is_dir() and (path.name.startswith("sub-") or path.parent in places):
+            findings.warning(path, "is not the folder of a session, so it is ignored: a copy of one?")
     for path in (*temporary_files(folder), *temporary_files(study.data)):
         findings.warning(path, "is an incomplete file left by a killed program, or is being written")
     return sessions
