@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path as File
 from typing import Annotated, Any, Final, Literal, Self
 
@@ -98,7 +98,11 @@ class Questionnaire(Table):
 
     def item(self, item_id: str) -> Question:
         """Return the item with an id (KeyError if there is none)."""
-        return {item.id: item for item in self.items}[item_id]
+        return self._items_by_id[item_id]
+
+    @cached_property
+    def _items_by_id(self) -> dict[str, Question]:
+        return {item.id: item for item in self.items}
 
     def context(self, scales: Mapping[str, Scale], language: str) -> Context:
         """Return the context of its items: scales and language."""

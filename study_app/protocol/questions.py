@@ -91,11 +91,11 @@ def shown_questions(items: Iterable[Question | ItemView], answers: Mapping[str, 
 
     Answers to items that are not shown count for nothing.
     """
-    shown_ids: list[str] = []
+    shown_ids: dict[str, None] = {}
     for item in items:
         rule = item.show_if
         if rule is None or (rule.item in shown_ids and rule.item in answers and rule.holds(answers[rule.item])):
-            shown_ids.append(item.id)
+            shown_ids[item.id] = None
     return tuple(shown_ids)
 
 

@@ -24,6 +24,20 @@ from tests.protocol.forms.mixed import mixed_file
 from tests.protocol.trials import level_studies, matching
 
 HERE = Path(__file__).parent
+FORM = """
+format = 2
+sequence = ["about", "stir"]
+study.name = "longform"
+liquids.thin.density_kg_m3 = 1000
+tasks.explore = {{ kind = "explore", min_s = 1, max_s = 2, instruction = "Explore." }}
+scales.agree.labels = ["1", "2", "3", "4", "5", "6", "7"]
+blocks.stir.conditions = ["thin"]
+[questionnaires.about]
+intro = "How was it?"
+scale = "agree"
+items = [
+{rows}]
+"""
 
 
 def signatures() -> list[str]:
@@ -295,3 +309,34 @@ def test_a_fit_of_own_trials_is_that_of_the_report(short: Path) -> None:
     assert own == pytest.approx(reported[columns].to_numpy(dtype=float), rel=1e-9)
     alone = api.fit(trials[["level", "success"]], levels=levels)
     assert list(alone["n"]) == [1, len(trials)]
+
+
+def calls_an_answer(folder: Path, statements: int) -> float:
+    """Return how many functions a session calls for each answer to a form of so many statements."""
+    rows = "".join(
+        f'{{ id = "s{number}", text = "Statement {number}", short = "S{number}" }},\n' for number in range(statements)
+    )
+    study = folder / f"form{statements}.toml"
+    study.write_text(FORM.format(rows=rows), encoding="utf-8")
+    calls = 0
+
+    def count(_frame: Any, event: str, _: Any) -> None:
+        nonlocal calls
+        calls += event == "call"
+
+    def answer(question: Any) -> dict[str, int]:
+        sys.setprofile(count)
+        return {item.id: 4 for item in question.page.items}
+
+    with api.open_session(study, "P001", results=folder / f"r{statements}", seed=1, answer=answer) as session:
+        pages = iter(session)
+        next(pages)
+        next(pages)
+        sys.setprofile(None)
+    return calls / statements
+
+
+@pytest.mark.slow
+@needs_servo
+def test_the_work_of_an_answer_does_not_grow_with_the_form(tmp_path: Path) -> None:
+    assert calls_an_answer(tmp_path, 80) < 1.5 * calls_an_answer(tmp_path, 20)

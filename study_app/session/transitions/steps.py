@@ -345,8 +345,8 @@ def _remove_answer(state: SessionState, item: str) -> Result:
 
 def _without_hidden(state: SessionState, done: Commands) -> Result:
     """Remove the answers to questions that are no longer shown."""
-    hidden = [item for item in state.items if item not in state.shown]
-    for item in hidden:
+    shown = set(state.shown)
+    for item in [item for item in state.items if item not in shown]:
         state, written = _remove_answer(state, item)
         done = (*done, *written)
     return state, done

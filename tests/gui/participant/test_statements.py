@@ -1,6 +1,7 @@
 """The questionnaire of statements: rows and columns by keys, mouse and touch, and what a screen reader hears."""
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -9,6 +10,7 @@ from PySide6.QtGui import QAccessible, QPointingDevice
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from study_app.gui.widgets.accessible import HeadingLabel
 from study_app.session.transitions.events import Chosen, ItemShown, Submitted
 from tests.gui.participant.driver import KEY, Participant, name_of, tap, told_of
 from tests.gui.small import DUTCH_LABELS, LABELS, questionnaire
@@ -153,3 +155,22 @@ def test_all_is_mirrored_but_the_order_of_the_scale_and_the_keys_that_go_along_i
     assert there.page.button.geometry().left() < 60 < here.page.button.geometry().left()
     there.press(KEY.Key_Right, KEY.Key_Right, KEY.Key_Space)
     assert values(there) == [2]
+
+
+@pytest.mark.parametrize("size", [SMALL, FULL, (1920, 1080)])
+def test_two_hundred_statements_stay_legible_and_quick(opening: Opening, size: tuple[int, int]) -> None:
+    seen = opening(questionnaire(tuple(f"Statement {number}" for number in range(1, 201))), size)
+    parts = len(seen.page.parts)
+    for part in (0, parts // 2, parts - 1):
+        seen.page.go_to(seen.page.parts[part][0])
+        QApplication.processEvents()
+        tabs = [tab for tab in seen.page.tabs if tab.isVisible()]
+        assert len([tab for tab in tabs if tab.isChecked()]) == 1
+        edges = sorted((tab.geometry().left(), tab.geometry().right()) for tab in tabs)
+        assert all(right < left for (_, right), (left, _) in pairwise(edges))
+        assert edges[0][0] > seen.page.findChild(HeadingLabel).geometry().right()
+        assert edges[-1][1] < seen.page.width()
+        assert all(tab.fontMetrics().horizontalAdvance(tab.text()) < tab.width() for tab in tabs)
+    for field in seen.page.parts[-1]:
+        seen.press(KEY.Key_4)
+    assert [value for _, value in seen.answers] == [4] * len(seen.page.parts[-1])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from PySide6.QtCore import QRect, QRectF, Qt, QTimer
+from PySide6.QtCore import QRect, QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import QAccessible, QColor, QFont, QFontMetrics, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QLayout, QPushButton, QStyle, QWidget
 
@@ -195,6 +195,7 @@ class QuestionsPage(PageWidget):
         self.foot = Foot(context.words, self)
         self.foot.button.clicked.connect(self.submit)
         self.tabs: list[QPushButton] = []
+        self._shown_parts: list[int] = []
         self._lay_out_once()
         self._sender = QTimer(self, singleShot=True, interval=0)
         self._sender.timeout.connect(self._send_seen)
@@ -349,27 +350,40 @@ class QuestionsPage(PageWidget):
         self._update_foot()
 
     def _make_tabs(self) -> None:
-        wanted = self.parts if len(self.parts) > 1 else []
-        while len(self.tabs) > len(wanted):
+        text, face = self.words_scale, font("label", scale=self.words_scale)
+        names = [_range_text(part) for part in self.parts]
+        widest = max(map(QFontMetricsF(face).horizontalAdvance, names))
+        size = QSize(round(max(TAB_WIDTH * text, widest + 12 * text)), round(target_px(text)))
+        shown = self._tabs_shown(size.width())
+        while len(self.tabs) > len(shown):
             remove_widget(self.tabs.pop())
-        while len(self.tabs) < len(wanted):
+        while len(self.tabs) < len(shown):
             self.tabs.append(self._new_tab(len(self.tabs)))
-        text = self.words_scale
-        for index, (tab, part) in enumerate(zip(self.tabs, wanted, strict=True)):
-            first, last = part[0].view.number, part[-1].view.number
-            tab.setText(str(first) if first == last else f"{first}–{last}")
-            tab.setFont(font("label", scale=text))
-            inner = round(target_px(text)) - 2  # without the edge
-            theme = PARTICIPANT
-            tab.setStyleSheet(TAB_STYLE.format(text=theme.text, text2=theme.text2, ctl=theme.ctl, height=inner))
-            tab.setFixedSize(round(TAB_WIDTH * text), inner + 2)
-            tab.setChecked(index == self._part)
+        theme = PARTICIPANT
+        style = TAB_STYLE.format(text=theme.text, text2=theme.text2, ctl=theme.ctl, height=size.height() - 2)
+        for tab, part in zip(self.tabs, shown, strict=True):
+            tab.setText(names[part])
+            tab.setFont(face)
+            tab.setStyleSheet(style)
+            tab.setFixedSize(size)
+            tab.setChecked(part == self._part)
+        self._shown_parts = shown
 
-    def _new_tab(self, part: int) -> QPushButton:
+    def _tabs_shown(self, tab_px: int) -> list[int]:
+        """Return the parts with a tab: all that fit beside the title, else the first, the last and the nearest."""
+        many = len(self.parts)
+        room = self.width() - 2 * round(self.margin) - self._title.sizeHint().width()
+        fitting = max(3, room // (tab_px + self._tab_row.spacing()))
+        if many <= fitting:
+            return list(range(many)) if many > 1 else []
+        first = min(max(1, self._part - (fitting - 2) // 2), many - 1 - (fitting - 2))
+        return [0, *range(first, first + fitting - 2), many - 1]
+
+    def _new_tab(self, place: int) -> QPushButton:
         tab = QPushButton(self)
         tab.setCheckable(True)
         tab.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        tab.clicked.connect(lambda: self.go_to(self.parts[part][0]))
+        tab.clicked.connect(lambda: self.go_to(self.parts[self._shown_parts[place]][0]))
         self._tab_row.addWidget(tab)
         return tab
 
@@ -491,6 +505,12 @@ def _fit_words(field: QuestionField, scale: float, width: int, room: int) -> int
             break
     field.setMinimumHeight(height)
     return height
+
+
+def _range_text(part: Sequence[QuestionField]) -> str:
+    """Return the numbers of a part's questions: "6–10"."""
+    first, last = part[0].view.number, part[-1].view.number
+    return str(first) if first == last else f"{first}–{last}"
 
 
 def _divide_into_parts(asked: Sequence[QuestionField], heights: Sequence[int], room: int) -> Parts:
