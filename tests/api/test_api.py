@@ -26,12 +26,15 @@ from tests.protocol.trials import level_studies, matching
 HERE = Path(__file__).parent
 FORM = """
 format = 2
-sequence = ["about", "stir"]
+sequence = ["about", "last", "stir"]
 study.name = "longform"
 liquids.thin.density_kg_m3 = 1000
 tasks.explore = {{ kind = "explore", min_s = 1, max_s = 2, instruction = "Explore." }}
-scales.agree.labels = ["1", "2", "3", "4", "5", "6", "7"]
+scales.agree.labels.en = ["1", "2", "3", "4", "5", "6", "7"]
 blocks.stir.conditions = ["thin"]
+[questionnaires.last]
+intro = "Anything else?"
+items = [{{ id = "else", kind = "text", text = "Else", short = "Else", required = false }}]
 [questionnaires.about]
 intro = "How was it?"
 scale = "agree"

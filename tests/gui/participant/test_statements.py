@@ -171,6 +171,6 @@ def test_two_hundred_statements_stay_legible_and_quick(opening: Opening, size: t
         assert edges[0][0] > seen.page.findChild(HeadingLabel).geometry().right()
         assert edges[-1][1] < seen.page.width()
         assert all(tab.fontMetrics().horizontalAdvance(tab.text()) < tab.width() for tab in tabs)
-    for field in seen.page.parts[-1]:
+    for _ in seen.page.parts[-1]:
         seen.press(KEY.Key_4)
     assert [value for _, value in seen.answers] == [4] * len(seen.page.parts[-1])
