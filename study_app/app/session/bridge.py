@@ -16,6 +16,7 @@ from inspect import unwrap
 from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtGui import QGuiApplication, QScreen
 from PySide6.QtWidgets import QWidget
 
 from study_app.app.failures import PAINTING, ThreadExceptions, UncaughtExceptions, guarded_session_slot
@@ -64,8 +65,6 @@ from study_app.store.program_log import DEVICE_FAILED
 from study_app.store.progress import Progress, progress_of
 
 if TYPE_CHECKING:
-    from PySide6.QtGui import QScreen
-
     from study_app.devices.base import Device
     from study_app.devices.rig import Rig
     from study_app.gui.theme.theme import Theme
@@ -83,8 +82,8 @@ END_SHOWN_MS = 5000
 SCREEN_SETTLES_MS = 500  # a window manager may briefly put a window on another screen
 SCREEN_REMOVED = (
     "Both windows are on one screen",
-    "The session is paused: the participant's window would cover the force stop. Connect the second screen again, and "
-    "move the participant's window to it before you resume.",
+    "The session is paused, and cannot be resumed: the participant's window would cover the force stop. Connect the "
+    "second screen again; the participant's window returns to it.",
 )
 log = logging.getLogger(__name__)
 
@@ -266,20 +265,41 @@ class SessionBridge(QObject):
         self._leave_session()
 
     def watch_screens(self) -> None:
-        """From now on, pause when a screen is removed and both windows end up on the same one."""
+        """From now on, pause when a screen is removed and both windows end up on the same one, until one is added."""
         for window in (self.participant, self.operator):
             window.windowHandle().screenChanged.connect(
                 lambda _screen: QTimer.singleShot(SCREEN_SETTLES_MS, self, self._check_screens)
             )
+        QGuiApplication.instance().screenAdded.connect(self._return_to_screen)  # type: ignore[union-attr]
+
+    @property
+    def _covers_operator(self) -> bool:
+        """Whether the participant's window covers the operator's, and with it the force stop."""
+        participant, operator = self.participant, self.operator
+        shared = participant.screen().name() == operator.screen().name()
+        return shared and self.strip is None and participant.isFullScreen() and not (self._gone or self.runner.finished)
 
     @guarded_session_slot
     def _check_screens(self) -> None:
-        participant, operator = self.participant, self.operator
-        shared = participant.screen().name() == operator.screen().name()
-        if shared and self.strip is None and participant.isFullScreen() and not (self._gone or self.runner.finished):
+        if self._covers_operator:
             self._post_event(PauseRequested(self._now(), "program"))
-            operator.bring_forward()
-            operator.show_message(*SCREEN_REMOVED)
+            self.operator.bring_forward()
+            self.operator.show_message(*SCREEN_REMOVED)
+
+    @guarded_session_slot
+    def _return_to_screen(self, screen: QScreen) -> None:
+        """Move the participant's window to a screen that was added, if it covers the operator's."""
+        if self._covers_operator:
+            self.participant.showNormal()  # a full-screen window does not change its screen
+            self.participant.open_on(screen)
+            self.operator.bring_forward()
+
+    def _refuses_resumption(self) -> bool:
+        """Return whether the session cannot be resumed because one window covers the other, and say so."""
+        if refused := self._covers_operator:
+            self.operator.bring_forward()
+            self.operator.show_message(*SCREEN_REMOVED)
+        return refused
 
     @guarded_session_slot
     def _pause_trial(self) -> None:
@@ -436,7 +456,8 @@ class SessionBridge(QObject):
     def _handle_page_event(self, event: Event) -> None:
         if isinstance(event, ForceStopped):
             self.parts.servo.stop_force()
-        self._post_event(event)
+        if not (isinstance(event, ResumeRequested) and self._refuses_resumption()):
+            self._post_event(event)
 
     @guarded_session_slot
     def _handle_request(self, what: str, details: tuple[Any, ...]) -> None:
@@ -445,6 +466,8 @@ class SessionBridge(QObject):
         match what:
             case "stop":
                 self._stop_force()
+            case "resume" if self._refuses_resumption():
+                pass
             case "resume":
                 post(ResumeRequested(self._now(), "operator"))
                 if self.strip is not None:

@@ -89,6 +89,15 @@ def test_a_participants_window_that_comes_to_cover_the_operators_pauses_the_sess
     assert len(told) == full_screen
     if full_screen:
         qtbot.waitUntil(lambda: QApplication.activeWindow() in (bridge.operator, *told))
+        bridge.operator.ask("resume")
+        assert not any(row[0] == "resumed" for row in world.done), "the participant's window would cover the force stop"
+        returned = []
+        monkeypatch.setattr(bridge.participant, "open_on", returned.append)
+        QApplication.instance().screenAdded.emit(handle.screen())
+        assert returned == [handle.screen()]
+        assert not bridge.participant.isFullScreen(), "only then it can change its screen"
+        bridge.operator.ask("resume")
+        assert any(row[0] == "resumed" for row in world.done)
 
 
 def test_a_screen_that_is_rescaled_in_a_trial_changes_neither_force_nor_place_of_the_hand(bridge, world):
