@@ -5,5 +5,5 @@
 ``planning`` simulates studies that do not exist yet.
 
 Reading order: wording, worker_messages; statistics; data; results; page_layout, questions; html_page; levels; export,
-figures; findings; contrasts; evaluate, planning; report; export_study; study_worker.
+figures; findings; contrasts; evaluate, planning; planned_exclusions; report; export_study; study_worker.
 """

@@ -34,8 +34,8 @@ SEED: Final = 1
 """Of all random rearrangements and resamples: the same results give the same numbers."""
 
 
-def evaluate(study: Study, *, progress: Progress = silent) -> Results:
-    """Test everything that the answers and recordings of a study can answer.
+def evaluate(study: Study, *, recordings: bool = True, progress: Progress = silent) -> Results:
+    """Test everything that the answers and, with ``recordings``, the recordings of a study can answer.
 
     While the key is sealed only counts and comparisons of codes are there; ``BlockResult.absent`` says what waits, and
     what so few participants could not show. A part that fails is in ``Results.failures`` and, with the reason, in its
@@ -55,7 +55,7 @@ def evaluate(study: Study, *, progress: Progress = silent) -> Results:
     """
     failures = Failures()
     try:
-        return _evaluated(study, failures, partial(_ending, progress))
+        return _evaluated(study, failures, partial(_ending, progress), recordings=recordings)
     except Ended as ended:
         raise ended.error from None
 
@@ -68,7 +68,7 @@ def _ending(progress: Progress, what: str, share: float) -> None:
         raise Ended(error) from error
 
 
-def _evaluated(study: Study, failures: Failures, progress: Progress) -> Results:
+def _evaluated(study: Study, failures: Failures, progress: Progress, *, recordings: bool) -> Results:
     collected = [
         failures.attempt("all tests", partial(block_answers, study, block, SEED, failures), block=block.id)
         for block in study.blocks
@@ -87,8 +87,8 @@ def _evaluated(study: Study, failures: Failures, progress: Progress) -> Results:
         return untested(block, NotTested(found.what, found.why)) if isinstance(found, Failure) else found
 
     def moved() -> Performance | None:
-        """Measure motion and force; None while sealed, since a thick liquid is known by its force."""
-        if not study.revealed:
+        """Measure motion and force if asked; None while sealed, since a thick liquid is known by its force."""
+        if not (study.revealed and recordings):
             return None
         return performance(
             study, lambda done, total: progress(f"reading recordings: {done} of {total}", 0.5 + 0.3 * done / total)

@@ -17,6 +17,7 @@ from study_app.analysis.worker_messages import (
     OpenKey,
     Order,
     Progress,
+    Proposed,
     ReadStudy,
     SessionsFound,
     StudiesFound,
@@ -29,7 +30,7 @@ from study_app.analysis.worker_messages import (
 from study_app.errors import StoreError
 from study_app.store import receipt
 from study_app.store.atomic import cannot_read
-from study_app.store.exclusions import exclude, include
+from study_app.store.exclusions import exclude, include, keep
 from study_app.store.merged import all_exclusions, folders_of, locate_participant, sessions_in
 from study_app.store.tables.study_files import participants_of, study_folders
 from study_app.store.unblinding import has_opened_keys, reveals_of, unblind_folder
@@ -55,8 +56,11 @@ def carry_out(order: Order, send: Send, stop: Callable[[], bool]) -> Done:
             _read(order.folder, send, stop)
         case LeaveOut():
             place = locate_participant(order.folder, order.participant)
-            change = include if isinstance(order, TakeBack) else exclude
-            change(*place, order.session, trial=order.trial, by=order.by, reason=order.reason)
+            if isinstance(order, TakeBack) and order.rule:
+                keep(*place, order.session, rule=order.rule, by=order.by, reason=order.reason)
+            else:
+                change = include if isinstance(order, TakeBack) else exclude
+                change(*place, order.session, trial=order.trial, by=order.by, reason=order.reason)
         case OpenKey():
             opened = unblind_folder(order.folder, by=order.by, reason=order.reason)
             return Done(warnings=tuple(line for site in opened.values() for line in site.left))
@@ -115,6 +119,10 @@ def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
     _draw_questions(study, send, stop)
     if study.revealed and study.n:
         _evaluate(study, send, stop)
+    else:
+        from study_app.analysis.planned_exclusions import undecided  # noqa: PLC0415
+
+        send(Proposed(undecided(study, None)))
 
 
 def _draw_questions(study: Study, send: Send, stop: Callable[[], bool]) -> None:
@@ -171,11 +179,13 @@ def _evaluate(study: Study, send: Send, stop: Callable[[], bool]) -> None:
     from study_app.analysis.evaluate import evaluate  # noqa: PLC0415
     from study_app.analysis.figures import answer_figures  # noqa: PLC0415
     from study_app.analysis.findings import all_findings  # noqa: PLC0415
+    from study_app.analysis.planned_exclusions import undecided  # noqa: PLC0415
     from study_app.analysis.report.study_figures import block_name, pictures  # noqa: PLC0415
 
     going = partial(_going, send, stop)
     going("testing", 0.0)
     results = evaluate(study, progress=lambda what, share: going(what, EVALUATION * share))
+    send(Proposed(undecided(study, results)))
     titles = {block_name(study, block): answer_figures.title(block) for block in study.blocks}
     titles |= {one.figure_name: one.figure_title for one in all_findings() if one.figure_name}
     for drawn, picture in enumerate(pictures(study, results, ("svg",)), start=1):

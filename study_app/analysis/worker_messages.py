@@ -40,7 +40,9 @@ class LeaveOut:
 
 @dataclass(frozen=True, slots=True)
 class TakeBack(LeaveOut):
-    """Take back that a session or a trial is left out (see ``store.exclusions.include``)."""
+    """Take back that a session or a trial is left out, or keep a session that meets a ``rule``."""
+
+    rule: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +119,13 @@ class StudyFound:
     colours: Mapping[str, str] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, slots=True)
+class Proposed:
+    """The exclusions that rules propose and nobody has decided; they have no time yet."""
+
+    exclusions: tuple[Exclusion, ...]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FigureDrawn:
     """A figure as SVG; one of an earlier ``name`` gives way. Without ``svg``, ``caption`` says why there is none."""
@@ -143,7 +152,7 @@ class Done:
     warnings: tuple[str, ...] = ()
 
 
-Answer: TypeAlias = StudiesFound | SessionsFound | StudyFound | FigureDrawn | Progress | Done
+Answer: TypeAlias = StudiesFound | SessionsFound | StudyFound | Proposed | FigureDrawn | Progress | Done
 
 
 AnalysisClient: TypeAlias = WorkerClient[Order, Answer]

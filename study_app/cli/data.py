@@ -14,6 +14,7 @@ from study_app.cli.options import (
     SESSION,
     Target,
     echo_files,
+    exclude_each_other,
     exit_if,
     progress,
     takes_session,
@@ -176,16 +177,25 @@ def _warn_if_opened(results: Path) -> None:
 @PARTICIPANT
 @SESSION
 @click.option("--trial", type=click.IntRange(1), help="This trial only, if it was excluded by itself.")
+@click.option("--rule", metavar="RULE", help="Keep a session that meets this rule, such as below_chance.")
 @BY
 @REASON
-def include(results: Path, participant: str, session: int, trial: int | None, by: str, reason: str) -> None:
-    """Reverse an exclusion, so that the session or trial is analysed again; name, time and reason are recorded."""
-    from study_app.store.exclusions import describe_exclusion
+def include(
+    results: Path, participant: str, session: int, trial: int | None, rule: str | None, by: str, reason: str
+) -> None:
+    """Include a session or trial again, or keep a session that a rule proposes; name, time and reason are recorded."""
+    from study_app.store.exclusions import describe_exclusion, keep
     from study_app.store.exclusions import include as include_in
     from study_app.store.merged import locate_participant
 
-    taken = include_in(*locate_participant(results, participant), session, trial=trial, by=by, reason=reason)
-    click.echo(f"counts again: {describe_exclusion(replace(taken, participant=participant))}")
+    exclude_each_other(trial=trial, rule=rule)
+    where = locate_participant(results, participant)
+    if rule is None:
+        taken = include_in(*where, session, trial=trial, by=by, reason=reason)
+    else:
+        taken = keep(*where, session, rule=rule, by=by, reason=reason)
+    done = "counts again" if rule is None else f"is kept, although it meets the rule {rule}"
+    click.echo(f"{done}: {describe_exclusion(replace(taken, participant=participant))}")
     _warn_if_opened(results)
 
 

@@ -384,6 +384,47 @@ class Contrast(Table):
         return f"{self.measure_words} {moves} {first} {joint} {second}{where}{near}"
 
 
+BELOW_CHANCE_P: Final = 0.001
+Rule: TypeAlias = Literal["below_chance", "threshold_beyond_levels", "constant_answers", "fast_answers"]
+RULES: Final[Mapping[Rule, str]] = {
+    "below_chance": "fewer answers of a block are correct than by chance (binomial p below 0.001)",
+    "threshold_beyond_levels": "a threshold lies beyond the levels of its stimulus",
+    "constant_answers": "more than {limit:g} % of the answers to statements are equal",
+    "fast_answers": "half of the answers were chosen within {limit:g} s of the question",
+}
+"""When each planned rule proposes a session for exclusion."""
+LIMITS: Final[Mapping[Rule, tuple[float, float]]] = {"constant_answers": (1, 100), "fast_answers": (0.05, 600)}
+"""The range of the limit of each rule that has one, in percent or seconds."""
+
+
+class ExclusionRule(Table):
+    """A rule by which a session is proposed for exclusion; a person decides."""
+
+    rule: Rule = Field(
+        description="below_chance: fewer correct answers than by chance; threshold_beyond_levels: a threshold beyond "
+        "the levels; constant_answers: nearly always the same answer; fast_answers: answers without reading."
+    )
+    limit: float | None = Field(
+        default=None,
+        description="constant_answers: largest percentage of equal answers; fast_answers: least median time to an "
+        "answer [s]; the other rules have none.",
+    )
+
+    @model_validator(mode="after")
+    def _limit_belongs_to_rule(self) -> Self:
+        bounds = LIMITS.get(self.rule)
+        if bounds is None and self.limit is not None:
+            raise invalid(f"is not used by the rule {self.rule}", "limit", kind="surplus")
+        if bounds is not None and not (self.limit is not None and bounds[0] <= self.limit <= bounds[1]):
+            raise invalid(f"give a number from {bounds[0]:g} to {bounds[1]:g}", "limit")
+        return self
+
+    @property
+    def words(self) -> str:
+        """When the rule proposes a session."""
+        return RULES[self.rule].format(limit=self.limit)
+
+
 class Analysis(Table):
     """Decisions about the analysis; without this table the report calls all its results exploratory."""
 
@@ -436,6 +477,9 @@ class Analysis(Table):
     )
     published: tuple[Published, ...] = later(default=(), description="Published values to compare with.")
     contrasts: tuple[Contrast, ...] = later(default=(), description="Hypotheses that are tested, and reported first.")
+    exclusions: tuple[ExclusionRule, ...] = later(
+        default=(), description="Rules by which sessions are proposed for exclusion."
+    )
 
     @model_validator(mode="after")
     def _looks_end_at_the_last_participant(self) -> Self:
@@ -468,6 +512,7 @@ class Analysis(Table):
             yield "Interim analyses", f"at {looks} participants; alpha spending {self.spending}"
         if self.precision is not None:
             yield "Precision", f"group mean ±{100 * self.precision:g} % (half its 95 % interval)"
+        yield from (("Proposes exclusion", rule.words) for rule in self.exclusions)
         yield from (("Hypothesis", contrast.described()) for contrast in self.contrasts)
         yield from (("Published", value.described()) for value in self.published)
 

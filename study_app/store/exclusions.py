@@ -10,6 +10,8 @@ from datetime import datetime
 from pathlib import Path
 
 from study_app.errors import StoreError
+from study_app.protocol.model import RULES
+from study_app.protocol.source.problems import did_you_mean
 from study_app.store.atomic import append_line, parse_json, read_own_if_there, write_file
 from study_app.store.columns import EXCLUSIONS
 from study_app.store.csv_files import MISSING, csv_bytes, header, unguard_formula
@@ -146,6 +148,34 @@ def include(
         append_line(study.reversed_exclusions, json.dumps(record, ensure_ascii=False).encode() + b"\n")
         write_file(study.exclusions, exclusion_bytes(tuple(row for row in rows if row is not taken)))
     return taken
+
+
+def keep(folder: Path, participant: str, session: int, *, rule: str, by: str, reason: str) -> Exclusion:
+    """Decide that a session is analysed although it meets a planned rule; return the exclusion that this prevents.
+
+    Raises
+    ------
+    StoreError
+        There is no such session, it is excluded, this was decided already, ``by`` or ``reason`` is empty, or the record
+        cannot be read or written.
+    """
+    if rule not in RULES:
+        raise StoreError(f"there is no rule {rule!r} for exclusions ({did_you_mean(rule, RULES)})")
+    by, reason = check_name_and_reason(by, reason, "keeping a session needs a name and a reason")
+    study = StudyFolder(folder)
+    _check_recorded(study, participant, session, None)
+    at = datetime.now().astimezone().isoformat(timespec="milliseconds")
+    kept = Exclusion(
+        participant=participant, session=session, trial=None, rule_or_person=rule, reason=reason, excluded_at=at
+    )
+    with lock_folder(folder):
+        if kept.what in {row.what for row in exclusions(folder)}:
+            raise StoreError(f"{describe_exclusion(kept)} is excluded: include it without --rule")
+        if any(row.what == kept.what and row.rule_or_person == rule for row in reversals(folder)):
+            raise StoreError(f"{describe_exclusion(kept)} is kept already, although it meets the rule {rule}")
+        record = {"at": at, "by": by, "reason": reason, "exclusion": asdict(kept)}
+        append_line(study.reversed_exclusions, json.dumps(record, ensure_ascii=False).encode() + b"\n")
+    return kept
 
 
 def exclusions(folder: Path) -> tuple[Exclusion, ...]:

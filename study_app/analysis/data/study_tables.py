@@ -17,6 +17,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias, TypeVar
 
@@ -52,7 +53,7 @@ from study_app.analysis.data.session_files import (
     with_excluded,
 )
 from study_app.errors import AnalysisError, StoreError
-from study_app.protocol.model import Contrast
+from study_app.protocol.model import RULES, Contrast
 from study_app.protocol.questions import STATEMENT
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import Key
@@ -158,7 +159,8 @@ class Study:
     are the main blocks that ask something; ``settings`` says what every (block, code) stands for, and is empty while
     the key is sealed; ``exclusions`` is what was decided to leave out, ``late`` what of it a person decided or
     reversed after the key was opened; ``doubts`` are files that are not as they were
-    recorded, and are used as they are. ``decided`` is what the protocol decided about the analysis, ``protocol`` the
+    recorded, and are used as they are; ``kept`` is what a person decided not to leave out.
+    ``decided`` is what the protocol decided about the analysis, ``protocol`` the
     first session's, as its receipt holds it. ``levels`` are the blocks with a design, ``intervals`` the
     intervals of their trials; ``others`` are the questions that no block of statements holds;
     ``answered`` has the rows of all questions as they were recorded, of which ``responses`` are those of statements;
@@ -166,7 +168,8 @@ class Study:
     "device" where the device measured it; None where receipts do not say it. ``withdrawn`` is how many participants
     withdrew, so that their data were erased. ``contrasts`` are the study's hypotheses and ``liquids`` its liquids'
     tables, once the key is open. ``sites``
-    are the names of the sites of a merged study, whose participants are SITE-ID.
+    are the names of the sites of a merged study, whose participants are SITE-ID. ``with_below_chance``: answers below
+    chance are analysed, although no person has decided so.
     """
 
     folder: Path
@@ -180,6 +183,7 @@ class Study:
     participants: pd.DataFrame
     exclusions: tuple[Exclusion, ...]
     late: tuple[Exclusion, ...] = ()
+    kept: tuple[Exclusion, ...] = ()
     doubts: tuple[Discrepancy, ...] = ()
     decided: Decided = NOTHING_DECIDED
     others: OtherQuestions = NO_QUESTIONS
@@ -192,6 +196,7 @@ class Study:
     withdrawn: int = 0
     sites: tuple[str, ...] = ()
     contrasts: tuple[Contrast, ...] = ()
+    with_below_chance: bool = False
     liquids: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @property
@@ -307,8 +312,8 @@ class Study:
         return measures.aggregate(self.answers(block), self.presented(block), block.codes, items, excluded)
 
 
-def load_study(folder: Path) -> Study:
-    """Read the results of a study.
+def load_study(folder: Path, *, planned: bool = True) -> Study:
+    """Read the results of a study; without ``planned``, as if no planned rule had excluded a session.
 
     A merged study (see `store.merged`) is sealed until the key of every site was opened.
 
@@ -332,17 +337,18 @@ def load_study(folder: Path) -> Study:
     1        P001   L2     immersive         5
     """
     merged = read_merged(Path(folder))
-    found = _load(Path(folder)) if merged is None else _load_sites(merged)
+    found = _load(Path(folder), planned=planned) if merged is None else _load_sites(merged, planned=planned)
     return replace(found, decided=found.decided.at(found.n))
 
 
-def _load_sites(merged: Merged) -> Study:
+def _load_sites(merged: Merged, *, planned: bool) -> Study:
     """Read a merged study; a site from which all participants withdrew has nothing to read."""
     places = {name: StudyFolder(merged.folder(name)) for name in merged.names}
     if missing := [place.path for place in places.values() if not place.path.is_dir()]:
         raise StoreError(f"{missing[0]} is missing, but {merged.manifest.name} lists it: restore it from a copy")
     opened = has_opened_keys(merged.path)
-    sites = {name: _load(place.path, sealed=not opened) for name, place in places.items() if place.sessions()}
+    read = partial(_load, sealed=not opened, planned=planned)
+    sites = {name: read(place.path) for name, place in places.items() if place.sessions()}
     if not sites:
         raise AnalysisError(f"{merged.path} does not contain sessions: all participants of its sites withdrew")
     return pooled(merged.path, sites, sum(len(tombstones(place)) for place in places.values()))
@@ -381,6 +387,7 @@ def pooled(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Study:
         intervals=table("intervals"),
         exclusions=rows("exclusions"),
         late=rows("late"),
+        kept=rows("kept"),
         doubts=tuple(doubt for one in studies for doubt in one.doubts),
         decided=replace(studies[0].decided, changed=any(one.decided.changed for one in studies)),
         own_dynamics=pooled_dynamics(
@@ -391,14 +398,14 @@ def pooled(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Study:
     )
 
 
-def _load(folder: Path, *, sealed: bool = False) -> Study:
+def _load(folder: Path, *, sealed: bool = False, planned: bool = True) -> Study:
     """Read the results in a folder that is not merged; ``sealed``: as if its key was not opened."""
     place = StudyFolder(folder)
     sessions = [session for session in place.sessions() if not is_never_begun(session.path)]
     if not sessions:
         raise AnalysisError(_no_sessions(place.path))
     key = None if sealed else _key(place, sessions)
-    listed = exclusions(place.path)
+    listed = tuple(row for row in exclusions(place.path) if planned or row.rule_or_person not in RULES)
     records = [read_session(sessions[0], key)]
     records += [read_session(session, key, like=records[0]) for session in sessions[1:]]
     listed += tuple(_undecided(place, records, listed))
@@ -432,6 +439,7 @@ def _load(folder: Path, *, sealed: bool = False) -> Study:
         participants=participants.assign(counted=participants["status"].isin(REACHED_END) & ~participants["excluded"]),
         exclusions=listed,
         late=late_exclusions(place.path, listed),
+        kept=reversals(place.path),
         doubts=tuple(doubt for one in records for doubt in session_discrepancies(Place(place, one.folder, one.study))),
         others=records[0].others,
         decided=read_decided([session.protocol.get("analysis") for session in records]),

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any, Final
 
 import pandas as pd
+from scipy.stats import binom
 
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.study_tables import Study
+from study_app.protocol.model import BELOW_CHANCE_P
 from study_app.protocol.presented.presentation import arrangement_of
 from study_app.protocol.trials.methods import Answer, TrackSetting
 from study_app.protocol.trials.stimuli import DELAY, FORCE_DELAY, Stimulus
@@ -59,7 +62,39 @@ def tracks(study: Study) -> pd.DataFrame:
     track_rows = [_track_row(by_id[row["block"]], row) for row in found[list(_READ)].to_dict("records")]
     found = found.drop(columns=list(_DELIVERED))
     found = found.join(pd.DataFrame(track_rows, index=found.index, columns=list(_TYPES)).astype(_TYPES))
-    return found.assign(reversal=_reversals(found, by_id))
+    found = found.assign(reversal=_reversals(found, by_id))
+    if study.with_below_chance:
+        return found
+    decided = {one.what[:2] for one in study.kept if one.rule_or_person == "below_chance"}
+    for one in below_chance(found, study.levels):
+        if (one.participant, one.session) not in decided:
+            own = (found["participant"] == one.participant) & (found["session"] == one.session)
+            found["analysed"] &= ~(own & (found["block"] == one.block)).astype("boolean")
+    return found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BelowChance:
+    """A session's answers in a block, of which fewer are correct than by chance; ``p`` is one-sided."""
+
+    participant: str
+    session: int
+    block: str
+    right: int
+    n: int
+    p: float
+
+
+def below_chance(found: pd.DataFrame, blocks: Iterable[LevelBlock]) -> Iterator[BelowChance]:
+    """Yield where answers are correct less often than by chance (binomial p below `BELOW_CHANCE_P`)."""
+    by_id = {block.id: block for block in blocks}
+    answered = found[found["analysed"].fillna(False) & found["right"].notna()]
+    of_blocks: Iterable[tuple[Any, pd.DataFrame]] = answered.groupby(["participant", "session", "block"])
+    for (who, session, block), rows in of_blocks:
+        right, n = int(rows["right"].sum()), len(rows)
+        p = float(binom.cdf(right, n, by_id[block].design.guess_rate or 0.5))
+        if p < BELOW_CHANCE_P:
+            yield BelowChance(participant=str(who), session=int(session), block=str(block), right=right, n=n, p=p)
 
 
 def setting_of(block: LevelBlock, track: str) -> TrackSetting | None:

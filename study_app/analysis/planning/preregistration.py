@@ -66,6 +66,7 @@ def commitment(protocol: Protocol, protocol_hash: str) -> Commitment:
         rules=(
             *([CATCH] if any(block.catch is not None for block in protocol.main_blocks) else []),
             *([MISSING_RULE] if any(block.design is not None for block in protocol.main_blocks) else []),
+            *(rule.rule for rule in (() if decided is None else decided.exclusions)),
         ),
     )
 
@@ -419,6 +420,11 @@ def _exclusions(protocol: Protocol) -> Iterator[str]:
     if any(block.design is None for block in protocol.main_blocks):
         trials = "Other trials" if has_intervals else "Trials"
         yield f"{trials} beyond a limit are analysed, and their number is reported."
+    for rule in () if protocol.analysis is None else protocol.analysis.exclusions:
+        yield (
+            f'Rule "{rule.rule}": a session is proposed for exclusion if {rule.words}. A person decides; the report '
+            "names the session and the decision, and gives the conclusions with and without all such sessions."
+        )
     yield f"Limits: {limits}."
     yield "Any other exclusion is a deviation from this preregistration; the report lists it with its reason and date."
 

@@ -22,6 +22,7 @@ from study_app.analysis.findings.finding import Answer, Finding
 from study_app.analysis.html_page import attempted, bullets, drawn, heading, paragraph, render, table, table_of
 from study_app.analysis.levels.evaluate import level_findings, level_limits, level_section
 from study_app.analysis.page_layout import Picture
+from study_app.analysis.planned_exclusions import PlannedExclusions
 from study_app.analysis.planning.power_curves import interval as share_interval
 from study_app.analysis.questions import MEASURES
 from study_app.analysis.report.methods import late_exclusions
@@ -162,11 +163,7 @@ LIMITS_SHOWN: Final = 6
 
 def first_page(results: Results, limits: Sequence[str]) -> Markup:
     """Return the table of verdicts, the limits below it, and how often the table is wrong."""
-    asked = {one.key: one.question for one in all_findings() if one.question}
-    kinds = {found.id: found.kind for found in results.blocks}
-    given = answers(results)
-    rows: list[tuple[str, ...]] = [("Hypothesis", question(one), one.verdict, answer(one)) for one in results.contrasts]
-    rows += [(one.title, asked[one.question].format(kind=kinds[one.block]), one.verdict, one.text) for one in given]
+    given, rows = answers(results), conclusions(results)
     verdicts = table(("Part", "Question", "Verdict", "What can be said"), rows, words=4)
     return render(
         "first_page.html",
@@ -179,6 +176,50 @@ def first_page(results: Results, limits: Sequence[str]) -> Markup:
         shown=LIMITS_SHOWN,
         empty=empty_studies(max(found.n for found in results.blocks)) if given and not results.decided.looks else "",
     )
+
+
+def conclusions(results: Results) -> list[tuple[str, ...]]:
+    """Return the conclusions: part, question, verdict and what can be said."""
+    asked = {one.key: one.question for one in all_findings() if one.question}
+    kinds = {found.id: found.kind for found in results.blocks}
+    hypotheses = [("Hypothesis", question(one), one.verdict, answer(one)) for one in results.contrasts]
+    return hypotheses + [
+        (one.title, asked[one.question].format(kind=kinds[one.block]), one.verdict, one.text)
+        for one in answers(results)
+    ]
+
+
+def planned_section(planned: PlannedExclusions | None) -> Iterator[str]:
+    """Yield the sessions that meet a planned rule, and each conclusion that depends on them."""
+    if planned is None:
+        return
+    yield heading(2, "Planned exclusions")
+    yield table_of(
+        planned.proposals,
+        ("Session", lambda one: f"{one.participant}, session {one.session}"),
+        ("rule", lambda one: one.rule.replace("_", " ")),
+        ("because", lambda one: one.why),
+        ("decision", lambda one: ", ".join(filter(None, [one.decision, one.by]))),
+        words=4,
+    )
+    included, left_out = map(_conclusions_by_question, (planned.included, planned.left_out))
+    differing = [name for name in {**included, **left_out} if included.get(name) != left_out.get(name)]
+    if not differing:
+        yield paragraph("No conclusion depends on whether these sessions are analysed.")
+        return
+    yield table_of(
+        differing,
+        ("Conclusion", lambda name: name),
+        ("with all of them", lambda name: included.get(name, "–")),
+        ("without them", lambda name: left_out.get(name, "–")),
+        words=3,
+    )
+
+
+def _conclusions_by_question(results: Results) -> dict[str, str]:
+    found = {f"{part}: {asked}": f"{verdict}: {text}" for part, asked, verdict, text in conclusions(results)}
+    sentences = (sentence.partition(": ") for sentence in of_levels(results))
+    return found | {about: text for about, _, text in sentences}
 
 
 def answers(results: Results) -> tuple[Answer, ...]:

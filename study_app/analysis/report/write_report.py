@@ -28,6 +28,7 @@ from study_app.analysis.findings.finding import TESTS
 from study_app.analysis.html_page import attempted, box, bullets, heading, paragraph, render, table
 from study_app.analysis.levels.evaluate import level_entries
 from study_app.analysis.page_layout import Picture
+from study_app.analysis.planned_exclusions import PlannedExclusions, Proposal, planned_exclusions
 from study_app.analysis.planning.preregistration import FILE as PREREGISTRATION
 from study_app.analysis.planning.preregistration import deviations
 from study_app.analysis.planning.preregistration import deviations_section as preregistration_section
@@ -35,7 +36,7 @@ from study_app.analysis.report import sections
 from study_app.analysis.report.methods import methods, version_words
 from study_app.analysis.report.study_figures import pictures
 from study_app.analysis.results import BlockResult, Failure, Failures, LevelsResult, Progress, Results, name, silent
-from study_app.analysis.wording import counted
+from study_app.analysis.wording import counted, listed
 from study_app.errors import AnalysisError
 from study_app.protocol.model import Contrast, Published
 from study_app.store.checksums import sha256
@@ -290,6 +291,11 @@ def report_files(study: Study, progress: Progress = silent) -> tuple[dict[str, b
         "limits": failures.value("texts: limits", lambda: sections.limits(study, results), ()),
         "methods": failures.value("texts: methods", lambda: methods(study, results), ""),
     }
+    planned = failures.value("planned exclusions", lambda: planned_exclusions(study, results), None)
+    if planned is not None:
+        open_ones = [one for one in planned.proposals if one.decision == "undecided"]
+        texts["limits"] = (*_proposed(open_ones), *texts["limits"])
+        texts["planned_exclusions"] = [asdict(one) for one in planned.proposals]
     files: dict[str, bytes] = {}
     for file, make in (
         ("report.R", lambda: r_script(study).encode()),
@@ -303,7 +309,7 @@ def report_files(study: Study, progress: Progress = silent) -> tuple[dict[str, b
         files |= {f"{one.name}.{form}": content for form, content in one.files.items()}
         files[f"{one.name}.txt"] = f"{one.caption}\n".encode()
     files |= failures.value("exported tables", lambda: table_files(study, deliver(study)), {})
-    page_ = _page(study, results, drawn, texts, failures).encode()
+    page_ = _page(study, results, drawn, texts, planned, failures).encode()
     numbers = document(study, results, texts, failures)
     return {"report.html": page_, "report.json": numbers, **files}, tuple(failures.found)
 
@@ -316,8 +322,20 @@ def _drawn(study: Study, results: Results, failures: Failures) -> Iterator[Pictu
         yield from level_pictures(study, results.levels, failures=failures)
 
 
+def _proposed(proposals: Sequence[Proposal]) -> Iterator[str]:
+    """Yield the sentence on sessions for which a person has to decide."""
+    if proposals:
+        who = listed([f"{one.participant}, session {one.session} ({one.rule.replace('_', ' ')})" for one in proposals])
+        yield f"Proposed for exclusion, not decided: {who}. See “Planned exclusions”."
+
+
 def _page(
-    study: Study, results: Results, drawn: Sequence[Picture], texts: Mapping[str, Any], failures: Failures
+    study: Study,
+    results: Results,
+    drawn: Sequence[Picture],
+    texts: Mapping[str, Any],
+    planned: PlannedExclusions | None,
+    failures: Failures,
 ) -> str:
     sections_: list[tuple[str, Callable[[], Iterable[str]]]] = [
         ("Hypotheses", lambda: contrast_section(results)),
@@ -330,6 +348,7 @@ def _page(
         ("Groups", lambda: sections.groups(study, results)),
         ("Sites", lambda: sections.groups(study, results, "site")),
         ("Motion and force", lambda: sections.motion(results)),
+        ("Planned exclusions", lambda: sections.planned_section(planned)),
         ("How it was run", lambda: sections.conduct(study, results)),
         ("Preregistration", lambda: preregistration_section(study)),
         ("Methods, to paste", lambda: (heading(2, "Methods, to paste"), box([paragraph(str(texts["methods"]))]))),

@@ -91,6 +91,7 @@ class ResultsView:
     sealed: bool | None = None
     opened: str = ""
     left_out: tuple[Exclusion, ...] = ()
+    proposed: tuple[Exclusion, ...] = ()
     exclusions_file: Path | None = None
     trials: Mapping[tuple[str, int], tuple[tuple[int, str], ...]] = field(default_factory=lambda: NOTHING)
     doubts: tuple[str, ...] = ()

@@ -23,6 +23,7 @@ from study_app.analysis.worker_messages import (
     OpenKey,
     Order,
     Progress,
+    Proposed,
     ReadStudy,
     SessionsFound,
     StudiesFound,
@@ -141,6 +142,7 @@ class LeaveOutDialog(Question):
     sessions : those that are not left out yet
     trials : of each session (participant, number) the main trials and the words for them
     chosen : the session to begin with
+    proposed : an exclusion that a rule proposes
     """
 
     def __init__(
@@ -150,6 +152,7 @@ class LeaveOutDialog(Question):
         sessions: Sequence[SessionFacts],
         trials: Mapping[tuple[str, int], tuple[tuple[int, str], ...]],
         chosen: SessionFacts | None,
+        proposed: Exclusion | None = None,
     ) -> None:
         super().__init__(
             parent,
@@ -173,6 +176,11 @@ class LeaveOutDialog(Question):
             self.editors["session"].show_value((chosen.participant, chosen.session))
         self.editors["session"].edited.connect(self._show_trials)
         self._show_trials()
+        if proposed is not None:
+            self.editors["session"].show_value((proposed.participant, proposed.session))
+            self._show_trials()
+            self.editors["by"].show_value(proposed.rule_or_person)
+            self.editors["reason"].show_value(proposed.reason)
 
     def _show_trials(self) -> None:
         trials = self._trials.get(self.value("session"), ())
@@ -258,10 +266,12 @@ class SessionsCard(Card):
 class ExclusionsCard(Card):
     """What is left out, each with its reason.
 
-    ``take_back_asked`` carries the `Exclusion` that is to count again.
+    ``take_back_asked`` carries the `Exclusion` that is to count again, or that is proposed and is not to be made;
+    ``exclude_asked`` one that is proposed and is to be made.
     """
 
     take_back_asked = Signal(object)
+    exclude_asked = Signal(object)
 
     def __init__(self) -> None:
         self.leave_out = ActionButton("minus", "Exclude …", height=36)
@@ -279,8 +289,10 @@ class ExclusionsCard(Card):
         add_parts(self.column, self.none, (self.area, 1), hbox(STRETCH, self.open))
         self.show_left_out(())
 
-    def show_left_out(self, listed: Sequence[Exclusion]) -> None:
-        """Show the exclusions, the latest first; the keyboard focus survives a removed line."""
+    def show_left_out(self, listed: Sequence[Exclusion], proposed: Sequence[Exclusion] = ()) -> None:
+        """Show the exclusions, those proposed and the latest first; the keyboard focus survives a removed line."""
+        self.open.setVisible(bool(listed))
+        listed = (*listed, *reversed(proposed))
         at = self.window().focusWidget()
         if at is not None and any(line.isAncestorOf(at) for line in self.lines):
             self.leave_out.setFocus()
@@ -290,23 +302,30 @@ class ExclusionsCard(Card):
         for place, line in enumerate(self.lines):
             self._rows.insertWidget(place, line)
         self.none.setVisible(not listed)
-        for part in (self.area, self.open):
-            part.setVisible(bool(listed))
+        self.area.setVisible(bool(listed))
         grows = QSizePolicy.Policy.Preferred if listed else QSizePolicy.Policy.Maximum
         self.setSizePolicy(QSizePolicy.Policy.Preferred, grows)
 
     def _exclusion_row(self, exclusion: Exclusion) -> QWidget:
-        """Return the row of one exclusion: what, why, who and when."""
-        back = ActionButton("undo", "Include again …", role="plain", height=30)
-        back.setAccessibleName(f"Include again: {exclusion_text(exclusion)}")
+        """Return the row of one exclusion: what, why, who and when; or which rule proposes it."""
+        proposed = not exclusion.excluded_at
+        back = ActionButton("undo", "Keep …" if proposed else "Include again …", role="plain", height=30)
+        back.setAccessibleName(f"{'Keep' if proposed else 'Include again'}: {exclusion_text(exclusion)}")
         back.clicked.connect(lambda: self.take_back_asked.emit(exclusion))
+        buttons = [back]
+        if proposed:
+            out = ActionButton("minus", "Exclude …", role="plain", height=30)
+            out.setAccessibleName(f"Exclude: {exclusion_text(exclusion)}")
+            out.clicked.connect(lambda: self.exclude_asked.emit(exclusion))
+            buttons.insert(0, out)
         made = QWidget()
         what = label(exclusion_text(exclusion), "label", wraps=True, weight=600)
         why = label(exclusion.reason, "label", "text2", wraps=True, weight=400)
         now, at = datetime.now().astimezone(), time_of(exclusion.excluded_at)
         by = exclusion.rule_or_person + ("" if at is None else f", {start_time_text(at.astimezone(now.tzinfo), now)}")
+        by = f"Proposed by the rule “{by.replace('_', ' ')}”, not decided" if proposed else by
         who = label(by, "small", "text2")
-        vbox(hbox((what, 1), back), why, who, spacing=0, margins=(0, 0, 6, 0), parent=made)
+        vbox(hbox((what, 1), *buttons), why, who, spacing=0, margins=(0, 0, 6, 0), parent=made)
         made.setAccessibleName(f"{exclusion_text(exclusion)}: {exclusion.reason} ({by})")
         return made
 
@@ -405,8 +424,9 @@ class ResultsPlace(Place):
         self.unblind.clicked.connect(self._ask_unblind)
         self.export.clicked.connect(self._ask_tables)
         self.report.clicked.connect(self._ask_report)
-        self.exclusions.leave_out.clicked.connect(self._ask_leave_out)
+        self.exclusions.leave_out.clicked.connect(lambda: self._ask_leave_out(None))
         self.exclusions.take_back_asked.connect(self._ask_take_back)
+        self.exclusions.exclude_asked.connect(self._ask_leave_out)
         self.exclusions.open.clicked.connect(lambda: self._opener(self.view.exclusions_file or self.results))
         self.figures.asked.connect(self._apply_remedy)
         self.sessions.rows.opened.connect(self._open_session)
@@ -453,8 +473,8 @@ class ResultsPlace(Place):
             self._show_studies()
         if (view.sessions, view.without_sessions) != (before.sessions, before.without_sessions):
             self.sessions.show_sessions(view.sessions, view.without_sessions)
-        if view.left_out != before.left_out:
-            self.exclusions.show_left_out(view.left_out)
+        if (view.left_out, view.proposed) != (before.left_out, before.proposed):
+            self.exclusions.show_left_out(view.left_out, view.proposed)
         self._show_chips()
         self.unblind.setVisible(view.sealed is True)
         for button in (self.unblind, self.export, self.report):
@@ -527,9 +547,9 @@ class ResultsPlace(Place):
         page = SessionPage(self, self.theme, session, self._opener)
         self._open_dialog(page)
 
-    def _ask_leave_out(self) -> None:
+    def _ask_leave_out(self, proposed: Exclusion | None) -> None:
         included = [session for session in self.view.sessions if session.excluded is None]
-        dialog = LeaveOutDialog(self, self.theme, included, self.view.trials, self.sessions.rows.chosen)
+        dialog = LeaveOutDialog(self, self.theme, included, self.view.trials, self.sessions.rows.chosen, proposed)
         decide = partial(self._order_decision, "leaving out", LeaveOut)
 
         def leave_out() -> None:
@@ -541,18 +561,26 @@ class ResultsPlace(Place):
         self._open_dialog(dialog)
 
     def _ask_take_back(self, exclusion: Exclusion) -> None:
+        proposed = not exclusion.excluded_at
+        done = "Keep" if proposed else "Include again"
+        why = (
+            f"A rule proposes to exclude it: {exclusion.reason}. It stays in measures, figures and tests."
+            if proposed
+            else f"It was excluded for this reason: “{exclusion.reason}”. It will be included again in measures, "
+            "figures and tests."
+        )
         dialog = Question(
             self,
             self.theme,
-            f"Include again: {exclusion_text(exclusion)}",
-            f"It was excluded for this reason: “{exclusion.reason}”. It will be included again in measures, "
-            "figures and tests. Your name, the reason and the time are stored in exclusions_reversed.jsonl.",
-            ActionButton("undo", "Include again", role="primary"),
+            f"{done}: {exclusion_text(exclusion)}",
+            f"{why} Your name, the reason and the time are stored in exclusions_reversed.jsonl.",
+            ActionButton("undo", done, role="primary"),
             fields=decision_fields("By", "Your name or initials, such as AK", "wrong participant"),
             needs=NEEDS,
             width=QUESTION_PX,
         )
         which = {"participant": exclusion.participant, "session": exclusion.session, "trial": exclusion.trial}
+        which |= {"rule": exclusion.rule_or_person} if proposed else {}
         decide = partial(self._order_decision, "taking the exclusion back", TakeBack, **which)
         dialog.accepted.connect(lambda: decide(by=dialog.value("by"), reason=dialog.value("reason")))
         self._open_dialog(dialog)
@@ -676,6 +704,8 @@ class ResultsPlace(Place):
                 self._take_studies(answer)
             case SessionsFound() if newest:
                 self._take_sessions(answer)
+            case Proposed() if newest:
+                self._update_view(proposed=answer.exclusions)
             case StudyFound() if newest:
                 self._blocks = answer.blocks
                 nothing = Trouble(
@@ -733,6 +763,7 @@ class ResultsPlace(Place):
             sessions=tuple(facts),
             listed=True,
             left_out=answer.exclusions,
+            proposed=(),
             exclusions_file=exclusions_at(answer.folder),
             sealed=reveal is None,
             opened="" if reveal is None else unblinding_text(reveal),

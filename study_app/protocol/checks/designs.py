@@ -12,7 +12,7 @@ from typing import Any, Final
 from study_app.errors import StudyError
 from study_app.haptics.model.overrides import number_names, override_value
 from study_app.protocol.blocks import Block
-from study_app.protocol.model import OF_LEVELS, Contrast, Protocol, Published
+from study_app.protocol.model import OF_LEVELS, Contrast, ExclusionRule, Protocol, Published
 from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.presented.presentation import scene_of
 from study_app.protocol.quantities import can_vary
@@ -72,6 +72,25 @@ def check_designs(protocol: Protocol) -> Iterator[Fault]:
         yield from _check_published(protocol, published, ("analysis", "published", number))
     for number, contrast in enumerate(protocol.analysis.contrasts if protocol.analysis is not None else ()):
         yield from _check_contrast(protocol, contrast, ("analysis", "contrasts", number))
+    for number, rule in enumerate(protocol.analysis.exclusions if protocol.analysis is not None else ()):
+        if (lacks := _missing_for(protocol, rule)) is not None:
+            yield Fault(("analysis", "exclusions", number, "rule"), f'"{rule.rule}" never applies: {lacks}')
+
+
+def _missing_for(protocol: Protocol, rule: ExclusionRule) -> str | None:
+    """Return what the study lacks for a rule to apply."""
+    blocks = [block for block in protocol.main_blocks if block.design is not None]
+    if rule.rule == "constant_answers":
+        asked = filter(None, (protocol.questionnaire_of(block.id) for block in protocol.main_blocks))
+        return None if any(found.statements for found in asked) else "no main block asks statements"
+    if rule.rule == "threshold_beyond_levels":
+        return None if any(block.stimulus is not None for block in blocks) else "no main block has levels"
+    stimuli = {block.id: None if block.stimulus is None else protocol.stimuli[block.stimulus] for block in blocks}
+    if rule.rule == "below_chance" and not any(
+        has_correct_answer(design_of(protocol, block), stimuli[block.id]) for block in blocks
+    ):
+        return "no main block has correct answers"
+    return None
 
 
 def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:

@@ -120,6 +120,23 @@ def test_what_is_left_out_is_taken_back_with_a_name_and_a_reason(place, qtbot):
     assert place.window().focusWidget() is place.exclusions.leave_out
 
 
+def test_what_a_rule_proposes_is_excluded_or_kept_by_a_person(place, qtbot):
+    proposed = replace(LEFT_OUT, trial=None, rule_or_person="below_chance", reason="0 of 40", excluded_at="")
+    place.show_view(replace(view(), proposed=(proposed,)))
+    out, keep = place.exclusions.lines[0].findChildren(ActionButton)
+    assert "Proposed by the rule “below chance”, not decided" in place.exclusions.lines[0].accessibleName()
+    click(qtbot, out)
+    assert [place.dialog.value(name) for name in ("session", "trial", "by", "reason")] == [
+        ("P003", 1), None, "below_chance", "0 of 40"
+    ]  # fmt: skip
+    place.dialog.reject()
+    click(qtbot, keep)
+    assert decided(qtbot, place, "CD", "left-handed") == TakeBack(
+        folder=place.view.chosen, participant="P003", session=1, trial=None, by="CD", reason="left-handed",
+        rule="below_chance",
+    )  # fmt: skip
+
+
 @pytest.mark.parametrize("sealed", [True, False])
 def test_outputs_say_that_settings_appear_as_codes_while_the_key_is_sealed_and_what_cannot_be_written(
     place, qtbot, monkeypatch, sealed

@@ -1,0 +1,168 @@
+"""Sessions that meet a planned rule of exclusion: what is proposed and decided, and the conclusions both ways."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import pandas as pd
+
+from study_app.analysis.data.study_tables import Study, load_study
+from study_app.analysis.evaluate import evaluate
+from study_app.analysis.levels.tracks import below_chance, tracks
+from study_app.analysis.results import Results
+from study_app.analysis.wording import number, percent
+from study_app.protocol.model import RULES
+from study_app.store.exclusions import Exclusion
+
+TABLES: Final = ("responses", "trials", "participants", "answered", "intervals")
+SESSION: Final = ["participant", "session"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proposal:
+    """A session that meets a rule, why, and what a person decided; ``by`` is "" while nobody has."""
+
+    participant: str
+    session: int
+    rule: str
+    why: str
+    decision: str = "undecided"
+    by: str = ""
+
+    @property
+    def what(self) -> tuple[str, int]:
+        """Participant and session."""
+        return self.participant, self.session
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlannedExclusions:
+    """The sessions that meet a rule, and the results with and without all of them."""
+
+    proposals: tuple[Proposal, ...]
+    included: Results
+    left_out: Results
+
+
+def planned_exclusions(study: Study, results: Results) -> PlannedExclusions | None:
+    """Return the sessions that meet a rule and the conclusions both ways; None if no session does."""
+    found = proposals(study, results)
+    if not found:
+        return None
+    excluded = any(one.decision == "excluded" for one in found)
+    whole = replace(load_study(study.folder, planned=False) if excluded else study, with_below_chance=True)
+    return PlannedExclusions(
+        proposals=found,
+        included=evaluate(whole, recordings=False),
+        left_out=evaluate(_without(whole, {one.what for one in found}), recordings=False),
+    )
+
+
+def proposals(study: Study, results: Results | None) -> tuple[Proposal, ...]:
+    """Return the sessions that meet a rule of the study, or answer below chance, with what was decided about each.
+
+    Without ``results`` no threshold is known.
+    """
+    planned = {rule["rule"]: rule.get("limit") for rule in (study.protocol.get("analysis") or {}).get("exclusions", ())}
+    excluded = (
+        Proposal(
+            participant=one.participant,
+            session=one.session,
+            rule=one.rule_or_person,
+            why=one.reason,
+            decision="excluded",
+            by=one.excluded_at,
+        )
+        for one in study.exclusions
+        if one.rule_or_person in RULES and one.trial is None
+    )
+    kept = {(*one.what[:2], one.rule_or_person): one for one in study.kept if one.trial is None}
+    met = (
+        Proposal(participant=str(who), session=int(session), rule=rule, why=why)
+        for rule, rows in (
+            ("below_chance", _below_chance(study)),
+            ("threshold_beyond_levels", _beyond_levels(study, results)),
+            ("constant_answers", _constant(study, planned.get("constant_answers"))),
+            ("fast_answers", _fast(study, planned.get("fast_answers"))),
+        )
+        if rule in planned or rule == "below_chance"
+        for (who, session), why in rows
+    )
+    decided = (
+        replace(one, decision="kept", by=f"{kept[key].excluded_at}: {kept[key].reason}")
+        if (key := (*one.what, one.rule)) in kept
+        else one
+        for one in met
+    )
+    return tuple(sorted((*excluded, *decided), key=lambda one: (*one.what, one.rule)))
+
+
+Rows = Iterator[tuple[Any, str]]
+
+
+def _below_chance(study: Study) -> Rows:
+    if study.revealed and study.levels:
+        for one in below_chance(tracks(replace(study, with_below_chance=True)), study.levels):
+            yield (
+                (one.participant, one.session),
+                f"{one.right} of {one.n} answers in {one.block} are correct, fewer than by chance "
+                f"(p = {one.p:.1g}): were keys exchanged?",
+            )
+
+
+def _beyond_levels(study: Study, results: Results | None) -> Rows:
+    sessions = study.participants[study.participants["counted"]]
+    for block in () if results is None else results.levels:
+        for row in block.statistics.get("thresholds", ()):
+            if row.participant is not None and row.beyond is not None:
+                for session in sessions.loc[sessions["participant"] == row.participant, "session"]:
+                    yield (row.participant, session), f"the threshold in {block.block} lies {row.beyond} the levels"
+
+
+def _constant(study: Study, limit: float | None) -> Rows:
+    answers = study.responses[study.responses["counted"] & study.responses["response"].notna()]
+    for session, rows in answers.groupby(SESSION):
+        share = rows["response"].value_counts(normalize=True).max()
+        if limit is not None and len(rows) > 1 and 100 * share > limit:
+            yield session, f"{percent(share)} of {len(rows)} answers to statements are equal"
+
+
+def _fast(study: Study, limit: float | None) -> Rows:
+    answers = study.answered[study.answered["counted"]]
+    times = (answers["first_choice_s"] - answers["onset_s"]).astype("Float64")
+    for session, some in times.dropna().groupby([answers[name] for name in SESSION]):
+        median = float(some.median())
+        if limit is not None and median < limit:
+            yield session, f"half of {len(some)} answers were chosen within {number(median)} s"
+
+
+def undecided(study: Study, results: Results | None) -> tuple[Exclusion, ...]:
+    """Return the exclusions that are proposed and wait for a person; they have no time yet."""
+    return tuple(
+        Exclusion(
+            participant=one.participant,
+            session=one.session,
+            trial=None,
+            rule_or_person=one.rule,
+            reason=one.why,
+            excluded_at="",
+        )
+        for one in proposals(study, results)
+        if one.decision == "undecided"
+    )
+
+
+def _without(study: Study, sessions: Collection[tuple[str, int]]) -> Study:
+    """Return the study as if these sessions were excluded."""
+
+    def masked(table: pd.DataFrame) -> pd.DataFrame:
+        if "counted" not in table:
+            return table
+        of_rows = zip(table["participant"].astype(str), table["session"].astype(int), strict=True)
+        stays = pd.Series([what not in sessions for what in of_rows], index=table.index, dtype=bool)
+        return table.assign(counted=table["counted"] & stays)
+
+    tables: dict[str, Any] = {name: masked(getattr(study, name)) for name in TABLES}
+    return replace(study, **tables)

@@ -1,0 +1,156 @@
+"""Planned exclusions: which sessions meet a rule, what a person decides, and the conclusions both ways."""
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app import api
+from study_app.analysis.data.study_tables import Study, load_study
+from study_app.analysis.evaluate import evaluate
+from study_app.analysis.planned_exclusions import planned_exclusions, proposals
+from study_app.analysis.planning.preregistration import commitment, preregistration
+from study_app.analysis.report.write_report import report
+from study_app.errors import ProtocolError, StoreError
+from study_app.protocol.load import load
+from study_app.protocol.source.files import shipped_file
+from study_app.store.exclusions import exclude, keep
+from study_app.store.unblinding import unblind
+from tests.analysis.conftest import SAMPLE
+from tests.compiled import needs_servo
+
+PAIRS = """
+format = 2
+sequence = ["thicker"]
+study.name = "pairs"
+liquids.damper.drag = { law = "linear", damping_nspm = 8 }
+tasks.stir = { kind = "follow", cycles = 1 }
+stimuli.damping = { vary = "damping_nspm", level = "weber", standards = [8], levels = [0.1, 0.6], spacing = "log" }
+methods.constant = { kind = "constant", levels = 2, repetitions = 6 }
+blocks.thicker = { stimulus = "damping", design = "2ifc", method = "constant" }
+[[analysis.exclusions]]
+rule = "below_chance"
+"""
+
+
+def with_rules(study: Study, *rules: dict[str, Any]) -> Study:
+    return replace(study, protocol={**study.protocol, "analysis": {"exclusions": list(rules)}})
+
+
+def test_each_rule_of_answers_counts_what_a_person_can_count() -> None:
+    study = load_study(SAMPLE.path)
+    first, second, *_ = study.people
+    responses, answered = study.responses.copy(), study.answered.copy()
+    own = responses["participant"] == first
+    responses.loc[own, "response"] = 4
+    hurried = answered["participant"] == second
+    answered.loc[hurried, "first_choice_s"] = answered.loc[hurried, "onset_s"] + 0.3
+    study = replace(study, responses=responses, answered=answered)
+    constant, fast = {"rule": "constant_answers", "limit": 95.0}, {"rule": "fast_answers", "limit": 0.5}
+    results = evaluate(study, recordings=False)
+    assert proposals(with_rules(study), results) == (), "rules that are not planned propose nothing"
+    found = proposals(with_rules(study, constant, fast), results)
+    assert [(one.participant, one.rule, one.decision) for one in found] == [
+        (first, "constant_answers", "undecided"),
+        (second, "fast_answers", "undecided"),
+    ]
+    assert found[0].why == f"100 % of {int((own & responses['counted']).sum())} answers to statements are equal"
+    assert found[1].why == f"half of {int((hurried & answered['counted']).sum())} answers were chosen within 0.30 s"
+
+
+@pytest.fixture(scope="module")
+def pairs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the unblinded results of two participants, of whom the second exchanged the keys."""
+    folder = tmp_path_factory.mktemp("pairs")
+    (folder / "pairs.toml").write_text(PAIRS, encoding="utf-8")
+
+    def answer(*, exchanged: bool) -> Callable[[Any], str | None]:
+        def of(question: Any) -> str | None:
+            if len(question.felt) != 2:
+                return None
+            first, second = (one.force_mean_n for one in question.felt)
+            return "first" if (first > second) != exchanged else "second"
+
+        return of
+
+    for number in (1, 2):
+        observer = answer(exchanged=number == 2)
+        with api.open_session(
+            folder / "pairs.toml", f"P00{number}", results=folder / "results", seed=number, answer=observer
+        ) as session:
+            session.run()
+    unblind(folder / "results", by="AB", reason="x")
+    return folder / "results"
+
+
+def table_text(page: str) -> str:
+    return page.partition("Planned exclusions</h2>")[2].partition("<h2")[0]
+
+
+@pytest.mark.slow
+@needs_servo
+def test_keys_that_were_exchanged_are_proposed_and_decided_by_a_person(pairs: Path, tmp_path: Path) -> None:
+    def thresholds(study: Study) -> list[str | None]:
+        return [one.participant for one in evaluate(study, recordings=False).levels[0].statistics["thresholds"]]
+
+    study = load_study(pairs)
+    (found,) = proposals(study, evaluate(study, recordings=False))
+    assert (found.what, found.rule, found.decision) == (("P002", 1), "below_chance", "undecided")
+    assert f"p = {math.pow(0.5, 12):.1g}" in found.why, "0 of 12 correct"
+    assert thresholds(study) == [None, "P001"], "not in the mean without a decision"
+    report(pairs, tmp_path / "open")
+    page = (tmp_path / "open" / "report.html").read_text("utf-8")
+    assert "Proposed for exclusion, not decided: P002, session 1 (below chance)." in page
+    assert "two participants" in table_text(page)
+    assert "1 participant)" in table_text(page)
+    held = json.loads((tmp_path / "open" / "report.json").read_text("utf-8"))
+    assert [one["decision"] for one in held["planned_exclusions"]] == ["undecided"]
+
+    keep(pairs, "P002", 1, rule="below_chance", by="AB", reason="left-handed")
+    with pytest.raises(StoreError, match="is kept already"):
+        keep(pairs, "P002", 1, rule="below_chance", by="AB", reason="left-handed")
+    study = load_study(pairs)
+    (found,) = proposals(study, evaluate(study, recordings=False))
+    assert (found.decision, found.by.partition(": ")[2]) == ("kept", "left-handed")
+    assert thresholds(study) == [None, "P001", "P002"]
+
+    exclude(pairs, "P002", 1, by="below_chance", reason="keys exchanged")
+    study = load_study(pairs)
+    planned = planned_exclusions(study, evaluate(study, recordings=False))
+    assert planned is not None
+    assert [(one.decision, one.why) for one in planned.proposals] == [("excluded", "keys exchanged")]
+    assert [len(one.people) for one in (planned.included, planned.left_out)] == [2, 1]
+
+
+def study_with(tmp_path: Path, rules: str, name: str = "demo") -> Path:
+    path = tmp_path / f"{name}.toml"
+    text = shipped_file(name).read_text("utf-8").replace("format = 1", "format = 2")
+    path.write_text(f"{text}\n{rules}", encoding="utf-8")
+    return path
+
+
+def test_the_preregistration_quotes_the_rules(tmp_path: Path) -> None:
+    rules = '[[analysis.exclusions]]\nrule = "constant_answers"\nlimit = 90\n'
+    protocol = load(study_with(tmp_path, rules))
+    text = preregistration(protocol, "0" * 64)
+    assert "a session is proposed for exclusion if more than 90 % of the answers to statements are equal" in text
+    assert commitment(protocol, "0" * 64).rules == ("constant_answers",)
+
+
+@pytest.mark.parametrize(
+    ("rule", "said"),
+    [
+        ('rule = "constant_answers"', "give a number from 1 to 100"),
+        ('rule = "fast_answers"\nlimit = 0', "give a number from 0.05 to 600"),
+        ('rule = "below_chance"\nlimit = 3', "is not used by the rule below_chance"),
+        ('rule = "below_chance"', "no main block has correct answers"),
+        ('rule = "threshold_beyond_levels"', "no main block has levels"),
+    ],
+)
+def test_a_rule_that_cannot_apply_is_refused(tmp_path: Path, rule: str, said: str) -> None:
+    with pytest.raises(ProtocolError, match=said):
+        load(study_with(tmp_path, f"[[analysis.exclusions]]\n{rule}\n"))
