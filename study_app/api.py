@@ -215,10 +215,17 @@ def read(results: str | Path) -> dict[str, pd.DataFrame]:
 
 
 def unblind(results: str | Path, *, by: str, reason: str) -> None:
-    """Open the sealed key of a study folder: `read` and `report` name conditions then; name and reason are recorded."""
+    """Open the sealed key of a study folder: `read` and `report` name conditions then; name and reason are recorded.
+
+    Raises
+    ------
+    StudyError
+        The key cannot be opened; or it was, and names the files that could not be written: unblind again.
+    """
     from study_app.store.unblinding import unblind_folder
 
-    unblind_folder(Path(results), by=by, reason=reason)
+    if left := [line for site in unblind_folder(Path(results), by=by, reason=reason).values() for line in site.left]:
+        raise StudyError("the key was opened, but not everything was written: " + "; ".join(left))
 
 
 def report(results: str | Path, to: str | Path) -> Path:

@@ -53,7 +53,7 @@ def export(
     progress("making the tables", 0.3)
     files, failures = _files(study, extras)
     progress("writing", 0.9)
-    written = write_output(study.folder, Path(to), files)
+    written = write_output(study.folder, Path(to), files, warn)
     study.tell_doubts(warn)
     if failed is not None:
         for failure in failures:

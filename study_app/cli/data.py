@@ -130,12 +130,15 @@ def report(results: Path, to: Path) -> None:
 def unblind(results: Path, by: str, reason: str) -> None:
     """Open the sealed key of a study and write the sealed columns; name, time and reason are recorded.
 
-    In a merged study the key of each site is opened; for one site give its folder, such as pooled/sites/A.
+    In a merged study the key of each site is opened; for one site give its folder, such as pooled/sites/A. Ends with
+    exit code 3 if a file was left unchanged: each is named with the reason and what to do.
     """
     from study_app.store.exclusions import describe_exclusion
     from study_app.store.unblinding import unblind_folder
 
-    for prefix, unblinding in unblind_folder(results, by=by, reason=reason).items():
+    with progress() as show:
+        unblinded = unblind_folder(results, by=by, reason=reason, progress=show)
+    for prefix, unblinding in unblinded.items():
         for block, codes in unblinding.codes.items():
             for code, condition in codes.items():
                 standard, of_track, _ = condition.partition("/")
@@ -145,6 +148,7 @@ def unblind(results: Path, by: str, reason: str) -> None:
             click.echo(f"excluded  {describe_exclusion(row)}: {row.reason}")
         for sentence in unblinding.left:
             click.echo(f"warning: {sentence}", err=True)
+    exit_if([sentence for unblinding in unblinded.values() for sentence in unblinding.left])
 
 
 @click.command()
@@ -257,8 +261,8 @@ def merge(sites: dict[str, Path], to: Path) -> None:
     from study_app.store.sites.merge import merge_sites
 
     with progress() as show:
-        show("copying")
-        made = merge_sites(sites, to)
+        show("reading the sites")
+        made = merge_sites(sites, to, progress=show)
     for site in made.sites:
         new = "merged" if site.name in sites else "kept  "
         click.echo(f"{new}  site {site.name}: {counted(site.sessions, 'session')}, key {site.key_hash[:12]}")

@@ -31,19 +31,20 @@ def write_file(path: Path, content: bytes | bytearray, *, waits: bool = True) ->
     """Write ``content`` to ``path``, replacing an existing file in one step.
 
     Written under a temporary name, flushed to the disk, renamed over the old file, and the folder's entry flushed. On
-    any failure the old file is untouched and no temporary file is left. Without ``waits`` nothing is flushed: for files
-    that can be recreated, since a power cut may then lose them.
+    any failure before the renaming the old file is untouched; no temporary file is left. Without ``waits`` nothing is
+    flushed: for files that can be recreated, since a power cut may then lose them.
 
     Raises
     ------
     StoreError
-        The file cannot be written; names the file and the system's reason.
+        The file cannot be written; names the file and the system's reason. Or it has its new content, and only the
+        folder's entry could not be flushed: then the message says so.
     """
     with _temporary_file(path, path) as half:
         write_new_file(half, content, waits=waits)
         _replace_file(half, path)
-        if waits:
-            sync_folder(path.parent)
+    if waits:
+        flush_entry(path)
 
 
 def _replace_file(half: Path, path: Path) -> None:
@@ -91,11 +92,8 @@ def create_folder(path: Path, files: Mapping[str, bytes], *, waits: bool = True,
         raise cannot_write(path, error) from error
     finally:
         shutil.rmtree(half, ignore_errors=True)
-    try:
-        if waits:
-            sync_folder(path.parent)
-    except OSError as error:
-        raise cannot_write(path, error) from error
+    if waits:
+        flush_entry(path)
     return True
 
 
@@ -130,11 +128,11 @@ def copy_folder(folder: Path, to: Path) -> None:
         to.parent.mkdir(parents=True, exist_ok=True)
         shutil.copytree(folder, half)
         half.rename(to)
-        sync_folder(to.parent)
     except OSError as error:  # shutil.Error, too
         raise cannot_write(to, error) from error
     finally:
         shutil.rmtree(half, ignore_errors=True)
+    flush_entry(to)
 
 
 def append_line(path: Path, line: bytes, *, waits: bool = True) -> None:
@@ -145,7 +143,7 @@ def append_line(path: Path, line: bytes, *, waits: bool = True) -> None:
     Raises
     ------
     StoreError
-        The file cannot be written; a partly written line is removed.
+        The file cannot be written; the line is removed again.
     """
     try:
         with path.open("a+b", buffering=0) as file:
@@ -154,11 +152,10 @@ def append_line(path: Path, line: bytes, *, waits: bool = True) -> None:
                 write_all(file, line if _ends_with_newline(file, size) else b"\n" + line)
                 if waits:
                     os.fsync(file.fileno())
+                    sync_folder(path.parent)
             except OSError:
                 file.truncate(size)
                 raise
-        if waits:
-            sync_folder(path.parent)
     except OSError as error:
         raise cannot_write(path, error) from error
 
@@ -184,12 +181,18 @@ def temporary_files(folder: Path, of: str = "") -> tuple[Path, ...]:
 def remove_old_temporary_files(folder: Path, of: str = "") -> None:
     """Remove old temporary files, ``of`` a name if set, from a folder into which other programs may be writing.
 
-    Only files too old to be in use are removed; a file that cannot be removed is left.
+    Only files too old to be in use are removed, by the time that the folder's disk gives to new files: this computer's
+    clock may differ from that of another one that is writing. A file that cannot be removed is left.
     """
-    for path in temporary_files(folder, of):
-        with contextlib.suppress(OSError):
-            if not path.is_dir() and time.time() - path.stat().st_mtime > OLD_S:
-                path.unlink()
+    if not (paths := temporary_files(folder, of)):
+        return
+    with contextlib.suppress(OSError, StoreError), _temporary_file(folder / "time", folder) as probe:
+        write_new_file(probe, b"", waits=False)
+        now_s = probe.stat().st_mtime
+        for path in paths:
+            with contextlib.suppress(OSError):
+                if not path.is_dir() and now_s - path.stat().st_mtime > OLD_S:
+                    path.unlink()
 
 
 def paths_in(folder: Path) -> list[Path]:
@@ -243,6 +246,23 @@ def sync_folder(path: Path) -> None:
             raise
     finally:
         os.close(descriptor)
+
+
+def flush_entry(path: Path) -> None:
+    """Flush the folder's entry of ``path``, which was renamed into place.
+
+    Raises
+    ------
+    StoreError
+        It cannot be flushed; the message says that ``path`` is written.
+    """
+    try:
+        sync_folder(path.parent)
+    except OSError as error:
+        raise StoreError(
+            f"{path} is written, but the disk did not confirm it ({system_message(error)}): check the disk; after a "
+            "power failure the older state may be back"
+        ) from error
 
 
 def cannot_write(path: Path, error: OSError) -> StoreError:

@@ -113,6 +113,7 @@ EXCLUSIONS: tuple[Column, ...] = (
     Column("rule_or_person", "text", "The rule that excludes it, or the initials of the person."),
     Column("reason", "text", "Reason for the exclusion."),
     Column("excluded_at", "time", "Time of the decision."),
+    optional("key_open", "flag", "Whether the study's key was open at the decision.", later=True),
 )
 
 

@@ -8,11 +8,13 @@ import re
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 from study_app.errors import StoreError
 from study_app.protocol.model import RULES
 from study_app.protocol.source.problems import did_you_mean
 from study_app.store.atomic import append_line, parse_json, read_own_if_there, write_file
+from study_app.store.blinded.blinding import reveals
 from study_app.store.columns import EXCLUSIONS
 from study_app.store.csv_files import MISSING, csv_bytes, header, unguard_formula
 from study_app.store.folder_lock import lock_folder
@@ -29,7 +31,10 @@ MISSING_RULE = "missing"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exclusion:
-    """An excluded session or trial; a row of ``exclusions.csv``."""
+    """An excluded session or trial; a row of ``exclusions.csv``.
+
+    ``key_open`` is whether the study's key was open at the decision, None where an earlier version wrote the row.
+    """
 
     participant: str
     session: int
@@ -37,11 +42,25 @@ class Exclusion:
     rule_or_person: str
     reason: str
     excluded_at: str
+    key_open: bool | None = None
 
     @property
     def what(self) -> tuple[str, int, int | None]:
         """Participant, session and trial."""
         return self.participant, self.session, self.trial
+
+    def fields(self) -> dict[str, Any]:
+        """Return the fields for JSON, without ``key_open`` in a row of an earlier version, as that version has them."""
+        return {name: value for name, value in asdict(self).items() if (name, value) != ("key_open", None)}
+
+
+@dataclass(frozen=True, slots=True)
+class Reversal:
+    """A reversed exclusion, with the time of its reversal and whether the key was open (None: not recorded)."""
+
+    exclusion: Exclusion
+    at: str
+    key_open: bool | None
 
 
 def exclude(
@@ -83,10 +102,16 @@ def exclude(
     study = StudyFolder(folder)
     _check_recorded(study, participant, session, trial)
     at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
-    new = Exclusion(
-        participant=participant, session=session, trial=trial, rule_or_person=by, reason=reason, excluded_at=at
-    )
     with lock_folder(folder):
+        new = Exclusion(
+            participant=participant,
+            session=session,
+            trial=trial,
+            rule_or_person=by,
+            reason=reason,
+            excluded_at=at,
+            key_open=bool(reveals(folder)),
+        )
         rows = exclusions(folder)
         for row in rows:
             if row.what in (new.what, (participant, session, None)):
@@ -123,7 +148,8 @@ def include(
 ) -> Exclusion:
     """Reverse the exclusion of a session, or of one of its trials; return that exclusion.
 
-    Its row is moved from ``exclusions.csv`` to ``exclusions_reversed.jsonl``, with who reversed it, when and why.
+    Its row is moved from ``exclusions.csv`` to ``exclusions_reversed.jsonl``, with who reversed it, when and why. A
+    call after an interrupted one completes it, and records nothing twice.
 
     Raises
     ------
@@ -144,8 +170,10 @@ def include(
             listed = "; ".join(describe_exclusion(row) for row in rows) or "nothing"
             raise StoreError(f"{name} is not excluded; excluded: {listed}")
         at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
-        record = {"at": at, "by": by, "reason": reason, "exclusion": asdict(taken)}
-        append_line(study.reversed_exclusions, json.dumps(record, ensure_ascii=False).encode() + b"\n")
+        key_open = bool(reveals(folder))
+        record = {"at": at, "by": by, "reason": reason, "key_open": key_open, "exclusion": taken.fields()}
+        if taken not in reversals(folder):
+            append_line(study.reversed_exclusions, json.dumps(record, ensure_ascii=False).encode() + b"\n")
         write_file(study.exclusions, exclusion_bytes(tuple(row for row in rows if row is not taken)))
     return taken
 
@@ -191,6 +219,7 @@ def exclusions(folder: Path) -> tuple[Exclusion, ...]:
     if content is None:
         return ()
     columns = header(EXCLUSIONS)
+    early = columns[:-1]  # of versions that did not write key_open
     try:
         text = decoded(content)
         reader = csv.reader(io.StringIO(text, newline=""), strict=True)
@@ -201,30 +230,31 @@ def exclusions(folder: Path) -> tuple[Exclusion, ...]:
         raise StoreError(f"{path} is not CSV ({error}): save it as CSV in UTF-8, with commas") from error
     if (separator := separator_of(text.partition("\n")[0], columns)) != ",":
         raise StoreError(f"{path} separates its columns with {separator!r}: save it as CSV with commas")
-    if tuple(names[1]) != columns:
+    if tuple(names[1]) not in (columns, early):
         raise StoreError(f"{path}: its columns must be {', '.join(columns)}, but are {', '.join(names[1])}")
-    return tuple(_parse_exclusion(path, line, row) for line, row in rows)
+    return tuple(_parse_exclusion(path, line, row, len(names[1])) for line, row in rows)
 
 
 def reversals(folder: Path) -> tuple[Exclusion, ...]:
     """Return the reversed exclusions of the study in ``folder``, in the order of the reversals."""
-    return tuple(taken for taken, _ in dated_reversals(folder))
+    return tuple(reversal.exclusion for reversal in dated_reversals(folder))
 
 
-def dated_reversals(folder: Path) -> tuple[tuple[Exclusion, str], ...]:
+def dated_reversals(folder: Path) -> tuple[Reversal, ...]:
     """Return each reversed exclusion with the time of its reversal."""
     path = StudyFolder(folder).reversed_exclusions
     lines = (read_own_if_there(path, folder) or b"").split(b"\n")  # a reason may contain other line endings
     return tuple(_parse_reversal(path, number, line) for number, line in enumerate(lines, start=1) if line.strip())
 
 
-def _parse_reversal(path: Path, number: int, line: bytes) -> tuple[Exclusion, str]:
+def _parse_reversal(path: Path, number: int, line: bytes) -> Reversal:
     with contextlib.suppress(ValueError, KeyError, TypeError):
         record = parse_json(line)
         taken = Exclusion(**record["exclusion"])
         texts = (taken.participant, taken.rule_or_person, taken.reason, taken.excluded_at)
         if all(isinstance(text, str) for text in texts) and isinstance(taken.session, int):
-            return taken, str(record.get("at", ""))
+            key_open = record.get("key_open")
+            return Reversal(taken, str(record.get("at", "")), key_open if isinstance(key_open, bool) else None)
     raise StoreError(f"{path}, line {number} is not a reversed exclusion: restore it from a copy, or remove the line")
 
 
@@ -233,14 +263,16 @@ def exclusion_bytes(rows: tuple[Exclusion, ...]) -> bytes:
     return csv_bytes(EXCLUSIONS, [{name: getattr(row, name) for name in header(EXCLUSIONS)} for row in rows])
 
 
-def _parse_exclusion(path: Path, line: int, row: list[str]) -> Exclusion:
-    if wrong := wrong_length(row, len(header(EXCLUSIONS))):
+def _parse_exclusion(path: Path, line: int, row: list[str], length: int) -> Exclusion:
+    if wrong := wrong_length(row, length):
         raise StoreError(f"{path}, line {line}: {wrong}")
-    participant, session, trial, by, reason, at, *_ = row
-    if not (_WHOLE.fullmatch(session) and (trial == MISSING or _WHOLE.fullmatch(trial))):
+    participant, session, trial, by, reason, at, *later = row
+    key_open = later[0].lower() if later else MISSING  # a spreadsheet writes TRUE
+    flags = {"true": True, "false": False, MISSING: None}
+    if not (_WHOLE.fullmatch(session) and (trial == MISSING or _WHOLE.fullmatch(trial)) and key_open in flags):
         raise StoreError(
             f"{path}, line {line}: {','.join(row)!r} is not an exclusion (participant, session, trial or {MISSING}, "
-            "name, reason, time): correct or remove the row"
+            "name, reason, time, whether the key was open): correct or remove the row"
         )
     return Exclusion(
         participant=participant,
@@ -249,6 +281,7 @@ def _parse_exclusion(path: Path, line: int, row: list[str]) -> Exclusion:
         rule_or_person=unguard_formula(by),
         reason=unguard_formula(reason),
         excluded_at=at,
+        key_open=flags[key_open],
     )
 
 

@@ -20,12 +20,16 @@ Names follow Psych-DS: key-value pairs whose values are letters and digits only.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 from study_app.errors import StoreError
 from study_app.protocol.table import unprintable_character
 
+ReportProgress: TypeAlias = Callable[[str, float], object]
+"""Called with what is being done and the share that is done."""
 REBUILT = "rebuilt.txt"
 FINGERPRINTS = "fingerprints.txt"
 

@@ -15,7 +15,7 @@ site nor an ID holds a dash, so that equal IDs of two sites are two participants
 import json
 import os
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -27,18 +27,22 @@ from study_app.store.journals.journal_events import is_valid_value, shorten_valu
 
 MANIFEST: Final = "sites.json"
 FOLDER: Final = "sites"
-FORMAT: Final = 1
+FORMAT: Final = 2
 DASH: Final = "-"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Site:
-    """A site of a merged study, as ``sites.json`` lists it."""
+    """A site of a merged study, as ``sites.json`` lists it.
+
+    ``withdrawals`` is their number at the merge; lists of format 1 do not have it.
+    """
 
     name: str
     merged_at: str
     key_hash: str
     sessions: int
+    withdrawals: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,10 +90,10 @@ def read_merged(folder: Path) -> Merged | None:
     path = folder / MANIFEST
     try:
         held = parse_json(read_regular(path))
-        if held["format"] != FORMAT:
+        if held["format"] not in (1, FORMAT):
             shown = shorten_value(held["format"])
             raise StoreError(
-                f"{path} has format {shown}, this version reads {FORMAT}: use a newer version of liquid-study"
+                f"{path} has format {shown}, this version reads 1 and {FORMAT}: use a newer version of liquid-study"
             )
         sites = tuple(Site(**site) for site in held["sites"])
         if sites and all(map(_is_site, sites)) and is_valid_value("protocol_hash", held["protocol_hash"]):
@@ -111,6 +115,7 @@ def _is_site(site: Site) -> bool:
         is_valid_value("at", site.merged_at)
         and is_valid_value("key_hash", site.key_hash)
         and isinstance(site.sessions, int)
+        and isinstance(site.withdrawals, int | None)
     )
     return named and typed
 
@@ -183,14 +188,7 @@ def all_exclusions(folder: Path) -> tuple[Exclusion, ...]:
         A list cannot be read.
     """
     return tuple(
-        Exclusion(
-            participant=f"{prefix}{row.participant}",
-            session=row.session,
-            trial=row.trial,
-            rule_or_person=row.rule_or_person,
-            reason=row.reason,
-            excluded_at=row.excluded_at,
-        )
+        replace(row, participant=f"{prefix}{row.participant}")
         for prefix, place in folders_of(folder).items()
         for row in exclusions(place)
     )

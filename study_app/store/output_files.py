@@ -8,7 +8,7 @@ import contextlib
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -18,6 +18,7 @@ from study_app.errors import AnalysisError, StoreError
 from study_app.store.atomic import (
     append_line,
     cannot_write,
+    make_folder,
     open_regular,
     parse_json,
     remove_old_temporary_files,
@@ -121,8 +122,12 @@ class Output:
         return tuple(path for name in self.files if (path := self.to / name).is_file())
 
 
-def write_output(study: Path, to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, ...]:
+def write_output(
+    study: Path, to: Path, files: Mapping[str, bytes | FileCopy], warn: Callable[[str], object] | None = None
+) -> tuple[Path, ...]:
     """Write ``files`` made from the results in ``study`` into the folder ``to``, as `write_files`, and list them.
+
+    If they cannot be listed, ``warn`` receives a sentence: a withdrawal will not find them.
 
     Raises
     ------
@@ -132,9 +137,12 @@ def write_output(study: Path, to: Path, files: Mapping[str, bytes | FileCopy]) -
     written = write_files(to, files)
     at = datetime.now().astimezone().isoformat(timespec="seconds")
     line = {"study": str(study.resolve()), "to": str(to.resolve()), "at": at, "files": [*files]}
-    with contextlib.suppress(StoreError, OSError):  # the outputs exist; failing to write the list is not an error
-        data_folder().mkdir(parents=True, exist_ok=True)
+    try:
+        make_folder(data_folder(), waits=False)
         append_line(data_folder() / NAME, json.dumps(line).encode() + b"\n", waits=False)
+    except StoreError as error:
+        if warn is not None:
+            warn(f"the output in {to} is not in the list of outputs, so withdraw will not name it: note it ({error})")
     return written
 
 

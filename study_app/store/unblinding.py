@@ -37,9 +37,17 @@ from study_app.store.blinded.blinding import (
 )
 from study_app.store.checksums import replace_checksums
 from study_app.store.csv_files import align_columns
-from study_app.store.exclusions import MISSING_RULE, Exclusion, dated_reversals, exclude, exclusions, reversals
+from study_app.store.exclusions import (
+    MISSING_RULE,
+    Exclusion,
+    Reversal,
+    dated_reversals,
+    exclude,
+    exclusions,
+    reversals,
+)
 from study_app.store.folder_lock import is_open, lock_folder
-from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.folders import ReportProgress, SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import Event, Recorded, TrialStarted, start_of
 from study_app.store.merged import folders_of
@@ -78,10 +86,11 @@ class Unblinded:
     excluded: tuple[Exclusion, ...] = ()
 
 
-def unblind(folder: Path, by: str, reason: str) -> Unblinded:
+def unblind(folder: Path, by: str, reason: str, progress: ReportProgress | None = None) -> Unblinded:
     """Open a study's key, record who opened it and why, and write the sealed columns into its tables.
 
-    A table that differs from its journal is not changed, nor is a session that runs or cannot be read.
+    A table that differs from its journal is not changed, nor is a session that runs or cannot be read. Unblinding again
+    completes an interrupted unblinding. ``progress`` is called with what is being done and the share that is done.
 
     Raises
     ------
@@ -95,11 +104,14 @@ def unblind(folder: Path, by: str, reason: str) -> Unblinded:
         remove_old_temporary_files(study.path)
         remove_old_temporary_files(study.data)
         left: list[str] = []
-        for session in study.sessions():
+        sessions = study.sessions()
+        for number, session in enumerate(sessions):
+            if progress is not None:
+                progress(f"opening session {number + 1} of {len(sessions)}", number / len(sessions))
             try:
                 left += _open_tables(study, session, key)
             except StoreError as error:
-                left.append(f"{error}; then: liquid-study rebuild {session.path}")
+                left.append(f"{error}; then unblind again")
         try:
             _open_study(study)
         except StoreError as error:
@@ -123,7 +135,7 @@ def is_unblinded(folder: Path) -> bool:
     return has_opened_keys(folder) and has_sealed_columns(read_if_there(StudyFolder(folder).description) or b"")
 
 
-def unblind_folder(folder: Path, by: str, reason: str) -> dict[str, Unblinded]:
+def unblind_folder(folder: Path, by: str, reason: str, progress: ReportProgress | None = None) -> dict[str, Unblinded]:
     """Open the key of a study, or of each site of a merged study; return results by the prefix of IDs ("A-" or "").
 
     Raises
@@ -138,18 +150,29 @@ def unblind_folder(folder: Path, by: str, reason: str) -> dict[str, Unblinded]:
             verified_key(StudyFolder(place))
     by_site: dict[str, Unblinded] = {}
     for prefix, place in folders.items():
-        of_site = unblind(place, by, reason)
+        of_site = unblind(place, by, reason, progress)
         excluded = tuple(replace(row, participant=f"{prefix}{row.participant}") for row in of_site.excluded)
         by_site[prefix] = replace(of_site, excluded=excluded)
     return by_site
 
 
 def late_exclusions(folder: Path, rows: Sequence[Exclusion]) -> tuple[Exclusion, ...]:
-    """Return the exclusions decided or reversed by a person after the key was opened; none for a merged study."""
+    """Return the exclusions decided or reversed by a person after the key was opened; none for a merged study.
+
+    Each records whether the key was open; times decide only for those of earlier versions.
+    """
     opened_at = min(filter(None, (_moment(reveal["at"]) for reveal in reveals(folder))), default=None)
-    dated = (*((row, row.excluded_at) for row in rows if row.rule_or_person not in RULES), *dated_reversals(folder))
-    times = ((row, _moment(text)) for row, text in dated)  # reveals are recorded in whole seconds
-    return tuple(row for row, at in times if opened_at and at and at.replace(microsecond=0) > opened_at)
+
+    def is_after_opening(text: str) -> bool:
+        at = _moment(text)  # reveals are recorded in whole seconds
+        return bool(opened_at and at and at.replace(microsecond=0) > opened_at)
+
+    by_person = (Reversal(row, row.excluded_at, row.key_open) for row in rows if row.rule_or_person not in RULES)
+    return tuple(
+        decision.exclusion
+        for decision in (*by_person, *dated_reversals(folder))
+        if (is_after_opening(decision.at) if decision.key_open is None else decision.key_open)
+    )
 
 
 def _moment(text: str) -> datetime | None:

@@ -182,6 +182,29 @@ def tombstones(study: StudyFolder) -> dict[str, Tombstone]:
     return by_participant
 
 
+def unerased_files(study: StudyFolder, participant: str) -> Iterator[Path]:
+    """Yield what an interrupted withdrawal left of a participant: the folder, and lists with the participant's rows."""
+    if is_there(person := study.data / f"sub-{participant}"):
+        yield person
+    if any(row.participant == participant for row in exclusions(study.path)):
+        yield study.exclusions
+    for path, has_participant in _listing_files(study, participant):
+        if any(map(has_participant, (read_if_there(path) or b"").splitlines())):
+            yield path
+    if (name := described_study(study)) is not None:
+        rows = (read_if_there(study.participants(name)) or b"").splitlines()
+        if any(participant.encode() in row.split(b",") for row in rows):
+            yield study.participants(name)
+
+
+def _listing_files(study: StudyFolder, participant: str) -> tuple[tuple[Path, Callable[[bytes], bool]], ...]:
+    """Return the lists from which lines are erased, each with the test for a line of the participant."""
+    return (
+        (study.fingerprints, lambda line: _is_row_of(line, study, participant)),
+        (study.reversed_exclusions, lambda line: _reverses(line, participant)),
+    )
+
+
 def describe_session(session: SessionFolder) -> ErasedSession:
     """Return the hashes that identify a session, as far as its files can be read."""
     try:
@@ -299,21 +322,17 @@ def _erase(study: StudyFolder, tombstone: Tombstone) -> bool:
     kept = tuple(row for row in rows if row.participant != participant)
     if kept != rows:
         write_file(study.exclusions, exclusion_bytes(kept))
-    changed = [
-        kept != rows,
-        _keep_lines(study.fingerprints, lambda line: not _is_row_of(line, study, participant)),
-        _keep_lines(study.reversed_exclusions, lambda line: not _reverses(line, participant)),
-    ]
+    changed = [kept != rows, *(_erase_lines(path, erased) for path, erased in _listing_files(study, participant))]
     name = described_study(study)
     if name is not None:
         write_participants(study, name)
     return bool(sessions) or any(changed)
 
 
-def _keep_lines(path: Path, keeps: Callable[[bytes], bool]) -> bool:
-    """Remove the lines for which ``keeps`` is false from a list; return whether there were any."""
+def _erase_lines(path: Path, erased: Callable[[bytes], bool]) -> bool:
+    """Remove the lines for which ``erased`` is true from a list; return whether there were any."""
     lines = (read_if_there(path) or b"").splitlines(keepends=True)
-    kept = [line for line in lines if keeps(line)]
+    kept = [line for line in lines if not erased(line)]
     if kept != lines:
         write_file(path, b"".join(kept))
     return kept != lines

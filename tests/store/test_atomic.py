@@ -1,9 +1,19 @@
+import os
+import time
 from pathlib import Path
 
 import pytest
 
 from study_app.errors import StoreError
-from study_app.store.atomic import append_line, create_folder, probe_free_bytes, write_file
+from study_app.store.atomic import (
+    OLD_S,
+    append_line,
+    create_folder,
+    probe_free_bytes,
+    remove_old_temporary_files,
+    temporary_path,
+    write_file,
+)
 from tests.platforms import files_up_to
 
 
@@ -30,6 +40,18 @@ def test_what_does_not_fit_leaves_what_was_there_and_nothing_beside(tmp_path: Pa
             act()
     assert (table.read_bytes(), lines.read_bytes()) == (b"old\n", b"1\n")
     assert names_in(tmp_path) == ["reveals.jsonl", "table.csv"]
+
+
+def test_a_clock_that_is_ahead_removes_no_temporary_file_that_is_being_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    new, old = temporary_path(tmp_path / "table"), temporary_path(tmp_path / "table")
+    for path in (new, old):
+        path.write_text("half")
+    os.utime(old, (time.time() - 2 * OLD_S,) * 2)
+    monkeypatch.setattr(time, "time", lambda: new.stat().st_mtime + 2 * OLD_S)
+    remove_old_temporary_files(tmp_path)
+    assert names_in(tmp_path) == [new.name]
 
 
 def test_lines_are_appended_after_a_torn_one_without_losing_either(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 from study_app.errors import StoreError
 from study_app.store import unblinding
 from study_app.store.exclusions import Exclusion, exclude, exclusions, include, reversals
-from study_app.store.unblinding import unblind
+from study_app.store.unblinding import late_exclusions, unblind
 from study_app.store.verification.verify_study import verify_study
 from tests.platforms import files_up_to
 from tests.store.conftest import Start
@@ -38,6 +38,7 @@ def test_a_session_and_a_trial_are_left_out_with_their_reasons(folder: Path) -> 
         rule_or_person="rule 3",
         reason="withdrew",
         excluded_at="2026-03-02T09:30:00.000+01:00",
+        key_open=False,
     )
     assert second == Exclusion(
         participant="P007",
@@ -46,13 +47,40 @@ def test_a_session_and_a_trial_are_left_out_with_their_reasons(folder: Path) -> 
         rule_or_person="AB",
         reason="=1+1, it rang",
         excluded_at="2026-03-02T09:30:00.000+01:00",
+        key_open=False,
     )
     assert exclusions(folder) == (first, second)
     assert (folder / "exclusions.csv").read_text(encoding="utf-8") == (
-        "participant,session,trial,rule_or_person,reason,excluded_at\n"
-        "P008,1,n/a,rule 3,withdrew,2026-03-02T09:30:00.000+01:00\n"
-        'P007,1,2,AB,"\'=1+1, it rang",2026-03-02T09:30:00.000+01:00\n'
+        "participant,session,trial,rule_or_person,reason,excluded_at,key_open\n"
+        "P008,1,n/a,rule 3,withdrew,2026-03-02T09:30:00.000+01:00,false\n"
+        'P007,1,2,AB,"\'=1+1, it rang",2026-03-02T09:30:00.000+01:00,false\n'
     )
+
+
+def test_a_decision_after_unblinding_is_late_although_the_clock_was_set_back(folder: Path) -> None:
+    early = exclude(folder, "P008", 1, by="rule 3", reason="withdrew", now=NOW)
+    unblind(folder, "CD", "to analyse")
+    assert datetime.now().astimezone() > NOW
+    late = exclude(folder, "P007", 1, by="AB", reason="slow", now=NOW)
+    assert late_exclusions(folder, exclusions(folder)) == (late,)
+    include(folder, "P008", 1, by="AB", reason="it counts", now=NOW)
+    assert late_exclusions(folder, exclusions(folder)) == (late, early)
+    assert verify_study(folder).is_sound
+
+
+def test_in_a_list_of_an_earlier_version_times_decide_what_is_late(folder: Path) -> None:
+    path = folder / "exclusions.csv"
+    unblind(folder, "CD", "to analyse")
+    later = (datetime.now().astimezone() + timedelta(hours=1)).isoformat(timespec="milliseconds")
+    path.write_text(
+        "participant,session,trial,rule_or_person,reason,excluded_at\n"
+        f"P008,1,n/a,AB,slow,2026-03-02T09:30:00.000+01:00\nP007,1,2,AB,the phone rang,{later}\n"
+    )
+    assert [row.key_open for row in exclusions(folder)] == [None, None]
+    assert [row.participant for row in late_exclusions(folder, exclusions(folder))] == ["P007"]
+    assert verify_study(folder).is_sound
+    exclude(folder, "P007", 1, trial=1, by="AB", reason="tired")
+    assert [row.key_open for row in exclusions(folder)] == [None, None, True]
 
 
 def test_a_rule_excludes_no_session_that_a_person_included_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

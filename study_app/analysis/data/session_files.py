@@ -1,7 +1,7 @@
 """The sessions of a results folder as typed tables, checked against their receipts, excluded rows marked."""
 
 import contextlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeAlias
@@ -333,9 +333,16 @@ def with_excluded(table: pd.DataFrame, listed: Sequence[Exclusion]) -> pd.DataFr
     """
     if not listed:
         return table.assign(excluded=False, exclusion_reason=pd.Series(pd.NA, index=table.index, dtype="string"))
+    by_what: dict[tuple[str, int, int | None], list[Exclusion]] = {}
+    for one in listed:
+        by_what.setdefault(one.what, []).append(one)
     trials = table["trial"] if "trial" in table.columns else [None] * len(table)
     found = [
-        list(_about(listed, str(participant), int(session), None if pd.isna(trial) else trial))
+        [
+            one
+            for which in dict.fromkeys((None, None if pd.isna(trial) else trial))  # the session's before the trial's
+            for one in by_what.get((participant, session, which), ())
+        ]
         for participant, session, trial in zip(table["participant"], table["session"], trials, strict=True)
     ]
     reasons = ["; ".join(one.reason for one in of_row if one.reason) or None for of_row in found]
@@ -343,12 +350,6 @@ def with_excluded(table: pd.DataFrame, listed: Sequence[Exclusion]) -> pd.DataFr
         excluded=pd.Series([bool(of_row) for of_row in found], index=table.index, dtype=bool),
         exclusion_reason=pd.Series(reasons, index=table.index, dtype="string"),
     )
-
-
-def _about(listed: Sequence[Exclusion], participant: str, session: int, trial: int | None) -> Iterator[Exclusion]:
-    """Yield what leaves out a row: its session's exclusion before its trial's."""
-    for which in dict.fromkeys((None, trial)):
-        yield from (one for one in listed if one.what == (participant, session, which))
 
 
 def check_there(study: StudyFolder, trials: pd.DataFrame, listed: Sequence[Exclusion]) -> None:

@@ -84,6 +84,6 @@ def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None)
         raise AnalysisError(f"a figure cannot be drawn: {failures.found[0]}")
     if not files:
         raise AnalysisError(f"{folder}: no completed session with answers yet: there is nothing to draw")
-    written = write_output(study.folder, Path(to), files)
+    written = write_output(study.folder, Path(to), files, warn)
     study.tell_doubts(warn)
     return written

@@ -261,7 +261,7 @@ def report(
         raise AnalysisError(f"{folder}: the study {study.name!r} asks no statements, so there is nothing to report")
     files, found = report_files(study, progress)
     progress("writing", 0.95)
-    written = write_output(study.folder, Path(to), files)
+    written = write_output(study.folder, Path(to), files, warn)
     study.tell_doubts(warn)
     if failed is not None:
         for failure in found:

@@ -114,6 +114,10 @@ WAITS = (
     "The force is off and nothing is lost. Free disk space or reconnect the drive; the session then continues, paused."
 )
 AFTERWARDS = "The session is closed and the force is off. Everything in the journal is safe."
+WAITS_AT_END = (
+    "The force is off and the journal is complete. Free disk space, and leave this window open until the session's "
+    "other files are written."
+)
 
 
 class Banner(QWidget):
@@ -137,7 +141,8 @@ class Banner(QWidget):
             self.what.setText(view.trouble[:1].upper() + view.trouble[1:])
         offered = view.may_reconnect and not view.over
         advice = RECONNECT if offered else WAITS if view.waits else WHAT_TO_DO
-        self.then.setText(AFTERWARDS if view.over else view.reconnection or advice)
+        afterwards = WAITS_AT_END if view.waits else AFTERWARDS
+        self.then.setText(afterwards if view.over else view.reconnection or advice)
         self.reconnect.setVisible(offered)
         self.reconnect.setEnabled(not view.reconnects)
         self.setVisible(bool(view.trouble))

@@ -517,8 +517,9 @@ def rehearse(
     folder = rehearsal_folder(workspace().results, study.study.name) if results is None else Path(results)
     check_study(StudyFolder(folder), study.study.name)
     people = [f"P{number:03d}" for number in range(1, participants + 1)]
+    used = used_ids(StudyFolder(folder))
     for person in people:
-        used_ids(StudyFolder(folder)).check_unused(person, 1)
+        used.check_unused(person, 1)
     for person, own_group in simulated_groups(StudyFolder(folder), study, people, group).items():
         opening = open_session(
             study,

@@ -19,6 +19,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -88,6 +89,46 @@ class Begun(NamedTuple):
     replaces: str | None
 
 
+class Entries:
+    """The entries of a study's folder, read once: reading them for each new participant would be quadratic."""
+
+    def __init__(self, study: StudyFolder) -> None:
+        self._study = study
+        held = claims(study)
+        self.counts_places = has_counted_places(held)
+        self._by_participant: dict[str, Claim] = {}
+        self._last: dict[str | None, int] = {}
+        for claim in held:
+            self.add(claim)
+
+    @cached_property
+    def begun(self) -> dict[str, Begun]:
+        """The entries in the journals, when they were first needed."""
+        return entries_begun(self._study)
+
+    @cached_property
+    def _last_begun(self) -> int:
+        return max((begun.entry for begun in self.begun.values()), default=0)
+
+    def add(self, claim: Claim) -> None:
+        """Add a claim."""
+        self._by_participant.setdefault(claim.participant, claim)
+        self._last[claim.group] = max(claim.entry, self._last.get(claim.group, 0))
+
+    def claim_of(self, participant: str | None) -> Claim | None:
+        """Return the claim of a participant."""
+        return self._by_participant.get(participant) if participant else None
+
+    def last(self, group: str | None) -> int:
+        """Return the last entry of a pre-existing group, or without ``group`` the last one of all; 0 if there is none.
+
+        Without ``group`` those in the journals count, too.
+        """
+        if group is not None:
+            return self._last.get(group, 0)
+        return max(self._last_begun, *self._last.values(), 0)
+
+
 def allocate(
     study: StudyFolder,
     key: Key,
@@ -96,24 +137,21 @@ def allocate(
     group: str | None = None,
     row_of: str | None = None,
     waits: bool = True,
+    entries: Entries | None = None,
 ) -> Allocation | None:
     """Return the allocation of a participant, claiming an entry if there is none yet; None in a study without groups.
 
     ``group`` is a new participant's pre-existing group, ``row_of`` the participant who is replaced; both were checked
-    (`check_choice`).
+    (`check_choice`). ``entries`` are those that were read before, to which a new claim is added.
     """
     if not key.groups and group is None and not is_there(study.allocated):
         return None
-    if (known := allocation_of(study, key, participant)) is not None:
+    entries = Entries(study) if entries is None else entries
+    if (known := allocation_of(study, key, participant, entries)) is not None:
         return known
-    held = claims(study)
-    replaced = _claim_of(held, row_of) if has_counted_places(held) else None
-    taken = [claim.entry for claim in held] + [begun.entry for begun in entries_begun(study).values()]
-    if key.groups:
-        group = None
-    else:
-        taken = [claim.entry for claim in held if claim.group == group]
-    entry = max(taken, default=0) if replaced is None else replaced.entry - 1
+    replaced = entries.claim_of(row_of) if entries.counts_places else None
+    group = None if key.groups else group
+    entry = entries.last(group) if replaced is None else replaced.entry - 1
     try:
         study.allocated.mkdir(exist_ok=True)
         while True:
@@ -126,7 +164,7 @@ def allocate(
                 sealed="" if group is not None else _seal_group(key, entry, participant),
                 group=group,
                 replaces=None if replaced is None else replaced.participant,
-                place_in_group=has_counted_places(held),
+                place_in_group=entries.counts_places,
             )
             try:
                 write_new_file(path, json.dumps(_claim_content(claim)).encode() + b"\n", waits=waits)
@@ -136,18 +174,20 @@ def allocate(
                 continue
             if waits:
                 sync_folder(study.allocated)
+            entries.add(claim)
             return _allocation(claim, key)
     except OSError as error:
         raise cannot_write(study.allocated, error) from error
 
 
-def allocation_of(study: StudyFolder, key: Key, participant: str) -> Allocation | None:
+def allocation_of(study: StudyFolder, key: Key, participant: str, entries: Entries | None = None) -> Allocation | None:
     """Return the allocation of a participant, or None if there is none yet."""
-    if (claim := _claim_of(claims(study), participant)) is not None:
+    entries = Entries(study) if entries is None else entries
+    if (claim := entries.claim_of(participant)) is not None:
         if not is_unchanged(claim, key):
             raise StoreError(f"{claim.path} was changed: restore it from a copy")
         return _allocation(claim, key)
-    if (begun := entries_begun(study).get(participant)) is not None:
+    if (begun := entries.begun.get(participant)) is not None:
         path = study.allocation(begun.entry, begun.group, None if begun.replaces is None else participant)
         raise StoreError(
             f"{path} is missing, although participant {participant} has entry {begun.entry}: restore it from a copy"
@@ -238,15 +278,16 @@ def simulated_groups(
     StudyError rejects a ``group`` that the study cannot take (`check_choice`).
     """
     held = claims(study)
+    by_participant = {claim.participant: claim for claim in reversed(held)}
     sizes = Counter(claim.group for claim in held if claim.group in protocol.groups and claim.replaces is None)
     dealt: dict[str, str | None] = {}
     for participant in participants:
-        known = _claim_of(held, participant)
+        known = by_participant.get(participant)
         own = group
         if own is None and known is None and protocol.asks_group:
             own = next_group(protocol.shares, sizes)
             sizes[own] += 1
-        check_choice(protocol, held, participant, group=own, row_of=None)
+        check_choice(protocol, () if known is None else (known,), participant, group=own, row_of=None)
         dealt[participant] = own
     return dealt
 

@@ -151,6 +151,8 @@ def has_same_conditions(folder: Path, protocol: Protocol) -> bool:
 def reveal(folder: Path, by: str, reason: str) -> Codes:
     """Record who opens the key and why, and return the mapping block → code → condition id.
 
+    A reveal equal to the last one, such as after an interrupted unblinding, is not recorded again.
+
     Raises
     ------
     StoreError
@@ -163,14 +165,12 @@ def reveal(folder: Path, by: str, reason: str) -> Codes:
             f"{folder} is not a study folder ({study.key.name} is missing): give one such as results/rek2024"
         )
     key = verified_key(study)
-    record = {
-        "at": datetime.now().astimezone().isoformat(timespec="seconds"),
-        "by": by,
-        "reason": reason,
-        "key_hash": key.hash,
-    }
-    line = json.dumps(record, ensure_ascii=False).encode("utf-8", "backslashreplace")
-    append_line(study.reveals, line + b"\n")
+    record = {"by": by, "reason": reason, "key_hash": key.hash}
+    known = reveals(folder)
+    if not (known and record.items() <= known[-1].items()):
+        at = datetime.now().astimezone().isoformat(timespec="seconds")
+        line = json.dumps({"at": at, **record}, ensure_ascii=False).encode("utf-8", "backslashreplace")
+        append_line(study.reveals, line + b"\n")
     return key.codes
 
 

@@ -223,6 +223,7 @@ class Journal:
 
     def __init__(self, path: Path, file: BinaryIO, clock: SessionClock) -> None:
         self.path = path
+        self._real_path = os.path.realpath(path)
         self.clock = clock
         self.file = file
         self._lines = 0
@@ -380,7 +381,7 @@ class Journal:
             is_same_file = False
         except OSError as error:
             raise cannot_write(self.path, error) from error
-        if not is_same_file:
+        if not is_same_file or os.path.realpath(self.path) != self._real_path:
             raise StoreError(f"{self.path} was moved, deleted or replaced while the session ran: put it back")
         if status.st_size != self._size and not torn:
             raise StoreError(f"{self.path} was written by another program while the session ran: end this session")

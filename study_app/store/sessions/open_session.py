@@ -224,7 +224,10 @@ class SessionStore:
                 failures.append(error)
         self.opening.release()
         if failures:
-            raise failures[0]
+            raise StoreError(
+                f"{failures[0]}; the journal is complete: liquid-study rebuild {self.folder.path} writes what is "
+                "missing"
+            ) from failures[0]
         self._over = True
 
     @property

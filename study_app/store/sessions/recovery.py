@@ -315,6 +315,11 @@ def _unfinished(folder: SessionFolder, lines: list[events.Event]) -> events.Sess
 
 def refuse_finished(folder: SessionFolder, done: Progress) -> None:
     """Raise StoreError if a session has ended, so that it is not resumed."""
+    if done.ended is not None and not is_there(folder.checksums):
+        raise StoreError(
+            f"{folder.path} is finished ({done.ended}), but its receipt, tables and checksums could not all be "
+            f"written: liquid-study rebuild {folder.path} writes them"
+        )
     if done.ended is not None:
         raise StoreError(
             f"{folder.path} is finished ({done.ended}) and cannot be resumed; use a new session number for another "

@@ -21,7 +21,7 @@ from study_app.protocol.orders.schedule import stream
 from study_app.protocol.source.files import unbundle
 from study_app.store import receipt
 from study_app.store.atomic import create_folder, make_folder
-from study_app.store.blinded.allocation import allocate
+from study_app.store.blinded.allocation import Entries, allocate
 from study_app.store.blinded.blinding import open_or_draw_key, opened_key, reveals, seal_event
 from study_app.store.checksums import checksum_bytes, fingerprint, note_fingerprint
 from study_app.store.folder_lock import Opening, lock_folder
@@ -75,13 +75,14 @@ class SimulatedStudy:
     ) -> None:
         self.folder = StudyFolder(Path(results))
         check_study(self.folder, protocol.study.name)
+        used = used_ids(self.folder)
         for person in participants:
             check_participant(person)
-            if self.folder.data.exists():
-                used_ids(self.folder).check_unused(person, 1)
+            used.check_unused(person, 1)
         make_folder(self.folder.path)
         self.key = open_or_draw_key(self.folder.path, protocol, stream(seed, "blinding").random, unbundle(source)[1])
         self.protocol = protocol
+        self.entries = Entries(self.folder)
         self._opening: Opening | None = None
         start = SessionStart(
             "",
@@ -158,7 +159,7 @@ class SimulatedSession:
         self.content = bytearray()  # of the journal
         self._hash = hashlib.sha256()
         self._study = study
-        allocation = allocate(study.folder, study.key, participant, group=group, waits=False)
+        allocation = allocate(study.folder, study.key, participant, group=group, waits=False, entries=study.entries)
         self.protocol = own_protocol(study.protocol, None if allocation is None else allocation.group, 1)
         started_at = clock.at(0)
         at = {"started_at": started_at, "clock": {"origin_ns": clock.origin_ns, "origin_at": started_at}}

@@ -10,6 +10,7 @@ import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
+from itertools import count
 from pathlib import Path
 from typing import Final
 
@@ -18,6 +19,7 @@ from study_app.store import receipt
 from study_app.store.atomic import (
     cannot_read,
     cannot_write,
+    flush_entry,
     is_there,
     open_regular,
     paths_in,
@@ -31,10 +33,10 @@ from study_app.store.atomic import (
 from study_app.store.blinded.blinding import Key, verified_key
 from study_app.store.checksums import is_system_file
 from study_app.store.folder_lock import create_locked_folder, is_never_begun, is_open, lock_folder, refuse_if_open
-from study_app.store.folders import ID_PATTERN, StudyFolder
+from study_app.store.folders import ID_PATTERN, ReportProgress, StudyFolder
 from study_app.store.merged import FOLDER, Merged, Site, merged_above, read_merged
 from study_app.store.tables.study_files import described_study
-from study_app.store.withdrawals import describe_session
+from study_app.store.withdrawals import describe_session, tombstones
 
 MAX_SITE_LENGTH: Final = 16
 LEFT_BEHIND: Final = shutil.ignore_patterns(".open-*.json", ".*.tmp")
@@ -56,10 +58,11 @@ class _Source:
     protocol_hash: str
     pilot: bool | None
     key: Key
+    withdrawals: int
     begun: Mapping[str, Path]
 
 
-def merge_sites(given: Mapping[str, Path], to: Path) -> Merged:
+def merge_sites(given: Mapping[str, Path], to: Path, progress: ReportProgress | None = None) -> Merged:
     """Copy the results folders of sites into the merged study ``to``, which is created or extended.
 
     Parameters
@@ -68,6 +71,8 @@ def merge_sites(given: Mapping[str, Path], to: Path) -> Merged:
         The sites' folders by the sites' names, which precede the participants' IDs.
     to : Path
         The merged study's folder.
+    progress : callable, optional
+        Called with what is being done and the share that is done.
 
     Raises
     ------
@@ -88,17 +93,24 @@ def merge_sites(given: Mapping[str, Path], to: Path) -> Merged:
     _check_sessions((*present, *new))
     at = datetime.now().astimezone().isoformat(timespec="seconds")
     sites = tuple(
-        Site(name=source.name, merged_at=at, key_hash=source.key.hash, sessions=len(source.begun)) for source in new
+        Site(
+            name=source.name,
+            merged_at=at,
+            key_hash=source.key.hash,
+            sessions=len(source.begun),
+            withdrawals=source.withdrawals,
+        )
+        for source in new
     )
     if merged is None:
         made = Merged(to, new[0].study, ran, sites)
-        _create_merged(made, new)
+        _create_merged(made, new, progress)
     else:
         made = Merged(to, merged.study, merged.protocol_hash, (*merged.sites, *sites))
         with lock_folder(to):
             if read_merged(to) != merged:
                 raise StoreError(f"{to} was changed by another program during the merge: merge again")
-            _add_sites(made, new)
+            _add_sites(made, new, progress)
     return made
 
 
@@ -166,6 +178,7 @@ def _read_source(name: str, path: Path) -> _Source:
         protocol_hash=next(iter(hashes), ""),
         pilot=any(held["pilot"] for held in receipts) if receipts else None,
         key=verified_key(study),
+        withdrawals=len(tombstones(study)),
         begun={describe_session(session).begun or str(session.path): session.path for session in sessions},
     )
 
@@ -203,7 +216,7 @@ def _check_sessions(sources: tuple[_Source, ...]) -> None:
             seen[begun] = path
 
 
-def _create_merged(merged: Merged, sources: tuple[_Source, ...]) -> None:
+def _create_merged(merged: Merged, sources: tuple[_Source, ...], progress: ReportProgress | None) -> None:
     """Create the folder atomically."""
     target = merged.path.absolute()
     half = temporary_path(target)
@@ -215,7 +228,7 @@ def _create_merged(merged: Merged, sources: tuple[_Source, ...]) -> None:
         opening = create_locked_folder(half)
         (half / FOLDER).mkdir()
         for source in sources:
-            _copy(source, half / FOLDER / source.name)
+            _copy(source, half / FOLDER / source.name, progress)
         write_file(half / merged.manifest.name, merged.content())
         sync_folder(half / FOLDER)
         if opening is not None:
@@ -224,14 +237,14 @@ def _create_merged(merged: Merged, sources: tuple[_Source, ...]) -> None:
         if target.is_dir():
             target.rmdir()
         half.rename(target)
-        sync_folder(target.parent)
     except OSError as error:  # shutil.Error, too
         raise cannot_write(merged.path, error) from error
     finally:
         shutil.rmtree(half, ignore_errors=True)
+    flush_entry(target)
 
 
-def _add_sites(merged: Merged, sources: tuple[_Source, ...]) -> None:
+def _add_sites(merged: Merged, sources: tuple[_Source, ...], progress: ReportProgress | None) -> None:
     """Copy further sites into the folder; they count once they are listed."""
     place = merged.path / FOLDER
     remove_temporary_files(place)
@@ -243,20 +256,29 @@ def _add_sites(merged: Merged, sources: tuple[_Source, ...]) -> None:
                 shutil.rmtree(copy)
             half = temporary_path(copy)
             copies.append(half)
-            _copy(source, half)
+            _copy(source, half, progress)
             half.rename(copy)
             copies[-1] = copy
         sync_folder(place)
         write_file(merged.manifest, merged.content())
     except (OSError, StoreError) as error:
-        for copy in copies:
-            shutil.rmtree(copy, ignore_errors=True)
+        if read_merged(merged.path) != merged:  # the list may be written although its folder could not be flushed
+            for copy in copies:
+                shutil.rmtree(copy, ignore_errors=True)
         raise error if isinstance(error, StoreError) else cannot_write(merged.path, error) from error
 
 
-def _copy(source: _Source, to: Path) -> None:
+def _copy(source: _Source, to: Path, progress: ReportProgress | None) -> None:
     """Copy a results folder and flush it to the disk; links stay links, for `verify` to judge."""
-    shutil.copytree(source.path, to, symlinks=True, ignore=LEFT_BEHIND, copy_function=_copy_file)
+    numbers = count()
+
+    def copy_file(*paths: str) -> str:
+        number = next(numbers)
+        if progress is not None and number % 100 == 0:
+            progress(f"copying site {source.name}", min(number / len(source.state), 1.0))
+        return _copy_file(*paths)
+
+    shutil.copytree(source.path, to, symlinks=True, ignore=LEFT_BEHIND, copy_function=copy_file)
     for place in (to, *(path for path in paths_in(to) if path.is_dir() and not path.is_symlink())):
         sync_folder(place)
     refuse_if_open(source.path)
@@ -270,12 +292,12 @@ def _folder_state(path: Path) -> list[tuple[Path, int, int]]:
     return [(entry, held.st_size, held.st_mtime_ns) for entry, held in states if not entry.is_dir()]
 
 
-def _copy_file(source: str, to: str, *, follow_symlinks: bool = True) -> str:
+def _copy_file(source: str, to: str) -> str:
     with open_regular(Path(source)) as file, Path(to).open("xb") as copy:
         shutil.copyfileobj(file, copy)
         copy.flush()
         os.fsync(copy.fileno())
-    shutil.copystat(source, to, follow_symlinks=follow_symlinks)
+    shutil.copystat(source, to)
     return to
 
 

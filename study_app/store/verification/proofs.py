@@ -10,7 +10,7 @@ import base64
 import json
 import threading
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
@@ -40,7 +40,7 @@ def record_proofs(study: StudyFolder) -> Proofs:
     """Return fingerprint and name of each record (withdrawal, reveal, exclusion) of a study."""
     rows = (*exclusions(study.path), *reversals(study.path))
     name = study.exclusions.name
-    excluded = [(proof_of(json.dumps(asdict(row)).encode()), f"{name}/sub-{row.participant}") for row in rows]
+    excluded = [(proof_of(json.dumps(row.fields()).encode()), f"{name}/sub-{row.participant}") for row in rows]
     opened = [(proof_of(json.dumps(reveal).encode()), study.reveals.name) for reveal in reveals(study.path)]
     return (*map(proof_of_withdrawal, tombstones(study).values()), *opened, *dict.fromkeys(excluded))
 

@@ -42,6 +42,7 @@ _BEGUN = "but receipt, tables, recordings or checksums show that the session beg
 _ROUNDED_S = 1.1e-6
 CHANGED = "has changed since the session ended (its checksum differs)"
 REBUILT_AFTER = "says that checksums or fingerprint were rewritten after the session ended"
+INTERRUPTED = "the unblinding was interrupted: run liquid-study unblind again"
 COMPARE = "compare it with fingerprints stored elsewhere: liquid-study verify --fingerprints FILE"
 
 
@@ -174,7 +175,7 @@ def _check_files(
     if not running:
         _check_tables(place, lines, findings, ended=ended)
         if ended:
-            _check_checksums(folder, told, hashes, findings, recordings=recordings)
+            _check_checksums(place, lines, told, hashes, findings, recordings=recordings)
         if recordings:
             _check_recordings(folder, told, key, hashes, findings, ended=ended)
     for name in system_files(folder):
@@ -402,8 +403,18 @@ def _check_tables(place: Place, lines: list[events.Event], findings: Findings, *
         return
     columns = table_columns(lines, opened=True)
     for (path, content), name in zip(expected, columns, strict=True):
-        if path not in telling:
+        held = path.read_bytes() if path.is_file() else content
+        if held != content and held == _sealed_tables(place, lines).get(path):
+            findings.error(path, f"lacks the sealed columns: {INTERRUPTED}")
+        elif path not in telling:
             check_table(path, content, columns[name], findings, may_differ=lambda _: not ended)
+
+
+def _sealed_tables(place: Place, lines: Sequence[events.Event]) -> dict[Path, bytes]:
+    """Return the tables of a session that `unblind` opens, as they were before; empty while the key is sealed."""
+    if opened_or_none(place.study_folder) is None or not events.start_of(lines).measures_sealed:
+        return {}
+    return dict(table_files(place, lines, None))
 
 
 def check_table(
@@ -458,14 +469,16 @@ def _listed(folder: SessionFolder, hashes: Mapping[str, str]) -> Mapping[str, st
 
 
 def _check_checksums(
-    folder: SessionFolder,
+    place: Place,
     lines: Sequence[events.Event],
+    told: Sequence[events.Event],
     hashes: Mapping[str, str],
     findings: Findings,
     *,
     recordings: bool,
 ) -> None:
-    kept = [line for line in lines if isinstance(line, events.Recorded)]
+    folder = place.folder
+    kept = [line for line in told if isinstance(line, events.Recorded)]
     opened_hashes = {line.sha256: line.opened_sha256 for line in kept}
     opened_hashes |= {line.frames_sha256: line.opened_frames_sha256 for line in kept}
     if not is_there(folder.checksums):
@@ -485,12 +498,22 @@ def _check_checksums(
                 findings.error(path, "was added after the session ended")
             elif not hashes[name]:
                 findings.error(path, "cannot be read")
-            elif hashes[name] == opened_hashes.get(listed[name]):
-                findings.warning(path, "was opened by an unblinding that did not finish: unblind again")
-            elif hashes[name] != listed[name]:
+            elif hashes[name] == listed[name]:
+                continue
+            elif hashes[name] == opened_hashes.get(listed[name]) or _is_opened_table(place, lines, path, listed[name]):
+                findings.warning(path, f"is opened, but its checksum is not: {INTERRUPTED}")
+            else:
                 content = read_regular(path)
                 same_text = hashlib.sha256(journal.as_written(content)).hexdigest() == listed[name]
                 findings.error(path, journal.notation_change(content) if same_text else CHANGED)
+
+
+def _is_opened_table(place: Place, lines: Sequence[events.Event], path: Path, listed: str) -> bool:
+    """Return whether a table is the opened one, and ``listed`` the SHA-256 of the sealed one."""
+    sealed = _sealed_tables(place, lines).get(path)
+    if sealed is None or hashlib.sha256(sealed).hexdigest() != listed:
+        return False
+    return read_regular(path) == dict(table_files(place, lines, opened_or_none(place.study_folder)))[path]
 
 
 def _check_recordings(

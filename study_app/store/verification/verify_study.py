@@ -13,6 +13,7 @@ import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, TypeAlias
 
@@ -45,8 +46,14 @@ from study_app.store.tables.study_files import (
 )
 from study_app.store.verification.leaks import certain_telltales, find_leaks, presented_numbers, recorded_numbers
 from study_app.store.verification.proofs import Proof, read_proof, record_proofs
-from study_app.store.verification.verify_session import CheckedSession, Findings, check_session, check_table
-from study_app.store.withdrawals import Tombstone, describe_session, proof_of_withdrawal, tombstones
+from study_app.store.verification.verify_session import (
+    INTERRUPTED,
+    CheckedSession,
+    Findings,
+    check_session,
+    check_table,
+)
+from study_app.store.withdrawals import Tombstone, describe_session, proof_of_withdrawal, tombstones, unerased_files
 
 IN_FILES: Final = ("question", "task", "method")
 """The kinds of plug-ins without which a session cannot be checked in full."""
@@ -100,19 +107,24 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findi
     with findings.reading(study.key):
         key = blinding.read_key(study.path)
     early = read_list(study.fingerprints)
-    withdrawn = _check_withdrawals(study, findings)
-    sessions = [check_session(Place(study, session, name), key, findings) for session in study.sessions()]
+    withdrawn, unerased = _check_withdrawals(study, findings)
+    sessions = [
+        check_session(Place(study, session, name), key, findings)
+        for session in study.sessions()
+        if session.participant not in withdrawn
+    ]
     _check_plug_ins(study, findings)
     _check_contents(study, findings)
-    _check_participants(study, name, sessions, findings)
+    if study.participants(name) not in unerased:
+        _check_participants(study, name, sessions, findings)
     if early_journals := sum(session.row is not None and not session.chained for session in sessions):
         many = "1 journal is" if early_journals == 1 else f"{early_journals} journals are"
         findings.warning(study.data, f"{many} of format 1, whose lines cannot show whether an earlier line was changed")
-    _check_fingerprints(study, sessions, early, findings)
+    _check_fingerprints(study, sessions, early, withdrawn, findings)
     if copy is not None:
         _check_copy(study, sessions, withdrawn, *copy, findings)
     _check_description(study, findings)
-    _check_exclusions(study, sessions, findings)
+    _check_exclusions(study, sessions, withdrawn, findings)
     _check_reveals(study, key, findings)
     check_allocation(study, key, withdrawn, findings)
     _check_blinding(study, key, findings)
@@ -195,21 +207,27 @@ def _same_entry(claim: Claim, replaced: Claim | None) -> bool:
     return replaced is not None and (claim.group, claim.entry) == (replaced.group, replaced.entry)
 
 
-def _check_withdrawals(study: StudyFolder, findings: Findings) -> dict[str, Tombstone]:
-    """Return the withdrawals, and report unfinished ones."""
+def _check_withdrawals(study: StudyFolder, findings: Findings) -> tuple[dict[str, Tombstone], set[Path]]:
+    """Return the withdrawals, and what interrupted ones left of the participants, which is reported."""
+    unerased: set[Path] = set()
     try:
         withdrawn = tombstones(study)
     except StoreError as error:
         findings.failure(study.withdrawals, error)
-        return {}
+        return {}, unerased
     for participant, tombstone in withdrawn.items():
-        if not is_there(study.data / f"sub-{participant}"):
+        left: list[Path] = []
+        with contextlib.suppress(StoreError):  # said of the list that cannot be read
+            left += unerased_files(study, participant)
+        for path in left:
+            what = "is there" if path.is_dir() else f"still lists {participant}"
+            again = "the withdrawal was interrupted: run liquid-study withdraw again"
+            findings.error(path, f"{what}, although {participant} withdrew; {again}")
+        if not left:
             when = f"at {tombstone.at} (recorded by {tombstone.by})"
             findings.warning(study.withdrawals, f"participant {participant} withdrew {when}; the data were erased")
-        else:
-            again = "the withdrawal was interrupted: run liquid-study withdraw again"
-            findings.error(study.data / f"sub-{participant}", f"is there, although {participant} withdrew; {again}")
-    return withdrawn
+        unerased.update(left)
+    return withdrawn, unerased
 
 
 def _check_participants(study: StudyFolder, name: str, sessions: Sessions, findings: Findings) -> None:
@@ -235,7 +253,9 @@ def _check_participants(study: StudyFolder, name: str, sessions: Sessions, findi
         findings.extend(told)
 
 
-def _check_fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, findings: Findings) -> None:
+def _check_fingerprints(
+    study: StudyFolder, sessions: Sessions, early: Proofs, withdrawn: Collection[str], findings: Findings
+) -> None:
     """Compare the sessions with the study's own list, read before they were checked.
 
     A program lists a session once its files are final, just before it lets go of it: a listed one is judged even where
@@ -244,7 +264,9 @@ def _check_fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, f
     path = study.fingerprints
     for number in unreadable_lines(path):
         findings.error(path, f"line {number} is not a fingerprint: restore it from a copy")
-    _compare_proofs(study, sessions, early, path.name, findings)
+    erased = tuple(f"data/sub-{participant}/" for participant in withdrawn)  # reported as an interrupted withdrawal
+    listed = [proof for proof in early if not proof[1].startswith(erased)]
+    _compare_proofs(study, sessions, listed, path.name, findings)
     if is_open(study.path):  # written by a program that lists a session just after creating it
         return
     known = {place for _, place in read_list(path)}
@@ -329,14 +351,20 @@ def _compare_proofs(
 def _check_description(study: StudyFolder, findings: Findings) -> None:
     """Compare the description with the one that this version writes for the study in one of the receipts."""
     held = read_own(study.description, study.path)
-    sealed = not (blinding.reveals(study.path) or has_sealed_columns(held))
+    opened = bool(blinding.reveals(study.path))
+    sealed = not (opened or has_sealed_columns(held))
     heads: set[bytes] = set()
+    sealed_heads: set[bytes] = set()
     for protocol in _published_protocols(study):
         with contextlib.suppress(KeyError, TypeError, ValueError):  # said of the receipt already
             head, number = StudyHead.model_validate(protocol["study"]), protocol.get("format", 1)
-            intervals = has_intervals(protocol)
-            heads.add(description_bytes(head, sealed=sealed, protocol_format=number, intervals=intervals))
+            describe = partial(description_bytes, head, protocol_format=number, intervals=has_intervals(protocol))
+            heads.add(describe(sealed=sealed))
+            sealed_heads.add(describe(sealed=True))
     if not heads or held in heads:
+        return
+    if opened and held in sealed_heads:
+        findings.error(study.description, f"lacks the sealed columns: {INTERRUPTED}")
         return
     if any(is_same_description(held, head) for head in heads):
         findings.warning(
@@ -355,19 +383,22 @@ def _published_protocols(study: StudyFolder) -> Iterator[dict[str, Any]]:
                 yield protocol
 
 
-def _check_exclusions(study: StudyFolder, sessions: Sessions, findings: Findings) -> None:
+def _check_exclusions(study: StudyFolder, sessions: Sessions, withdrawn: Collection[str], findings: Findings) -> None:
     with findings.reading(study.reversed_exclusions):
         exclusions.reversals(study.path)
     with findings.reading(study.exclusions):
         rows = exclusions.exclusions(study.path)
         if not is_there(study.exclusions):
             return
-        for problem in csv_files.table_problems(without_byte_order_mark(read_regular(study.exclusions)), EXCLUSIONS):
+        content = without_byte_order_mark(read_regular(study.exclusions))
+        names = content.partition(b"\n")[0].decode("utf-8", "replace")
+        columns = [column for column in EXCLUSIONS if column.name in names or not column.later]
+        for problem in csv_files.table_problems(content, columns):
             findings.error(study.exclusions, problem)
         trials = {
             (session.place.folder.participant, session.place.folder.number): session.trials for session in sessions
         }
-        for row in rows:
+        for row in (row for row in rows if row.participant not in withdrawn):
             known = trials.get((row.participant, row.session))
             if known is None or (row.trial is not None and row.trial not in known):
                 findings.error(study.exclusions, f"there is no {exclusions.describe_exclusion(row)}")
@@ -441,11 +472,11 @@ def _check_site(merged: Merged, site: Site, findings: Findings) -> None:
     if (name := described_study(study)) not in (None, merged.study):
         findings.error(study.path, f"is of study {name}, but {merged.manifest.name} lists sites of {merged.study}")
     with contextlib.suppress(StoreError):  # said when the site is checked
-        merged_at = datetime.fromisoformat(site.merged_at)
-        since = [
-            tombstone for tombstone in tombstones(study).values() if datetime.fromisoformat(tombstone.at) >= merged_at
-        ]
-        erased = sum(len(tombstone.sessions) for tombstone in since)
+        withdrawn, merged_at = list(tombstones(study).values()), datetime.fromisoformat(site.merged_at)
+        before = site.withdrawals  # clocks of sites may differ, so times decide only for format 1
+        if before is None:
+            before = sum(datetime.fromisoformat(tombstone.at) < merged_at for tombstone in withdrawn)
+        erased = sum(len(tombstone.sessions) for tombstone in withdrawn[before:])
         if (present := len(study.sessions())) + erased < site.sessions:
             which = f"{present} of the {site.sessions} sessions that {merged.manifest.name} lists"
             findings.error(study.path, f"has {which}: restore the others from a copy")

@@ -104,3 +104,11 @@ def test_repainting_the_live_plots_keeps_no_reference_to_none(running, health):
             running.show_lateness(health)
         running.position.plot.viewport().repaint()
     assert abs(sys.getrefcount(None) - before) < 100
+
+
+def test_an_ended_session_that_waits_for_the_disk_says_that_the_window_stays_open(running, told, health):
+    told.tell("session_ended", status="completed", reason="", fingerprint="wwww-mmmm")
+    running.show_view(told.view(health, trouble="no space left on the disk", waits=True, force_on=False))
+    assert "leave this window open" in running.banner.then.text()
+    running.show_view(told.view(health, trouble="the device stopped responding", force_on=False))
+    assert running.banner.then.text().startswith("The session is closed")

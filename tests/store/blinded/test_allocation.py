@@ -4,9 +4,10 @@ import json
 import re
 import signal
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -199,6 +200,29 @@ def test_a_session_that_the_group_does_not_have_is_refused_before_anything_is_cl
 
 
 @pytest.mark.slow
+def counting(whole: Callable[[StudyFolder], Any], calls: Counter[str]) -> Callable[[StudyFolder], Any]:
+    def counted(study: StudyFolder) -> Any:
+        calls[whole.__name__] += 1
+        return whole(study)
+
+    return counted
+
+
+@pytest.mark.slow
+def test_the_entries_are_read_once_however_many_participants_follow(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = tmp_path / "grouped.toml"
+    source.write_bytes(SOURCE)
+    reads = Counter[str]()
+    for name in ("claims", "entries_begun"):
+        monkeypatch.setattr(allocation, name, counting(getattr(allocation, name), reads))
+    for people in (2, 6):
+        rehearse_answers(str(source), participants=people, seed=3, results=tmp_path / str(people), features=_felt())
+    assert reads == {"claims": 2 * 2, "entries_begun": 2}, "before the participants, and once for all of them"
+    assert [claim.entry for claim in claims(StudyFolder(tmp_path / "6"))] == [1, 2, 3, 4, 5, 6]
+
+
 def test_a_rehearsal_allocates_from_its_seed_and_reproduces(tmp_path: Path) -> None:
     source = tmp_path / "grouped.toml"
     source.write_bytes(SOURCE)

@@ -148,6 +148,19 @@ def test_a_journal_that_is_no_longer_under_its_name_takes_no_line_until_it_is_ba
     assert [line.others["value"] for line in read(path)] == [1, 2]
 
 
+def test_a_journal_whose_folder_was_replaced_by_a_link_takes_no_line(tmp_path: Path) -> None:
+    folder, away = tmp_path / "ses-01", tmp_path / "away"
+    folder.mkdir()
+    with Journal.create(folder / "journal.jsonl") as journal:
+        folder.rename(away)
+        folder.symlink_to(away)
+        with pytest.raises(StoreError, match=r"journal\.jsonl was moved, deleted or replaced .*: put it back"):
+            journal.append(event_of("counted", value=1))
+        folder.unlink()
+        away.rename(folder)
+        journal.append(event_of("counted", value=1))
+
+
 json_values = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),

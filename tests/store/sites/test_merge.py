@@ -133,6 +133,28 @@ def test_a_withdrawal_that_reaches_an_older_copy_after_merging_is_no_error(
     assert verify_study(pooled).is_sound
 
 
+def test_a_withdrawal_by_a_computer_with_a_slow_clock_is_no_missing_session(
+    labs: dict[str, Path], results: Path
+) -> None:
+    pooled = merge_sites({"A": labs["A"], "B": labs["B"]}, results / "pooled").path
+    slow = datetime.now().astimezone() - timedelta(hours=1)
+    withdraw(pooled / "sites/A", "P001", by="AK", reason="asked", now=slow)
+    assert verify_study(pooled).is_sound
+    shutil.rmtree(pooled / "sites/B/data/sub-P001")
+    said = "sites/B: has 1 of the 2 sessions that sites.json lists: restore the others from a copy"
+    assert said in list(map(str, verify_study(pooled).errors))
+
+
+def test_a_list_of_sites_of_format_1_is_read(labs: dict[str, Path], results: Path) -> None:
+    merged = merge_sites({"A": labs["A"], "B": labs["B"]}, results / "pooled")
+    held = json.loads(merged.manifest.read_text())
+    for site in held["sites"]:
+        del site["withdrawals"]
+    merged.manifest.write_text(json.dumps(held | {"format": 1}))
+    withdraw(merged.folder("A"), "P001", by="AK", reason="asked")
+    assert verify_study(merged.path).is_sound
+
+
 def unfinished(session: Path) -> None:
     """Take the end of a session away, and what follows from it."""
     path = session / "journal.jsonl"
