@@ -76,7 +76,7 @@ def values_of(value: object) -> Iterator[str]:
 
 
 def sentences() -> Iterator[tuple[str, str]]:
-    """Yield place and text: strings of the program, its tables of failures and words, sentences of the documentation."""
+    """Yield place and text: strings of the program, its tables of failures and words, sentences of the docs."""
     for path in sorted((ROOT / "study_app").rglob("*.py")):
         place = path.relative_to(ROOT).as_posix()
         if not place.startswith(SKIPPED):

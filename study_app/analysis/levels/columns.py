@@ -44,8 +44,8 @@ OF_TRACKS: Final[tuple[Column, ...]] = (
     Column(
         "analysed",
         "flag",
-        "true if the row is analysed and does not present the modulus of a magnitude estimation. False in a session that "
-        "answers the block below chance, until a person keeps it.",
+        "true if the row is analysed and does not present the modulus of a magnitude estimation. False in a session "
+        "that answers the block below chance, until a person keeps it.",
     ),
     Column("track", "text", "Meaning of the code: standard and number of the track (8/1), or the condition."),
     Column(
