@@ -26,7 +26,7 @@ HEADINGS = ("== ", "-- ")
 SHOWN = 40
 """Most lines of a difference that are printed."""
 TEXT_ENDS = re.compile(r" [|/] |^[-+=]+ ")
-"""What separates the texts of a line."""
+"""What separates the licence of a line."""
 CHANGED: Counter[str] = Counter()
 """How often each text was removed ("- ...") or added ("+ ...") by ``--regenerate``."""
 

@@ -377,8 +377,8 @@ def enough(alpha: float, bound: float) -> str:
     share = minority(bound, STEPS)
     return (
         f"{least(alpha, bound)}, because a smaller sample has more than a {percent(alpha)} chance of including "
-        f"nobody from a minority of {percent(share)} of all people if their answers differ by "
-        f"{significant(bound / share)} points, which shifts the mean by the bound"
+        f"nobody from a minority ({percent(share)} of all people) whose answers differ by "
+        f"{significant(bound / share)} points, enough to shift the mean by the bound"
     )
 
 
@@ -386,7 +386,7 @@ def test_name(outcome: Outcome) -> str:
     """Return a test as a sentence names it."""
     return {
         "Friedman": "Friedman's test",
-        "Wilcoxon signed ranks": "Wilcoxon's signed ranks",
+        "Wilcoxon signed ranks": "Wilcoxon's signed-rank test",
         "trend over participants": "the test of a trend over participants",
         "t test of slopes": "Student's t test of the participants' own slopes",
     }.get(outcome.test, outcome.test)

@@ -614,7 +614,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     multiple=True,
     default=(1,),
     show_default=True,
-    help="Seed of the simulation; repeatable; studies of all seeds are evaluated together.",
+    help="Seed of the simulation. Repeat the option for more seeds; all studies are evaluated together.",
 )
 @takes_workers
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for thresholds.md and thresholds.csv.")

@@ -188,7 +188,9 @@ def _write_estimate(estimate: Powers | Precisions, to: Path | None) -> None:
 
 @click.command()
 @FILE
-@click.option("--power", "computed", type=Target(), metavar="DIR", help="Folder that power --to wrote; included.")
+@click.option(
+    "--power", "computed", type=Target(), metavar="DIR", help="Folder written by power --to, whose tables are included."
+)
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for preregistration.md; default: print it.")
 def preregister(protocol: str, computed: Path | None, to: Path | None) -> None:
     """Write a preregistration from the protocol: hypotheses, design, participants, exclusions, analysis, and its hash.

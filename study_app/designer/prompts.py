@@ -84,7 +84,7 @@ class DeleteCard(Prompt):
             self.column.addWidget(label(f"Also deletes: {too}.", "label", wraps=True))
         self.all = ActionButton("trash", "Delete them too", role="danger", height=40)
         self.all.clicked.connect(lambda: self.answered.emit(DeleteElement(path, "all")))
-        self.gaps = ActionButton("", "Leave the gaps", height=40)
+        self.gaps = ActionButton("", "Keep the gaps", height=40)
         self.gaps.clicked.connect(lambda: self.answered.emit(DeleteElement(path, "gaps")))
         self.other = make_dense(Choice(), "Use another instead", 40)
         self.other.setPlaceholderText("Use another …")

@@ -13,7 +13,7 @@ from study_app.errors import DeviceError, DeviceNotFound
 State = Literal["ok", "found", "not checked"]
 ORDER: Final[tuple[State, ...]] = ("found", "not checked", "ok")
 WIDTH: Final = 100
-NOTHING_WRONG: Final = "No problem was found."
+NOTHING_WRONG: Final = "No problems were found."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

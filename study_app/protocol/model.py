@@ -55,7 +55,7 @@ __all__ = [
 
 MAX_FORCE_N = 8.0
 HandForceN: TypeAlias = Annotated[
-    float, within(0.1, MAX_FORCE_N, "below 0.1 N a hand feels little; 8 N is the most that is safe")
+    float, within(0.1, MAX_FORCE_N, "a hand feels little below 0.1 N; 8 N is the safe maximum")
 ]
 
 
@@ -76,7 +76,7 @@ class Credits(Table):
         default=None, description="Licence of the data: an SPDX identifier such as CC-BY-4.0, or an address."
     )
     citation: Printable | None = Field(default=None, description="How to cite the data or the paper.")
-    funder: Printable | None = Field(default=None, description="Who paid for the study.")
+    funder: Printable | None = Field(default=None, description="Funder of the study.")
     url: Printable | None = Field(default=None, description="Address of the study, such as its preregistration.")
 
 
@@ -84,8 +84,10 @@ class StudyHead(Table):
     """Name, version and languages of the study."""
 
     name: str = Field(pattern=r"^[a-z][a-z0-9]*$", max_length=40, description="Short name, used in folders and files.")
-    title: Localised = Field(description="Title as people read it.")
-    description: Description = Field(default="", description="What the study asks, for those who find its results.")
+    title: Localised = Field(description="Title shown to people.")
+    description: Description = Field(
+        default="", description="The question of the study, for later readers of its results."
+    )
     version: str = Field(
         pattern=r"^[0-9A-Za-z.+-]+$", max_length=40, description="Version of this protocol; raise it with every change."
     )
@@ -511,7 +513,7 @@ class Analysis(Table):
             looks = ", ".join(map(str, self.looks))
             yield "Interim analyses", f"at {looks} participants; alpha spending {self.spending}"
         if self.precision is not None:
-            yield "Precision", f"group mean ±{100 * self.precision:g} % (half its 95 % interval)"
+            yield "Precision", f"half width of the 95 % interval of the group mean: {100 * self.precision:g} %"
         yield from (("Proposes exclusion", rule.words) for rule in self.exclusions)
         yield from (("Hypothesis", contrast.described()) for contrast in self.contrasts)
         yield from (("Published", value.described()) for value in self.published)
@@ -547,12 +549,14 @@ class Protocol(Table):
     designs: dict[Kind, AnyDesign] = later(default_factory=dict, description="How trials with intervals are built.")
     methods: dict[Kind, AnyMethod] = later(default_factory=dict, description="How the levels of a stimulus are chosen.")
     blocks: Named[Block] = Field(min_length=1)
-    sequence: Steps = Field(default=(), min_length=1, description="Pages, blocks and forms in order, in every session.")
+    sequence: Steps = Field(
+        default=(), min_length=1, description="Pages, blocks and forms in the order of every session."
+    )
     sequences: Sequences = later(default=(), min_length=1, description="The steps of session 1, 2 … if they differ.")
     groups: dict[Id, Group] = later(default_factory=dict)
     limits: Limits = Field(default_factory=Limits)
     analysis: Analysis | None = Field(
-        default=None, description="Decisions about the analysis, made before the first session."
+        default=None, description="Decisions about the analysis that are made before the first session."
     )
     simulated_participants: SimulatedParticipants | None = later(
         default=None, description="How simulated participants answer statements, in power analyses and rehearsals."

@@ -17,7 +17,7 @@ from study_app.protocol.source.problems import Fault, unknown_name
 from study_app.protocol.table import Id, Localised, Table, invalid
 from study_app.protocol.wording.languages import language_name, missing_text
 
-Weight = Annotated[float, within(-1e6, 1e6, "no instrument has larger weights")]
+Weight = Annotated[float, within(-1e6, 1e6, "instruments use smaller weights")]
 
 
 class Score(Table):
@@ -28,11 +28,11 @@ class Score(Table):
     comparisons), and a ``mean`` is divided by the sum of the weights.
     """
 
-    items: Annotated[tuple[Id, ...], Field(min_length=1)] = Field(description="The items that are combined.")
-    reverse: tuple[Id, ...] = Field(default=(), description="Of these, the items whose answers are reversed.")
+    items: Annotated[tuple[Id, ...], Field(min_length=1)] = Field(description="The items to combine.")
+    reverse: tuple[Id, ...] = Field(default=(), description="Which of these items are reversed.")
     combine: Literal["mean", "sum"] = Field(default="mean", description="mean: their mean; sum: their sum.")
     factor: Weight = Field(default=1, description="Factor by which the result is multiplied.")
-    offset: Weight = Field(default=0, description="Number that is then added.")
+    offset: Weight = Field(default=0, description="Number added to the result.")
     weights: dict[Id, Weight] = Field(default_factory=dict, description="Weight of an item; default: 1.")
     weights_from: tuple[Id, ...] = Field(
         default=(), description="Choices between items: each item's weight is how often it was chosen."
@@ -77,14 +77,14 @@ def score(
 class Questionnaire(Table):
     """Questions that are answered after a trial, or on their own where ``sequence`` names the questionnaire."""
 
-    title: Localised | None = Field(default=None, description="Heading; default: the name of the setting.")
+    title: Localised | None = Field(default=None, description="Heading; default: the name of the trial.")
     intro: Localised = Field(description="The question above the statements.")
     scale: Id | None = Field(default=None, description="The scale of all statements; omit it without statements.")
     item_order: Literal["fixed", "shuffled"] = Field(
         default="fixed", description="fixed: as written; shuffled: a new order in every trial."
     )
     items: tuple[AnyQuestion, ...] = Field(
-        min_length=1, description="The questions; one without kind is a statement on the questionnaire's scale."
+        min_length=1, description="The questions; a question without kind is a statement on the questionnaire's scale."
     )
     instrument: str | None = later(
         default=None, description="The standard questionnaire whose items and scoring are used."
@@ -287,7 +287,7 @@ def _unpublished_fault(path: Path, of: str, language: str, lacks: Sequence[tuple
     why = (
         f"the program does not include {of} in {language_name(language)}{published}"
         if source["languages"]
-        else f"the texts of {of} may not be passed on"
+        else f"the licence of {of} does not permit its texts to be included"
     )
     message = f"{why}: write {listed}"
     hint = f'items = [{{ id = "{source["items"][0]["id"]}", text = {{ {language} = "…" }} }}, …]'

@@ -104,7 +104,7 @@ ValueType: TypeAlias = Literal["integer", "number", "text"]
 
 MOST: Final = 1e12
 """No greater number can be given as an answer."""
-Bound: TypeAlias = Annotated[float, within(-MOST, MOST, "no greater number can be given as an answer")]
+Bound: TypeAlias = Annotated[float, within(-MOST, MOST, "answers cannot be larger")]
 
 OPINION_POINTS = 7
 """Opinions of the simulated observer go from 1 to so many points."""
@@ -162,12 +162,12 @@ class Question(Table):
     figure: ClassVar[str | None] = None
     value_type: ClassVar[ValueType]
 
-    id: Id = Field(description="Name of the item in every table; never change it once data exist.")
-    text: Localised = Field(description="The statement as the participant reads it.")
-    short: Localised = Field(description="One to three words for figures and tables.")
-    required: bool = Field(default=True, description="Whether an answer is needed to continue.")
+    id: Id = Field(description="Name of the item in every table; do not change it after data collection has begun.")
+    text: Localised = Field(description="The statement shown to the participant.")
+    short: Localised = Field(description="Short label for figures and tables, one to three words.")
+    required: bool = Field(default=True, description="Whether an answer is required to continue.")
     show_if: ShowIf | None = later(
-        default=None, description="The answer to an earlier item that shows this one; default: always shown."
+        default=None, description="The answer to an earlier item on which this item is shown; default: always shown."
     )
 
     @property
@@ -319,7 +319,7 @@ class Option(Table):
     """One answer that can be chosen."""
 
     id: Id = Field(description="Name of the option in every table.")
-    text: Localised = Field(description="The option as the participant reads it.")
+    text: Localised = Field(description="The option shown to the participant.")
 
 
 class Choice(Question):
@@ -336,7 +336,7 @@ class Choice(Question):
         max_length=MOST_OPTIONS,
         description=("The options, in the order in which they are shown."),
     )
-    several: bool = Field(default=False, description="Whether any number of options can be chosen.")
+    several: bool = Field(default=False, description="Whether participants can choose several options.")
 
     @model_validator(mode="after")
     def _options_differ(self) -> Self:
@@ -478,8 +478,8 @@ class Slider(Question):
     value_type: ClassVar[ValueType] = "number"
 
     kind: Literal["slider"] = "slider"
-    low: Localised = Field(description="Words at the lower end.")
-    high: Localised = Field(description="Words at the upper end.")
+    low: Localised = Field(description="Label at the lower end.")
+    high: Localised = Field(description="Label at the upper end.")
     least: Bound = Field(default=0, alias="from", description="The number at the lower end.")
     most: Bound = Field(default=100, alias="to", description="The number at the upper end.")
     step: float = Field(default=1, gt=0, description="Difference between neighbouring numbers.")
@@ -487,7 +487,7 @@ class Slider(Question):
     @model_validator(mode="after")
     def _whole_steps(self) -> Self:
         if self.most <= self.least:
-            raise invalid(f"{self.most:g} is not more than from = {self.least:g}", "to")
+            raise invalid(f"{self.most:g} must be greater than from = {self.least:g}", "to")
         steps = (self.most - self.least) / self.step
         if abs(steps - round(steps)) > 1e-6 or not 1 <= round(steps) <= MOST_STEPS:
             permitted = f"a whole number of 1 to {MOST_STEPS}"

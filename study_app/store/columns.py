@@ -336,7 +336,7 @@ VIDEO: tuple[Column, ...] = (
     ),
     _count(
         "video_frames_lost",
-        "Frames of the video between the first and the last shown that were not shown.",
+        "Number of video frames skipped between the first and the last frame shown.",
         sealed=True,
         later=True,
     ),

@@ -494,7 +494,7 @@ def test_every_finding_of_a_doctor_has_a_cause_a_cure_and_how_it_is_known(name: 
         assert "\n" not in one.tested + one.symptom + one.cause + one.cure
     with pytest.raises(DeviceError, match="emulated can"):
         doctor.examine(name, options={}, faults=["nan"], progress=str)
-    with pytest.raises(DeviceError, match="fault 'thirst' is not known; choose of: "):
+    with pytest.raises(DeviceError, match="fault 'thirst' is not known; choose from: "):
         doctor.examine(f"{name}-emulated", options={}, faults=["thirst"], progress=str)
 
 
@@ -518,7 +518,7 @@ def test_a_doctor_finds_what_is_wrong_and_nothing_else(name: str, fault: str | N
     assert [one.id for one in report.found] == ([mode] if mode else [])
     if mode is None:
         assert report.well
-        assert report.conclusion == "No problem was found."
+        assert report.conclusion == "No problems were found."
         assert "new positions per second: 1000" in " ".join(report.seen)
     else:
         assert report.failure is None or report.found[0].cure in report.failure

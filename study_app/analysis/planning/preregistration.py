@@ -355,8 +355,8 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
     if one.participants is not None:
         decided = decisions(protocol)
         planned = (
-            f"We plan {number_text.counted(one.participants, 'participant')}. The study ends when as many valid "
-            "sessions are complete; only then is the key opened and anything tested."
+            f"We plan {number_text.counted(one.participants, 'participant')}. The study ends when this number "
+            "of valid sessions is complete; only then is the key opened and the data tested."
             if not decided.looks
             else f"We plan {one.participants} participants. The key is opened and everything is tested when "
             f"{listed([str(look) for look in decided.looks])} valid sessions are complete; adjusted p values up to "

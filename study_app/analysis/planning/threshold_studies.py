@@ -366,7 +366,7 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
         yield from smallest_differences(
             one, precisions.sizes, decisions(precisions.protocol).alphas[-1], len(decided.contrasts), rows,
             f"trials{first.per}",
-            f"SD{share}: of {whose} by a factor of {BETWEEN_PEOPLE:g}.",
+            f"SD{share}; {whose} by a factor of {BETWEEN_PEOPLE:g}.",
             (lambda end: f"×/÷ {math.exp(end):.2f}") if ratio else "±{:.2f}".format,
             group_shares(precisions.protocol, one), log_bound(precisions.protocol, one) if ratio else one.bound,
             bounds=sum(each.bound is not None for each in decided.contrasts),

@@ -473,7 +473,7 @@ class ChoiceField(Field):
         if self.segments is not None:
             self.box.addStretch()
         self._values: list[str | None] = []
-        opens = f"Open what {row.label} names"
+        opens = f"Open the element that {row.label} refers to"
         self.arrow = IconButton("arrow_right", opens, with_key(f"{opens}; back", "back"), size=FIELD_PX)
         self.arrow.clicked.connect(lambda: self.asked.emit(Do("select", (self.row.target,))))
         if row.kind == "reference":

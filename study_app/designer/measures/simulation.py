@@ -533,7 +533,7 @@ def _simulate_studies(plan: ThresholdPlan, sizes: Sequence[int], check: Check) -
 
 
 SHOWN: Final = "{} of studies of {} show it, if people answer as the model does"
-EQUALITY: Final = "{} of studies of {} show equality, if there is no difference"
+EQUALITY: Final = "{} of studies of {} show equivalence if there is no difference"
 
 
 def _ratio_sentences(protocol: Protocol, block: str, people: int, check: Check) -> Iterator[tuple[str, str]]:

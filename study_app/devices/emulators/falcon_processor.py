@@ -147,7 +147,7 @@ class Faults:
             known = ", ".join(
                 (*(f"{fault_spelling(known)}=CHANCE" for known in CHANCES), *map(fault_spelling, SWITCHES), POWER_OFF)
             )
-            raise DeviceError(f"fault '{word}' is not known; choose of: {known}") from None
+            raise DeviceError(f"fault '{word}' is not known; choose from: {known}") from None
         self.chance(name, chance)
 
 

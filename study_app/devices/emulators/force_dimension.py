@@ -80,7 +80,7 @@ class EmulatedFunctions:
             There is no such fault.
         """
         if fault not in FAULTS:
-            raise DeviceError(f"fault '{fault}' is not known; choose of: {', '.join(FAULTS)}")
+            raise DeviceError(f"fault '{fault}' is not known; choose from: {', '.join(FAULTS)}")
         self.state.fault, self.state.fault_after = FAULTS[fault], after
 
     def close(self) -> bool:

@@ -255,7 +255,7 @@ class Service(HandOrders):
             There is no such fault.
         """
         if fault not in FAULTS:
-            raise DeviceError(f"fault '{fault}' is not known; choose of: {', '.join(FAULTS)}")
+            raise DeviceError(f"fault '{fault}' is not known; choose from: {', '.join(FAULTS)}")
         versions = {"version-3.0": "3.0", "version-3.1": "3.1", "not-websocket": "http", "no-device": "empty"}
         self.version = versions.get(fault, self.version)
         if fault in STATUS_OF:

@@ -105,7 +105,7 @@ def end_torque(name: str) -> None:
     transport = open_transport(name)
     try:
         if not send_zero_torque(transport):
-            raise DeviceError("it takes no packet")
+            raise DeviceError("it does not accept packets")
     finally:
         transport.close()
 

@@ -125,7 +125,7 @@ def balance(
     raises StudyError.
     """
     if not participants:
-        raise StudyError("no participants: a design is judged over at least one")
+        raise StudyError("a design needs at least one participant")
     orders = orders_of(protocol)
     places = [place if in_group else enrolment_number(who) for place, who in enumerate(participants, start=1)]
     unnumbered = tuple(who for who, place in zip(participants, places, strict=True) if place is None)
@@ -193,20 +193,24 @@ def block_order_words(protocol: Protocol, planned: int | None, *, in_group: bool
     orders = orders_of(protocol)
     blocks = sum(block.phase == "main" for block in orders.blocks)
     if orders.block_order == "fixed":
-        return "fixed: everybody has them in this order"
+        return "fixed: the same order for all participants"
     if orders.block_order == "random":
-        of = "" if planned is None else f": {planned / blocks:.3g} of {planned} participants have a block in a place"
-        return f"random: drawn in each session, even on average only{of}"
+        of = (
+            ""
+            if planned is None
+            else (f": {planned / blocks:.3g} of {planned} participants have a block in each position")
+        )
+        return f"random: drawn in each session, so balanced only on average{of}"
     order_evenness = _block_evenness(orders, [("", place) for place in range(1, planned + 1)], 1) if planned else None
     rows = row_count("williams", blocks)
-    by, of = ("place in the group", " per group") if in_group else ("number in the participant's id", "")
+    by, of = ("place in the group", " per group") if in_group else ("number in the participant's ID", "")
     text = f"balanced: {rows} orders, by the {by}"
     if planned is None or order_evenness is None:
         return f"{text}; any multiple of {rows} participants{of} is balanced"
     counts = [count for line in order_evenness.positions for count in line]
     even = _times_text(counts[0]) if order_evenness.positions_even else _range_text(counts)
     more = "" if order_evenness.balanced else f"; {planned + -planned % rows} would be even"
-    return f"{text}; {planned} participants{of} have each block in each place {even}{more}"
+    return f"{text}; {planned} participants{of} have each block in each position {even}{more}"
 
 
 def _block_evenness(orders: Orders, placed: Iterable[tuple[str, int | None]], seed: int) -> Evenness:
@@ -253,17 +257,17 @@ def _count_lines(corner: str, names: Sequence[object], codes: Sequence[str], cou
 def _verdict_lines(counted: Evenness) -> Iterator[str]:
     cells = [count for line in counted.positions for count in line]
     if counted.positions_even:
-        yield f"Positions are balanced: each code comes in each position {_times_text(cells[0])}."
+        yield f"Positions are balanced: each code occurs in each position {_times_text(cells[0])}."
     else:
-        yield f"Positions are uneven: a code comes in a position {_range_text(cells)}."
+        yield f"Positions are not balanced: a code occurs in a position {_range_text(cells)}."
     after = counted.after_another
     if counted.follows_even:
-        yield f"Carry-over is balanced: each code follows each other one {_times_text(after[0])}."
+        yield f"Carry-over is balanced: each code follows each other code {_times_text(after[0])}."
     else:
-        yield f"Carry-over is uneven: a code follows another one {_range_text(after)}."
+        yield f"Carry-over is not balanced: a code follows another code {_range_text(after)}."
     if counted.shortest_distance is not None:
-        least = f"the least distance from one to the next of its kind is {counted.shortest_distance}"
-        yield f"At most {counted.longest_run} of a kind come in a row; {least}."
+        least = f"the minimum distance between repeats is {counted.shortest_distance}"
+        yield f"At most {counted.longest_run} presentations of a condition occur in a row; {least}."
 
 
 def _advice(block: BlockBalance) -> Iterator[str]:
@@ -284,7 +288,9 @@ def _advice(block: BlockBalance) -> Iterator[str]:
             yield from _round_lines(block, row_count(square, codes))
             if square == "williams" and not has_even_borders(codes, repetitions):
                 enough = next(more for more in count(repetitions) if has_even_borders(codes, more))
-                yield f"From one repetition to the next carry-over cannot be even; with {enough} repetitions it can."
+                yield (
+                    f"With this number of repetitions carry-over cannot be balanced; with {enough} repetitions it can."
+                )
             if square == "latin" and codes > 2:
                 yield 'A Latin square balances only positions; order = "williams" also balances carry-over.'
 
@@ -301,14 +307,17 @@ def _round_lines(block: BlockBalance, rows: int) -> Iterator[str]:
         rounds = people // rows
         yield f"{people} participants are {'a full round' if rounds == 1 else f'{rounds} full rounds'} of {rows} rows."
     elif people % rows == 0:
-        yield f"A full round is the numbers 1 to {rows}, {rows + 1} to {2 * rows} and so on: these ids miss some."
+        yield (
+            f"A full round is the numbers 1 to {rows}, {rows + 1} to {2 * rows} and so on, but these IDs are "
+            "incomplete."
+        )
     else:
         enough = people + -people % rows
-        then = f"each code then comes in each position {_times_text(enough // codes)}"
+        then = f"each code then occurs in each position {_times_text(enough // codes)}"
         if block.order == "williams" and has_even_borders(codes, block.repetitions):
             follows = enough * (codes * block.repetitions - 1) // (codes * (codes - 1))
-            then += f" and follows each other one {_times_text(follows)}"
-        yield f"A full round is {rows} participants, the next number that fills one is {enough}: {then}."
+            then += f" and follows each other code {_times_text(follows)}"
+        yield f"A full round is {rows} participants. The next complete number is {enough}: {then}."
 
 
 def _times_text(number: int) -> str:

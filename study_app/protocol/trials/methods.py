@@ -243,7 +243,7 @@ class Adjustment(Method):
     adaptive: ClassVar[bool] = False
     adjusts: ClassVar[bool] = True
     repetitions: Annotated[int, Field(ge=1, le=1000)] = Field(
-        default=10, description="How many settings each track has."
+        default=10, description="Number of adjustments in each track."
     )
     step_size: Annotated[float, within(1e-6, 1e6, "a step is at least 1e-6 and at most 1e6")] | None = Field(
         default=None,

@@ -225,7 +225,7 @@ def stop_force_after_end(state: SessionState, _event: ForceStopped) -> Result:
 def repeat_trial(state: SessionState, event: RepeatRequested) -> Result:
     """Present the trial again; the earlier attempt stays in the data."""
     if not event.reason.strip():
-        raise SessionError("repeating a trial needs a reason: enter one")
+        raise SessionError("repeating a trial requires a reason")
     repeated = Write(journal.Repeat(trial=state.trial.number, reason=event.reason), waits=True)
     return start_trial(replace(state, attempt=state.attempt + 1), (*interrupt_trial(state), repeated), event.at_s)
 

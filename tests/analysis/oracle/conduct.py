@@ -67,7 +67,7 @@ def _question(rows: pd.DataFrame, reported: Numbers) -> Numbers:
 
 
 def compare_captions(compared: Compared, trials: pd.DataFrame) -> None:
-    """Compare the numbers in the texts of the figures: people, missing answers, errors of the delay, and hits."""
+    """Compare the numbers in the licence of the figures: people, missing answers, errors of the delay, and hits."""
     people, counting = trials[trials["here"]]["participant"].nunique(), trials[trials["counts"]]
     of_names = [own for (_, question, *_), own in compared.rows.items() if question == "liquids are recognised"]
     hits = [[own[name] for name in ("statistic", "expected", "p")] for own in of_names]

@@ -67,7 +67,7 @@ def own_share(kind: SimulatedParticipants, effect: float) -> float:
 
 
 def signed_rank_p(differences: np.ndarray) -> np.ndarray:
-    """Return the exact p of Wilcoxon's signed ranks of each row, zeros left out, ties as mean ranks."""
+    """Return the exact p of Wilcoxon's signed-rank test of each row, zeros left out, ties as mean ranks."""
     signs = np.array(list(product((0.0, 1.0), repeat=differences.shape[1])), np.float32)
     ranks = np.where(differences == 0, np.nan, np.abs(differences))
     ranks = np.nan_to_num(rankdata(ranks, axis=1, nan_policy="omit"))

@@ -166,6 +166,6 @@ def end_torque(path: str) -> None:
     transport = ServedTransport(path)
     try:
         if not send_zero_torque(transport):
-            raise DeviceError("it takes no packet")
+            raise DeviceError("it does not accept packets")
     finally:
         transport.close()

@@ -14,7 +14,7 @@ SHORT = {"length": 1, "scaling": 1}
     [
         ({"wake": {"length": 11, "scaling": 10}}, "the wake would outrun the body"),
         ({"effects": ("drag", "wake")}, "its table"),
-        ({"effects": ("wake",), "wake": {"length": 1, "scaling": 1}}, "name both"),
+        ({"effects": ("wake",), "wake": {"length": 1, "scaling": 1}}, "list both"),
         ({"effects": ("drag", "drag")}, "twice"),
         ({"effects": ("drag", "magnet")}, "'drag', 'wake', 'local_wake'"),
         ({"density_kg_m3": float("nan")}, "finite"),
@@ -22,7 +22,7 @@ SHORT = {"length": 1, "scaling": 1}
         ({"viscosity": 1}, "Extra inputs are not permitted"),
         ({"effects": ("drag", "local_wake")}, "its table"),
         ({"effects": ("drag", "current")}, 'kind = "uniform", "channel" or "vortex"'),
-        ({"effects": ("current",), "current": {"kind": "vortex", "core_m": 1, "peak_mps": 1}}, "name both"),
+        ({"effects": ("current",), "current": {"kind": "vortex", "core_m": 1, "peak_mps": 1}}, "list both"),
         ({"effects": ("drag", "wake", "local_wake"), "wake": SHORT, "local_wake": SHORT}, "two models of the same"),
         ({"local_wake": {"length": 11, "scaling": 10}}, "the wake would outrun the body"),
         ({"drag": {"law": "brown-lawler"}}, "needs the liquid's viscosity_pa_s"),

@@ -75,7 +75,7 @@ def test_a_study_inherits_what_is_known_of_an_instrument_and_is_asked_for_the_re
         assert all(item["id"] in fault.message for item in source["items"])
         included = f"the program does not include {name} in"
         assert fault.message.startswith(
-            included if source["languages"] else f"the texts of {name} may not be passed on"
+            included if source["languages"] else f"the licence of {name} does not permit its texts to be included"
         )
 
     table, scales = begin(name, languages)

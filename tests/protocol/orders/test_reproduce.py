@@ -44,18 +44,18 @@ def test_an_untouched_session_is_reproduced(seed: int, participant: str, order: 
     ("change", "expected"),
     [
         (lambda trials: [*trials[:1], replace(trials[1], block="look"), *trials[2:]],
-         "trial 2: block look recorded, the seed gives feel"),
+         "trial 2: block look recorded, but the seed gives feel"),
         (lambda trials: [*trials[:1], replace(trials[1], part=None), *trials[2:]],
-         "trial 2: part none recorded, the seed gives 1"),
+         "trial 2: part none recorded, but the seed gives 1"),
         (lambda trials: [*trials[:1], replace(trials[1], items=trials[1].items[::-1]), *trials[2:]],
-         "trial 2: items cold, warm recorded, the seed gives warm, cold"),
+         "trial 2: items cold, warm recorded, but the seed gives warm, cold"),
         (lambda trials: [*trials[:1], replace(trials[1], items=()), *trials[2:]],
-         "trial 2: items none recorded, the seed gives warm, cold"),
+         "trial 2: items none recorded, but the seed gives warm, cold"),
         (lambda trials: [*trials, replace(trials[-1], number=8)],
          "trial 8: recorded, but the seed does not produce this trial"),
-        (lambda trials: trials[:-1], "trial 7 was not recorded, though the session is complete"),
-        (lambda trials: trials[:-3], "trials 5 to 7 were not recorded, though the session is complete"),
-        (lambda trials: [], "trials 1 to 7 were not recorded, though the session is complete"),
+        (lambda trials: trials[:-1], "trial 7 was not recorded, although the session is complete"),
+        (lambda trials: trials[:-3], "trials 5 to 7 were not recorded, although the session is complete"),
+        (lambda trials: [], "trials 1 to 7 were not recorded, although the session is complete"),
         (lambda trials: trials[:2] + trials[3:], "trial 4: came after trial 2, but trial 3 was due"),
         (lambda trials: trials[1:], "trial 2: came first, but trial 1 was due"),
     ],
@@ -74,8 +74,8 @@ def test_another_order_of_a_block_is_found():
     block = REK.blocks["liquids"].model_copy(update={"order": "fixed"})
     other = REK.model_copy(update={"blocks": {**REK.blocks, "liquids": block}})
     assert reproduce(other, 1, "P001", run(REK, "P001", 1), complete=True) == (
-        "trial 2: code L2 recorded, the seed gives L1",
-        "trial 3: code L1 recorded, the seed gives L2",
+        "trial 2: code L2 recorded, but the seed gives L1",
+        "trial 3: code L1 recorded, but the seed gives L2",
     )
 
 
