@@ -166,7 +166,7 @@ def test_a_sink_that_hangs_delays_neither_markers_nor_the_end(monkeypatch) -> No
     assert sink.hanging.wait(5)
     for trial in range(2, 7):
         thread.mark(marker(trial))
-    assert thread.lost.startswith("3 markers wait to be sent (limit): no more are sent; check")
+    assert thread.lost.startswith("3 markers wait to be sent (limit): sending has stopped; check")
     thread.close(0.01)
     assert not sink.closed.is_set()
     sink.go_on.set()

@@ -122,7 +122,7 @@ def test_liquids_are_named_as_conditions_where_a_study_has_none() -> None:
 
 @pytest.mark.parametrize("name", ["", "Water", "2nd", "with blank", "é", "a" * (MAX_ID + 1)])
 def test_check_id_refuses_what_is_no_id(name: str) -> None:
-    with pytest.raises(StudyError, match="is not an id: write at most"):
+    with pytest.raises(StudyError, match="is not a valid ID: write at most"):
         check_id(name)
 
 

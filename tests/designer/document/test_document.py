@@ -73,7 +73,7 @@ def test_a_study_with_a_liquid_file_shows_its_own_text_alone(tmp_path: Path) -> 
 
 
 def test_typed_refuses_half_a_character() -> None:
-    with pytest.raises(StudyError, match="half a character"):
+    with pytest.raises(StudyError, match="incomplete character"):
         DEMO.with_text(DEMO.text + "# \ud800")
 
 
@@ -205,7 +205,7 @@ def test_what_cannot_be_a_version_is_refused(version: str) -> None:
     check_version("1.2-rc+3", [Run(hash="abc", version="1.2-rc+3", pilots=1)])
     with pytest.raises(StudyError, match="cannot be a version"):
         check_version(version, [])
-    with pytest.raises(StudyError, match="was run with another content"):
+    with pytest.raises(StudyError, match="was run with different content"):
         check_version("1.0", [Run(hash="abc", version="1.0", sessions=1)])
 
 

@@ -190,7 +190,7 @@ def test_apply_writes_as_the_neighbours_do(before: str, edit: Edit, after: str) 
         (Unset(("b",)), "there is no b in the study anymore"),
         (Set(("a", "b"), 1), "a is not a table"),
         (Set(("c",), None), "a value cannot be empty: remove the key"),
-        (Set(("c",), {"d": "\ud800"}), "half a character"),
+        (Set(("c",), {"d": "\ud800"}), "incomplete character"),
         (Duplicate(("a",), "l"), 'the name "l" is taken'),
         (Rename(("a",), "l"), 'the name "l" is taken'),
         (Move(("l", 0), 2), "cannot move to place 3"),

@@ -95,7 +95,7 @@ ANSWERS: Final[Mapping[str, Kind]] = {
     "a list": first("not-json", []),
     "not a number of JSON": first("not-json", message_of(config=CONFIG | {"device_info": float("nan")})),
     "beyond a number": first("not-json", json.dumps(message_of()).replace("0.0", "1e999").encode()),
-    "half a character": first("not-json", message_of(config=CONFIG | {"device_info": "\ud800"})),
+    "incomplete character": first("not-json", message_of(config=CONFIG | {"device_info": "\ud800"})),
     "inverse3 a number": first("version", {"inverse3": 5}),
     "devices are numbers": first("no-device", {"inverse3": [5, None]}),
     "ids with lines": first("no-device", {"inverse3": []} | {"inverse3": [{"id": "a\nb"}]}),

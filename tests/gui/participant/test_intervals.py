@@ -7,14 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
-from PySide6.QtGui import QImage, QKeyEvent, QWheelEvent
+from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, Qt
+from PySide6.QtGui import QImage, QKeyEvent, QPainter, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
+from study_app.gui.participant.pages.page_widget import draw_progress
 from study_app.gui.participant.window import PointerCapture
 from study_app.protocol.wording.languages import LANGUAGES, words
-from study_app.session.pages import Interval, TaskPage
+from study_app.session.pages import Interval, Progress, TaskPage
 from study_app.session.transitions.events import Continue, PauseRequested, Stepped, Submitted
 from tests.gui.participant.driver import KEY, Participant
 from tests.gui.small import ORDINALS, choice, follow, number, task_page, view
@@ -203,3 +204,14 @@ def test_buttons_are_within_the_window_large_enough_and_cover_no_word(
     below = seen.page.grab(covered).toImage().convertToFormat(QImage.Format.Format_Grayscale8)
     greys = np.frombuffer(below.constBits(), np.uint8).reshape(below.height(), -1)[:, : below.width()]
     assert int(greys.max()) - int(greys.min()) < 40, "a word is below the controls"
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_the_head_of_a_trial_of_intervals_stays_in_its_room(qapp: QApplication, language: str) -> None:
+    scale, room = 2.0, QRectF(0, 0, 360, 40)
+    progress = Progress(part=1, parts=2, label=words(language).trial + " 57", index=57, of=220, at_most=True)
+    painter = QPainter(image := QImage(400, 40, QImage.Format.Format_RGB32))
+    end = draw_progress(painter, room, progress, words(language), scale=scale)
+    painter.end()
+    assert not image.isNull()
+    assert end <= room.width() + 10 * scale + 1

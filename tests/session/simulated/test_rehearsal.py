@@ -168,7 +168,7 @@ def test_a_servo_that_is_ended_from_outside_ends_the_rehearsal(monkeypatch: Any)
         return advance(self, ticks)
 
     monkeypatch.setattr(Servo, "advance", ended)
-    with pytest.raises(SessionError, match="stopped from outside"):
+    with pytest.raises(SessionError, match="another program stopped"):
         condition_features(small.protocol(), seed=1, people=1)
 
 

@@ -226,7 +226,10 @@ class StatementField(ScaleField):
         face = font("statement", scale=sizes.text * shrink, weight=weight)
         note_face = font("label", scale=sizes.text * note_shrink, weight=600)
         height = statement_height(self.view.text, sizes.text * shrink, weight, math.floor(sizes.statement_width))
-        return face, note_face, height, QFontMetricsF(note_face).height() if note else 0.0
+        metrics = QFontMetricsF(note_face)
+        room = sizes.statement_width - NOTE_SIGN * metrics.height() * self.missing
+        lines = 0 if not note else 1 if metrics.horizontalAdvance(note) <= room else 2
+        return face, note_face, height, lines * metrics.height()
 
     def _update_state(self) -> None:
         super()._update_state()
@@ -245,6 +248,7 @@ class StatementField(ScaleField):
         painter.drawLine(QPointF(x, middle - half), QPointF(x, middle + half))
 
 
+NOTE_SIGN = 1.6  # width of the sign in front of a note with its gap, in heights of the note's line
 LABEL_WIDTH = 98.0  # in which a label over a column wraps, where there is room
 SHARES = (1.0, 1.2, 1.4, 1.6, 1.8)
 

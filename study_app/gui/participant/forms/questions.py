@@ -539,6 +539,10 @@ class TextField(TypedField):
         self.put_answer_part(self.entry)
         self.give_keyboard_to(self.entry, TEXT_WAIT_MS, self.finish)
 
+    @property
+    def answer_keys(self) -> str:
+        return self._words.letter_keys
+
     def show_answer(self, value: Value) -> None:
         self.keep_answer(value)
         with QSignalBlocker(self.entry):

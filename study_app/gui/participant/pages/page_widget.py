@@ -158,16 +158,24 @@ def draw_progress(
     """Draw text and bars from the start of a line in ``room``; return the width [px].
 
     ``share`` is how much of the present bar is full: the task is its first half, the questionnaire its second. Bars
-    that find no room are left out; the words say the same.
+    that find no room are left out; the words say the same, and shrink if they would leave ``room``.
     """
     flip = wording.right_to_left
     part, setting = progress_texts(progress, wording)
     x = 0.0
+    texts = [
+        (text, weight, colour)
+        for text, weight, colour in ((part, 600, PARTICIPANT.text), (setting, 400, PARTICIPANT.text2))
+        if text
+    ]
+    widths = [
+        QFontMetricsF(font("statement", scale=scale, weight=weight)).horizontalAdvance(text)
+        for text, weight, _ in texts
+    ]
+    scale *= min(1.0, room.width() / (sum(widths) + 14 * scale * len(texts)))
     painter.save()
     painter.setLayoutDirection(Qt.LayoutDirection.RightToLeft if flip else Qt.LayoutDirection.LeftToRight)
-    for text, weight, colour in ((part, 600, PARTICIPANT.text), (setting, 400, PARTICIPANT.text2)):
-        if not text:
-            continue
+    for text, weight, colour in texts:
         painter.setFont(font("statement", scale=scale, weight=weight))
         painter.setPen(QColor(colour))
         wide = QFontMetricsF(painter.font()).horizontalAdvance(text)
