@@ -203,7 +203,7 @@ def test_copies_in_two_languages_are_counted_until_each_is_edited_and_a_missing_
     count = sum(any(map(str.isalpha, str(text["en"]))) for _, text in texts_of(translated))
     assert (translated.faults, copied_texts(translated)) == ((), {"nl": count, "de": count})
     assert words(translated) == [
-        f"study.languages: {count} texts to translate to {name}, as in English so far" for name in ("Dutch", "German")
+        f"study.languages: {count} texts to translate to {name}, still in English" for name in ("Dutch", "German")
     ]
     assert (copied_texts(DEMO), words(DEMO)) == ({}, [])
     for edit in (Set((*TITLE, "nl"), "Een eerste blik"), Unset((*TITLE, "nl"))):
