@@ -40,11 +40,11 @@ class Criterion(Table):
 class Catch(Table):
     """Easy trials among the others: a participant who answers many of them incorrectly does not attend to the task."""
 
-    share: Annotated[float, within(0.01, 0.5, "a catch trial in 100 to one in 2 others")] = Field(
+    share: Annotated[float, within(0.01, 0.5, "from one catch trial in 100 other trials to one in 2")] = Field(
         default=0.1,
         description="Number of catch trials per other trial of a track; one occurs at random in every 1/share trials.",
     )
-    wrong_most: Annotated[float, within(0, 1, "a share of the catch trials")] = Field(
+    wrong_most: Annotated[float, within(0, 1, "a proportion of the catch trials")] = Field(
         default=0.25, description="Proportion of incorrect answers to catch trials above which the session is excluded."
     )
 

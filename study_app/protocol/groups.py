@@ -25,7 +25,7 @@ Sequences: TypeAlias = tuple[Annotated[Steps, Field(min_length=1)], ...]
 class Group(Table):
     """A group of participants; a group without a sequence has that of the study."""
 
-    share: Annotated[int, within(1, MOST_SHARE, "a share is a small whole number")] = Field(
+    share: Annotated[int, within(1, MOST_SHARE, "shares are small whole numbers")] = Field(
         default=1,
         description=(
             "Number of its participants per randomisation round; for a pre-existing group, its part in the "

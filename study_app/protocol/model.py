@@ -132,8 +132,8 @@ class StudyHead(Table):
 class DeviceNeeds(Table):
     """What the study requires of the device."""
 
-    rate_hz: Annotated[float, within(250, 4000, "below, no force is stable; above, no tick fits")] = Field(
-        default=1000, description="Rate of the servo [Hz]."
+    rate_hz: Annotated[float, within(250, 4000, "slower forces are never stable; faster ticks cannot be finished")] = (
+        Field(default=1000, description="Rate of the servo [Hz].")
     )
     force_limit_n: HandForceN = Field(default=MAX_FORCE_N, description="Largest force on the hand [N].")
     workspace_mm: tuple[float, float, float] = Field(
@@ -243,39 +243,44 @@ def scene_with(scene: SceneDefaults, device: DeviceNeeds, liquids: Sequence[Stud
 class Limits(Table):
     """Limits within which a trial is valid."""
 
-    lateness_ms: Annotated[float, within(0.01, 1000, "no servo is more punctual, and 1 s is a failure")] = Field(
+    lateness_ms: Annotated[float, within(0.01, 1000, "servos are less punctual, and 1 s is a failure")] = Field(
         default=2, description="99th percentile of the lateness of ticks [ms]."
     )
     worst_gap_ms: Annotated[float, within(0.25, 1000, "from a tick at 4 kHz to a second, which is a failure")] = Field(
         default=20, description="Longest time between two ticks [ms]."
     )
-    delay_error_ms: Annotated[float, within(1, 1000, "no screen is more punctual, and 1 s is a failure")] = Field(
+    delay_error_ms: Annotated[float, within(1, 1000, "screens are less punctual, and 1 s is a failure")] = Field(
         default=25, description="95th percentile of achieved − requested delay [ms]."
     )
-    frame_gap_ms: Annotated[float, within(1, 1000, "no screen is faster, and 1 s is a failure")] = Field(
+    frame_gap_ms: Annotated[float, within(1, 1000, "screens are slower, and 1 s is a failure")] = Field(
         default=250,
         description="Longest time before the first frame, between two frames, or before the end of the trial [ms].",
     )
-    withheld_percent: Annotated[float, within(0.01, 100, "a share of the force; none withheld at all is rare")] = Field(
+    withheld_percent: Annotated[
+        float, within(0.01, 100, "a proportion of the force; some force is nearly always held back")
+    ] = Field(
         default=5,
         description=("Proportion of the force that slope limits, passivity controller and slew limit hold back [%]."),
     )
-    targets_percent: Annotated[float, within(0.01, 100, "a share of the targets; left out, any is enough")] | None = (
-        later(default=None, description="Minimum proportion of a reaching task's targets that must be reached [%].")
-    )
+    targets_percent: (
+        Annotated[float, within(0.01, 100, "a proportion of the targets; without this limit any number is enough")]
+        | None
+    ) = later(default=None, description="Minimum proportion of a reaching task's targets that must be reached [%].")
     level_error_percent: Annotated[float, within(0.1, 100, "encoder counts alone give 0.2 %")] | None = later(
         default=None, description="Error of an interval's delivered level [%]; default: 2."
     )
     level_error_ms: Annotated[float, within(0.1, 100, "frames of 120 Hz last 8 ms")] | None = later(
         default=None, description="Error of the delay difference delivered in a trial [ms]; default: 2."
     )
-    pace_error_percent: Annotated[float, within(1, 1000, "no hand keeps a pace to 1 %")] | None = later(
+    pace_error_percent: Annotated[float, within(1, 1000, "a hand cannot keep a pace within 1 %")] | None = later(
         default=None, description="Error of the hand's RMS speed relative to the followed target [%]; default: 40."
     )
     attempts: Annotated[int, Field(ge=1, le=100)] | None = later(
         default=None, description="How many times a trial of intervals is presented until it is delivered; default: 3."
     )
-    missing_percent: Annotated[float, within(0, 100, "a share of the trials; 0: none may be missing")] | None = later(
+    missing_percent: (
+        Annotated[float, within(0, 100, "a proportion of the trials; with 0, trials must not be missing")] | None
+    ) = later(
         default=None,
         description=(
             "Proportion of a session's main trials of intervals that may be missing because they were not "
@@ -284,7 +289,7 @@ class Limits(Table):
     )
 
 
-Reported = Annotated[float, within(-1e9, 1e9, "no published value is larger")]
+Reported = Annotated[float, within(-1e9, 1e9, "published values are smaller")]
 
 
 class Published(Table):
@@ -299,10 +304,10 @@ class Published(Table):
     standard: Reported | None = Field(default=None, description="Its standard, in that unit; default: all standards.")
     low: Reported | None = Field(default=None, description="Lower end of its interval or range.")
     high: Reported | None = Field(default=None, description="Upper end of its interval or range.")
-    percent: Annotated[float, within(0, 100, "a share of answers")] | None = Field(
+    percent: Annotated[float, within(0, 100, "a proportion of answers")] | None = Field(
         default=None, description="Percentage of correct answers at the value; default: unknown."
     )
-    n: Annotated[int, within(1, 1_000_000, "no study had more")] | None = Field(
+    n: Annotated[int, within(1, 1_000_000, "studies have fewer")] | None = Field(
         default=None, description="Number of its participants."
     )
     source: Brief = Field(default="", description="Where it was published.")
@@ -344,7 +349,7 @@ class Contrast(Table):
             "higher: the first is expected to be above the second; lower: below the second; default: either direction."
         ),
     )
-    bound: Annotated[float, within(1e-9, 1e9, "no larger difference is published")] | None = Field(
+    bound: Annotated[float, within(1e-9, 1e9, "published differences are smaller")] | None = Field(
         default=None,
         description="Largest difference that would not matter (for thresholds the largest ratio, such as "
         "1.25); default: equivalence is not tested.",
@@ -408,8 +413,8 @@ class ExclusionRule(Table):
     )
     limit: float | None = Field(
         default=None,
-        description="constant_answers: largest percentage of equal answers; fast_answers: least median time to an "
-        "answer [s]; the other rules have none.",
+        description="constant_answers: largest percentage of equal answers; fast_answers: minimum median response time "
+        "[s]; the other rules do not use a limit.",
     )
 
     @model_validator(mode="after")
@@ -430,10 +435,10 @@ class ExclusionRule(Table):
 class Analysis(Table):
     """Decisions about the analysis; without this table the report calls all its results exploratory."""
 
-    alpha: Annotated[float, within(0.0001, 0.2, "no study of people shows less than 0.0001")] = Field(
+    alpha: Annotated[float, within(0.0001, 0.2, "studies of people cannot show less than 0.0001")] = Field(
         default=0.05, description="Largest p that counts as significant."
     )
-    equivalence_bound: Annotated[float, within(0.05, 6, "the scale has 6 steps, means differ by tenths")] | None = (
+    equivalence_bound: Annotated[float, within(0.05, 6, "the scale has 6 steps, and means differ by tenths")] | None = (
         Field(
             default=None,
             description="Largest mean difference from no delay that would not matter, in points of the scale; default: "
@@ -455,7 +460,7 @@ class Analysis(Table):
     participants: Annotated[int, Field(ge=1, le=100_000)] | None = later(
         default=None, description="How many participants are planned."
     )
-    precision: Annotated[float, within(0.001, 10, "a share of the group's mean")] | None = later(
+    precision: Annotated[float, within(0.001, 10, "relative to the group mean")] | None = later(
         default=None, description="Planned half width of the 95 % interval of the group mean, relative to the mean."
     )
     trends: Literal["ranks", "slopes"] = later(

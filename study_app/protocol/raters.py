@@ -33,14 +33,14 @@ class SimulatedParticipants(Table):
         default=0.76,
         description="SD between participants of their response bias, in points, which is added to every answer.",
     )
-    slope_sd: Annotated[float, within(0, 2, "with 2, three in ten answer the opposite way")] = Field(
+    slope_sd: Annotated[float, within(0, 2, "with 2, three in ten people respond in the opposite direction")] = Field(
         default=0.50,
         description=(
             "SD between participants of the slope of their answers across conditions, relative to the mean "
             "slope; used by power analyses, not by rehearsals."
         ),
     )
-    lapse_rate: Annotated[float, within(0, 0.5, "more than half of the answers are not given in error")] = Field(
+    lapse_rate: Annotated[float, within(0, 0.5, "fewer than half of the answers are errors")] = Field(
         default=0.0,
         description=(
             "Proportion of answers given in error, 3 points too high; used by power analyses, not by rehearsals."

@@ -110,7 +110,7 @@ def opened(**options: Any) -> None:
         (lambda: api.fit(TRIALS.drop(columns="success"), levels=(0.02, 1.0)), "no column success"),
         (lambda: api.fit(TRIALS, levels=(1.0, 0.02)), "levels"),
         (lambda: api.fit(TRIALS, levels=(0.02, 1.0), design="magnitude"), "no threshold .* give one of abx, 2ifc"),
-        (lambda: api.fit(TRIALS.assign(level=math.nan), levels=(0.02, 1.0)), "what is no level"),
+        (lambda: api.fit(TRIALS.assign(level=math.nan), levels=(0.02, 1.0)), "contains an invalid level"),
         (lambda: api.fit(TRIALS.assign(success=0.5), levels=(0.02, 1.0)), "neither true nor false"),
         (lambda: api.fit(TRIALS[:0], levels=(0.02, 1.0)), "no trial"),
     ],

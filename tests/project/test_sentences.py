@@ -14,7 +14,7 @@ SKIPPED = ("study_app/analysis/report/", "study_app/analysis/findings/", "study_
 CODE = re.compile(r"`[^`]*`|“[^”]*”|\"[^\"]*\"|'[^']*'|\{[^{}]*\}|https?://\S+|\(`|--\w[\w-]*")
 PLACE = re.compile(r"^(?:liquid-study|[\w.* ]*X[\w.*, X]*): ")
 PATTERNS = {
-    "two colons": re.compile(r"\w[)”%]?: [^.;]*\w[)”%]?: "),
+    "two colons": re.compile(r"[\w)”%]: [^.;]*[\w)”%]: "),
     "is no, has no, gives no": re.compile(
         r"(?<!there )\b(?:is|are|was|were|has|have|had|gives?|holds?|contains?|finds?|names?|knows?|needs?) "
         r"(?:no|none|nothing)\b(?! (?:longer|more|effect|meaning|power|significant))",
@@ -22,7 +22,7 @@ PATTERNS = {
     ),
     "that of, those of": re.compile(r"\b(?:is|are|be|as|from|with|of|to|in|than|by) (?:that|those) of\b"),
     "where for if": re.compile(r"\b(?:n/a|true|false|omitted|only|even|except|but|none|case) where\b", re.IGNORECASE),
-    "from … on": re.compile(r"\bfrom [\w.]+ (?:[\w%]+ )?on\b(?! the| a| your| this| one| both)"),
+    "from … on": re.compile(r"\bfrom [\w.]+ (?:[\w%]+ )?on\b(?! (?:the|a|an|your|this|one|both|which|its|screen|paper|disk)\b)"),
     "left out": re.compile(r"\bleft out: |\bleave (?:it|them|this) out\b", re.IGNORECASE),
     "an id": re.compile(r"\b(?:an|the|this|its|participant) ids?\b"),
     "anew, besides, whoever": re.compile(r"\b(?:anew|whoever|whatever|besides)\b", re.IGNORECASE),

@@ -480,7 +480,7 @@ def read_decided(tables: Sequence[Mapping[str, Any] | None]) -> Decided:
         )
     except (KeyError, TypeError, ValueError) as error:
         raise AnalysisError(
-            f"a receipt does not contain the decisions about the analysis ({type(error).__name__}: {error}): it "
+            f"a receipt does not contain the decisions about the analysis ({type(error).__name__}, {error}): it "
             "was changed, or written by another version of the program; restore it from a copy"
         ) from error
 

@@ -167,7 +167,7 @@ def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: 
         agrees = by_bootstrap <= alpha, float(further.p_bootstrap(bound)[0]) <= alpha
         found = replace(found, checks_agree=agrees == (max(p_lower, p_upper) <= alpha, beyond))
     verdict: Verdict = "out of reach" if unseen > alpha else "equivalent" if by_tests else "inconclusive"
-    few = f"too few participants to call it equivalent: {fewest(alpha, bound, largest)}are needed"
+    few = f"too few participants to call it equivalent: {fewest(alpha, bound, largest)} are needed"
     note = "" if verdict == "equivalent" else few if by_tests else "equivalence is not shown"
     return replace(
         found,

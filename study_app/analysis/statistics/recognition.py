@@ -246,7 +246,7 @@ def _p_more_often(named: Flags, named_other: Flags, answered: Flags) -> float:
 
 def _note(n: int, undecided: int, smallest: float) -> str:
     if n == 0:
-        return "none of the participants rated all labels in any condition"
+        return "no participant rated all labels in any condition"
     if smallest == 1.0:
         return "no variation: every participant gave all conditions the same name or none"
     if undecided:

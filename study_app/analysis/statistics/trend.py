@@ -99,7 +99,7 @@ def trend(values: ArrayLike, direction: Direction | None = "increasing", *, seed
         direction=direction,
     )
     if not n or (ranks == k + 1).all():
-        note = "none of the participants answered in all conditions" if n == 0 else NO_VARIATION
+        note = "no participant answered in all conditions" if n == 0 else NO_VARIATION
         return replace(found, no_interval=note, note=note)
     side: Alternative = "two-sided" if direction is None else "greater"
     away = scores - middle

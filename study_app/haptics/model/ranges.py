@@ -42,9 +42,7 @@ DensityKgM3: TypeAlias = Annotated[
 ViscosityPaS: TypeAlias = Annotated[
     float, within(1e-6, 1e6, "gases have 1e-5 Pa·s, honey 10, tar 100", what="Dynamic viscosity [Pa·s].")
 ]
-DiameterM: TypeAlias = Annotated[
-    float, within(1e-3, 1, "the ball is moved by a hand", 0.068, "Diameter of the ball [m].")
-]
+DiameterM: TypeAlias = Annotated[float, within(1e-3, 1, "a hand moves the ball", 0.068, "Diameter of the ball [m].")]
 DragCoefficient: TypeAlias = Annotated[
     float,
     within(0, 10, "a wing has 0.04, a sphere 0.47, a plate 1.2", 0.47, "Drag coefficient in the constant drag law."),
@@ -77,7 +75,7 @@ Exponent: TypeAlias = Annotated[
         0.05, 10, ("outside this range a wake is full at once or never begins"), what="Response exponent y of the wake."
     ),
 ]
-Smoothing: TypeAlias = Annotated[float, within(0, 1, "a hand moves on within a second")]
+Smoothing: TypeAlias = Annotated[float, within(0, 1, "a hand keeps moving within a second")]
 TailLength: TypeAlias = Annotated[
     int,
     within(

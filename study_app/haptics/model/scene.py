@@ -199,9 +199,9 @@ class ForceLink(Frozen):
         Of jitter and loss, below 2³².
     """
 
-    delay_s: Annotated[float, within(0, MOST_DELAY_MS / 1000, "beyond, a liquid pushes instead of resisting")] = 0.0
-    jitter_s: Annotated[float, within(0, MOST_JITTER_MS / 1000, "networks deviate less")] = 0.0
-    loss: Annotated[float, within(0, MOST_LOSS, "beyond, most forces are held ones")] = 0.0
+    delay_s: Annotated[float, within(0, MOST_DELAY_MS / 1000, "beyond this a liquid pushes instead of resisting")] = 0.0
+    jitter_s: Annotated[float, within(0, MOST_JITTER_MS / 1000, "networks have smaller deviations")] = 0.0
+    loss: Annotated[float, within(0, MOST_LOSS, "beyond this most forces are held values")] = 0.0
     seed: Annotated[int, within(0, 2**32 - 1, "32 bits")] = 0
 
     @property
@@ -269,7 +269,8 @@ class Accuracy(Frozen):
     """What ``effects = "auto"`` may leave out: up to a share of the force, or a force if that is greater."""
 
     relative: Annotated[
-        float, within(0, 1, "a share of the force", what="Largest omitted share of the force, or of the force limit.")
+        float,
+        within(0, 1, "a proportion of the force", what="Largest omitted share of the force, or of the force limit."),
     ] = 0.05
     absolute_n: Annotated[
         float, within(0, 20, "the force limit is at most 20 N", what="Largest omitted force, if that is greater [N].")

@@ -46,7 +46,7 @@ class Modulus(Table):
     """The level of a block's first trial and the number that the participant is given for it; it is not analysed."""
 
     level: float = Field(description="The level that is presented.")
-    number: Annotated[float, within(1e-6, 1e9, "a number that a person can name")] = Field(
+    number: Annotated[float, within(1e-6, 1e9, "numbers that people use")] = Field(
         description="The number that represents it."
     )
 
@@ -70,7 +70,7 @@ class Design(Table):
     pause_s: Annotated[float, within(0.3, 10, "hands need 0.3 s to settle; memory fades within seconds")] = Field(
         default=0.6, description="Interstimulus interval: zero force between two intervals [s]."
     )
-    between_s: Annotated[float, within(0.0, 60, "a minute is a break, which has a page")] = Field(
+    between_s: Annotated[float, within(0.0, 60, "use a break page for a minute or more")] = Field(
         default=0.8, description="Zero force between an answer and the next trial [s]."
     )
     feedback: Feedback | None = Field(
@@ -79,7 +79,7 @@ class Design(Table):
         "practice, the default; always: after every answer. If no answer can be correct, the "
         "default is never.",
     )
-    feedback_s: Annotated[float, within(0.2, 10, "a sign needs 0.2 s to be seen")] = Field(
+    feedback_s: Annotated[float, within(0.2, 10, "people need 0.2 s to see a sign")] = Field(
         default=0.6, description="How long the feedback is shown [s]."
     )
 
@@ -268,9 +268,9 @@ class YesNo(Design):
     """Was it there? (Green & Swets 1966): the answer "yes" to a comparison is a hit, to a standard a false alarm."""
 
     kind: Literal["yesno"] = "yesno"
-    noise_share: Annotated[float, within(0.05, 0.5, "fewer say nothing of false alarms; half is balanced")] = Field(
-        default=0.3, description="Proportion of trials that present the standard."
-    )
+    noise_share: Annotated[
+        float, within(0.05, 0.5, "with fewer noise trials false alarms are unknown; half is balanced")
+    ] = Field(default=0.3, description="Proportion of trials that present the standard.")
     paper_name: ClassVar = "yes–no"
     answers: ClassVar = ("yes", "no")
     arrangements: ClassVar = ((True,), (False,))

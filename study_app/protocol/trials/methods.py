@@ -252,7 +252,7 @@ class Adjustment(Method):
             "default: a 40th of the span."
         ),
     )
-    most_s: Annotated[float, within(2, 600, "a hand needs 2 s to feel a change, and tires within minutes")] = Field(
+    most_s: Annotated[float, within(2, 600, "a hand needs 2 s to feel a change and tires within minutes")] = Field(
         default=60, description="Longest time for a setting [s]."
     )
 

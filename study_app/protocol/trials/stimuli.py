@@ -57,13 +57,13 @@ class Condition(Table):
     ball: Literal["shown", "hidden"] = later(
         default="shown", description="shown: the ball is always drawn; hidden: it is drawn only during a task's lead."
     )
-    force_delay_ms: Annotated[float, within(0, scene.MOST_DELAY_MS, "a later force pushes the hand")] = later(
+    force_delay_ms: Annotated[float, within(0, scene.MOST_DELAY_MS, "a longer delay pushes the hand")] = later(
         default=0, description="Delay of the force [ms]; the picture is not delayed."
     )
-    force_jitter_ms: Annotated[float, within(0, scene.MOST_JITTER_MS, "networks deviate less")] = later(
+    force_jitter_ms: Annotated[float, within(0, scene.MOST_JITTER_MS, "networks have smaller deviations")] = later(
         default=0, description="Largest additional delay of the force, drawn at random at every tick [ms]."
     )
-    force_loss: Annotated[float, within(0, scene.MOST_LOSS, "beyond, most forces are held ones")] = later(
+    force_loss: Annotated[float, within(0, scene.MOST_LOSS, "beyond this most forces are held values")] = later(
         default=0, description="Proportion of ticks whose force is lost; the previous force is held."
     )
     view: str = later(

@@ -157,7 +157,7 @@ class Follow(Task):
     ] = Field(default=1, description="Frequency of the target [Hz].")
     cycles: int = Field(default=3, ge=1, le=1000, description="Number of periods after the lead, which are evaluated.")
     radius_mm: Radius = Field(default=6, description="Radius of the target [mm].")
-    lead_s: Annotated[float, within(0.1, 10, "a hand needs 0.2 s to react; nothing of the lead is judged")] = Field(
+    lead_s: Annotated[float, within(0.1, 10, "a hand needs 0.2 s to react; the lead-in is not evaluated")] = Field(
         default=1, description="Time over which the amplitude rises before the evaluated periods [s]."
     )
     instruction: Localised | None = Field(
@@ -204,7 +204,7 @@ class Follow(Task):
         return self.amplitude_m * ramp * math.sin(2 * math.pi * self.frequency_hz * t_s), 0.0, 0.0
 
 
-Millimetres: TypeAlias = Annotated[float, within(-500, 500, "the tank reaches to 500 mm on either side at most")]
+Millimetres: TypeAlias = Annotated[float, within(-500, 500, "the tank extends at most 500 mm to either side")]
 
 REACH_S: Final = 0.3
 """From target to target, as fast as aimed reaches are. [choice]"""

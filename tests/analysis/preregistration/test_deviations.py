@@ -58,7 +58,7 @@ def test_a_study_that_kept_to_it_has_no_deviation(answered: Results) -> None:
     committed(answered)
     assert evaluate_block(answered) == ()
     text = " ".join(map(str, deviations_section(load_study(answered.folder))))
-    assert "No difference was found" in text
+    assert "There was no difference" in text
     assert HASH in text
 
 

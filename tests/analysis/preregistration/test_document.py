@@ -91,7 +91,7 @@ def test_the_tables_of_power_are_included(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "line"), [(None, "power.md cannot be read"), ("# Power of x (y 1)", "is not of rek2024 1.0")]
+    ("content", "line"), [(None, "power.md cannot be read"), ("# Power of x (y 1)", "does not belong to rek2024 1.0")]
 )
 def test_a_folder_without_this_studys_power_is_a_usage_error(content: str | None, line: str, tmp_path: Path) -> None:
     if content is not None:

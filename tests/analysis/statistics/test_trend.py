@@ -92,7 +92,7 @@ def test_step_down_stops_at_the_first_failure_even_if_a_later_one_would_do() -> 
     assert result.lowest_ms is None
     assert len(result.steps) == 1
     assert trend(values[:, :3]).p < 0.001  # type: ignore[operator]
-    assert "not evidence that there is none" in result.note
+    assert "this does not show that there is none" in result.note
 
 
 def test_the_step_down_hardly_ever_finds_a_delay_where_there_is_none() -> None:
@@ -102,9 +102,9 @@ def test_the_step_down_hardly_ever_finds_a_delay_where_there_is_none() -> None:
 
 
 def test_bad_delays_and_a_single_setting_are_refused() -> None:
-    with pytest.raises(AnalysisError, match="do not go up"):
+    with pytest.raises(AnalysisError, match="do not increase"):
         step_down(np.ones((3, 2)), (50, 0))
-    with pytest.raises(AnalysisError, match="do not go up"):
+    with pytest.raises(AnalysisError, match="do not increase"):
         step_down(np.ones((3, 2)), (0, 50, 100))
     with pytest.raises(AnalysisError, match="at least 2"):
         trend(np.ones((3, 1)))

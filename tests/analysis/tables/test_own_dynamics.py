@@ -99,7 +99,7 @@ def test_a_table_binds_and_its_absence_or_change_does_not() -> None:
 
 
 def test_a_receipt_that_does_not_say_it_is_refused() -> None:
-    with pytest.raises(AnalysisError, match="a receipt does not say what was decided"):
+    with pytest.raises(AnalysisError, match="a receipt does not contain the decisions"):
         blocks.read_decided([{"alpha": 0.05}])
 
 

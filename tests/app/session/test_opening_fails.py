@@ -166,5 +166,5 @@ def test_changed_conditions_are_refused_before_a_device_opens(qtbot, tmp_path, m
         live.open()
     live.wait()
     assert isinstance(live.error, StoreError)
-    assert "sealed for other conditions" in str(live.error)
+    assert "sealed for conditions that differ" in str(live.error)
     assert opened == []

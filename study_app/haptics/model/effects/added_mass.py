@@ -28,7 +28,10 @@ class AddedMass(Frozen):
     """The mass of the liquid that is accelerated with the body."""
 
     coefficient: Annotated[
-        float, within(0, 10, "a sphere has 0.5", what="Added mass over the mass of the displaced liquid, C_a.")
+        float,
+        within(
+            0, 10, "a sphere has a coefficient of 0.5", what="Added mass over the mass of the displaced liquid, C_a."
+        ),
     ] = 0.5
     filter_s: Smoothing | None = Field(
         default=None,

@@ -35,7 +35,9 @@ class Channel(Frozen):
     centre_m: Metres = Field(default=(0.0, 0.0, 0.0), description="A point on the middle line [m].")
     heading_deg: Annotated[
         float,
-        within(-360, 360, "one turn", what="Direction [°]: 0 is to the right (+x), 90 away from the participant (−z)."),
+        within(
+            -360, 360, "one full turn", what="Direction [°]: 0 is to the right (+x), 90 away from the participant (−z)."
+        ),
     ] = 0.0
     width_m: Extent = Field(description="Distance between the walls [m].")
     peak_mps: ranges.Flow = Field(description="Speed midway between the walls [m/s].")

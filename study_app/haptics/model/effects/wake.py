@@ -51,7 +51,8 @@ class Wake(Frozen):
     scaling: TailScaling
     exponent: Exponent = 1.0
     breaking_angle_deg: Annotated[
-        float, within(0, 180, "180° is straight back", what="Change of direction β that starts a new segment [°].")
+        float,
+        within(0, 180, "180° reverses the direction", what="Change of direction β that starts a new segment [°]."),
     ] = 45.0
     breaking_span_m: Annotated[
         float,
