@@ -42,7 +42,10 @@ def test_a_table_with_one_reading_is_read(text: str) -> None:
     ("content", "said"),
     [
         (b"rate,stress\n1,5,26,7\n", "line 2: has 4 fields, more than the 2 of the header: write decimal points"),
-        (b"rate,stress\n0.1,21\n2,5,28.6\n", "line 3: has 3 fields, more than the 2 of the header: remove the additional"),
+        (
+            b"rate,stress\n0.1,21\n2,5,28.6\n",
+            "line 3: has 3 fields, more than the 2 of the header: remove the additional",
+        ),
         (b"rate;stress\n0.1;21\n\n2.5\n", "line 4: has 1 field, fewer than the 2 of the header"),
         (b"rate,stress,note\n0.1,21\n", "line 2: has 2 fields, fewer than the 3 of the header"),
         (b"rate;stress\n1,234;5,678\n", "line 2: “1,234” can be read as 1.234 or 1234: write 1.234 or 1234"),

@@ -24,8 +24,8 @@ ROUNDING: Final = 1e-9
 class Criterion(Table):
     """A block ends as soon as ``right`` of its last ``of`` answers were correct."""
 
-    right: int = Field(ge=1, le=100, description="How many of the last answers must be correct.")
-    of: int = Field(ge=1, le=100, description="How many of the last answers count.")
+    right: int = Field(ge=1, le=100, description="Number of these answers that must be correct.")
+    of: int = Field(ge=1, le=100, description="Number of last answers considered.")
     missed: Literal["go_on", "end"] = Field(
         default="go_on", description="go_on: if this is not reached, the session continues; end: it ends."
     )

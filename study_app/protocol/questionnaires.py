@@ -79,7 +79,7 @@ class Questionnaire(Table):
 
     title: Localised | None = Field(default=None, description="Heading; default: the name of the trial.")
     intro: Localised = Field(description="The question above the statements.")
-    scale: Id | None = Field(default=None, description="The scale of all statements; omit it without statements.")
+    scale: Id | None = Field(default=None, description="The scale of all statements; omit it if there are none.")
     item_order: Literal["fixed", "shuffled"] = Field(
         default="fixed", description="fixed: as written; shuffled: a new order in every trial."
     )

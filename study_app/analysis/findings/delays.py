@@ -71,8 +71,7 @@ def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
         f"{percent(1 - 2 * first.alpha)} intervals. Equivalent: both the t tests and the bootstrap show that the mean "
         f"difference lies within the bound, with {enough(first.alpha, first.bound)}. Not equivalent: the whole "
         "interval lies beyond the bound; this is not corrected for the number of comparisons. Inconclusive: neither, "
-        "which is not evidence of a difference. Out of reach: too few participants to show equivalence, whatever "
-        "they had answered."
+        "which does not show a difference. Out of reach: too few participants to show equivalence with any answers."
     )
     disagree = sum(one.found.checks_agree is False for one in against)
     if disagree:
@@ -282,18 +281,18 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
             steps = step_down(answers.values[one.item], answers.block.delays_ms, direction, alpha=alpha)
             lowest.append(Lowest(one.item, steps, one.members))
         if trends and not showing:
-            why = "no statement shows a trend over all delays, which is not evidence that people notice none"
+            why = "no statement shows a trend over all delays, which does not show that people notice none"
             return (), (NotTested(cls.what, why),)
         return tuple(lowest), ()
 
     def rows(self) -> Iterator[Row]:
         for lowest in self.value:
             for step in lowest.steps.steps:
-                row = test_row(self.found, "answers follow the delay, stepping down", step.trend)
+                row = test_row(self.found, "answers change with the delay, step-down test", step.trend)
                 row |= rows_alone(self.found, f"stepping down within {lowest.item}") | {
                     "members": len(lowest.steps.steps)
                 }
-                row |= {"correction": "none: fixed order, ends at the first that fails"}
+                row |= {"correction": "none: fixed order, ends at the first test that is not significant"}
                 yield row | {"item": lowest.item, "comparison": f"up to {step.longest_ms:g} ms"}
 
     def section(self) -> Iterator[str]:
@@ -342,7 +341,7 @@ class DetectionThreshold(Finding[Threshold | None]):
             return None, (NotTested(cls.what, "the protocol states no statement about it (analysis.noticed)"),)
         rising = [one.item for one in DelayTrend.of(found) if one.verdict in FOUND and (one.outcome.effect or 0.0) > 0]
         if item not in rising:
-            return None, (NotTested(cls.what, "agreement is not shown to rise with the delay"),)
+            return None, (NotTested(cls.what, "agreement is not shown to increase with the delay"),)
         return noticed(answers.single[item], answers.block.delays_ms), ()
 
     def rows(self) -> Iterator[Row]:
@@ -435,10 +434,10 @@ class NoticedFrom(Finding[None]):
         for primary, verdict in ((True, "shown"), (False, "suggested")):
             text = self._shortest([item.id for item in self.found.items if decided.is_primary(item.id) == primary])
             if not text and fitted is not None and decided.is_primary(fitted) == primary:
-                text = "Agreement rises with the delay, but no single delay is shown to be noticed."
+                text = "Agreement increases with the delay, but it is not shown that any single delay is noticed."
             if text:
                 return self.answered(verdict, text, claims=True)
-        return self.answered("not shown", f"No delay was shown to be noticed. {NO_EVIDENCE}")
+        return self.answered("not shown", f"It is not shown that any delay is noticed. {NO_EVIDENCE}")
 
     def _shortest(self, items: Sequence[str]) -> str:
         """Return the sentence of the shortest delay that changes one of these statements; empty without any."""
@@ -494,7 +493,7 @@ def _beyond_words(against: Sequence[ContrastWithControl]) -> str:
     """Return how many comparisons are not equivalent, as a sentence; without any, that nothing follows."""
     beyond = sum(one.verdict == "not equivalent" for one in against)
     if not beyond:
-        return "That is not evidence that they change."
+        return "This does not show that they change."
     return (
         f"In {beyond} of {number_text.counted(len(against), 'comparison')} the whole interval lies beyond the bound "
         "(not equivalent; not corrected for the number of comparisons)."
@@ -550,12 +549,12 @@ class Movement(Finding[None]):
         ]
         people = medians["participant"].nunique()
         n = counted(people, "participant")
-        foot = "Added delay, ms. A participant's point: the median of a trial's reaches, the first left out."
+        foot = "Added delay, ms. Each point is a participant's median over the reaches of a trial, excluding the first."
         caption = (
-            f"How participants reached, against the requested delay ({drawing.simulated}n = {people} "
-            f"with recordings). Thin lines: {answer_figures.line_words(people)}; thick line: median; band: the middle "
-            "half. Movement time: from the lighting of a target to the entry that was held. Scales do not begin at "
-            f"zero. {_kept(block, drawing.results)}"
+            f"How participants reached, against the requested delay ({drawing.simulated}n = {people} with "
+            f"recordings). Thin lines: {answer_figures.line_words(people)}; thick line: median; band: "
+            "interquartile range. Movement time is the time from the lighting of a target to the final entry. "
+            f"Scales do not begin at zero. {_kept(block, drawing.results)}"
         )
         delays_ms = [setting.delay_ms or 0.0 for setting in block.settings]
         draw = partial(answer_figures.draw_answers, plots, delays_ms, [None] * len(plots), foot, own_scales=True)

@@ -249,33 +249,33 @@ def verdict(p: float | None, least: float | None, alpha: float, *, primary: bool
 TESTS: Final = (
     Column("block", "text", "Id of the block."),
     Column("question", "text", "What is asked."),
-    optional("item", "text", "Id of the statement; n/a where the test is over several."),
-    optional("comparison", "text", "Which settings, where not all."),
+    optional("item", "text", "ID of the statement; n/a if the test is over several."),
+    optional("comparison", "text", "The conditions tested, if not all."),
     Column("test", "text", "The test."),
     Column("n", "integer", "Participants used.", minimum=0),
-    Column("dropped", "integer", "Participants not used, for missing answers.", minimum=0),
+    Column("dropped", "integer", "Number of participants excluded because of missing answers.", minimum=0),
     Column("statistic_name", "text", "What the statistic is."),
     optional("statistic", "number", "The statistic."),
     optional("p", "number", "p, not corrected.", minimum=0, maximum=1),
-    optional("p_adjusted", "number", "p, corrected within the family.", minimum=0, maximum=1),
-    optional("smallest_p", "number", "The smallest p that could have come out.", minimum=0, maximum=1),
+    optional("p_adjusted", "number", "p corrected within the family.", minimum=0, maximum=1),
+    optional("smallest_p", "number", "The smallest p that these data could have given.", minimum=0, maximum=1),
     optional("family", "text", "What is corrected together."),
     optional("members", "integer", "Tests in the family.", minimum=1),
-    optional("correction", "text", "How p is corrected."),
-    optional("primary", "flag", "true where it was decided on before the study."),
-    optional("verdict", "text", "What may be said."),
+    optional("correction", "text", "Correction of p."),
+    optional("primary", "flag", "true if the test was planned before the study."),
+    optional("verdict", "text", "Verdict."),
     Column("effect_name", "text", "What the effect is."),
     optional("effect", "number", "The effect."),
     optional("low", "number", "Lower end of the effect's interval."),
     optional("high", "number", "Upper end of the effect's interval."),
     optional("level", "number", "Confidence of the interval."),
-    optional("interval", "text", "How the interval was made, or why there is none."),
+    optional("interval", "text", "Method of the interval, or why there is none."),
     Column("method", "text", "How p was found."),
-    optional("note", "text", "What must be said with it."),
+    optional("note", "text", "Notes on the result."),
     Column(
         "codes",
         "text",
-        "Codes of the settings that are compared, in their order, with spaces between; + joins those of one delay.",
+        "Codes of the compared conditions in their order, separated by spaces; + joins conditions with the same delay.",
     ),
 )
 
@@ -331,7 +331,7 @@ def rows_alone(found: BlockResult, what: str) -> dict[str, Any]:
     return {"family": f"{found.id}: {what}", "members": 1, "correction": ALONE}
 
 
-NO_EVIDENCE: Final = "That is not evidence that there is no difference."
+NO_EVIDENCE: Final = "This does not show that there is no difference."
 FOUND: Final = ("shown", "suggested")
 
 

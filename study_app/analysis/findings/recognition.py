@@ -52,7 +52,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
     kinds = ("liquids",)
     waits = ("liquids",)
     figure_name = "recognition"
-    figure_title = "What each liquid was named"
+    figure_title = "Names given to each liquid"
 
     @classmethod
     def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[RecognitionResult | None, Absent]:
@@ -62,7 +62,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         if not labels or not set(labels) <= answers.values.keys() or not any(right):
             return None, (NotTested(cls.what, "the protocol does not say which statements name these liquids"),)
         if not 2 <= answers.k <= MOST_NAMED or len(labels) < 2:
-            return None, (NotTested(cls.what, f"it needs 2 to {MOST_NAMED} settings and two names"),)
+            return None, (NotTested(cls.what, f"it needs 2 to {MOST_NAMED} conditions and two names"),)
         ratings = np.stack([answers.values[label] for label in labels], axis=2)
         truth = [None if label is None else labels.index(label) for label in right]
         tested = recognition(named(ratings), truth, len(labels), seed=answers.intervals)
@@ -105,9 +105,10 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         )
         how = "" if outcome.interval is None else f" Interval of kappa: {outcome.interval.method}."
         yield paragraph(
-            f"Intervals of the shares: Clopper–Pearson.{how} p tests whether the name is used for the liquid more "
-            "often than for each other liquid, within participants (McNemar's exact test, one-sided); the liquid with "
-            "the largest p is the closest other liquid. Adjusted p is corrected by Holm over the liquids.",
+            f"Intervals of proportions are Clopper–Pearson intervals.{how} p tests whether the name is used for "
+            "the liquid more often than for each other liquid, within participants (McNemar's exact test, "
+            "one-sided); the liquid with the largest p is the closest other liquid. Adjusted p is corrected by "
+            "Holm over the liquids.",
             "soft",
         )
 
@@ -126,8 +127,9 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
             )
         caption = (
             "The name that was rated highest for each liquid "
-            f"({drawing.simulated}{answer_figures.counts(study, block)[0]}). Cells: counts and share of the row; "
-            f"framed: correct. Undecided: {counted(2, 'name')} or more were rated equally high.{chance}"
+            f"({drawing.simulated}{answer_figures.counts(study, block)[0]}). Cells show counts and percentages "
+            f"of the row; correct names are framed. Undecided: {counted(2, 'name')} or more were rated equally "
+            f"high.{chance}"
         )
         return drawing.picture(
             self.figure_title,

@@ -555,6 +555,6 @@ class MeanTests(StatementTests):
             }
             words = listed([how[test] for test in how if test in tests])
             yield (
-                f"In an exploratory analysis, the answers were treated as numbers: {words}, in the participants who "
-                "answered under all settings; the false discovery rate was controlled (Benjamini–Hochberg)."
+                f"In an exploratory analysis, the answers were treated as numbers: {words}, in the participants "
+                "who answered in all conditions; the false discovery rate was controlled (Benjamini–Hochberg)."
             )

@@ -127,10 +127,10 @@ def _exclusions(study: Study) -> str:
     sentences = []
     if parts:
         sentences.append(
-            f"{number_text.capitalised(listed(parts))} {'were' if many else 'was'} left out of the analysis."
+            f"{number_text.capitalised(listed(parts))} {'were' if many else 'was'} excluded from the analysis."
         )
     if study.late:
-        sentences.append(f"Decided after the key was opened: {late_exclusions(study)}.")
+        sentences.append(f"Decisions after the key was opened: {late_exclusions(study)}.")
     elif study.revealed and any(one.rule_or_person not in RULES for one in study.exclusions):
         sentences.append("Exclusions were decided while the key was sealed.")
     return " ".join(sentences)
@@ -328,13 +328,13 @@ def _common(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
         yield from finding.common_methods(blocks)
     if gone := sorted({person for found in blocks for people in found.incomplete.values() for person in people}):
         yield (
-            f"Missing answers were not replaced: {number_text.counted(len(gone), 'participant')} with a missing answer "
-            "to a statement were left out of its tests over all conditions, and of those comparisons of two conditions "
-            "that the missing answer concerns."
+            f"Missing answers were not replaced: {number_text.counted(len(gone), 'participant')} with a missing "
+            "answer to a statement were excluded from its tests over all conditions, and from comparisons of "
+            "two conditions that involve the missing answer."
         )
     measured = results.performance
     if measured is not None and measured.recorded:
         yield (
-            "Movement times were measured from recordings at the servo's rate, from the moment a target lit up until "
-            "the entry that was held; the first reach of each trial was left out."
+            "Movement times were measured from recordings at the servo's rate, from the moment a target lit up "
+            "until the final entry; the first reach of each trial was excluded."
         )

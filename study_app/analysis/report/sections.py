@@ -60,7 +60,10 @@ def none_found(results: Results) -> str:
     """Return why there are no findings."""
     if results.blocks:
         return "No answers are included yet."
-    return "The study asks no statements after trials, so there are no tests; the sections below show the answers."
+    return (
+        "The study does not ask for statements after trials, so there are no tests; the sections below show "
+        "the answers."
+    )
 
 
 def limits(study: Study, results: Results) -> tuple[str, ...]:
@@ -99,11 +102,11 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
             "--reason TEXT."
         )
         if study.own_codes:
-            yield "Until the key is open, each participant has other codes, so settings cannot be compared."
+            yield "Until unblinding each participant has separate codes, so conditions cannot be compared."
         if study.sites:
             yield (
-                "Each site has its own key: until the keys of all sites are open, the code of a setting begins with "
-                "its site, and settings of different sites cannot be compared."
+                "Each site has its own key: until all sites are unblinded, codes begin with the site, and "
+                "conditions of different sites cannot be compared."
             )
     if study.simulated:
         yield "The participants were SIMULATED: this report is not evidence about people."
@@ -111,8 +114,8 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
         yield "These are pilot sessions: do not report them as results of the study."
     if not decided.made:
         yield (
-            "The protocol states no decisions about the analysis (it has no table [analysis]), so all results are "
-            "exploratory."
+            "The protocol does not state decisions about the analysis (the table [analysis] is missing), so "
+            "all results are exploratory."
         )
     elif decided.changed:
         yield (
@@ -126,16 +129,17 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
         )
     if study.late:
         yield (
-            f"Decided after the key was opened, when the effect on the results was visible: {late_exclusions(study)}. "
-            "Compare this report with that of a copy in which `include` or `exclude` reverses these decisions."
+            "Decisions after the key was opened, when their effect on the results was visible: "
+            f"{late_exclusions(study)}. Compare this report with the report of a copy in which `include` or "
+            "`exclude` reverses these decisions."
         )
     if study.n == 1:
         yield "There is only one participant: the results do not generalise to other people."
     if study.n < FEW and results.blocks:
         people = counted(study.n, "participant")
         yield (
-            f"{people[:1].upper()}{people[1:]}: intervals of mean rank correlations and exploratory tests of means "
-            f"need at least {FEW}. An effect that is not shown here may well exist."
+            f"{people[:1].upper()}{people[1:]}: intervals of mean rank correlations and exploratory tests of "
+            f"means need at least {FEW}. Effects that are not shown here may still exist."
         )
 
 
@@ -417,11 +421,11 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         for one in study.exclusions
     ]
     if study.left_out:
-        gone.append(f"{counted(study.left_out, 'session')} not completed: not in the analysis")
+        gone.append(f"{counted(study.left_out, 'session')} not completed and not analysed")
     yield bullets(_first(gone)) if gone else paragraph("Nothing is excluded.")
     yield from _missing(study)
     if study.doubts:
-        yield heading(3, "Files that are not as they were recorded")
+        yield heading(3, "Files that have changed since recording")
         yield bullets(
             _first([f"{doubt.path.relative_to(study.folder).as_posix()} {doubt.what}" for doubt in study.doubts])
         )
@@ -506,8 +510,8 @@ def _missing(study: Study) -> Iterator[str]:
     permitted = study.protocol.get("limits", {}).get(MISSING_PERCENT)
     if permitted is not None:
         yield paragraph(
-            f"The study states that {permitted:g} % of a session's trials may be missing. A session with more is "
-            "incomplete, and not counted unless a person included it again.",
+            f"The study states that {permitted:g} % of a session's trials may be missing. A session with more "
+            "is incomplete, and excluded unless a person included it again.",
             "soft",
         )
 
@@ -556,7 +560,7 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
         "latency. "
         + (f"Timing limits: {'; '.join(_limit(what, limit) for what, limit in limits.items())}. " if limits else "")
         + f"{_beyond(study, limits)}Trials beyond a limit are included, unless they are excluded above."
-        + ("" if study.revealed else " Delay error and withheld force are sealed, and not judged, until unblinding."),
+        + ("" if study.revealed else " Delay error and force held back are sealed, and not checked, until unblinding."),
         "soft",
     )
 
@@ -599,7 +603,7 @@ def _orders(results: Results) -> Iterator[str]:
         yield paragraph(f"{found.title}, {counted(counts.orders, 'order')}: {_evenness(counts)}")
         lines = enumerate(counts.positions, start=1)
         yield table(("Position", *names), [[str(place), *map(str, line)] for place, line in lines])
-    yield paragraph("How often each setting was in each position of its block.", "soft")
+    yield paragraph("Number of times that each condition was in each position of its block.", "soft")
 
 
 def _evenness(counts: Evenness) -> str:
@@ -629,10 +633,14 @@ def motion(results: Results) -> Iterator[str]:
             yield table(head, rows)
             if found.id not in measured.reaching:
                 yield paragraph(
-                    "This block has no reaching task, and so no movement times, overshoots and submovements.", "soft"
+                    "This block does not contain a reaching task, so there are no movement times, overshoots "
+                    "or submovements.",
+                    "soft",
                 )
             elif not measured.recorded_in(found.id):
-                yield paragraph("No recording of this block could be read, so it has no measures of reaches.", "soft")
+                yield paragraph(
+                    "The recordings of this block could not be read, so there are no measures of reaches.", "soft"
+                )
     yield paragraph(_recordings(measured))
     yield bullets(
         f"{_label(measure)}: {words}." for measure, words in {**TRIAL_DEFINITIONS, **REACH_DEFINITIONS}.items()
@@ -680,8 +688,8 @@ def _label(measure: str) -> str:
 
 def _recordings(measured: Performance) -> str:
     if not measured.trials:
-        return "The study has no reaching trials, and so no measures of reaches."
-    text = f"Measures of reaches are from the recordings of {measured.recorded} of {measured.trials} reaching trials"
+        return "The study does not contain reaching trials, so there are no measures of reaches."
+    text = f"Measures of reaches come from the recordings of {measured.recorded} of {measured.trials} reaching trials"
     if measured.unread:
         text += f" (others: {'; '.join(measured.unread)})"
     if not measured.judged:

@@ -68,7 +68,7 @@ def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None)
     """
     study = load_study(folder)
     if not study.blocks and not study.others.questions:
-        raise AnalysisError(f"{folder}: the study {study.name!r} asks nothing, so there is nothing to draw")
+        raise AnalysisError(f"{folder}: the study {study.name!r} does not ask questions, so there is nothing to draw")
     files: dict[str, bytes] = {}
     failures = Failures()
     questions = question_pictures(study, question_results(study), failures=failures)

@@ -100,14 +100,14 @@ MOTION: Final = (
     Column("block", "text", "Id of the block."),
     Column("code", "text", "Code of the setting."),
     Column("setting", "text", "What the setting is."),
-    Column("measure", "text", "The measure, its unit at the end."),
+    Column("measure", "text", "The measure, ending with its unit."),
     Column("n", "integer", "Participants with the measure.", minimum=0),
     optional("median", "number", "Median over participants."),
     optional("q1", "number", "Lower quartile over participants."),
     optional("q3", "number", "Upper quartile over participants."),
-    Column("trials", "integer", "Trials that count under the setting.", minimum=0),
-    Column("judged", "integer", "Of these: those of which it is known whether they kept to the limits.", minimum=0),
-    Column("valid", "integer", "Of these: those that kept to the protocol's limits of timing.", minimum=0),
+    Column("trials", "integer", "Number of analysed trials in the condition.", minimum=0),
+    Column("judged", "integer", "Number of these trials with measured limits.", minimum=0),
+    Column("valid", "integer", "Number of these trials that met the protocol's timing limits.", minimum=0),
 )
 
 
@@ -413,10 +413,10 @@ def _again(study: Study, results: Results) -> Iterator[str]:
         f"{together.hexdigest()}. Each one's hash, and every session's seed, is in report.json."
     )
     yield paragraph(
-        "Files next to this page: report.json (every number), tests.csv (one row per test), motion.csv, the tables of "
-        "responses, trials and aggregates with their codebook, every figure as PNG, SVG and PDF with its caption, "
-        "methods.txt, and report.R, which computes the main numbers again in base R. "
-        f"Made by liquid-study {__version__}.",
+        "Files next to this page: report.json (every number), tests.csv (one row per test), motion.csv, the "
+        "tables of responses, trials and aggregates with their codebook, every figure as PNG, SVG and PDF with "
+        "its caption, methods.txt, and report.R, which recomputes the main numbers in base R. Made by "
+        f"liquid-study {__version__}.",
         "soft",
     )
 

@@ -204,7 +204,7 @@ def friedman(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> Friedma
     spread = tied_spread(ranks)
     sums = ranks.sum(axis=0)
     if spread == 0:
-        note, middle = NO_VARIATION if n else "no participant answered under all settings", (k + 1) / 2
+        note, middle = NO_VARIATION if n else "no participant answered in all conditions", (k + 1) / 2
         ranks_of_all = (middle,) * k if n else ()
         return Friedman(n=n, dropped=dropped, no_interval=note, note=note, df=k - 1, mean_ranks=ranks_of_all)
     squares = _squares(sums[None, :], n)[0]

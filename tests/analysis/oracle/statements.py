@@ -275,7 +275,7 @@ def _trends(block: Block) -> None:
             own = _trend(answers.where(answers.notna().all(axis=1)).iloc[:, :last], block.sides.get(item))
             longest = {"longest_ms": block.delays[last - 1]}
             block.compared.check(f"{block.place}.{place}.steps.{step}", longest)
-            words = ("answers follow the delay, stepping down", item, f"up to {longest['longest_ms']:g} ms")
+            words = ("answers change with the delay, step-down test", item, f"up to {longest['longest_ms']:g} ms")
             block.record(f"{place}.steps.{step}.trend", own, *words)
             if own["p"] > 0.05:
                 break

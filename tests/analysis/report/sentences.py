@@ -94,7 +94,7 @@ class Told:
         """Return of each statement with a trend the shortest delay whose steps are all significant, by item."""
         trends = {row["item"]: row for row in self.asked("answers follow the delay")}
         found = {}
-        for row in self.asked("answers follow the delay, stepping down"):
+        for row in self.asked("answers change with the delay, step-down test"):
             step = float(row["comparison"].removeprefix("up to ").removesuffix(" ms"))
             if float(row["p"] or 1) > self.alpha / int(trends[row["item"]]["members"]):
                 found.setdefault(row["item"], math.nan)  # the first that fails ends them
@@ -174,7 +174,7 @@ def trend_is_shown(match: re.Match[str], told: Told) -> bool:
     for side, item, number in re.findall(rf"(higher|lower) in “(\w+)” \(mean rank correlation {R}\)", rated):
         (row,) = (
             row
-            for row in told.asked("answers follow the delay, stepping down")
+            for row in told.asked("answers change with the delay, step-down test")
             if row["item"] == item.lower() and row["comparison"] == f"up to {at} ms"
         )
         effect = float(row["effect"]) * (-1 if item.lower() in falling else 1)

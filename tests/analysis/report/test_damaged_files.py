@@ -1,4 +1,4 @@
-"""Files that are not as they were recorded: an analysis goes on, and says so wherever it speaks."""
+"""Files that have changed since recording: an analysis goes on, and says so wherever it speaks."""
 
 import csv
 import hashlib

@@ -74,10 +74,12 @@ def test_a_changed_file_of_one_version_and_an_exclusion_after_unblinding_are_sta
     report(small.folder, tmp_path / "report")
     told = " ".join((tmp_path / "report" / "methods.txt").read_text("utf-8").split())
     assert (
-        "in 2 different files); 1 participant lacks a condition, because single trials were excluded. 1 excluded "
-        "session and two excluded trials were left out of the analysis." in told
+        "in 2 different files); 1 participant lacks a condition, because single trials were excluded. 1 "
+        "excluded session and two excluded trials were excluded from the analysis." in told
     )
-    assert f"Decided after the key was opened: 1 exclusion of {len(gone) + 1} and the reversal of 1 exclusion." in told
+    assert (
+        f"Decisions after the key was opened: 1 exclusion of {len(gone) + 1} and the reversal of 1 exclusion."
+    ) in told
     rows = json.loads((tmp_path / "report" / "report.json").read_text("utf-8"))["exclusions"]
     assert [row["participant"] for row in rows if row["after_unblinding"]] == ["B"]
 

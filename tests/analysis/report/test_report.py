@@ -29,7 +29,7 @@ def test_while_sealed_nothing_is_told_that_blinding_hides(small: Results, tmp_pa
     assert "Blinded: by code" in told
     assert "after unblinding" in told
     assert re.search(r" all +sealed +sealed +sealed +sealed +28 +28 of 28 ", " ".join(told.split()))
-    assert "Delay error and withheld force are sealed, and not judged, until unblinding." in told
+    assert "Delay error and force held back are sealed, and not checked, until unblinding." in told
     (delivered,) = numbers(tmp_path / "report")["results"]["delivered"]
     assert (delivered["error_mean_ms"], delivered["error_worst_ms"], delivered["achieved_ms"]) == (None, None, None)
     for path in (tmp_path / "report").iterdir():
