@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -542,6 +543,25 @@ SAID_EVERY_S: Final = 20.0
 """Progress is written so often where it is no line of a terminal."""
 
 
+def _timed_lines() -> Callable[[str], None]:
+    """Return a function that writes a line on standard error, with the seconds since now."""
+    begun = time.monotonic()
+    return lambda text: click.echo(f"{time.monotonic() - begun:.0f} s: {text}", err=True)
+
+
+def _at_intervals(say: Callable[[str], None]) -> Callable[[str], None]:
+    """Return a function that says a text at most once in `SAID_EVERY_S`."""
+    said = -math.inf
+
+    def say_sometimes(text: str) -> None:
+        nonlocal said
+        if time.monotonic() - said >= SAID_EVERY_S:
+            said = time.monotonic()
+            say(text)
+
+    return say_sometimes
+
+
 @click.command("validate-report")
 @click.option(
     "--studies",
@@ -572,20 +592,9 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     make_output_folder(to)
     rates: tuple[Rate, ...] = ()
     begun, done = time.monotonic(), 0
-
-    said = begun - SAID_EVERY_S
-
-    def say(text: str) -> None:
-        click.echo(f"{time.monotonic() - begun:.0f} s: {text}", err=True)
-
-    def say_sometimes(text: str) -> None:
-        nonlocal said
-        if time.monotonic() - said >= SAID_EVERY_S:
-            said = time.monotonic()
-            say(text)
-
+    say = _timed_lines()
     try:
-        with progress(say_sometimes) as show, executor_for(workers) as executor:
+        with progress(_at_intervals(say)) as show, executor_for(workers) as executor:
             show("rehearsing every condition")
             protocol = load("rek2024")
             studied = plan(protocol, condition_features(protocol, seed=seed))
@@ -603,7 +612,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
 @click.option(
     "--studies",
     type=click.IntRange(10, 1_000_000),
-    default=200,
+    default=100,
     show_default=True,
     help="Number of studies of 20 participants, for each protocol and seed.",
 )
@@ -624,7 +633,8 @@ def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], worke
     For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay) the command simulates and
     analyses many studies of 20 observers whose thresholds differ by a factor of 1.2; in magnitude estimation the
     exponent is known. Then it rehearses three participants with servo, files, unblinding and analysis. Every value is
-    printed with its limit. Ends with exit code 3 if a value exceeds its limit.
+    printed with its limit; the interval in brackets allows for the number of values. Ends with exit code 3 if an
+    interval lies beyond its limit.
     """
     from study_app.evidence.thresholds.known_values import NAMES, evidence, known_value
     from study_app.evidence.thresholds.known_values import validate as validate_values
@@ -635,9 +645,9 @@ def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], worke
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     make_output_folder(to)
-    begun = time.monotonic()
-    with progress() as show, executor_for(workers) as executor:
-        verdicts = validate_values(chosen, studies, seeds, executor, show)
+    begun, say = time.monotonic(), _timed_lines()
+    with progress(_at_intervals(say)) as show, executor_for(workers) as executor:
+        verdicts = validate_values(chosen, studies, seeds, executor, show, say)
     used_s = sum(os.times()[:4])  # with the workers', which have ended
     took = f"{time.monotonic() - begun:.0f} s, {used_s:.0f} s of processor time"
     heading = f"{studies} studies of each protocol and seed ({', '.join(map(str, seeds))}), in {took}"

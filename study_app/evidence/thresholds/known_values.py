@@ -15,17 +15,20 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from statistics import NormalDist
 from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
+from scipy.stats import beta
+from scipy.stats import t as student
 
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.measures import Array
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.levels.thresholds import estimate_slope, estimated_exponents, jnd_slope, thresholds
 from study_app.analysis.levels.tracks import tracks
-from study_app.analysis.planning.power_curves import interval as wilson_interval
 from study_app.analysis.statistics.outcome import student_interval
 from study_app.evidence.table import Evidence, Table, run
 from study_app.haptics.model.overrides import override_value
@@ -76,12 +79,14 @@ REHEARSED: Final = 3
 ERROR_MOST: Final = 0.05
 NEAR: Final = 0.15
 NEAR_SHARE: Final = 0.95
-OWN_COVERAGE: Final = (0.93, 0.98)
+COVERAGE_LEAST: Final = 0.93
+OWN_COVERAGE_MOST: Final = 0.98
 SLOPE_ERROR_MOST: Final = 0.15
 EXPONENT_ERROR_MOST: Final = 0.03
 DELIVERED_LEAST: Final = 0.99
-SPREADS: Final = 3
-KIND_SHARE: Final = 10
+FAMILY_ERROR: Final = 0.05
+"""Probability that chance alone takes any value beyond its limit, shared equally among all (Bonferroni)."""
+KIND_SHARE: Final = 20
 """For each kind of people there is one study to so many others."""
 
 
@@ -93,6 +98,81 @@ class Verdict(NamedTuple):
     value: str
     limit: str
     holds: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measure:
+    """A value that is judged: its limit, and the interval in which the true value lies at a confidence.
+
+    Attributes
+    ----------
+    study, what : str
+        As in `Verdict`.
+    value : float
+        The value.
+    interval : callable
+        Returns the ends of its interval from a confidence.
+    least, most : float
+        What the limit permits.
+    limit : str
+        The limit in words.
+    written : callable
+        Returns a value in words.
+    """
+
+    study: str
+    what: str
+    value: float
+    interval: Callable[[float], tuple[float, float]]
+    least: float = -math.inf
+    most: float = math.inf
+    limit: str
+    written: Callable[[float], str]
+
+    def judged(self, confidence: float) -> Verdict:
+        """Return the verdict: the limit is exceeded if the interval lies wholly beyond it."""
+        low, high = self.interval(confidence)
+        value = self.written(self.value)
+        if low < high:
+            value += f" [{self.written(low)}, {self.written(high)}]"
+        holds = low <= self.most and high >= self.least
+        return Verdict(study=self.study, what=self.what, value=value, limit=self.limit, holds=holds)
+
+
+def verdicts_on(measures: Sequence[Measure]) -> list[Verdict]:
+    """Return the verdicts: that any limit is exceeded by chance has a probability of at most `FAMILY_ERROR`."""
+    return [one.judged(1.0 - FAMILY_ERROR / len(measures)) for one in measures]
+
+
+def mean_interval(values: ArrayLike) -> Callable[[float], tuple[float, float]]:
+    """Return the interval of the mean of the values of independent studies, by Student's t."""
+    of_studies = np.asarray(values, float)
+    mean, error = float(of_studies.mean()), float(of_studies.std(ddof=1)) / math.sqrt(len(of_studies))
+
+    def ends(confidence: float) -> tuple[float, float]:
+        half = float(student.ppf((1 + confidence) / 2, len(of_studies) - 1)) * error
+        return mean - half, mean + half
+
+    return ends
+
+
+def share_interval(shares: ArrayLike, each: int) -> Callable[[float], tuple[float, float]]:
+    """Return the interval of a mean share of studies (n,), each of so many cases, which may depend on each other.
+
+    That of Clopper and Pearson for the number of independent cases whose share would vary as much (Korn & Graubard
+    1998, Survey Methodology 24, 193–201).
+    """
+    of_studies = np.asarray(shares, float)
+    share, studies = float(of_studies.mean()), len(of_studies)
+    variance = float(of_studies.var(ddof=1)) / studies
+    cases = min(share * (1 - share) / variance, studies * each) if variance else studies
+
+    def ends(confidence: float) -> tuple[float, float]:
+        tail, held = (1 - confidence) / 2, share * cases
+        low = float(beta.ppf(tail, held, cases - held + 1)) if held else 0.0
+        return low, float(beta.ppf(1 - tail, held + 1, cases - held)) if held < cases else 1.0
+
+    return ends
 
 
 class Estimated(NamedTuple):
@@ -229,42 +309,61 @@ class KnownThreshold(KnownValue):
         of_groups = [self.error([one.value for one in found.group]) for found in studies]
         return np.array(of_groups) - [self.error(of_people) for of_people in truths]
 
-    def verdicts(self, studies: Sequence[StudyFound]) -> Iterator[Verdict]:
+    def measures(self, studies: Sequence[StudyFound]) -> Iterator[Measure]:
         """Yield error and, with several standards, the slope of ln JND over ln standard."""
         errors = self.errors(studies)
-        mean = math.expm1(float(errors.mean()))
-        what = "mean error of the threshold"
-        yield Verdict(
-            study=self.name, what=what, value=f"{100 * mean:+.1f} %", limit="within ±5 %", holds=abs(mean) <= ERROR_MOST
+        yield error_measure(self.name, errors)
+        near = np.abs(np.expm1(errors)) <= NEAR
+        yield Measure(
+            study=self.name,
+            what=f"studies of {PEOPLE} within ±15 %",
+            value=float(near.mean()),
+            interval=share_interval(near, 1),
+            least=NEAR_SHARE,
+            limit="at least 95 %",
+            written=percent,
         )
-        near, n = int((np.abs(np.expm1(errors)) <= NEAR).sum()), len(studies)
-        what, limit = f"studies of {PEOPLE} within ±15 %", "at least 95 % (Wilson interval)"
-        holds = wilson_interval(near / n, n)[1] >= NEAR_SHARE
-        yield Verdict(study=self.name, what=what, value=f"{100 * near / n:.1f} %", limit=limit, holds=holds)
         standards = np.array([one for one in standards_of(self.protocol, self.block) if one is not None])
         if len(standards) < 2:
             return
         unit = standards if stimulus_of(self.protocol, self.block).level_kind == "weber" else 1.0
         slopes = [
-            jnd_slope(standards, np.array([one.value for one in person]) * unit)
+            [jnd_slope(standards, np.array([one.value for one in person]) * unit) for person in found.own]
             for found in studies
-            for person in found.own
         ]
-        slope, true = float(np.mean(slopes)), 0.0 if self._of_delay else 1.0  # a constant JND, or Weber's law
-        what, limit = "exponent of JND over standard", f"{true:g} ± {SLOPE_ERROR_MOST:g}"
-        yield Verdict(
-            study=self.name, what=what, value=f"{slope:.3f}", limit=limit, holds=abs(slope - true) <= SLOPE_ERROR_MOST
+        of_studies, true = np.mean(slopes, axis=1), 0.0 if self._of_delay else 1.0  # a constant JND, or Weber's law
+        yield Measure(
+            study=self.name,
+            what="exponent of JND over standard",
+            value=float(of_studies.mean()),
+            interval=mean_interval(of_studies),
+            least=true - SLOPE_ERROR_MOST,
+            most=true + SLOPE_ERROR_MOST,
+            limit=f"{true:g} ± {SLOPE_ERROR_MOST:g}",
+            written="{:.3f}".format,
         )
 
     def values_of(self, block: LevelBlock, rows: pd.DataFrame) -> Iterator[float]:
         return (row.threshold for row in thresholds(block, rows) if row.participant is not None)
 
-    def recovered(self, values: Sequence[float], spread: float) -> Verdict:
+    def recovered(self, values: Sequence[float], spread: float) -> Measure:
+        """Return the threshold of rehearsed people; ``spread`` is that of its logarithm over studies of as many."""
         error = self.error(values)
-        what = f"threshold of {REHEARSED} people, {'ms' if self.threshold > 1 else 'Weber fraction'}"
-        value = f"{self.threshold * math.exp(error):.3g}"
-        limit = f"{self.threshold:g} ± {SPREADS} SD ({100 * SPREADS * spread:.0f} %)"
-        return Verdict(study=self.name, what=what, value=value, limit=limit, holds=abs(error) <= SPREADS * spread)
+
+        def ends(confidence: float) -> tuple[float, float]:
+            half = normal_half(confidence) * spread
+            return self.threshold * math.exp(error - half), self.threshold * math.exp(error + half)
+
+        return Measure(
+            study=self.name,
+            what=f"threshold of {REHEARSED} people, {'ms' if self.threshold > 1 else 'Weber fraction'}",
+            value=self.threshold * math.exp(error),
+            interval=ends,
+            least=self.threshold,
+            most=self.threshold,
+            limit=f"{self.threshold:g}",
+            written="{:.3g}".format,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -302,26 +401,35 @@ class KnownExponent(KnownValue):
         each = tuple((Estimated(one, truth=truth),) for one, truth in zip(own.tolist(), truths, strict=True))
         return StudyFound((Estimated(value=float(own.mean()), low=low, high=high, truth=EXPONENT),), each)
 
-    def verdicts(self, studies: Sequence[StudyFound]) -> Iterator[Verdict]:
-        mean = float(np.mean([found.group[0].value for found in studies]))
-        what = f"exponent over {stimulus_of(self.protocol, self.block).vary}"
-        limit = f"{EXPONENT:g} ± {EXPONENT_ERROR_MOST:g}"
-        yield Verdict(
+    def measures(self, studies: Sequence[StudyFound]) -> Iterator[Measure]:
+        """Yield the mean exponent."""
+        of_studies = [found.group[0].value for found in studies]
+        yield Measure(
             study=self.name,
-            what=what,
-            value=f"{mean:.3f}",
-            limit=limit,
-            holds=abs(mean - EXPONENT) <= EXPONENT_ERROR_MOST,
+            what=f"exponent over {stimulus_of(self.protocol, self.block).vary}",
+            value=float(np.mean(of_studies)),
+            interval=mean_interval(of_studies),
+            least=EXPONENT - EXPONENT_ERROR_MOST,
+            most=EXPONENT + EXPONENT_ERROR_MOST,
+            limit=f"{EXPONENT:g} ± {EXPONENT_ERROR_MOST:g}",
+            written="{:.3f}".format,
         )
 
     def values_of(self, block: LevelBlock, rows: pd.DataFrame) -> Iterator[float]:
         return (found.exponent for found in estimated_exponents(block, rows) if found.participant is not None)
 
-    def recovered(self, values: Sequence[float], spread: float) -> Verdict:
+    def recovered(self, values: Sequence[float], spread: float) -> Measure:
+        """Return the mean exponent of rehearsed people; ``spread`` is that over studies of as many."""
         mean = float(np.mean(values))
-        what, limit = f"exponent of {len(values)} people", f"{EXPONENT:g} ± {SPREADS} SD ({SPREADS * spread:.3f})"
-        return Verdict(
-            study=self.name, what=what, value=f"{mean:.3f}", limit=limit, holds=abs(mean - EXPONENT) <= SPREADS * spread
+        return Measure(
+            study=self.name,
+            what=f"exponent of {len(values)} people",
+            value=mean,
+            interval=lambda sure: (mean - normal_half(sure) * spread, mean + normal_half(sure) * spread),
+            least=EXPONENT,
+            most=EXPONENT,
+            limit=f"{EXPONENT:g}",
+            written="{:.3f}".format,
         )
 
 
@@ -384,42 +492,72 @@ def rehearsed(one: Known, source: bytes, seed: int) -> Rehearsed:
         return Rehearsed(float(intervals["invalid_reasons"].isna().mean()), findings, values)
 
 
-def coverage(name: str, studies: Sequence[StudyFound], *, few: bool = False) -> Iterator[Verdict]:
-    """Yield whether 95 % intervals hold the truth: the group's in 95 % of studies but for chance, and participants'.
-
-    Of ``few`` studies participants' intervals are judged but for chance, too.
-    """
-    groups = [one.covered for found in studies for one in found.group]
-    share, slack = float(np.mean(groups)), 3 * math.sqrt(0.95 * 0.05 / len(studies))
-    limit, what = f"95 ± {100 * slack:.1f} %", "coverage of the group's 95 % intervals"
-    yield Verdict(study=name, what=what, value=f"{100 * share:.1f} %", limit=limit, holds=abs(share - 0.95) <= slack)
-    own = [one.covered for found in studies for person in found.own for one in person if not math.isnan(one.low)]
-    if own:
-        (low, high), share = OWN_COVERAGE, float(np.mean(own))
-        what, limit = "coverage of participants' 95 % intervals", f"{100 * low:.0f} to {100 * high:.0f} %"
-        if few:
-            least, most = wilson_interval(share, len(own))
-            value = f"{100 * share:.1f} % [{100 * least:.1f}, {100 * most:.1f}]"
-            yield Verdict(
-                study=name, what=what, value=value, limit=f"reaches {limit}", holds=least <= high and most >= low
-            )
-        else:
-            yield Verdict(study=name, what=what, value=f"{100 * share:.1f} %", limit=limit, holds=low <= share <= high)
+def percent(share: float) -> str:
+    """Return a share in percent."""
+    return f"{100 * share:.1f} %"
 
 
-def judged(one: Known, found: Rehearsed, spread: float) -> Iterator[Verdict]:
-    """Yield the verdicts on rehearsed participants; ``spread`` is that of studies of as many."""
-    share, findings = found.delivered, found.findings
-    what = "intervals delivered as requested"
-    yield Verdict(
-        study=one.name, what=what, value=f"{100 * share:.2f} %", limit="at least 99 %", holds=share >= DELIVERED_LEAST
+def normal_half(confidence: float) -> float:
+    """Return half the interval of a normal distribution [standard deviations]."""
+    return NormalDist().inv_cdf((1 + confidence) / 2)
+
+
+def error_measure(study: str, errors: Array) -> Measure:
+    """Return the mean error of thresholds from errors of their logarithm in each study."""
+    ends = mean_interval(errors)
+    return Measure(
+        study=study,
+        what="mean error of the threshold",
+        value=math.expm1(float(errors.mean())),
+        interval=lambda sure: (math.expm1(ends(sure)[0]), math.expm1(ends(sure)[1])),
+        least=-ERROR_MOST,
+        most=ERROR_MOST,
+        limit="within ±5 %",
+        written=lambda share: f"{100 * share:+.1f} %",
     )
-    yield Verdict(
+
+
+def coverage(name: str, studies: Sequence[StudyFound]) -> Iterator[Measure]:
+    """Yield in how many cases the 95 % intervals of groups and of participants hold the truth."""
+    of_groups = [[one.covered for one in found.group] for found in studies]
+    of_people = [
+        [one.covered for person in found.own for one in person if not math.isnan(one.low)] for found in studies
+    ]
+    for whose, covered, most in (("the group's", of_groups, 1.0), ("participants'", of_people, OWN_COVERAGE_MOST)):
+        shares = [float(np.mean(of_study)) for of_study in covered if of_study]
+        if not shares:
+            continue
+        yield Measure(
+            study=name,
+            what=f"coverage of {whose} 95 % intervals",
+            value=float(np.mean(shares)),
+            interval=share_interval(shares, max(map(len, covered))),
+            least=COVERAGE_LEAST,
+            most=most,
+            limit="at least 93 %" if most == 1.0 else f"93 to {100 * most:.0f} %",
+            written=percent,
+        )
+
+
+def rehearsed_measures(one: Known, found: Rehearsed, spread: float) -> Iterator[Measure]:
+    """Yield what rehearsed participants show; ``spread`` is that of studies of as many."""
+    yield Measure(
+        study=one.name,
+        what="intervals delivered as requested",
+        value=found.delivered,
+        interval=lambda _confidence: (found.delivered, found.delivered),
+        least=DELIVERED_LEAST,
+        limit="at least 99 %",
+        written=percent,
+    )
+    yield Measure(
         study=one.name,
         what="findings of verify, reproduce and replay",
-        value=str(findings),
+        value=found.findings,
+        interval=lambda _confidence: (found.findings, found.findings),
+        most=0,
         limit="0",
-        holds=findings == 0,
+        written=str,
     )
     yield one.recovered(found.values, spread)
 
@@ -430,12 +568,14 @@ def validate(
     seeds: Sequence[int],
     executor: Executor,
     progress: Callable[[str, float | None], object],
+    say: Callable[[str], object] = lambda _text: None,
 ) -> list[Verdict]:
     """Return all verdicts on known values, each with the source of its protocol; studies of all seeds count together.
 
-    Sessions are rehearsed with the first seed. ``progress`` is called with what is done, and the share of it.
+    Sessions are rehearsed with the first seed. ``progress`` is called with what is done, and the share of it; ``say``
+    with a line for each study and each kind of people when it is finished.
     """
-    verdicts: list[Verdict] = []
+    measures: list[Measure] = []
     every: list[StudyFound] = []
     rehearsals = [executor.submit(rehearsed, one, source, seeds[0]) for source, one in known]
     cases = [(number, seed) for seed in dict.fromkeys(seeds) for number in range(studies)]
@@ -444,29 +584,23 @@ def validate(
         def counted(done: int, name: str = one.name) -> None:
             progress(f"{name}: {done} of {len(cases)} studies", done / len(cases))
 
+        counted(0)
         found = run(one.simulate, cases, executor, counted)
         every += found
-        verdicts += [*one.verdicts(found), *coverage(one.name, found)]
+        measures += [*one.measures(found), *coverage(one.name, found)]
         progress(f"{one.name}: rehearsing {REHEARSED} participants", None)
-        verdicts += judged(one, rehearsal.result(), one.spread(found, REHEARSED))
-    verdicts += coverage("all of them", every)
+        measures += rehearsed_measures(one, rehearsal.result(), one.spread(found, REHEARSED))
+        say(f"{one.name}: {len(cases)} studies and {REHEARSED} rehearsed participants")
+    measures += coverage("all of them", every)
     of_thresholds = [one for _, one in known if isinstance(one, KnownThreshold)]
     cases = cases[:: max(1, min(KIND_SHARE, len(cases) // 2))]
     for kind in (*KINDS, MIXED) if of_thresholds else ():
         progress(f"people: {kind}", None)
         found_of = [run(one.simulate, [(*it, kind) for it in cases], executor) for one in of_thresholds]
         errors = np.concatenate([one.errors(found) for one, found in zip(of_thresholds, found_of, strict=True)])
-        verdicts += [_of_kind(kind, errors), *coverage(kind, [one for found in found_of for one in found], few=True)]
-    return verdicts
-
-
-def _of_kind(kind: str, errors: Array) -> Verdict:
-    """Return whether the mean error of thresholds of one kind of people is within its limit, but for chance."""
-    mean, chance = float(errors.mean()), 2 * float(errors.std(ddof=1)) / math.sqrt(len(errors))
-    low, high = (100 * math.expm1(mean + end) for end in (-chance, chance))
-    holds = abs(mean) - chance <= math.log1p(ERROR_MOST)
-    value = f"{100 * math.expm1(mean):+.1f} % [{low:+.1f}, {high:+.1f}]"
-    return Verdict(study=kind, what="mean error of the threshold", value=value, limit="reaches ±5 %", holds=holds)
+        measures += [error_measure(kind, errors), *coverage(kind, [one for found in found_of for one in found])]
+        say(f"people, {kind}: {len(errors)} studies")
+    return verdicts_on(measures)
 
 
 def evidence(verdicts: Sequence[Verdict], heading: str) -> Evidence:

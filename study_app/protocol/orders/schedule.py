@@ -27,6 +27,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TypeAlias
 
 from study_app.protocol.blocks import Phase
@@ -98,7 +99,7 @@ class FormStep:
 Step: TypeAlias = PageStep | FormStep | Trial
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Schedule:
     """The steps of one participant's session, in order."""
 
@@ -106,7 +107,7 @@ class Schedule:
     seed: int
     steps: tuple[Step, ...]
 
-    @property
+    @cached_property  # each trial of a track asks for them
     def trials(self) -> tuple[Trial, ...]:
         """The trials alone, in order."""
         return tuple(step for step in self.steps if isinstance(step, Trial))

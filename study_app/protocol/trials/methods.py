@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -422,8 +423,8 @@ class QuestPlus(Adaptive):
     def ended(self, track: TrackSetting, heard: Sequence[TrialResult]) -> bool:
         if self.stop is None or sum(not result.noise for result in heard) < self.stop.after:
             return False
-        search, counts = self._search(track), self._counts(track, heard)
-        interval = fit(search.levels, *counts, search.grid).interval
+        search = self._search(track)
+        interval = fit(search.levels, *_counts(track.stimulus, search.levels, heard), search.grid).interval
         return ratio_in_u(track.stimulus, *interval) <= self.stop.ratio
 
     def after(self, track: TrackSetting, heard: Sequence[TrialResult]) -> float:
@@ -431,7 +432,8 @@ class QuestPlus(Adaptive):
         levels = _levels(track)
         if all(result.noise for result in heard) and (first := self.first(track.number)) is not None:
             return levels[_nearest(_coordinates(track), track.stimulus.coordinate(first))]
-        return levels[self._search(track).next(*self._counts(track, heard))]
+        search = self._search(track)
+        return levels[search.next(*_counts(track.stimulus, search.levels, heard))]
 
     def simulated(self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None) -> Answers:
         """Return the tracks of simulated observers; a track ends early only if levels have logarithms."""
@@ -453,12 +455,15 @@ class QuestPlus(Adaptive):
         grid = running_grid(stimulus, design, self.assumed(stimulus, design), self.lapses)
         return Search(grid, _coordinates(track), self.learn, design.has_noise)
 
-    def _counts(self, track: TrackSetting, heard: Sequence[TrialResult]) -> tuple[list[int], list[int]]:
-        coordinates = _coordinates(track)
-        counts = ([0] * len(coordinates), [0] * len(coordinates))
-        for (level, success), number in Counter((answer.level, bool(answer.success)) for answer in heard).items():
-            counts[0 if success else 1][_nearest(coordinates, track.stimulus.coordinate(level))] += number
-        return counts
+
+def _counts(
+    stimulus: Stimulus, coordinates: Sequence[float], heard: Sequence[TrialResult]
+) -> tuple[list[int], list[int]]:
+    """Return the numbers of successes and failures at each of the levels."""
+    counts = ([0] * len(coordinates), [0] * len(coordinates))
+    for (level, success), number in Counter((answer.level, bool(answer.success)) for answer in heard).items():
+        counts[0 if success else 1][_nearest(coordinates, stimulus.coordinate(level))] += number
+    return counts
 
 
 def _levels(track: TrackSetting) -> tuple[float, ...]:
@@ -472,9 +477,10 @@ def _coordinates(track: TrackSetting) -> tuple[float, ...]:
 
 def _nearest(coordinates: Sequence[float], u: float) -> int:
     """Return the index of the coordinate nearest to ``u``, the lower of two."""
-    if u == coordinates[0]:
-        return 0  # also −∞, that of noise trials
-    return min(range(len(coordinates)), key=lambda index: abs(coordinates[index] - u))
+    above = bisect_left(coordinates, u)
+    if above in (0, len(coordinates)):
+        return min(above, len(coordinates) - 1)  # the first is −∞ where there are noise trials
+    return above - (u - coordinates[above - 1] <= coordinates[above] - u)
 
 
 class Reversals(Table):
