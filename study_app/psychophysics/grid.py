@@ -26,6 +26,11 @@ FREE_GUESSES: Final[Values] = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3)
 """Guess rates if the answers to noise trials determine it."""
 
 
+OUTER_SHARE: Final = 0.05
+OPEN_MASS: Final = 0.005
+"""An end of an interval is open where more of the posterior lies in the outer share of the grid. [choice]"""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Grid:
     """The cells of a posterior, and their prior.
@@ -116,9 +121,9 @@ class Posterior:
         """The weight of each threshold."""
         return np.asarray(np.einsum("abcd->a", self.weights), float)
 
-    def with_widths(self, prior: NDArray[np.float64]) -> Posterior:
-        """Return the posterior under a prior on the widths, (widths,), from this one, under a flat one."""
-        weights = self.weights * prior[:, None, None]
+    def reweighted(self, factors: NDArray[np.float64]) -> Posterior:
+        """Return the posterior whose prior differs from this one's by ``factors`` (widths, lapses)."""
+        weights = self.weights * factors[:, :, None]
         return Posterior(self.grid, weights / weights.sum())
 
     def quantile(self, share: float) -> float:
@@ -136,6 +141,12 @@ class Posterior:
         middle, own = self.threshold, Z_95 * self.session_sd
         below, above = (math.hypot(self.quantile(share) - middle, own) for share in (0.025, 0.975))
         return middle - below, middle + above
+
+    @property
+    def open_ends(self) -> tuple[bool, bool]:
+        """Whether the lower and the upper end of the interval are unknown: the threshold may lie beyond the grid."""
+        outer = max(1, round(OUTER_SHARE * len(self.marginal)))
+        return bool(self.marginal[:outer].sum() > OPEN_MASS), bool(self.marginal[-outer:].sum() > OPEN_MASS)
 
     @cached_property
     def session_sd(self) -> float:
@@ -216,19 +227,67 @@ def tables(grid: Grid, levels: Values) -> tuple[NDArray[np.float64], ...]:
     return psi, np.log(psi), np.log1p(-psi)
 
 
-ALIKE: Final = 1 / 3
+ALIKE: Final = 0.6
 """Of the standard deviation of log widths so much is between people of one group; the rest is shared. [choice]"""
 APART: Final = (0.05, 0.1, 0.2)
 """Standard deviations of the thresholds of people of one group [range of thresholds]. [choice]"""
+MEAN_LAPSE: Final = 0.05
+"""The mean lapse rates of groups are exponentially distributed with this mean. [choice]"""
+NEAR_MODE: Final = 2
+"""Estimates of several people weight what they share by this power of its posterior: a lapse rate is not below zero,
+so that the mean is too high if few answers are lapses, and thresholds would be too low. [choice]"""
+GROUP_LAPSES: Final = (0.002, 0.01, 0.02, 0.03, 0.045, 0.065, 0.09, 0.12)
+"""The mean lapse rates of a group; each person's is about it as `lapse_weights` has it."""
 
 
-def group_widths(flat: Sequence[Posterior], width_prior: tuple[float, float]) -> tuple[NDArray[np.float64], float]:
-    """Return the prior on each person's width, (people, widths), that follows from the answers of the others.
+def lapse_weights(lapses: Values, mean: float) -> NDArray[np.float64]:
+    """Return the prior weight of each lapse rate of a person in a group of this mean: Erlang's distribution of order 2.
 
-    Followed by the variance [u²] of the mean of the people's thresholds that is due to the width that they share.
+    ``lapses`` are ascending; each stands for those that are nearer to it than to the others.
+    """
+    edges = 2 / mean * np.array([0.0, *(np.array(lapses[1:]) + lapses[:-1]) / 2, np.inf])
+    beyond = np.append((1 + edges[:-1]) * np.exp(-edges[:-1]), 0.0)
+    return np.asarray(-np.diff(beyond), float)
 
-    Widths of a group are log-normal about a centre, which is log-normal itself; thresholds are normal about a mean, all
-    means being equally likely. One person has `width_prior`, but for its share beyond the grid.
+
+def group_lapse_weights() -> NDArray[np.float64]:
+    """Return the prior weight of each of `GROUP_LAPSES`, which stand for the rates that are nearest to them."""
+    edges = np.array([0.0, *(np.array(GROUP_LAPSES[1:]) + GROUP_LAPSES[:-1]) / 2, np.inf])
+    return np.asarray(-np.diff(np.exp(-edges / MEAN_LAPSE)), float)
+
+
+def lapse_prior(lapses: Values) -> Values:
+    """Return the prior weight of each lapse rate of a person of whose group nothing is known."""
+    of_means = [lapse_weights(lapses, mean) for mean in GROUP_LAPSES]
+    return tuple((group_lapse_weights() @ np.array(of_means)).tolist())
+
+
+class GroupPriors(NamedTuple):
+    """What the answers of a group say about each of its people.
+
+    Attributes
+    ----------
+    factors : (people, widths, lapses) array
+        The prior of width and lapse rate that follows from the answers of the others, over that of their grid.
+    variance : float
+        Mean square error of the mean of the people's thresholds that is due to what they share [u²].
+    below, above : float
+        How far the 95 % interval of this error extends below and above [u].
+    """
+
+    factors: NDArray[np.float64]
+    variance: float
+    below: float
+    above: float
+
+
+def group_priors(flat: Sequence[Posterior], width_prior: tuple[float, float]) -> GroupPriors:
+    """Return the prior of each person's width and lapse rate that follows from the answers of the others.
+
+    Widths of a group are log-normal about a centre, which is log-normal itself; lapse rates are about a mean, which is
+    exponential; thresholds are normal about a mean, all means being equally likely. Answers near a threshold say little
+    about a person's lapse rate, which moves the threshold: the answers of all say more, and what they leave open is an
+    error that all share. One person has `width_prior` and `lapse_prior`, but for their share beyond the grid.
 
     Parameters
     ----------
@@ -240,24 +299,37 @@ def group_widths(flat: Sequence[Posterior], width_prior: tuple[float, float]) ->
     grid = flat[0].grid
     thresholds, widths = np.array(grid.thresholds), np.log(grid.widths)
     median, log_factor = math.log(width_prior[0]), math.log(width_prior[1])
-    own = np.exp(-0.5 * ((widths - widths[:, None]) / (ALIKE * log_factor)) ** 2)  # (centres, widths)
-    own /= own.sum(axis=1, keepdims=True)
+    of_width = np.exp(-0.5 * ((widths - widths[:, None]) / (ALIKE * log_factor)) ** 2)  # (centres, widths)
+    of_width /= of_width.sum(axis=1, keepdims=True)
+    of_lapse = np.array([lapse_weights(grid.lapses, mean) for mean in GROUP_LAPSES]) / grid.lapse_prior
     log_centres = -0.5 * ((widths - median) / log_factor) ** 2 / (1.0 - ALIKE**2)
+    log_shared = (log_centres[:, None] + np.log(group_lapse_weights())).ravel()  # (centres × means of lapses)
     apart = np.array(APART)[:, None, None] * np.ptp(thresholds)
     about = np.exp(-0.5 * ((thresholds - thresholds[::2, None]) / apart) ** 2).reshape(-1, len(thresholds))
     about /= about.sum(axis=1, keepdims=True)  # (means and spreads, thresholds)
-    joint = np.array([np.einsum("abcd->ab", one.weights) for one in flat])
-    evidence = np.einsum("pmw,cw->pmc", np.einsum("ma,paw->pmw", about, joint), own)
-    evidence = np.log(np.maximum(evidence, 1e-300))
-    of_others = log_centres + evidence.sum(axis=0) - evidence
+    joint = np.array([np.einsum("abcd->abc", one.weights) for one in flat])
+    given_shared = np.einsum("cw,pawl->pacl", of_width, joint)
+    given_shared = np.einsum("kl,pacl->pack", of_lapse, given_shared).reshape(*joint.shape[:2], -1)
+    evidence = np.log(np.maximum(np.einsum("ma,pas->pms", about, given_shared), 1e-300))
+    of_others = log_shared + evidence.sum(axis=0) - evidence
     weights = np.exp(of_others - of_others.max(axis=(1, 2), keepdims=True)).sum(axis=1)
-    priors = np.asarray(weights / weights.sum(axis=1, keepdims=True) @ own, float)
-    of_all = log_centres + evidence.sum(axis=0)
-    centres = np.exp(of_all - of_all.max()).sum(axis=0)
-    centres /= centres.sum()
-    masses = np.einsum("paw,cw->pac", joint, own)
-    means = (np.einsum("pac,a->pc", masses, thresholds) / masses.sum(axis=1)).mean(axis=0)
-    return priors, float(centres @ (means - centres @ means) ** 2)
+    weights **= NEAR_MODE if len(flat) > 1 else 1
+    weights = (weights / weights.sum(axis=1, keepdims=True)).reshape(len(flat), len(widths), -1)
+    factors = np.einsum("pck,cw,kl->pwl", weights, of_width, of_lapse)
+    of_all = log_shared + evidence.sum(axis=0)
+    shared = np.exp(of_all - of_all.max()).sum(axis=0)
+    shared /= shared.sum()
+    means = (np.einsum("pas,a->ps", given_shared, thresholds) / given_shared.sum(axis=1)).mean(axis=0)
+    errors = means - np.average(means, weights=shared**NEAR_MODE)
+    order = np.argsort(errors)
+    places = np.cumsum(shared[order]) - shared[order] / 2
+    low, high = np.interp((0.025, 0.975), places, errors[order])
+    return GroupPriors(
+        factors=np.asarray(factors, float),
+        variance=float(shared @ errors**2),
+        below=max(0.0, -float(low)),
+        above=max(0.0, float(high)),
+    )
 
 
 def _median(values: Values, weights: NDArray[np.float64]) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Final, Literal, NamedTuple
 
@@ -112,7 +112,8 @@ _COVERED: Final = 0.95
 class Estimates(NamedTuple):
     """Thresholds of many observers, (observers,) arrays [u]: medians, ends of 95 % intervals, variances.
 
-    ``shared``, (groups,), is the variance of a group's mean that is due to the width that its people share.
+    ``shared``, (groups,), is the variance of a group's mean that is due to the width and the lapse rate that its people
+    share.
     """
 
     medians: Floats
@@ -136,21 +137,22 @@ class Expected:
         Number of standards in the group's mean.
     halves : mapping of str to sequence of float
         Half the 95 % intervals of participants, in u, for each kind of people; infinite if nothing is measured.
-    spread : float
-        Standard deviation of the estimate's error, in u; infinite if nothing is measured.
+    spreads : mapping of str to float
+        Standard deviation of the estimate's error, in u, for each kind of people; infinite if nothing is measured.
     threshold : float
         Approximate threshold, as a level; or the assumed d′, d_a or exponent.
-    shared : float
-        Variance of a group's mean at one standard that is due to the width that its people share, times their number.
+    shared : mapping of str to float
+        For each kind the variance of a group's mean that is due to the width and the lapse rate that its people share,
+        times their number: that of 20 is about half that of 10.
     """
 
     spacing: Literal["log", "linear"]
     trials: int
     standards: int
     halves: Mapping[str, Sequence[float]]
-    spread: float
+    spreads: Mapping[str, float]
     threshold: float
-    shared: float = 0.0
+    shared: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def measured(self) -> bool:
@@ -163,27 +165,39 @@ class Expected:
         return float(np.median(np.concatenate([*self.halves.values()])))
 
     @property
+    def spread(self) -> float:
+        """The median of `spreads`."""
+        return float(np.median([*self.spreads.values()]))
+
+    @property
     def worst(self) -> tuple[str, float]:
         """The kind of people with the widest interval, and the median of half of it."""
         return max(((kind, float(np.median(one))) for kind, one in self.halves.items()), key=lambda one: one[1])
 
     def of_group(self, participants: int, trials: float | None = None) -> float:
-        """Return half the 95 % interval of a group's mean over all standards, as a share of the mean.
+        """Return half the 95 % interval of a group's mean over all standards, as a share of the mean: median of kinds.
 
         Parameters
         ----------
         participants : int
             Their number; the result is infinite below two.
         trials : float, optional
-            Of each standard; variances of errors are taken to be inversely proportional to their number.
+            Of each standard; variances of errors are taken to be inversely proportional to their number. What people
+            share is an error that the standards have in common.
         """
         if participants < 2:
             return math.inf
         log = self.spacing == "log"
         between = math.log10(BETWEEN_PEOPLE) if log else self.threshold * math.log(BETWEEN_PEOPLE)
-        fewer = self.trials / (trials or self.trials) / self.standards
-        half = student_975(participants - 1) * math.sqrt(self.spread**2 * fewer + between**2)
-        half = math.hypot(half, Z_95 * math.sqrt(self.shared * fewer)) / math.sqrt(participants)
+        fewer, t = self.trials / (trials or self.trials), student_975(participants - 1)
+        halves = [
+            math.hypot(
+                t * math.sqrt(spread**2 * fewer / self.standards + between**2),
+                Z_95 * math.sqrt(self.shared.get(kind, 0.0) * fewer),
+            )
+            for kind, spread in self.spreads.items()
+        ]
+        half = float(np.median(halves)) / math.sqrt(participants)
         return 10.0**half - 1.0 if log else half / self.threshold
 
     def participants_for(self, precision: float, most: int = 1000) -> int | None:

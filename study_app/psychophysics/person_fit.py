@@ -8,6 +8,7 @@ them.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from typing import Final, NamedTuple
@@ -18,16 +19,21 @@ from numpy.typing import ArrayLike, NDArray
 from study_app.psychophysics.families import CLIP, Floats, normal_cdf, success
 from study_app.psychophysics.grid import Grid, Posterior, Values, log_likelihood, posterior, tables
 
-PREFERENCE_SD: Final = 1.0
+PREFERENCE_SD: Final = 0.4
 """Standard deviation of preferences between people [SD of the decision]. [choice]"""
 CHANGE_PRIOR: Final = 1.5
 """Factor by which a threshold changes from the first trial to the last (one standard deviation). [choice]"""
 BEYOND_CHANCE: Final = 2.0
-"""A preference, and a change that is named, is one from so many standard errors on."""
+"""A change that is named is one from so many standard errors on."""
 PREFERENCE_STEP: Final = 0.1
 """Preferences are rounded to so much [SD of the decision], so that people have tables in common."""
 PASSES: Final = 2
 """Fits after which preferences are estimated: the first threshold is too high."""
+CHANGES: Final = np.linspace(-2.5, 2.5, 9)
+CHANGE_WEIGHTS: Final = np.exp(-0.5 * CHANGES**2)
+"""The changes over which a posterior is a mean [SD of the prior], and the prior weight of each."""
+EARLY_TRIALS: Final = 15.0
+"""Practice is taken to fade to 1/e in so many trials. [choice]"""
 NEWTON_STEPS: Final = 10
 STEP: Final = 0.01
 """By so many widths a threshold is moved to differentiate the function."""
@@ -81,13 +87,14 @@ class Given(NamedTuple):
                 break
             shifts, parts = moved, _likelihoods(self, moved, grid)
             found = posterior(grid, np.add.reduce([*parts.values()]))
-        score, information = change_score(self, found, shifts)
+        score, information = _time_score(self, found, shifts, self.done)
         decade = 1.0 if grid.log else abs(found.threshold) * math.log(10)
-        change = score / (information + (math.log10(CHANGE_PRIOR) * decade) ** -2) if decade else 0.0
-        named, (constant, share) = score**2 > BEYOND_CHANCE**2 * information, grid.session_sd
+        sd, named = math.log10(CHANGE_PRIOR) * decade, score**2 > BEYOND_CHANCE**2 * information
+        change = score / (information + sd**-2) if sd else 0.0
+        constant, share = grid.session_sd
         if named:
             grid = replace(grid, session_sd=(math.hypot(constant, change / math.sqrt(12)), share))
-        return PersonFit(self, shifts, change, named, _posterior(parts, change, grid))
+        return PersonFit(self, shifts, change, named, _posterior(parts, sd * CHANGES, grid, CHANGE_WEIGHTS))
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,8 +129,10 @@ class PersonFit:
 
     def after(self, n: int) -> Posterior:
         """Return what the first n answers say, where preferences and change are those of all, as ``flat``."""
+        if n == len(self.shifts):
+            return self.flat
         grid = self.flat.grid
-        return _posterior(_likelihoods(self.given.first(n), self.shifts[:n], grid), self.change, grid)
+        return _posterior(_likelihoods(self.given.first(n), self.shifts[:n], grid), np.array([self.change]), grid)
 
 
 def _likelihoods(given: Given, shifts: Floats, grid: Grid) -> dict[float, NDArray[np.float64]]:
@@ -138,12 +147,20 @@ def _likelihoods(given: Given, shifts: Floats, grid: Grid) -> dict[float, NDArra
     return found
 
 
-def _posterior(parts: dict[float, NDArray[np.float64]], change: float, grid: Grid) -> Posterior:
-    """Return the posterior of the threshold in the middle, if that of either half is the mean in it."""
-    cells = change / 4 / (grid.thresholds[1] - grid.thresholds[0])
+def _posterior(
+    parts: dict[float, NDArray[np.float64]], changes: Floats, grid: Grid, weights: ArrayLike = 1.0
+) -> Posterior:
+    """Return the posterior of the threshold in the middle, where that of either half is the mean in it.
+
+    It is a mean over ``changes`` of the threshold from the first trial to the last [u], with prior ``weights``.
+    """
+    cells = changes / 4 / (grid.thresholds[1] - grid.thresholds[0])
     flat = replace(grid, width_prior=None)
-    whole = np.add.reduce([_further(likelihood, half * cells) for half, likelihood in parts.items()])
-    return replace(posterior(flat, whole), grid=grid)
+    logarithms = [
+        np.log(weight) + np.add.reduce([_further(likelihood, half * moved) for half, likelihood in parts.items()])
+        for moved, weight in zip(cells, np.broadcast_to(weights, cells.shape), strict=True)
+    ]
+    return replace(posterior(flat, np.logaddexp.reduce(logarithms)), grid=grid)
 
 
 def _further(values: NDArray[np.float64], cells: float) -> NDArray[np.float64]:
@@ -155,8 +172,8 @@ def _further(values: NDArray[np.float64], cells: float) -> NDArray[np.float64]:
     return np.asarray(values[low] * (1.0 - share) + values[low + 1] * share, float)
 
 
-def change_score(given: Given, found: Posterior, shifts: Floats) -> tuple[float, float]:
-    """Return score and information, at none, of a change of the threshold from first to last trial [1/u, 1/u²].
+def _time_score(given: Given, found: Posterior, shifts: Floats, course: Floats) -> tuple[float, float]:
+    """Return score and information, at none, of a threshold that changes as ``course`` (n,) does [1/u, 1/u²].
 
     ``found`` is of these answers, as if the threshold were constant, ``shifts`` (n,) are of the decisions [SD].
     """
@@ -169,8 +186,22 @@ def change_score(given: Given, found: Posterior, shifts: Floats) -> tuple[float,
     information = slope**2 / (psi * (1.0 - psi))
     if not information.any():
         return 0.0, 0.0
-    time = given.done - np.average(given.done, weights=information)
-    return float((slope * (y - psi) / (psi * (1.0 - psi)) * time).sum()), float((information * time**2).sum())
+    course = course - np.average(course, weights=information)
+    return float((slope * (y - psi) / (psi * (1.0 - psi)) * course).sum()), float((information * course**2).sum())
+
+
+def early_change(fits: Sequence[tuple[PersonFit, Posterior]]) -> float | None:
+    """Return by how many standard errors the thresholds of a group rise after the first trials; None: not known.
+
+    The time course fades exponentially over `EARLY_TRIALS`, as practice does; scores and information of all, each with
+    the posterior of the person, are summed.
+    """
+    scores = [
+        _time_score(fit.given, found, fit.shifts, -np.exp(-np.arange(len(fit.shifts)) / EARLY_TRIALS))
+        for fit, found in fits
+    ]
+    score, information = np.sum(scores, axis=0)
+    return float(score / math.sqrt(information)) if information else None
 
 
 @cache
@@ -191,20 +222,19 @@ def preferences(given: Given, found: Posterior) -> Floats:
     """Return how far preferences move each decision between two intervals towards the correct one (n,) [SD].
 
     A probit regression of the answers, with what the levels contribute fixed, has the preference for the first interval
-    and that for the answer before as coefficients; those within `BEYOND_CHANCE` standard errors count as none.
-    ``found`` is the posterior of these answers.
+    and that for the answer before as coefficients, with a normal prior: removing preferences that are chance would make
+    thresholds too low. ``found`` is the posterior of these answers.
     """
     (z, of_z), first, lapse = _normal_table(), given.towards, found.others.lapse
     unbiased = ((found.success(given.levels) - lapse) / (1.0 - 2.0 * lapse))[given.places]
     sensed, said = first * np.interp(np.clip(unbiased, 0.5, 0.999), of_z, z), np.where(given.successes, first, -first)
-    causes, weights = np.column_stack([np.abs(first), given.before]), np.zeros(2)
+    both = np.abs(first) if np.ptp(first) else np.zeros(len(first))  # one order alone does not show which is preferred
+    causes, weights = np.column_stack([both, given.before]), np.zeros(2)
     for _ in range(NEWTON_STEPS):
         agreed = said * (sensed + causes @ weights)
         hazard = np.exp(-0.5 * agreed**2) / (math.sqrt(2 * math.pi) * np.interp(agreed, z, of_z))
         information = (causes.T * (hazard * (hazard + agreed))) @ causes + np.eye(2) / PREFERENCE_SD**2
         weights += np.linalg.solve(information, causes.T @ (said * hazard) - weights / PREFERENCE_SD**2)
-    errors = np.sqrt(np.diag(np.linalg.inv(information)))
-    weights = np.where(np.abs(weights) > BEYOND_CHANCE * errors, weights, 0.0)
     return np.asarray(first * np.round(causes @ weights / PREFERENCE_STEP) * PREFERENCE_STEP + 0.0, float)
 
 

@@ -173,14 +173,12 @@ def log10_of(percent):
     ("participants", "trials", "percent"), [(10, 60, 27), (20, 60, 17), (20, 100, 15)]
 )  # thresholds of people who differ by a factor of 1.2, with a standard deviation of 28 % at 60 trials
 def test_a_groups_interval_is_students_over_errors_and_people(participants, trials, percent):
-    one = Expected(
-        spacing="log", trials=60, standards=1, halves=log10_of(90), spread=0.28 / math.log(10), threshold=0.2
-    )
+    one = Expected(spacing="log", trials=60, standards=1, halves={}, spreads={"": 0.28 / math.log(10)}, threshold=0.2)
     assert 100 * one.of_group(participants, trials) == pytest.approx(percent, abs=1.5)
 
 
 def test_the_fewest_participants_and_trials_for_a_precision():
-    one = Expected(spacing="log", trials=20, standards=1, halves=(0.5,), spread=0.2, threshold=0.2)
+    one = Expected(spacing="log", trials=20, standards=1, halves={}, spreads={"": 0.2}, threshold=0.2)
     people = one.participants_for(0.15)
     assert one.of_group(people) <= 0.15 < one.of_group(people - 1)
     trials = one.trials_for(0.15, 20)

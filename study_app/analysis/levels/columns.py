@@ -140,6 +140,12 @@ THRESHOLDS: Final[tuple[Column, ...]] = (
     optional("low", "number", "Lower end of the threshold's equal-tailed 95 % interval."),
     optional("high", "number", "Upper end of the threshold's equal-tailed 95 % interval."),
     optional(
+        "open_end",
+        "text",
+        "Which end of the interval the answers leave open: the true end lies further out; n/a: neither.",
+        levels=(("low", "the lower"), ("high", "the upper"), ("both", "both")),
+    ),
+    optional(
         "beyond",
         "text",
         "Whether the threshold lies beyond the levels of the stimulus; n/a: within the levels.",

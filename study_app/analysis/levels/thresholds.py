@@ -21,7 +21,6 @@ from study_app.analysis.data.measures import number_or_none
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.levels.answers import Answers
 from study_app.analysis.levels.statistic import (
-    INTERVAL,
     INTERVAL_2,
     MOTORS,
     OF_WHOM,
@@ -42,20 +41,29 @@ from study_app.analysis.wording import counted, listed, number
 from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES, SESSION_SD, Assumed, Stimulus, analysis_grid
 from study_app.psychophysics.families import level_at
-from study_app.psychophysics.grid import ALIKE, Posterior, group_widths
-from study_app.psychophysics.person_fit import BEYOND_CHANCE, CHANGE_PRIOR, Given, PersonFit
+from study_app.psychophysics.grid import ALIKE, MEAN_LAPSE, NEAR_MODE, GroupPriors, Posterior, group_priors
+from study_app.psychophysics.person_fit import (
+    BEYOND_CHANCE,
+    CHANGE_PRIOR,
+    EARLY_TRIALS,
+    PREFERENCE_SD,
+    Given,
+    PersonFit,
+    early_change,
+)
 
 FAMILIES: Final = {"weibull": "Weibull", "normal": "cumulative normal", "logistic": "logistic"}
 WIDTH_UNITS: Final = {"log": "decades", "linear": "level"}
 BEYOND: Final = {None: "", "above": "above ", "below": "below "}
+OPEN_ENDS: Final = {(False, False): None, (True, False): "low", (False, True): "high", (True, True): "both"}
 SHIFT: Final = 0.1
 """A prior that shifts a threshold by a larger share of it is named."""
 FEW_ANSWERS: Final = 40
 """The fewest answers for which the coverage of the intervals was tested."""
 MOST_NAMED: Final = 6
 REMOVED: Final = (
-    "A preference for an interval or for the previous answer, by probit regression, {} removed where it {} more than "
-    f"{BEYOND_CHANCE:g} standard errors."
+    "A preference for an interval or for the previous answer, estimated by probit regression (standard deviation "
+    f"between people: {PREFERENCE_SD:g} of that of a decision), {{}} removed."
 )
 
 
@@ -64,9 +72,10 @@ class ThresholdEstimate:
     """A participant's threshold at one standard, as in `columns.RESULTS`, or the group's of ``n`` participants.
 
     ``flat_width`` is the threshold under a flat prior on the width, ``variance`` the posterior variance in u,
-    ``change`` that of the threshold from the first to the last trial as a share of it, 0 where none is found, and
-    ``compared`` the level at the percentage of successes of the published value, see `compared_percent`. Of the group
-    only threshold and ``compared`` are known, each with its interval.
+    ``change`` that of the threshold from the first to the last trial as a share of it, 0 where none is found,
+    ``open_end`` the ends of the interval beyond which the answers do not exclude a threshold, and ``compared`` the
+    level at the percentage of successes of the published value, see `compared_percent`. Of the group only threshold and
+    ``compared`` are known, each with its interval, and ``early_change``, see `person_fit.early_change`.
     """
 
     participant: str | None
@@ -84,6 +93,8 @@ class ThresholdEstimate:
     fit_p: float | None = None
     drift: float | None = None
     change: float | None = None
+    early_change: float | None = None
+    open_end: str | None = None
     reversal_mean: float | None = None
     target_percent: float | None = None
     compared: float | None = None
@@ -94,6 +105,11 @@ class ThresholdEstimate:
     def fits(self) -> bool:
         """Whether simulated answers deviate from the function as much as those given; true where this is not known."""
         return self.fit_p is None or self.fit_p >= WORST
+
+    @property
+    def learned(self) -> bool:
+        """Whether the thresholds of the group rose or fell after the first trials."""
+        return abs(self.early_change or 0.0) > BEYOND_CHANCE
 
     @property
     def drifts(self) -> bool:
@@ -138,11 +154,11 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdEst
     if assumed is None or stimulus is None:
         return
     for standard, at_standard in _answered(block, opened).groupby("standard", dropna=False, sort=True):
-        fits, shared = _fits(block, assumed, at_standard[at_standard["analysed"]])
+        fits, priors = _fits(block, assumed, at_standard[at_standard["analysed"]])
         heard = dict(list(at_standard.groupby("participant")))
         own = [_own(block, stimulus, standard, one, heard[one.person]) for one in fits]
-        if own:
-            yield _group(stimulus, standard, own, shared)
+        if priors is not None:
+            yield _group(stimulus, standard, own, priors, early_change([(one.fit, one.posterior) for one in fits]))
         yield from own
 
 
@@ -162,29 +178,28 @@ def thresholds_of(trials: pd.DataFrame, stimulus: Stimulus, design: Design) -> I
 
 @dataclass(frozen=True, slots=True)
 class FittedPerson:
-    """What the ``rows`` of a participant at a standard say; the width follows from the answers of all."""
+    """What the ``rows`` of a participant at a standard say; width and lapse rate follow from the answers of all."""
 
     person: Any
     rows: pd.DataFrame
     fit: PersonFit
-    width_prior: Array
+    factors: Array
 
     @property
     def posterior(self) -> Posterior:
-        return self.fit.flat.with_widths(self.width_prior)
+        return self.fit.flat.reweighted(self.factors)
 
 
-def _fits(block: LevelBlock, assumed: Assumed, rows: pd.DataFrame) -> tuple[list[FittedPerson], float]:
-    """Return the fit of each participant from the analysed rows of one standard.
-
-    Followed by the variance of the group's mean that is due to the width that people share [u²].
-    """
+def _fits(block: LevelBlock, assumed: Assumed, rows: pd.DataFrame) -> tuple[list[FittedPerson], GroupPriors | None]:
+    """Return the fit of each participant from the analysed rows of one standard, and what the group says about it."""
     fits, of_people = _flat_fits(block, rows), dict(list(rows.groupby("participant")))
-    priors, shared = group_widths([one.flat for one in fits.values()], assumed.width_prior) if fits else ((), 0.0)
+    if not fits:
+        return [], None
+    priors = group_priors([one.flat for one in fits.values()], assumed.width_prior)
     return [
-        FittedPerson(person, of_people[person], fit, prior)
-        for (person, fit), prior in zip(fits.items(), priors, strict=True)
-    ], shared
+        FittedPerson(person, of_people[person], fit, factors)
+        for (person, fit), factors in zip(fits.items(), priors.factors, strict=True)
+    ], priors
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -219,10 +234,10 @@ def thresholds_compared(
             if prior is None or not people:
                 continue
             fits = [one.flat for one in (*people.values(), *others.values())]
-            priors, of_width = group_widths(fits, prior.width_prior)
-            shared += 0.0 if alike else of_width / len(of_block) ** 2
-            for (person, fit), widths in zip(people.items(), priors, strict=False):
-                found[place].setdefault(str(person), []).append(fit.flat.with_widths(widths))
+            priors = group_priors(fits, prior.width_prior)
+            shared += 0.0 if alike else priors.variance / len(of_block)
+            for (person, fit), factors in zip(people.items(), priors.factors, strict=False):
+                found[place].setdefault(str(person), []).append(fit.flat.reweighted(factors))
     first_of, second_of = (
         {
             person: ThresholdInU(
@@ -275,6 +290,7 @@ def _own(
         flat_width=level_of(fit.flat.threshold),
         beyond="above" if threshold > highest else "below" if threshold < lowest else None,
         variance=found.variance,
+        open_end=OPEN_ENDS[found.open_ends],
         fit_p=p_of_fit(np.bincount(cells, given.successes), np.bincount(cells), psi[first]),
         drift=drift(given.successes, psi),
         change=10.0**decades - 1.0 if fit.named else 0.0,
@@ -296,14 +312,17 @@ def _reversal_mean(block: LevelBlock, stimulus: Stimulus, heard: pd.DataFrame) -
     return stimulus.level_of(float(np.mean(means))) if means else None
 
 
-def _group(stimulus: Stimulus, standard: Any, own: Sequence[ThresholdEstimate], shared: float) -> ThresholdEstimate:
+def _group(
+    stimulus: Stimulus, standard: Any, own: Sequence[ThresholdEstimate], priors: GroupPriors, early: float | None
+) -> ThresholdEstimate:
     """Return the random-effects mean of participants, at the published percentage too where all have theirs."""
 
     def level_of(end: float | None) -> float | None:
         return None if end is None else stimulus.level_of(end)
 
     def mean(levels: Sequence[float]) -> GroupMean:
-        return group_mean([*map(stimulus.coordinate, levels)], [one.variance or 0.0 for one in own], shared)
+        variances = [one.variance or 0.0 for one in own]
+        return group_mean([*map(stimulus.coordinate, levels)], variances, (priors.below, priors.above))
 
     found = mean([one.threshold for one in own])
     group = ThresholdEstimate(
@@ -313,6 +332,7 @@ def _group(stimulus: Stimulus, standard: Any, own: Sequence[ThresholdEstimate], 
         threshold=stimulus.level_of(found.mean),
         low=level_of(found.low),
         high=level_of(found.high),
+        early_change=early,
     )
     compared = [one.compared for one in own if one.compared is not None]
     if len(compared) < len(own):
@@ -382,7 +402,7 @@ def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[Trac
     for standard, fitted in sorted(fits, key=lambda one: one[1].person)[:most]:
         own, ends = fitted.rows, []
         for n in range(1, len(own) + 1):
-            so_far = fitted.fit.after(n).with_widths(fitted.width_prior)
+            so_far = fitted.fit.after(n).reweighted(fitted.factors)
             ends.append([stimulus.level_of(end) for end in so_far.interval])
         low, high = np.array(ends).T
         yield TrackCourse(
@@ -435,7 +455,15 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         def fit(one: ThresholdEstimate) -> str:
             return "–" if one.fit_p is None else f"{one.fit_p:.3f}{'' if one.fits else ': the function does not fit'}"
 
+        def interval(one: ThresholdEstimate) -> str:
+            if one.low is None or one.high is None:
+                return "–"
+            below, above = one.open_end in ("low", "both"), one.open_end in ("high", "both")
+            return f"{'< ' * below}{digits(one.low)} – {'> ' * above}{digits(one.high)}"
+
         def drift(one: ThresholdEstimate) -> str:
+            if one.participant is None and one.early_change is not None:
+                return f"{one.early_change:+.1f} SE{'!' if one.learned else ''}".replace("-", "−")
             return "–" if one.drift is None else f"{one.drift:+.2f}{'!' if one.drifts else ''}".replace("-", "−")
 
         return (
@@ -445,7 +473,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 "threshold" + (" (Weber fraction)" if found.level_kind == "weber" else unit(found)),
                 lambda one: f"{BEYOND[one.beyond]}{one.threshold:.3g}",
             ),
-            INTERVAL,
+            ("95 % interval", interval),
             None if compared is None else (f"at {compared:g} %", lambda one: digits(one.compared)),
             ("with device damping", lambda one: digits(with_device(found, one)))
             if any(with_device(found, one) is not None for one in self.rows)
@@ -481,14 +509,16 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             f"between guess rate and one minus lapse rate{at}: posterior median with an equal-tailed 95 % "
             "interval, from all counted answers, at the levels delivered to the hand. The width, from 5 to 95 "
             "% of the rise, has a log-normal prior; the next column is the threshold under a flat prior. "
-            "“Above” and “below” mark thresholds beyond the levels of the stimulus. Intervals include that a "
+            "“Above” and “below” mark thresholds beyond the levels of the stimulus, “<” and “>” mark ends of "
+            "intervals that the answers leave open. Intervals include that a "
             f"person’s threshold differs between sessions by a factor of {10**SESSION_SD:.2f} (one standard "
             "deviation), and a change over the trials. The group is the random-effects mean (Paule–Mandel), "
             "with the interval of Hartung and Knapp from three participants on. A variance counts as its "
             f"geometric mean with their median.{level}{reversals} Fit: p of the deviance among {SETS} simulated "
             "sets of answers. Drift: correlation of trial number and deviance residual, with “!” if the "
-            f"threshold changes over the trials by more than {BEYOND_CHANCE:g} standard errors. n counts "
-            f"answers{catch}." + (f" {REMOVED.format('is', 'is')}" if found.design == "2ifc" else "")
+            f"threshold changes over the trials by more than {BEYOND_CHANCE:g} standard errors; for the group, by how "
+            f"many standard errors thresholds rose or fell after the first trials. n counts answers{catch}."
+            + (f" {REMOVED.format('is')}" if found.design == "2ifc" else "")
         )
 
     def compares(self, measure: str) -> bool:
@@ -531,6 +561,19 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         for applies, words in kinds:
             if some := [one for one in own if applies(one)]:
                 yield f"{title}: {words} ({_named_people(own, some)})."
+        if some := [one for one in own if one.open_end]:
+            yield (
+                f"{title}: the answers leave an end of the 95 % interval open, which is marked “<” or “>” "
+                f"({_named_people(own, some)})."
+            )
+        for one in self.rows:
+            if one.participant is None and one.learned:
+                where = "" if one.standard is None else f" at standard {with_unit(self.found, one.standard)}"
+                yield (
+                    f"{title}: the answers do not fit thresholds that stay the same or change evenly: thresholds "
+                    f"{'rose' if (one.early_change or 0.0) > 0 else 'fell'} after the first trials{where} by "
+                    f"{abs(one.early_change or 0.0):.1f} standard errors, so that the group's threshold may be biased."
+                )
         if some := [one for one in own if one.drifts]:
             sizes = listed([f"{100 * (one.change or 0.0):+.0f} %".replace("-", "−") for one in some[:MOST_NAMED]])
             yield (
@@ -579,10 +622,11 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             f"A {family} function of the {'logarithm of the ' if log else ''}level was fitted, with a "
             f"flat prior on the threshold, a log-normal one on the width (median {median:.3g} "
             f"{'decades' if log else 'units of the level'}, factor {factor:.3g}) and lapse rates up to "
-            f"{100 * max(ANALYSIS_LAPSES):.0f} %."
+            f"{100 * max(ANALYSIS_LAPSES):.0f} %. The participants’ mean lapse rate has an exponential prior (mean "
+            f"{100 * MEAN_LAPSE:g} %)."
         )
         if block.design.kind == "2ifc":
-            yield REMOVED.format("was", "was")
+            yield REMOVED.format("was")
 
     @classmethod
     def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterator[str]:
@@ -594,13 +638,17 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 "residual (Wichmann & Hill 2001). Intervals include that a person’s threshold differs between "
                 f"sessions by a factor of {10**SESSION_SD:.2f} (one standard deviation; from data of Jäkel & "
                 f"Wichmann 2006), and how far it changed over the trials if this exceeded {BEYOND_CHANCE:g} "
-                f"standard errors. The most probable change (prior: a factor of {CHANGE_PRIOR:g}) was removed, "
+                f"standard errors. The posterior averages over linear changes (prior: a factor of {CHANGE_PRIOR:g}), "
                 f"so the threshold refers to the middle of the trials. We assumed that {100 * ALIKE:.0f} % of "
-                "the standard deviation of log widths is common to participants, so each width depends on the "
-                "answers of all. Group means are random-effects means, with each variance replaced by its "
+                "the standard deviation of log widths is between participants and that lapse rates vary about a "
+                "common mean, so each participant’s width and lapse rate depend on the answers of all; the posterior "
+                f"of what participants share was raised to the power of {NEAR_MODE}. Group means are "
+                "random-effects means, with each variance replaced by its "
                 "geometric mean with the median variance, the between-person variance of Paule and Mandel "
                 f"(1982) and, with at least {FEWEST} participants, the interval of Hartung and Knapp (2001), "
-                "widened by the uncertainty of the width that all have in common."
+                "widened by the uncertainty of the width and the lapse rate that all have in common. Whether "
+                "thresholds rose or fell after the first trials was tested by the score of a change that fades over "
+                f"{EARLY_TRIALS:g} trials."
             )
 
 

@@ -32,6 +32,7 @@ from study_app.protocol.warnings.expected_precision import (
     ThresholdPlan,
     precision_plan,
 )
+from study_app.psychophysics.grid import Z_95
 from study_app.psychophysics.people import BETWEEN_PEOPLE, ESTIMATE_NOISE, Estimates, Person
 from study_app.store.csv_files import Column, csv_bytes, optional
 
@@ -68,9 +69,12 @@ class PrecisionResult:
 
     @property
     def spread(self) -> float:
-        """The standard deviation of one participant's error at one standard; infinite where nothing is measured."""
-        errors = np.concatenate([one.ravel() for one in self.errors])
-        return float(np.std(errors[np.isfinite(errors)])) if np.isfinite(errors).any() else math.inf
+        """The standard deviation of one participant's error at one standard: the median of the studies.
+
+        Infinite where nothing is measured.
+        """
+        spreads = [float(errors.std(ddof=1)) for errors in self.errors if np.isfinite(errors).all()]
+        return float(np.median(spreads)) if spreads else math.inf
 
     def half(self, place: int) -> float:
         """Return the median of half the group's interval at one of the sizes."""
@@ -127,8 +131,8 @@ def study_batch(case: Case, sizes: Sequence[int]) -> PrecisionResult:
         halves = []
         for n, (medians, variances, shared) in zip(sizes, by_size, strict=True):
             of_people, of_variances = medians[study].mean(axis=1), variances[study].sum(axis=1) / plan.standards**2
-            of_all = float(shared[study].sum()) / plan.standards**2
-            group = group_mean(of_people.tolist(), of_variances.tolist(), of_all) if n >= FEWEST else None
+            of_all = Z_95 * math.sqrt(float(shared[study].mean()))
+            group = group_mean(of_people.tolist(), of_variances.tolist(), (of_all, of_all)) if n >= FEWEST else None
             if group is None or group.low is None or group.high is None:
                 halves.append(math.nan)
             elif not measured:
@@ -223,8 +227,8 @@ COLUMNS: Final = (
     optional(
         "spread",
         "number",
-        "Standard deviation of the logarithm of one participant's threshold; for d′, d_a and exponents, "
-        "relative to their value; empty if limits clip the levels.",
+        "Standard deviation of the logarithm of one participant's threshold, median of the studies; for d′, d_a "
+        "and exponents, relative to their value; empty if limits clip the levels.",
         minimum=0,
     ),
     optional(

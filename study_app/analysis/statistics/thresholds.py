@@ -310,11 +310,14 @@ def random_effects_weights(estimates: Array, variances: Array) -> tuple[Array, f
     return 1.0 / (v + between), between
 
 
-def group_mean(estimates: Sequence[float], variances: Sequence[float], shared: float = 0.0) -> GroupMean:
+def group_mean(
+    estimates: Sequence[float], variances: Sequence[float], shared: tuple[float, float] = (0.0, 0.0)
+) -> GroupMean:
     """Return the random-effects mean of estimates, shape (n,), with their variances, each above zero.
 
     A variance counts as its geometric mean with the median of all: variances are estimates, too, and thresholds that
-    are too high have the smaller ones. ``shared`` is the variance of an error that all have in common.
+    are too high have the smaller ones. ``shared`` is how far the 95 % interval of an error that all have in common
+    extends below and above.
     """
     y, n = np.asarray(estimates, float), len(estimates)
     if n == 0:
@@ -324,5 +327,6 @@ def group_mean(estimates: Sequence[float], variances: Sequence[float], shared: f
     if n < FEWEST:
         return GroupMean(n=n, mean=mean, low=None, high=None, between=between)
     variance = float((weights * (y - mean) ** 2).sum()) / ((n - 1) * float(weights.sum()))
-    half = math.hypot(float(student.ppf(0.975, n - 1)) * math.sqrt(variance), Z_95 * math.sqrt(shared))
-    return GroupMean(n=n, mean=mean, low=mean - half, high=mean + half, between=between)
+    half, (below, above) = float(student.ppf(0.975, n - 1)) * math.sqrt(variance), shared
+    low, high = mean - math.hypot(half, below), mean + math.hypot(half, above)
+    return GroupMean(n=n, mean=mean, low=low, high=high, between=between)

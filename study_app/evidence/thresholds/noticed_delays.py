@@ -22,7 +22,7 @@ from study_app.evidence.thresholds.known_values import KnownThreshold, known_val
 from study_app.protocol.load import load
 from study_app.protocol.simulated import NO_FEATURES, Observer, Rater, rate, rater
 from study_app.protocol.streams import Draw, stream
-from study_app.protocol.trials.stimuli import LINEAR_OBSERVER
+from study_app.protocol.trials.stimuli import LINEAR_WIDTH
 from study_app.psychophysics.families import success
 from study_app.psychophysics.people import normal
 
@@ -148,7 +148,7 @@ def draw(found: Compared) -> Figure:
     thresholds.set(title="Threshold, ms", xlabel="Mean criterion of the ratings, ms", xlim=(50, 175), xticks=criteria)
     thresholds.set(ylim=(0, 205), yticks=[0, 50, 100, 150, 200])
     delays, (middle, low, high) = np.linspace(1.0, 200.0, 200), found.detected_ms
-    correct = success("weibull", np.log10(delays), np.log10(middle), LINEAR_OBSERVER[0], GUESS, LAPSE)
+    correct = success("weibull", np.log10(delays), np.log10(middle), LINEAR_WIDTH, GUESS, LAPSE)
     shares.plot(delays, correct, color=style.TEXT, dashes=(4, 2), label=f"correct in {FORCED_CHOICE}")
     shares.plot([middle], [GUESS + (1 - GUESS - LAPSE) / 2], "s", markersize=4, color=style.TEXT)
     thresholds.axhspan(low, high, color=style.BAND, linewidth=0)

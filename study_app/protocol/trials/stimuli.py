@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated, ClassVar, Final, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import Field, model_validator
@@ -18,7 +19,7 @@ from study_app.haptics.model.scene import ForceLink
 from study_app.protocol.table import Id, Table, invalid
 from study_app.protocol.trials.designs import Design
 from study_app.psychophysics.families import Family, Floats
-from study_app.psychophysics.grid import FREE_GUESSES, Grid, evenly, geometric
+from study_app.psychophysics.grid import FREE_GUESSES, Grid, Values, evenly, geometric, lapse_prior
 
 Level = TypeVar("Level", float, Floats)
 """One level or value, or an array of them."""
@@ -100,6 +101,17 @@ class Condition(Table):
         )
 
 
+@lru_cache(maxsize=64)  # each trial asks for the levels; with that of `_running_grid` it takes a third less
+def _spaced(low: float, high: float, log: bool, count: int) -> tuple[float, ...]:
+    if count == 1:
+        return (high,)
+    shares = [number / (count - 1) for number in range(count)]
+    if not log:
+        return tuple(low + (high - low) * share for share in shares)
+    inner = (math.exp(math.log(low) + math.log(high / low) * share) for share in shares[1:-1])
+    return (low, *inner, high)
+
+
 class Stimulus(Table):
     """A number that is varied, its standards, and the range of levels L.
 
@@ -164,14 +176,7 @@ class Stimulus(Table):
 
     def spaced(self, count: int) -> tuple[float, ...]:
         """Return ``count`` levels, evenly spaced over the range, smallest first."""
-        low, high = self.levels
-        if count == 1:
-            return (high,)
-        shares = [number / (count - 1) for number in range(count)]
-        if self.spacing == "linear":
-            return tuple(low + (high - low) * share for share in shares)
-        inner = (math.exp(math.log(low) + math.log(high / low) * share) for share in shares[1:-1])
-        return (low, *inner, high)
+        return _spaced(*self.levels, self.spacing == "log", count)
 
     @property
     def grid(self) -> tuple[float, ...]:
@@ -215,20 +220,28 @@ RUNNING_THRESHOLDS: Final = 41
 RUNNING_WIDTHS: Final = 9
 WIDTHS: Final = (0.5, 4.0)
 """The smallest and the largest width, in decades."""
-LINEAR_OBSERVER: Final = (1.4, 2.0)
-"""Median and factor of people's widths [decades]; d′ of an observer of that median is proportional to the level."""
+ANALYSIS_WIDTHS: Final = (0.15, 5.6)
+"""Those of the analysis; people's functions are 0.2 to 2 decades wide."""
+LINEAR_WIDTH: Final = 1.4
+"""Width of an observer whose d′ is proportional to the level [decades]."""
+WIDTH_PRIOR: Final = (0.5, 2.0)
+"""Median and factor of people's widths [decades]. The median is the slope of 3.5 that QUEST assumes.
+
+(Watson & Pelli 1983, Percept. Psychophys. 33, 113–120.) Of three medians it is the best on the published answers of
+discrimination; confirmed on plaid and checkerboard (``tests/benchmarks/analysis/people.py``).
+"""
 LAPSES: Final = (0.0, 0.02, 0.04)
 LAPSE_PRIOR: Final = (0.4, 0.4, 0.2)
-ANALYSIS_LAPSES: Final = (0.0, 0.01, 0.02, 0.03, 0.05)
-ANALYSIS_LAPSE_PRIOR: Final = (0.25, 0.3, 0.2, 0.15, 0.1)
+ANALYSIS_LAPSES: Final = (0.0, 0.01, 0.02, 0.03, 0.045, 0.065, 0.09, 0.12, 0.16)
 SESSION_SD: Final = 0.049
 """Standard deviation of a person's threshold from one session to the next [decades], with [0.034, 0.077].
 
 Of six observers of Jäkel & Wichmann 2006 (J. Vision 6:13) between series of 400 trials
 (``tests/benchmarks/analysis/people.py --spread``).
 """
-BEYOND_DECADES: Final = 0.2
-"""How far beyond the ends of the levels a threshold is looked for."""
+BEYOND_DECADES: Final = 0.4
+BEYOND_SPANS: Final = 0.25
+"""How far beyond the ends of the levels a threshold is looked for, on log and on linear spacing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,7 +266,7 @@ def assumed_for(stimulus: Stimulus, design: Design) -> Assumed:
     return Assumed(
         family="weibull" if by_chance else "normal",
         widths=WIDTHS if log else (span / 8, 2 * span),
-        width_prior=LINEAR_OBSERVER if log and is_distance(stimulus) else (span / 2, 2.0),
+        width_prior=WIDTH_PRIOR if log and is_distance(stimulus) else (span / 2, 2.0),
     )
 
 
@@ -284,14 +297,21 @@ def running_grid(stimulus: Stimulus, design: Design, assumed: Assumed, lapses: t
     All widths are equally likely, so that levels are at the threshold however wide a person's function is: with levels
     above it the threshold would depend on the prior.
     """
+    return _running_grid(assumed.family, stimulus.domain, assumed.widths, lapses, guesses_of(stimulus, design))
+
+
+@lru_cache(maxsize=64)
+def _running_grid(
+    family: Family, domain: tuple[float, float], widths: tuple[float, float], lapses: Values, guesses: Values | None
+) -> Grid:
     return Grid(
-        family=assumed.family,
-        thresholds=evenly(*stimulus.domain, RUNNING_THRESHOLDS),
-        widths=geometric(*assumed.widths, RUNNING_WIDTHS),
+        family=family,
+        thresholds=evenly(*domain, RUNNING_THRESHOLDS),
+        widths=geometric(*widths, RUNNING_WIDTHS),
         width_prior=None,
         lapses=lapses,
         lapse_prior=LAPSE_PRIOR if lapses == LAPSES else (1.0 / len(lapses),) * len(lapses),
-        guesses=guesses_of(stimulus, design),
+        guesses=guesses,
     )
 
 
@@ -302,15 +322,16 @@ def analysis_grid(stimulus: Stimulus, design: Design, assumed: Assumed, session_
     """
     low, high = stimulus.domain
     log = stimulus.spacing == "log"
-    beyond = BEYOND_DECADES if log else (high - low) / 10
+    beyond = BEYOND_DECADES if log else BEYOND_SPANS * (high - low)
     least, most = assumed.widths
+    widest = ANALYSIS_WIDTHS if log else (0.3 * least, 1.4 * most)
     return Grid(
         family=assumed.family,
-        thresholds=evenly(low - beyond, high + beyond, 81),
-        widths=geometric(0.7 * least, 1.4 * most, 17),
+        thresholds=evenly(low - beyond, high + beyond, 97),
+        widths=geometric(min(widest[0], 0.7 * least), max(widest[1], 1.4 * most), 17),
         width_prior=assumed.width_prior,
         lapses=ANALYSIS_LAPSES,
-        lapse_prior=ANALYSIS_LAPSE_PRIOR,
+        lapse_prior=lapse_prior(ANALYSIS_LAPSES),
         guesses=guesses_of(stimulus, design),
         session_sd=(session_sd, 0.0) if log else (0.0, session_sd * math.log(10)),
         log=log,

@@ -24,11 +24,11 @@ from study_app.protocol.quantities import quantity
 from study_app.protocol.tracks import design_of, has_correct_answer, method_of, standards_of, stimulus_of, tracks_of
 from study_app.protocol.trials.designs import Design, Rated
 from study_app.protocol.trials.methods import Method, TrackSetting
-from study_app.protocol.trials.stimuli import Stimulus, analysis_grid, guesses_of, rises
+from study_app.protocol.trials.stimuli import LINEAR_WIDTH, WIDTH_PRIOR, Stimulus, analysis_grid, guesses_of, rises
 from study_app.psychophysics.adaptive import Answers, Observers
 from study_app.psychophysics.detection import NORMAL, rating
 from study_app.psychophysics.families import Floats
-from study_app.psychophysics.grid import Z_95, Posterior, group_widths
+from study_app.psychophysics.grid import Z_95, Posterior, group_priors
 from study_app.psychophysics.people import ALONE, ASSUMED, ESTIMATE_NOISE, KINDS, Estimates, Expected, Person
 
 D_PRIME: Final = 1.0
@@ -171,14 +171,14 @@ def expected_mean(plan: MeanPlan) -> Expected:
         trials=plan.trials,
         standards=1,
         halves={"": [Z_95 * spread]},
-        spread=spread,
+        spreads={"": spread},
         threshold=plan.value,
     )
 
 
 OBSERVERS: Final = 200
 """Of a simulated threshold."""
-PEOPLE: Final = 10
+PEOPLE: Final = 20
 """Of a study, unless it is said how many."""
 SEED: Final = 1
 FALSE_ALARMS: Final = 0.1
@@ -290,7 +290,7 @@ class ThresholdPlan:
         observers = Observers(
             family=assumed.family,
             thresholds=thresholds,
-            width=assumed.width_prior[0] * width,
+            width=(LINEAR_WIDTH if assumed.width_prior == WIDTH_PRIOR else assumed.width_prior[0]) * width,
             guess=guess,
             lapse=lapse,
             presented=presented,
@@ -342,10 +342,10 @@ class ThresholdPlan:
         found, of_groups = list[tuple[float, ...]](), list[float]()
         for first in range(0, len(fits), together):
             group = fits[first : first + together]
-            priors, shared = group_widths(group, prior)
-            fitted = map(Posterior.with_widths, group, priors)
+            priors = group_priors(group, prior)
+            fitted = map(Posterior.reweighted, group, priors.factors)
             found += [(own.threshold, *own.interval, own.variance) for own in fitted]
-            of_groups.append(shared)
+            of_groups.append(priors.variance)
         medians, lows, highs, variances = np.array(found).T
         return Estimates(medians=medians, lows=lows, highs=highs, variances=variances, shared=np.array(of_groups))
 
@@ -396,17 +396,17 @@ def expected(plan: ThresholdPlan) -> Expected:
         errors = (found.medians - truth).reshape(len(kinds), -1)[:, full]
         measured = full.mean() > 0.5
         halves.append(ends if measured else np.full((len(kinds), 1), math.inf))
-        variances.append(float(errors.var()) if measured else math.inf)
-        shared.append(together * float(found.shared.mean()))
+        variances.append(errors.var(axis=1, ddof=1) if measured else np.full(len(kinds), math.inf))
+        shared.append(together * found.shared.reshape(len(kinds), -1).mean(axis=1))
     shrunk = (simulated.trials / plan.trials) ** 0.5
     return Expected(
         spacing=plan.stimulus.spacing,
         trials=plan.trials,
         standards=plan.standards,
         halves=dict(zip(kinds, (shrunk * np.concatenate(halves, axis=1)).tolist(), strict=True)),
-        spread=shrunk * (sum(variances) / len(variances)) ** 0.5,
+        spreads=dict(zip(kinds, (shrunk * np.sqrt(np.mean(variances, axis=0))).tolist(), strict=True)),
         threshold=plan.stimulus.level_of(float(np.median(own))),
-        shared=shrunk**2 * sum(shared) / len(shared),
+        shared=dict(zip(kinds, (shrunk**2 * np.mean(shared, axis=0)).tolist(), strict=True)),
     )
 
 

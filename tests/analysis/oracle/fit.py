@@ -1,21 +1,26 @@
-"""Fit thresholds by the model of docs/statistics.md: a posterior over a grid, without preferences and without drift."""
+"""Fit thresholds by the model of docs/statistics.md: a posterior over a grid, without preferences and over changes."""
 
 import math
 from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-from scipy import optimize, special, stats
+from scipy import interpolate, optimize, special, stats
 
 from tests.analysis.oracle.recomputed import Floats, Numbers
 
 Z_95 = stats.norm.ppf(0.975)
 KAPPA = math.log10(math.log(20) / math.log(20 / 19))
-LAPSES, LAPSE_PRIOR = np.array([0.0, 0.01, 0.02, 0.03, 0.05]), np.array([0.25, 0.3, 0.2, 0.15, 0.1])[:, None]
+LAPSES = np.array([0.0, 0.01, 0.02, 0.03, 0.045, 0.065, 0.09, 0.12, 0.16])
+MEANS = np.array([0.002, 0.01, 0.02, 0.03, 0.045, 0.065, 0.09, 0.12])
+MEAN_PRIOR = np.diff(stats.expon.cdf([0, *(MEANS[1:] + MEANS[:-1]) / 2, np.inf], scale=0.05))
+OF_LAPSE = np.diff(stats.gamma.cdf([0, *(LAPSES[1:] + LAPSES[:-1]) / 2, np.inf], 2, scale=MEANS[:, None] / 2))
+LAPSE_PRIOR = MEAN_PRIOR @ OF_LAPSE
 GUESSES = {"2ifc": np.array([0.5]), "yesno": np.array([0.01, 0.02, 0.05, 0.1, 0.2, 0.3])}
-WIDTHS = np.geomspace(0.7 * 0.5, 1.4 * 4, 17)
-MEDIAN, FACTOR, ALIKE, APART = math.log(1.4), math.log(2.0), 1 / 3, np.array([0.05, 0.1, 0.2])
-SESSION_SD, CHANGE_SD, STEP, CLIP = 0.049, math.log10(1.5), 0.01, 1e-9
+WIDTHS = np.geomspace(0.15, 1.4 * 4, 17)
+MEDIAN, FACTOR, ALIKE, APART = math.log(0.5), math.log(2.0), 0.6, np.array([0.05, 0.1, 0.2])
+SESSION_SD, CHANGE_SD, PREFERENCE_SD, STEP, CLIP = 0.049, math.log10(1.5), 0.4, 0.01, 1e-9
+PRIOR = stats.norm.pdf(np.log(WIDTHS), MEDIAN, FACTOR)[:, None] * LAPSE_PRIOR
 
 
 def rise(design: str, distance: Floats) -> Floats:
@@ -32,40 +37,39 @@ class Fit:
         placed = rows.groupby("level")["delivered"].transform("mean").fillna(rows["level"]).to_numpy(float)
         self.u = np.log10(placed, where=placed > 0, out=np.full(len(rows), -np.inf))
         self.design, self.success, self.shifts = design, rows["success"].to_numpy(bool), np.zeros(len(rows))
-        self.thresholds = np.linspace(math.log10(ends[0]) - 0.2, math.log10(ends[1]) + 0.2, 81)
-        self.done, prior = np.linspace(0, 1, len(rows)), stats.norm.pdf(np.log(WIDTHS), MEDIAN, FACTOR)
-        weights = self._posterior(0.0, prior)
+        self.thresholds = np.linspace(math.log10(ends[0]) - 0.4, math.log10(ends[1]) + 0.4, 97)
+        self.done = np.linspace(0, 1, len(rows))
+        weights = self._posterior(np.zeros(1), PRIOR)
         for _ in range(2 if design == "2ifc" else 0):
             self.shifts = self._preferences(rows, weights)
-            weights = self._posterior(0.0, prior)
-        step, psi = STEP * self.medians(weights)[1], self.expected(weights)
-        slope = (self.expected(weights, -step) - self.expected(weights, step)) / (2 * step)
-        information = slope**2 / (psi * (1 - psi))
-        time = self.done - np.average(self.done, weights=information)
-        score = -slope / (psi * (1 - psi)) @ ((self.success - psi) * time)
-        change = score / (information @ time**2 + CHANGE_SD**-2)
-        self.change = change if score**2 > 4 * information @ time**2 else 0.0
+            weights = self._posterior(np.zeros(1), PRIOR)
+        score, information = self.score(weights, self.done)
+        self.change = score / (information + CHANGE_SD**-2) if score**2 > 4 * information else 0.0
         self.sd = math.hypot(SESSION_SD / math.sqrt(rows["session"].nunique()), self.change / math.sqrt(12))
-        self.weights = self._posterior(change, np.ones(len(WIDTHS)))
+        self.weights = self._posterior(CHANGE_SD * np.linspace(-2.5, 2.5, 9), LAPSE_PRIOR)
 
-    def _posterior(self, change: float, prior: Floats) -> Floats:
-        """Return the posterior from the halves of the trials, each moved by a quarter of the change."""
-        step, last = self.thresholds[1] - self.thresholds[0], len(self.thresholds) - 1
-        logs, table = 0.0, pd.DataFrame({"u": self.u, "shift": self.shifts, "half": np.sign(self.done - 0.5)})
-        guesses = GUESSES[self.design]
-        for (u, shift, half), right in pd.Series(self.success).groupby([table[name] for name in table]):
+    def score(self, weights: Floats, course: Floats) -> Floats:
+        """Return score and information, at none, of a threshold that takes this course over the trials."""
+        step, psi = STEP * self.medians(weights)[1], self.expected(weights)
+        slope = (self.expected(weights, step) - self.expected(weights, -step)) / (2 * step)
+        course = course - np.average(course, weights=slope**2 / (psi * (1 - psi)) + 1e-300)
+        terms = [slope * course * (self.success - psi), (slope * course) ** 2]
+        return np.asarray(np.sum(terms / (psi * (1 - psi)), axis=1))
+
+    def _posterior(self, changes: Floats, prior: Floats) -> Floats:
+        """Return the mean posterior of the halves of the trials, each moved by a quarter of a change."""
+        guesses, parts = GUESSES[self.design], {}
+        for (u, shift, half), right in pd.Series(self.success).groupby([self.u, self.shifts, np.sign(self.done - 0.5)]):
             share = rise(self.design, (u - self.thresholds[:, None]) / WIDTHS)[..., None, None]
-            psi = guesses + (1 - guesses - LAPSES[:, None]) * share
+            psi = np.clip(guesses + (1 - guesses - LAPSES[:, None]) * share, CLIP, 1 - CLIP)
             if shift:
                 psi = preferred(np.clip((1 + share) / 2, CLIP, 1 - CLIP), LAPSES[:, None], shift)
-            psi = np.clip(psi, CLIP, 1 - CLIP)
-            of_cells = right.sum() * np.log(psi) + (~right).sum() * np.log1p(-psi)
-            at = np.clip(np.arange(last + 1) + half * change / 4 / step, 0, last)
-            low = np.minimum(at.astype(int), last - 1)
-            further = (at - low)[:, None, None, None]
-            logs = logs + of_cells[low] * (1 - further) + of_cells[low + 1] * further
-        weights = np.exp(logs - np.max(logs)) * LAPSE_PRIOR * prior[:, None, None]
-        return np.asarray(weights / weights.sum())
+            parts[half] = parts.get(half, 0) + right.sum() * np.log(psi) + (~right).sum() * np.log1p(-psi)
+        logs = np.log(stats.norm.pdf(changes, scale=CHANGE_SD)[:, None, None, None, None] * prior[..., None])
+        for half, part in parts.items():
+            at = np.clip(self.thresholds + half / 4 * changes[:, None], *self.thresholds[[0, -1]])
+            logs = logs + interpolate.make_interp_spline(self.thresholds, part, k=1)(at)
+        return np.asarray(special.softmax(logs, axis=None).sum(axis=0))
 
     def quantile(self, weights: Floats, share: float) -> float:
         half = (self.thresholds[1] - self.thresholds[0]) / 2
@@ -94,17 +98,15 @@ class Fit:
         causes = np.column_stack([np.ones(len(said)), rows["before"]])
 
         def loss(mode: Floats) -> float:
-            return float(mode @ mode / 2 - special.log_ndtr(said * (sensed + causes @ mode)).sum())
+            return float(mode @ mode / 2 / PREFERENCE_SD**2 - special.log_ndtr(said * (sensed + causes @ mode)).sum())
 
         mode = optimize.minimize(loss, np.zeros(2), tol=1e-10).x
-        agreed = said * (sensed + causes @ mode)
-        hazard = np.exp(stats.norm.logpdf(agreed) - special.log_ndtr(agreed))
-        errors = np.sqrt(np.diag(np.linalg.inv((causes.T * hazard * (hazard + agreed)) @ causes + np.eye(2))))
-        return np.asarray(towards * np.round(causes @ np.where(abs(mode) > 2 * errors, mode, 0.0), 1))
+        return np.asarray(towards * np.round(causes @ mode, 1))
 
     def under(self, prior: Floats) -> tuple[Floats, float]:
-        """Return the weights under a prior on the width, and the variance of the threshold."""
-        weights = self.weights * prior[:, None, None] / (self.weights * prior[:, None, None]).sum()
+        """Return the weights under a prior on width and lapse rate, and the variance of the threshold."""
+        weights = self.weights * (prior / LAPSE_PRIOR)[..., None]
+        weights /= weights.sum()
         marginal = weights.sum(axis=(1, 2, 3))
         return weights, float(marginal @ (self.thresholds - marginal @ self.thresholds) ** 2) + self.sd**2
 
@@ -116,6 +118,7 @@ class Fit:
         own = {"n": len(psi), "threshold": 10**threshold, "width": width, "lapse": lapse, "guess": guess}
         own |= {"low": 10 ** (threshold - ends[0]), "high": 10 ** (threshold + ends[1]), "variance": variance}
         own |= {"flat_width": 10 ** self.quantile(self.weights, 0.5), "change": 10**self.change - 1}
+        own["_early"] = self.score(weights, -np.exp(-np.arange(len(psi)) / 15))
         return own | {"drift": np.corrcoef(np.arange(len(psi)), residuals)[0, 1]}
 
 
@@ -125,22 +128,25 @@ def preferred(unbiased: Floats, lapse: Floats | float, shift: Floats | float) ->
     return np.clip(psi, CLIP, 1 - CLIP)
 
 
-def width_priors(fits: Sequence[Fit]) -> tuple[Floats, float]:
-    """Return each person's prior on the width from the answers of the others, and the variance of what all share."""
+def group_priors(fits: Sequence[Fit]) -> tuple[Floats, Floats]:
+    """Return each person's prior on width and lapse rate by the others' answers, and the ends of a common error."""
     widths, thresholds = np.log(WIDTHS), fits[0].thresholds
-    own = stats.norm.pdf(widths, widths[:, None], ALIKE * FACTOR)
-    own /= own.sum(axis=1, keepdims=True)
-    centres = stats.norm.logpdf(widths, MEDIAN, FACTOR * math.sqrt(1 - ALIKE**2))
-    spreads = APART * np.ptp(thresholds)
-    about = np.vstack([stats.norm.pdf(thresholds, thresholds[::2, None], spread) for spread in spreads])
+    of_width = stats.norm.pdf(widths, widths[:, None], ALIKE * FACTOR)
+    of_width /= of_width.sum(axis=1, keepdims=True)
+    shared = stats.norm.logpdf(widths, MEDIAN, FACTOR * math.sqrt(1 - ALIKE**2))[:, None] + np.log(MEAN_PRIOR)
+    about = np.vstack([stats.norm.pdf(thresholds, thresholds[::2, None], sd * np.ptp(thresholds)) for sd in APART])
     about /= about.sum(axis=1, keepdims=True)
-    joint = np.array([fit.weights.sum(axis=(2, 3)) for fit in fits])
-    evidence = np.log(np.maximum(np.einsum("ma,paw,cw->pmc", about, joint, own, optimize=True), 1e-300))
-    of_others = special.softmax(centres + evidence.sum(axis=0) - evidence, axis=(1, 2)).sum(axis=1)
-    of_all = special.softmax(centres + evidence.sum(axis=0)).sum(axis=0)
-    masses = np.einsum("paw,cw->pac", joint, own)
-    means = (np.einsum("pac,a->pc", masses, thresholds) / masses.sum(axis=1)).mean(axis=0)
-    return of_others @ own, float(of_all @ (means - of_all @ means) ** 2)
+    likelihoods = np.array([fit.weights.sum(axis=3) for fit in fits]) / LAPSE_PRIOR
+    masses = np.einsum("pawl,cw,kl->pack", likelihoods, of_width, OF_LAPSE, optimize=True)
+    evidence = np.log(np.maximum(np.einsum("ma,pack->pmck", about, masses, optimize=True), 1e-300))
+    of_others = special.softmax(shared + evidence.sum(axis=0) - evidence, axis=(1, 2, 3)).sum(axis=1)
+    of_others **= 2 if len(fits) > 1 else 1
+    of_others /= of_others.sum(axis=(1, 2), keepdims=True)
+    of_all = special.softmax(shared + evidence.sum(axis=0)).sum(axis=0).ravel()
+    errors = np.average(np.tensordot(masses, thresholds, (1, 0)) / masses.sum(axis=1), axis=0).ravel()
+    errors, order = errors - np.average(errors, weights=of_all**2), np.argsort(errors)
+    ends = np.interp([0.025, 0.975], np.cumsum(of_all[order]) - of_all[order] / 2, errors[order])
+    return np.einsum("pck,cw,kl->pwl", of_others, of_width, OF_LAPSE), ends
 
 
 def random_effects(sample: pd.DataFrame) -> tuple[float, float]:

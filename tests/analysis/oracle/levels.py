@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from tests.analysis.oracle.fit import Z_95, Fit, random_effects, width_priors
+from tests.analysis.oracle.fit import Z_95, Fit, group_priors, random_effects
 from tests.analysis.oracle.recomputed import SESSION, TRIAL, Compared, Numbers, exact_share, named, quartiles, student
 from tests.analysis.oracle.statements import adjusted
 
@@ -29,12 +29,10 @@ def compare_levels(compared: Compared, answers: pd.DataFrame, intervals: pd.Data
         for which, times in enumerate(found["times"]):
             seconds = rows.loc[rows["code"] == times["code"], "response_s"]
             compared.check(f"{place}.times.{which}.numbers", {"n": len(seconds), **quartiles(seconds)})
-        parts = {"answers": _answers(rows, design), "conduct": _delivery(rows)}
+        parts = {"answers": _answers(rows, design), "conduct": _delivery(rows), "catches": []}
         caught = rows[rows["catch"].eq(True)].groupby(SESSION)["right"] if wrong else ()
-        parts["catches"] = [
-            {"session": session, "n": len(right), "wrong": (~right).sum(), "most": wrong}
-            for (_, session), right in caught
-        ]
+        for (_, session), right in caught:
+            parts["catches"].append({"session": session, "n": len(right), "wrong": (~right).sum(), "most": wrong})
         if design in ANSWERS:
             people = rows.groupby(["standard", "participant"])
             fits = compared.values[key, "fits"] = {of: Fit(own, design, stimulus["levels"]) for of, own in people}
@@ -125,13 +123,14 @@ def _thresholds(fits: dict[tuple[float, str], Fit]) -> list[Numbers]:
     lines = []
     for standard in dict.fromkeys(standard for standard, _ in fits):
         people = {person: fit for (at, person), fit in fits.items() if at == standard}
-        priors, shared = width_priors([*people.values()])
+        priors, ends = group_priors([*people.values()])
         own = [fit.numbers(prior) | {"standard": standard} for fit, prior in zip(people.values(), priors, strict=True)]
         table = pd.DataFrame(own)
         mean, error = random_effects(table.assign(value=np.log10(table["threshold"])))
-        reach = math.hypot(stats.t.ppf(0.975, len(own) - 1) * error, Z_95 * math.sqrt(shared))
-        group = {"threshold": 10**mean, "low": 10 ** (mean - reach), "high": 10 ** (mean + reach)}
-        lines += [group | {"n": len(own), "standard": standard}]
+        low, high = np.hypot(stats.t.ppf(0.975, len(own) - 1) * error, ends)
+        score, information = table["_early"].sum()
+        group = {"threshold": 10**mean, "low": 10 ** (mean - low), "high": 10 ** (mean + high), "standard": standard}
+        lines += [group | {"n": len(own), "early_change": score / math.sqrt(information)}]
         lines += [one | {"_person": person} for person, one in zip(people, own, strict=True)]
     return lines
 
@@ -171,7 +170,8 @@ def _tested(compared: Compared, contrast: Numbers, trials: pd.DataFrame) -> Numb
     else:
         variance = sides[0]["variance"] + sides[1]["variance"]
         samples = [pd.DataFrame({"value": sides[0]["value"] - sides[1]["value"], "variance": variance}).dropna()]
-    means, errors = zip(*map(random_effects if ratio else _mean, samples), strict=True)
+    pairs = [random_effects(one) if ratio else (one["value"].mean(), stats.sem(one["value"])) for one in samples]
+    means, errors = zip(*pairs, strict=True)
     mean, error, freedom = means[0] - sum(means[1:]), math.hypot(*errors), min(map(len, samples)) - 1
     t, scale = stats.t(freedom), math.exp if ratio else float
     above, below, reach = t.sf(mean / error), t.cdf(mean / error), t.ppf(0.975) * error
@@ -196,16 +196,12 @@ def _numbers(compared: Compared, contrast: Numbers) -> list[pd.DataFrame]:
     return sides
 
 
-def _mean(sample: pd.DataFrame) -> tuple[float, float]:
-    return sample["value"].mean(), stats.sem(sample["value"])
-
-
 def _in_ln(compared: Compared, contrast: Numbers) -> list[pd.DataFrame]:
     """Return ln thresholds, means over standards, in blocks of the same levels: their widths are in common."""
     fits, lines = [compared.values[block, "fits"] for block in contrast["blocks"]], []
     for standard in {standard for standard, _ in fits[0]}:
         people = [(side, who, fit) for side, own in enumerate(fits) for (at, who), fit in own.items() if at == standard]
-        for (side, person, fit), prior in zip(people, width_priors([fit for *_, fit in people])[0], strict=True):
+        for (side, person, fit), prior in zip(people, group_priors([fit for *_, fit in people])[0], strict=True):
             weights, variance = fit.under(prior)
             lines.append((side, person, math.log(10) * fit.medians(weights)[0], math.log(10) ** 2 * variance))
     table = pd.DataFrame(lines, columns=["side", "person", "value", "variance"]).groupby(["side", "person"])

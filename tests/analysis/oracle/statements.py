@@ -14,8 +14,6 @@ from statsmodels.stats.multitest import multipletests
 
 from tests.analysis.oracle.recomputed import Compared, Floats, Numbers, exact_share, named, quartiles, student
 
-TIED = 1e-9
-
 
 @dataclass
 class Block:
@@ -129,9 +127,8 @@ def _measures(block: Block, trials: pd.DataFrame) -> None:
         own |= {f"count_{level}": (values == level).sum() for level in range(1, 8)}
         block.compared.check(f"{block.place}.measures.{number}", own | {"agree_percent": 100 * (values >= 5).mean()})
     for number, (item, code) in enumerate(product(block.wide, block.codes[1:])):
-        differences = (block.wide[item][code] - block.wide[item][block.codes[0]]).dropna()
-        recomputed = {"n": len(differences), "mean": differences.mean(), **student(differences)}
-        block.compared.check(f"{block.place}.effects.{number}", recomputed)
+        d = (block.wide[item][code] - block.wide[item][block.codes[0]]).dropna()
+        block.compared.check(f"{block.place}.effects.{number}", {"n": len(d), "mean": d.mean(), **student(d)})
 
 
 def _settings_differ(block: Block) -> None:
@@ -169,8 +166,8 @@ def _alike(answers: pd.DataFrame) -> Numbers:
     w, squares, shares = statistic.statistic / n / (k - 1), ranks.sum() - n * (k + 1) / 2, _rank_sums(ranks.to_numpy())
     f = (n - 1) * w / (1 - w)
     own = {"n": n, "dropped": len(answers) - n, "df": k - 1, "statistic": statistic.statistic, "effect": w, "f": f}
-    own |= {"p": shares[shares.index >= (squares**2).sum() - TIED].sum(), "p_chi2": statistic.pvalue}
-    own |= {"smallest_p": shares[shares.index >= max(shares.index) - TIED].sum()}
+    own |= {"p": shares[shares.index >= (squares**2).sum() - 1e-9].sum(), "p_chi2": statistic.pvalue}
+    own |= {"smallest_p": shares[shares.index >= max(shares.index) - 1e-9].sum()}
     return own | {"p_f": stats.f.sf(f, freedom, (n - 1) * freedom), **named("mean_ranks", enumerate(ranks.mean()))}
 
 
@@ -320,6 +317,5 @@ def _equivalence(block: Block) -> None:
             own |= {"p_upper": upper.pvalue, "p": max(lower.pvalue, upper.pvalue)}
             own |= {"statistic": min(lower.statistic, -upper.statistic)}
             own |= named("interval", student(differences, 1 - 2 * alpha) | {"level": 1 - 2 * alpha})
-        words = ("a delay is equivalent", item, f"{delay:g} ms − {control:g} ms")
-        block.record(f"against.{number}.found", own, *words)
+        block.record(f"against.{number}.found", own, "a delay is equivalent", item, f"{delay:g} ms − {control:g} ms")
         block.compared.check(f"{block.place}.against.{number}", {"delay_ms": delay, "control_ms": control})

@@ -1,5 +1,6 @@
 """Our numbers beside those of pingouin, statsmodels, scikit-posthocs and psignifit, on the same answers."""
 
+import math
 import warnings
 
 import numpy as np
@@ -130,7 +131,8 @@ def test_intervals_cover_the_mean(people, shared):
     for _ in range(1000):
         variances = draw.uniform(0.02, 0.1, people)
         common = draw.normal(0, np.sqrt(shared))
-        found = group_mean(draw.normal(common, np.sqrt(variances + 0.05)), variances, shared)
+        half = 1.959964 * math.sqrt(shared)
+        found = group_mean(draw.normal(common, np.sqrt(variances + 0.05)), variances, (half, half))
         assert found.low is not None
         assert found.high is not None
         covered += found.low <= 0 <= found.high
