@@ -69,7 +69,7 @@ def test_blocks_with_one_code_are_left_out():
 
 
 def test_a_design_needs_participants():
-    with pytest.raises(StudyError, match="no participants"):
+    with pytest.raises(StudyError, match="at least one participant"):
         balance(REK, (), 1)
 
 

@@ -56,8 +56,8 @@ def test_an_untouched_session_is_reproduced(seed: int, participant: str, order: 
         (lambda trials: trials[:-1], "trial 7 was not recorded, although the session is complete"),
         (lambda trials: trials[:-3], "trials 5 to 7 were not recorded, although the session is complete"),
         (lambda trials: [], "trials 1 to 7 were not recorded, although the session is complete"),
-        (lambda trials: trials[:2] + trials[3:], "trial 4: came after trial 2, but trial 3 was due"),
-        (lambda trials: trials[1:], "trial 2: came first, but trial 1 was due"),
+        (lambda trials: trials[:2] + trials[3:], "trial 4 came after trial 2, but trial 3 was due"),
+        (lambda trials: trials[1:], "trial 2 came first, but trial 1 was due"),
     ],
 )  # fmt: skip
 def test_whatever_was_changed_is_named(change: Callable[[list[RecordedTrial]], list[RecordedTrial]], expected: str):
@@ -97,11 +97,11 @@ def test_a_block_that_a_resumed_session_presents_again_is_reproduced_where_the_s
         resume: SHUFFLED.model_copy(update={"study": SHUFFLED.study.model_copy(update={"resume": resume})})
         for resume in ("block", "trial")
     }
-    for resume, expected in (("block", ()), ("trial", (f"trial 2: came after trial {reached}",))):
+    for resume, expected in (("block", ()), ("trial", (f"trial 2 came after trial {reached}",))):
         found = reproduce(by[resume], 3, "P001", [*trials[:reached], *trials[1:]], complete=True)
         assert tuple(one.partition(",")[0] for one in found) == expected
     (found,) = reproduce(by["block"], 3, "P001", [*trials[:reached], *trials[2:]], complete=True)
-    assert found.startswith(f"trial 3: came after trial {reached}, where")
+    assert found.startswith(f"trial 3 came after trial {reached}, where")
 
 
 def journal(trials: tuple[Trial, ...]) -> Iterator[dict[str, Any]]:
