@@ -574,7 +574,7 @@ def _at_intervals(say: Callable[[str], None]) -> Callable[[str], None]:
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the simulation.")
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for rates.md and rates.csv.")
 def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) -> None:
-    """Measure how often the report's verdicts are wrong, on studies simulated with no, some or all effects.
+    """Measure how often the report's verdicts are wrong, on simulated studies without effects, with some, or with all.
 
     The report's own tests analyse studies of rek2024 with 5, 12 and 24 participants, simulated by the rehearsals'
     answer model and by an ordinal probit model with random effects. Every rate is printed with its Wilson interval, and

@@ -208,7 +208,7 @@ def rehearse(
         click.echo(f"Simulated participants are spread evenly over the pre-existing groups {', '.join(study.groups)}.")
     if answers_only:
         if context.get_parameter_source("device") is not ParameterSource.DEFAULT:
-            raise click.UsageError("--answers-only uses no device: omit --device")
+            raise click.UsageError("--answers-only does not use a device: omit --device")
         from study_app.session.simulated.answers_only import rehearse_answers
 
         folder = rehearse_answers(protocol, progress=click.echo, **chosen)
@@ -259,7 +259,7 @@ def studies() -> None:
     from study_app.workspace import workspace as workspace_here
 
     here = workspace_here()
-    click.echo(f"Protocols in {here.protocols.absolute()}, shipped ones, and recently opened ones")
+    click.echo(f"Protocols in {here.protocols.absolute()}, shipped protocols, and recently opened protocols")
     for name in (*known_protocols(), *recent_protocols()):
         try:
             if is_scene_file(name):

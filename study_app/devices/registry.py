@@ -122,7 +122,7 @@ def check_options(name: str, options: Iterable[str]) -> None:
         if option not in taken:
             takers = [device.title for device in all_devices() if option in {known.name for known in device.options}]
             only = f"; only these do: {', '.join(takers)}" if takers else ""
-            raise DeviceError(f"device '{name}' takes no {option}{only}: leave --{option} out")
+            raise DeviceError(f"device '{name}' does not use {option}{only}: omit --{option}")
 
 
 def backends() -> list[Backend]:

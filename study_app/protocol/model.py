@@ -305,7 +305,7 @@ class Published(Table):
     low: Reported | None = Field(default=None, description="Lower end of its interval or range.")
     high: Reported | None = Field(default=None, description="Upper end of its interval or range.")
     percent: Annotated[float, within(0, 100, "a proportion of answers")] | None = Field(
-        default=None, description="Percentage of correct answers at the value; default: unknown."
+        default=None, description="Percentage of correct answers at this value; default: unknown."
     )
     n: Annotated[int, within(1, 1_000_000, "studies have fewer")] | None = Field(
         default=None, description="Number of its participants."

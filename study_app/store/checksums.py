@@ -75,7 +75,7 @@ def renew_checksums(session: SessionFolder, rewritten: Collection[Path]) -> bool
     if not (changed := [name for name in ours if file_hash(session, name) != listed.get(name)]):
         return False
     if others := [name for name in changed if name != REBUILT]:
-        note_rebuilt(session, f"other checksums were listed for {', '.join(others)}")
+        note_rebuilt(session, f"different checksums were listed for {', '.join(others)}")
     write_file(
         session.checksums, checksum_bytes(listed | {name: file_hash(session, name) for name in (*ours, REBUILT)})
     )

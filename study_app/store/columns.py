@@ -78,7 +78,7 @@ PARTICIPANTS: tuple[Column, ...] = (
 TRIALS_MISSING = optional(
     "trials_missing",
     "integer",
-    "Number of main trials that nobody answered because no presentation was delivered within the protocol's limits.",
+    "Number of main trials that were not answered because no presentation was delivered within the protocol's limits.",
     minimum=0,
     later=True,
 )

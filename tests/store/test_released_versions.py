@@ -158,5 +158,5 @@ def test_rebuild_mends_a_table_and_notes_the_columns_that_have_come_since(study:
     trials = folder.table("rek2024", "trials")
     assert rebuild_session(folder.path).rewritten == (table, trials, folder.checksums, folder.rebuilt)
     assert table.read_bytes() == before
-    assert folder.rebuilt.read_text().endswith(f"rebuild: other checksums were listed for {trials.name}\n")
+    assert folder.rebuilt.read_text().endswith(f"rebuild: different checksums were listed for {trials.name}\n")
     assert "rebuilt.txt" in warned(study)

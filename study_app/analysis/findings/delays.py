@@ -281,7 +281,7 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
             steps = step_down(answers.values[one.item], answers.block.delays_ms, direction, alpha=alpha)
             lowest.append(Lowest(one.item, steps, one.members))
         if trends and not showing:
-            why = "no statement shows a trend over all delays, which does not show that people notice none"
+            why = "no statement shows a trend over all delays, which does not show that delays go unnoticed"
             return (), (NotTested(cls.what, why),)
         return tuple(lowest), ()
 

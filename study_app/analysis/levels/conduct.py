@@ -203,5 +203,5 @@ class Withheld(LevelStatistic[Row]):
             rows = [one for one in self.rows if one["standard"] == standard]
             kept = list(takewhile(lambda one: one["most_percent"] <= WITHHELD_PERCENT, rows))
             at = "" if standard is None else f" at the standard of {standard:.4g}{of}"
-            until = f"up to {kept[-1]['high']:.3g}{of}" if kept else "at no level presented"
+            until = f"up to {kept[-1]['high']:.3g}{of}" if kept else "not at any level presented"
             yield f"At most {WITHHELD_PERCENT:g} % was held back in every comparison {until}{at}."

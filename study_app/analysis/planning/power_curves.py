@@ -519,7 +519,10 @@ def smallest_differences(
         else f" Equivalence requires at least {fewest(alpha / bounds, bound, largest)} "
         f"participants{' in each group' if shares else ''}, at α = {alpha / bounds:.2g}."
     )
-    yield f"{said}{both} Smallest difference: what {WANTED:.0%} of studies show {at}.{within} {LEFT_OUT}"
+    yield (
+        f"{said}{both} The smallest difference is the difference that {WANTED:.0%} of studies detect "
+        f"{at}.{within} {LEFT_OUT}"
+    )
     yield from ("", f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|")
     for name, words, spread in rows:
         for n in sizes:

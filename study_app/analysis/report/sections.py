@@ -290,7 +290,7 @@ def _parts(
         yield finding.what or finding.figure_title, finding(found, results, pictures).section
     if found.absent:
         lines = [f"{line[:1].upper()}{line[1:]}" for line in missing(found)]
-        yield "what is not here", lambda: (heading(3, "What could not be computed, and why"), bullets(lines))
+        yield "missing parts", lambda: (heading(3, "What could not be computed, and why"), bullets(lines))
 
 
 def verdicts_mean(results: Results) -> Iterator[str]:

@@ -258,7 +258,9 @@ def report(
     progress("reading", 0.0)
     study = load_study(folder)
     if not has_questions(study):
-        raise AnalysisError(f"{folder}: the study {study.name!r} asks no statements, so there is nothing to report")
+        raise AnalysisError(
+            f"{folder}: the study {study.name!r} does not ask for statements, so there is nothing to report"
+        )
     files, found = report_files(study, progress)
     progress("writing", 0.95)
     written = write_output(study.folder, Path(to), files, warn)

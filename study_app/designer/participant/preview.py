@@ -648,7 +648,7 @@ class ParticipantPreview(Card):
             return f"{counted(count, 'problem')} elsewhere: {values} are shown."
         shown = f"{values} are"
         if own.kind == "alike":
-            shown = "the text as it is written is"
+            shown = "the text as written is"
         elif own.missing_language or own.kind == "one language":
             shown = "the text of another language is"
         return f"{title_of(study.document, self._selected)} has a problem ({own.message}): {shown} shown."

@@ -31,7 +31,7 @@ RUNNING, OSCILLATES, MOVED, SILENT_DEVICE, SILENT_HOST, STOP_BUTTON = range(6)
 ENDED: Final = {
     OSCILLATES: "the handle oscillates",
     MOVED: "the handle moved too far",
-    SILENT_DEVICE: "the device reports no new position",
+    SILENT_DEVICE: "the device does not report new positions",
     SILENT_HOST: "the program did not respond",
     STOP_BUTTON: "the stop button was pressed",
 }

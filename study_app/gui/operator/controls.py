@@ -275,7 +275,7 @@ class DeviceCard(Card):
         self.name = label("", "card")
         self.chip = Chip("neutral", "ring", "Waiting", small=True)
         self.diagnose = ActionButton("pulse", "Diagnose …", key="D", height=36)
-        self.diagnose.setToolTip("Turns the force off and pauses first")
+        self.diagnose.setToolTip("First turns the force off and pauses")
         self._most = ALL_ROWS
         self._view: OperatorView | None = None
         row = hbox(self.icon, self.name, STRETCH, self.chip, spacing=10)

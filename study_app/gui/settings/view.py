@@ -281,8 +281,8 @@ class DisplayTest(QWidget):
 STACKED_BELOW = 1000
 SAMPLE = "I think this feels like interacting with a liquid."
 MOST_SAMPLE = 2.4
-STAMPS = "Such as https://freetsa.org/tsr. Leave empty for none."
-PORTS = "One byte per event: serial:/dev/ttyUSB0, serial:COM3 or parallel:/dev/parport0. Leave empty for none."
+STAMPS = "For example https://freetsa.org/tsr. Leave empty to disable."
+PORTS = "One byte per event: serial:/dev/ttyUSB0, serial:COM3 or parallel:/dev/parport0. Leave empty to disable."
 
 
 def _check_port(text: str) -> str:
@@ -323,7 +323,7 @@ FIELDS = (
     Field("camera", "Camera for conditions that show a camera picture", longest=CAMERA_LENGTH, placeholder=USUAL),
     Field(
         "proofs", "Folder for the study's proof, written when a session ends", "folder",
-        hint="A folder that people who can change results cannot change. Leave empty for none.",
+        hint="A folder that people who can change results cannot change. Leave empty to disable.",
         parse=_check_path, write=_text_or_empty,
     ),
     Field("stamps", "Time-stamp server for proofs (RFC 3161)", hint=STAMPS, parse=_check_server),

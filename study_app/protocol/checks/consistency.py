@@ -199,7 +199,7 @@ def check_liquids_differ(parts: Draft) -> Iterator[Fault]:
     for name, liquid in parts.liquids.items():
         if (earlier := first.setdefault(repr(felt_numbers(liquid)), name)) != name:
             yield Fault(
-                ("liquids", name), f'has the same numbers as "{earlier}"', ("change it, or list that condition twice")
+                ("liquids", name), f'has the same values as "{earlier}"', ("change it, or list that condition twice")
             )
 
 

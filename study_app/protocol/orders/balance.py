@@ -226,7 +226,7 @@ def describe_balance(judged: Balance) -> str:
     whose = f", {judged.session}" if judged.session else ""
     head = f"{judged.study}{whose}: the orders of {people}, each with seed {judged.seed}"
     if not judged.blocks:
-        return f"{head}\n\nNo block has more than one code: there is nothing to balance."
+        return f"{head}\n\nAll blocks have only one code, so there is nothing to balance."
     return "\n\n".join((head, *("\n".join(_block_lines(block)) for block in judged.blocks)))
 
 

@@ -284,7 +284,7 @@ def _trial_differences(planned: Trial | None, run: RecordedTrial) -> Iterator[st
     expected = tuple(item for item in planned.items if item in run.items) if run.may_hide else planned.items
     if run.items != expected:
         said, given = (", ".join(items) or "none" for items in (run.items, planned.items))
-        yield f"trial {run.number}: items {said} recorded, but the seed gives {given}"
+        yield f"trial {run.number}: the items {said} were recorded, but the seed gives {given}"
 
 
 def _progress_differences(

@@ -189,7 +189,7 @@ def _unpaced_blocks(protocol: Protocol, block: Block) -> Iterator[str]:
     if highest_damping(protocol, block) > 0 and error_percent is not None:
         fast_hz = fastest_hz(protocol.scene.velocity, protocol.device.rate_hz, 1 - error_percent / 100)
         yield (
-            f"tasks.{block.task}: in motions above {fast_hz:.1f} Hz the velocity estimator takes more than "
+            f"tasks.{block.task}: in motions above {fast_hz:.1f} Hz the velocity estimator removes more than "
             f"{error_percent:g} % of a damper's force; such trials are repeated; {PACED}"
         )
 
