@@ -63,7 +63,7 @@ FEW_ANSWERS: Final = 40
 MOST_NAMED: Final = 6
 REMOVED: Final = (
     "A preference for an interval or for the previous answer, estimated by probit regression (standard deviation "
-    f"between people: {PREFERENCE_SD:g} of that of a decision), {{}} removed."
+    f"between people: {PREFERENCE_SD:g} times the standard deviation of a decision), {{}} removed."
 )
 
 

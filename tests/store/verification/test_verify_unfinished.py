@@ -48,7 +48,7 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Start) -> None:
         "sub-P009/ses-01/.receipt.json.0123abcd.tmp: is an incomplete file",
         "sub-P009/ses-01/recordings: trial 1, attempt 1 has none: No space left on device",
         "sub-P009/ses-01/recordings/trial-002.parquet: does not appear in the journal",
-        "sub-P007/ses-01/crash.txt: shows where the program crashed",
+        "sub-P007/ses-01/crash.txt: shows how the program crashed",
         "sub-P010/ses-01: was created, but the program ended before it wrote a journal",
         "sub-P011/ses-01: is open in another program",
         "data/.x.csv.0123abcd.tmp: is an incomplete file left by a killed program, or is being written",
