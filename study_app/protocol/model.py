@@ -414,7 +414,7 @@ class ExclusionRule(Table):
     limit: float | None = Field(
         default=None,
         description="constant_answers: largest percentage of equal answers; fast_answers: minimum median response time "
-        "[s]; the other rules do not use a limit.",
+        "in seconds; the other rules do not use a limit.",
     )
 
     @model_validator(mode="after")

@@ -278,13 +278,13 @@ def _trial_differences(planned: Trial | None, run: RecordedTrial) -> Iterator[st
         ours, theirs = getattr(planned, name), getattr(run, name)
         if ours != theirs:
             said, given = ("none" if value is None else value for value in (theirs, ours))
-            yield f"trial {run.number}: {name} {said} recorded, but the seed gives {given}"
+            yield f"trial {run.number}: recorded {name} {said}, but the seed gives {given}"
     if run.items is None:
         return
     expected = tuple(item for item in planned.items if item in run.items) if run.may_hide else planned.items
     if run.items != expected:
         said, given = (", ".join(items) or "none" for items in (run.items, planned.items))
-        yield f"trial {run.number}: the items {said} were recorded, but the seed gives {given}"
+        yield f"trial {run.number}: recorded items {said}, but the seed gives {given}"
 
 
 def _progress_differences(

@@ -182,7 +182,7 @@ def test_a_link_survives_a_change_of_numbers_and_is_no_number_of_the_scene():
     felt = damper(delay_s=0.02, seed=4)
     assert override_value(felt, "damping_nspm", 3.0).link == felt.link
     assert not {"delay_s", "jitter_s", "loss", "seed"} & set(number_names(felt))
-    with pytest.raises(StudyError, match="no parameter 'link'"):
+    with pytest.raises(StudyError, match="the parameter 'link'"):
         override_value(felt, "link", "{delay_s=0.1}")
     assert "link" not in scene_text(felt)
     assert is_built_alike(felt, override_value(felt, "damping_nspm", 3.0))

@@ -116,14 +116,14 @@ def test_parameters_that_belong_together_are_judged_together():
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("densty_kg_m3", 1, "no parameter 'densty_kg_m3': did you mean 'density_kg_m3'"),
-        ("wake.alpha", 1, "no parameter 'wake.alpha': did you mean 'alpha'"),
-        ("kind", "given", "no parameter 'kind'"),
+        ("densty_kg_m3", 1, "the parameter 'densty_kg_m3': did you mean 'density_kg_m3'"),
+        ("wake.alpha", 1, "the parameter 'wake.alpha': did you mean 'alpha'"),
+        ("kind", "given", "the parameter 'kind'"),
         ("wake", "{length=1", "cannot read wake = {length=1: write a table such as"),
-        ("liquids", "1", "no parameter 'liquids'"),
+        ("liquids", "1", "the parameter 'liquids'"),
         ("decay", 1.5, "cannot set decay = 1.5.*less than or equal to 1"),
         ("decay", "fast", "cannot set decay = fast.*valid number"),
-        ("drag", "1", "cannot set drag = 1: drag: is a table of parameters: set one of them by its name"),
+        ("drag", "1", "cannot set drag = 1: drag: is a table of parameters: set one parameter by its name"),
     ],
 )
 def test_an_override_that_fails_says_why(name, value, message):

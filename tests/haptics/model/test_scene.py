@@ -64,7 +64,7 @@ def test_what_is_known_of_the_motion_follows_from_the_hand_unless_said(region, d
 
 
 def test_liquids_need_ids_of_their_own_and_a_scene_takes_eight():
-    with pytest.raises(ValidationError, match="share an id"):
+    with pytest.raises(ValidationError, match="share an ID"):
         scene(liquid(id="a"), liquid(id="a"))
     with pytest.raises(ValidationError, match="at most 8"):
         scene(*(liquid(id=f"a{i}") for i in range(9)))

@@ -18,7 +18,7 @@ from study_app.protocol.warnings.study_warnings import warnings
             "damping_nspm = 4",
             "damping_nspm = 0.01",
             "",
-            "stimuli.delay.vary: the condition does not produce force",
+            "stimuli.delay.vary: the condition does not",
         ),
         ("demo", "format = 1", "format = 1", "Mouse", "blocks.liquids: Mouse does not produce force: participants see"),
         (

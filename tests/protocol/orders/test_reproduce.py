@@ -44,13 +44,13 @@ def test_an_untouched_session_is_reproduced(seed: int, participant: str, order: 
     ("change", "expected"),
     [
         (lambda trials: [*trials[:1], replace(trials[1], block="look"), *trials[2:]],
-         "trial 2: block look recorded, but the seed gives feel"),
+         "trial 2: recorded block look, but the seed gives feel"),
         (lambda trials: [*trials[:1], replace(trials[1], part=None), *trials[2:]],
-         "trial 2: part none recorded, but the seed gives 1"),
+         "trial 2: recorded part none, but the seed gives 1"),
         (lambda trials: [*trials[:1], replace(trials[1], items=trials[1].items[::-1]), *trials[2:]],
-         "trial 2: the items cold, warm were recorded, but the seed gives warm, cold"),
+         "trial 2: recorded items cold, warm, but the seed gives warm, cold"),
         (lambda trials: [*trials[:1], replace(trials[1], items=()), *trials[2:]],
-         "trial 2: the items none were recorded, but the seed gives warm, cold"),
+         "trial 2: recorded items none, but the seed gives warm, cold"),
         (lambda trials: [*trials, replace(trials[-1], number=8)],
          "trial 8: recorded, but the seed does not produce this trial"),
         (lambda trials: trials[:-1], "trial 7 was not recorded, although the session is complete"),
@@ -74,8 +74,8 @@ def test_another_order_of_a_block_is_found():
     block = REK.blocks["liquids"].model_copy(update={"order": "fixed"})
     other = REK.model_copy(update={"blocks": {**REK.blocks, "liquids": block}})
     assert reproduce(other, 1, "P001", run(REK, "P001", 1), complete=True) == (
-        "trial 2: code L2 recorded, but the seed gives L1",
-        "trial 3: code L1 recorded, but the seed gives L2",
+        "trial 2: recorded code L2, but the seed gives L1",
+        "trial 3: recorded code L1, but the seed gives L2",
     )
 
 
