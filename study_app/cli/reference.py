@@ -29,7 +29,7 @@ def kinds_markdown() -> str:
     """Return a Markdown table for each kind that has a descriptor."""
     tables = (
         ("Questions", ("`kind`", "question", "its own keys", "value in tables"), _question_rows()),
-        ("Standard questionnaires", ("`instrument`", "texts", "scores", "source; compared with"), _instrument_rows()),
+        ("Standard questionnaires", ("`instrument`", "texts", "scores", "source and comparison"), _instrument_rows()),
         ("Designs", ("`kind`", "question or answer"), _kind_descriptions(designs.KINDS)),
         ("Methods", ("`kind`", "next level"), _kind_descriptions(methods.KINDS)),
         ("Effects", ("effect", "what it is", "format", "`auto`", "not with"), _effect_rows()),

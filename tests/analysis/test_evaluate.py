@@ -123,7 +123,7 @@ def test_nothing_decided_makes_everything_exploratory(tmp_path: Path) -> None:
     assert "depend on the answers" in why["equivalence test"]
     assert "does not say which statements name" in why["test of recognition"]
     assert {one.outcome.method.split(", ")[1] for one in DelayTrend.of(delays)} == {"two-sided"}
-    assert "states no statement about it" in why["detection threshold"]
+    assert "does not state a detection question" in why["detection threshold"]
 
 
 def test_a_bound_that_was_not_decided_is_not_made_up(tmp_path: Path) -> None:

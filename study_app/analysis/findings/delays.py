@@ -338,7 +338,7 @@ class DetectionThreshold(Finding[Threshold | None]):
     def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[Threshold | None, Absent]:
         item = answers.decided.noticed
         if item is None or item not in answers.values:
-            return None, (NotTested(cls.what, "the protocol states no statement about it (analysis.noticed)"),)
+            return None, (NotTested(cls.what, "the protocol does not state a detection question (analysis.noticed)"),)
         rising = [one.item for one in DelayTrend.of(found) if one.verdict in FOUND and (one.outcome.effect or 0.0) > 0]
         if item not in rising:
             return None, (NotTested(cls.what, "agreement is not shown to increase with the delay"),)

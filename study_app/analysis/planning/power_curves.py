@@ -285,7 +285,7 @@ OF_BLOCK: Final = (
     Column("block", "text", "ID of the block of trials."),
 )
 OF_STUDIES: Final = (
-    Column("participants", "integer", "Participants of each study.", minimum=2),
+    Column("participants", "integer", "Number of participants in each study.", minimum=2),
     Column("studies", "integer", "Simulated studies.", minimum=1),
 )
 """Columns of all tables of power."""
@@ -413,7 +413,8 @@ def _preface(found: Powers) -> list[str]:
         if block.groups
         for line in (
             "",
-            f"{block.title}: n counts participants of {' and '.join(block.groups)}; other groups do not have it.",
+            f"{block.title}: n is the number of participants in {' and '.join(block.groups)}; other groups do "
+            "not have this block.",
         )
     ]
     return lines

@@ -106,7 +106,7 @@ MOTION: Final = (
     optional("q1", "number", "Lower quartile over participants."),
     optional("q3", "number", "Upper quartile over participants."),
     Column("trials", "integer", "Number of analysed trials in the condition.", minimum=0),
-    Column("judged", "integer", "Number of these trials with measured limits.", minimum=0),
+    Column("judged", "integer", "Number of these trials whose limits were checked.", minimum=0),
     Column("valid", "integer", "Number of these trials that met the protocol's timing limits.", minimum=0),
 )
 

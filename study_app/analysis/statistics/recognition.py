@@ -184,7 +184,7 @@ def _kappa(given: Whole, right: Whole, labels: int, seed: int | None) -> tuple[f
         return None, None, f"no interval: {why}"
 
     if seed is None:
-        return whole, None, "no interval: an interval was not requested"
+        return whole, None, "an interval was not requested"
     if (n := len(tables)) < 2:
         return whole, None, "no interval: there is only one participant"
     correct, decided = np.trace(tables, axis1=1, axis2=2), tables.sum(axis=(1, 2))

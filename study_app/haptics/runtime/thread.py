@@ -217,8 +217,9 @@ class LoopThread:
         delay_ticks = driver.dynamics.delay_ticks(self._rate_hz)
         if delay_ticks > MOST_DELAY:
             raise DeviceError(
-                f"the device '{driver.name}' answers {delay_ticks} ticks late at {self._rate_hz:g} Hz, and no force is "
-                f"stable beyond {MOST_DELAY}: connect it without a hub, close other programs on the bus, restart"
+                f"the device '{driver.name}' answers {delay_ticks} ticks late at {self._rate_hz:g} Hz, but "
+                f"forces are unstable beyond {MOST_DELAY}: connect it without a hub, close other programs on "
+                "the bus, restart"
             )
         return new_safety(driver.force_limit_n, delay_ticks)
 

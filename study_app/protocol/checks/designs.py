@@ -214,7 +214,7 @@ def _check_varied_number(protocol: Protocol, name: str, stimulus: Stimulus) -> I
         yield Fault((*place, "condition"), message, "a condition with one liquid")
     elif protocol.liquids[liquids[0]].effects == "auto":
         message = f'the effects of "{liquids[0]}" would be selected again at every level'
-        yield Fault((*place, "vary"), message, 'name them: effects = ["drag"]')
+        yield Fault((*place, "vary"), message, 'list them: effects = ["drag"]')
     else:
         try:
             present_value(protocol, stimulus)

@@ -25,7 +25,7 @@ def optional_library(name: str) -> Any:
     try:
         return import_module(name)
     except ImportError as error:
-        raise StoreError(f"a proof with {name.partition('.')[0]} {EXTRA}") from error
+        raise StoreError(f"a proof needs {name.partition('.')[0]} {EXTRA}") from error
 
 
 def request_stamp(lines: str, server: str) -> str:

@@ -180,7 +180,7 @@ def test_a_block_of_some_groups_counts_their_participants() -> None:
     assert {block.id: block.groups for block in study_plan.blocks} == {"thin": (), "thick": ("b",)}
     studies, counts = swept(study_plan)
     found = powers(study_plan, SIZES, studies, studies, 1, counts)
-    assert power_markdown(found).count("n counts participants of b; other groups do not have it.") == 1
+    assert power_markdown(found).count("n counts participants of b; other groups do not have this block.") == 1
 
 
 def test_a_protocol_that_compares_nothing_is_refused() -> None:
