@@ -403,7 +403,7 @@ def incomplete_words(found: BlockResult) -> str:
         f"{person} ({'all statements' if len(items) == every else listed(items)})"
         for person, items in sorted(statements.items())
     ]
-    return f"Left out of tests over all {settings_noun(found)}s, because an answer is missing: {listed(who)}."
+    return f"Excluded from tests over all {settings_noun(found)}s, because an answer is missing: {listed(who)}."
 
 
 def missing(found: BlockResult) -> tuple[str, ...]:

@@ -131,7 +131,7 @@ def unblind(results: Path, by: str, reason: str) -> None:
     """Open the sealed key of a study and write the sealed columns; name, time and reason are recorded.
 
     In a merged study the key of each site is opened; for one site give its folder, such as pooled/sites/A. Ends with
-    exit code 3 if a file was left unchanged: each is named with the reason and what to do.
+    exit code 3 if a file was left unchanged; the command states the reason and what to do.
     """
     from study_app.store.exclusions import describe_exclusion
     from study_app.store.unblinding import unblind_folder

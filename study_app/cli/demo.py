@@ -129,7 +129,7 @@ def _show_results(study: Path) -> int:
         if platform not in UNSEEN_PLATFORMS:
             from study_app import app
 
-            click.echo("Opening the program on these results; close its window to end")
+            click.echo("The program opens with these results; close its window to finish")
             return int(app.run_home_window(then=lambda visit: visit.show_study(study)))
         reason = f"QT_QPA_PLATFORM={platform} does not show windows"
     except DisplayError as error:

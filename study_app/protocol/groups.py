@@ -40,7 +40,7 @@ class Group(Table):
     @model_validator(mode="after")
     def _one_of(self) -> Self:
         if self.sequence and self.sequences:
-            message = "give either sequence or sequences, one of the two"
+            message = "give either sequence or sequences"
             raise invalid(message, "sequences")
         return self
 

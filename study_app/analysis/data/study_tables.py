@@ -516,7 +516,7 @@ def _no_sessions(path: Path) -> str:
 
 def _other_study(other: Session, first: Session) -> str:
     return (
-        f"{other.folder.path} is of the study {other.study!r}, {first.folder.path} of {first.study!r}: keep "
+        f"{other.folder.path} belongs to study {other.study!r}, {first.folder.path} to {first.study!r}: keep "
         "each study in a separate folder"
     )
 

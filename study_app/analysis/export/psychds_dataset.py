@@ -215,7 +215,11 @@ def _json(content: Any) -> bytes:
 
 def _readme(study: Study, tables: Mapping[str, bytes], report: Mapping[str, bytes], missing: Sequence[str]) -> bytes:
     simulated = "**All participants are simulated.** " if study.simulated else ""
-    blinded = "Settings are named." if study.revealed else ("Conditions appear as codes, because the study is blinded.")
+    blinded = (
+        "Conditions are identified."
+        if study.revealed
+        else ("Conditions appear as codes, because the study is blinded.")
+    )
     script = f"; `Rscript analysis/{SCRIPT} data results` recomputes its main numbers" if SCRIPT in report else ""
     lines = [
         f"# {study.title}",

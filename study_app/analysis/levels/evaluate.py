@@ -98,7 +98,7 @@ def level_section(found: LevelsResult, pictures: Sequence[Picture], estimator: s
     )
     at_each = "Answers at each level" if found.vary is not None or not found.revealed else "Answers"
     if not Settings.of(found):
-        yield heading(3, "Answers over levels" if found.adaptive else at_each)
+        yield heading(3, "Answers against levels" if found.adaptive else at_each)
     if not found.revealed:
         yield paragraph(SEALED)
         return

@@ -396,7 +396,7 @@ def _again(study: Study, results: Results) -> Iterator[str]:
     decided = results.decided
     bound = decided.equivalence_bound
     rows = [
-        ("Decided before the first session", "yes" if decided.binding else "no: everything is exploratory"),
+        ("Decided before the first session", "yes" if decided.binding else "no, all results are exploratory"),
         ("Alpha", decided.alpha_words()),
         ("Equivalence bound", "none" if bound is None else f"±{bound:g}"),
         ("Primary statements", (", ".join(decided.primary) or "all") if decided.binding else "none"),

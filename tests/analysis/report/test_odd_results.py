@@ -91,7 +91,7 @@ def test_another_study_mixed_in_or_an_empty_folder_is_one_clear_error(
     foreign = small.add("P077", lambda _condition, _item: 4)
     shutil.copytree(foreign.path.parent, rek.folder / "data" / "sub-P077")
     for _ in ("sealed", "opened"):
-        with pytest.raises(AnalysisError, match=r"is of the study 'small', .* keep each study in a folder of its own"):
+        with pytest.raises(AnalysisError, match=r"belongs to study 'small', .* keep each study in a separate folder"):
             report(rek.folder, tmp_path / "report")
         shutil.move(rek.folder / "data" / "sub-P077", tmp_path / "sub-P077")
         rek.open()
