@@ -9,12 +9,14 @@ from __future__ import annotations
 import importlib
 import pkgutil
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
-from functools import cache
+from functools import cache, wraps
 from importlib.metadata import EntryPoint, entry_points
+from inspect import getattr_static
+from numbers import Real
 from types import ModuleType
-from typing import Any, Final, Generic, Literal, TypeVar, cast
+from typing import Any, Final, Generic, Literal, NamedTuple, TypeVar, cast
 
 from study_app.errors import PlugInError, StudyError
 
@@ -81,6 +83,32 @@ def _of_kind(kind: str) -> Iterator[tuple[EntryPoint, PlugIn]]:
             )
 
 
+class Returns(NamedTuple):
+    """What a function or property of a plug-in may return: a phrase, and the test of a value."""
+
+    permitted: str
+    holds: Callable[[Any], bool]
+
+
+def number_between(low: float, high: float) -> Returns:
+    """Return the permission of numbers from ``low`` to ``high``, which NaN is not."""
+    return Returns(
+        f"a number from {low:g} to {high:g}", lambda value: isinstance(value, Real) and low <= float(value) <= high
+    )
+
+
+def instance_of(kind: type) -> Returns:
+    """Return the permission of values of a class."""
+    return Returns(f"of the class {kind.__name__}", lambda value: isinstance(value, kind))
+
+
+def are_numbers(values: Any) -> bool:
+    """Return whether ``values`` is a sequence of finite numbers."""
+    return isinstance(values, Sequence) and all(
+        isinstance(value, Real) and abs(float(value)) < 1e12 for value in values
+    )
+
+
 class Registry(Mapping[str, T], Generic[T]):
     """The descriptors of one kind, by name: the program's ``own``, then those of plug-ins.
 
@@ -88,11 +116,21 @@ class Registry(Mapping[str, T], Generic[T]):
     class ``base``, with its ``name``; or a class that extends it, whose name is the value of its attribute or field
     ``key``. Names that study files hold, those of a ``kind``, begin with the package, ``package:name``: so a file says
     itself what to install.
+
+    ``returns`` are the functions and properties of a plug-in that the program calls, with what they may return: another
+    value, or an error, is a `PlugInError` that names the plug-in.
     """
 
-    def __init__(self, kind: str, own: Mapping[str, T], base: type, key: Literal["name", "key", "kind"]) -> None:
+    def __init__(
+        self,
+        kind: str,
+        own: Mapping[str, T],
+        base: type,
+        key: Literal["name", "key", "kind"],
+        returns: Mapping[str, Returns],
+    ) -> None:
         self.kind, self.own = kind, own
-        self._base, self._key = base, key
+        self._base, self._key, self._returns = base, key, returns
         self._found: tuple[tuple[PlugIn, ...], Mapping[str, T]] | None = None
 
     @property
@@ -138,7 +176,8 @@ class Registry(Mapping[str, T], Generic[T]):
                 try:
                     found = point.load()
                     name = self._name_of(found, point.value, plug_in.package, others)
-                except (Exception, SystemExit) as error:  # noqa: BLE001 - code of another package
+                    found = self._checked(found, replace(plug_in, name=name))
+                except (Exception, SystemExit, KeyboardInterrupt) as error:  # noqa: BLE001 - code of another package
                     plug_ins.append(replace(plug_in, fault=_line(error)))
                 else:
                     plug_ins.append(replace(plug_in, name=name))
@@ -168,6 +207,30 @@ class Registry(Mapping[str, T], Generic[T]):
         if name in self.own or name in others:
             raise StudyError(f"{self.kind} '{name}' exists already: rename it")
         return name
+
+    def _checked(self, found: Any, plug_in: PlugIn) -> Any:
+        """Return a plug-in whose functions and properties return what ``returns`` permits, or raise an error."""
+
+        def check(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+            return _checked_function(function, plug_in, name, self._returns[name])
+
+        if not isinstance(found, type):
+            values = {name: getattr(found, name) for name in self._returns}
+            return replace(found, **{name: check(name, value) for name, value in values.items() if callable(value)})
+        for name, returns in self._returns.items():
+            holder = next(kind for kind in (*found.__mro__, object) if name in vars(kind) or kind is object)
+            value = getattr_static(found, name, None)
+            if holder is object or holder.__module__.startswith("study_app."):
+                continue  # inherited
+            if isinstance(value, property):
+                setattr(found, name, property(check(name, cast("Callable[..., Any]", value.fget))))
+            elif isinstance(value, classmethod | staticmethod):
+                setattr(found, name, type(value)(check(name, value.__func__)))
+            elif callable(value):
+                setattr(found, name, check(name, value))
+            elif not _holds(returns, value):
+                raise StudyError(f"{name} is {_shown(value)}, not {returns.permitted}")
+        return found
 
     def forget(self) -> None:
         """Look for plug-ins again when one is asked for."""
@@ -208,6 +271,42 @@ def plug_ins() -> tuple[PlugIn, ...]:
     return tuple(found)
 
 
+def _checked_function(function: Callable[..., Any], plug_in: PlugIn, name: str, returns: Returns) -> Callable[..., Any]:
+    """Return a plug-in's function whose errors and wrong values are those of the plug-in."""
+
+    @wraps(function)
+    def call(*values: Any, **named: Any) -> Any:
+        try:
+            value = function(*values, **named)
+        except StudyError:
+            raise
+        except (Exception, SystemExit) as error:
+            raise _failure(plug_in.package, plug_in.version, _line(error)) from error
+        if not _holds(returns, value):
+            words = f"{name} of {plug_in.kind} {plug_in.name} returned {_shown(value)}, not {returns.permitted}"
+            raise _failure(plug_in.package, plug_in.version, words)
+        return value
+
+    return call
+
+
+def _holds(returns: Returns, value: object) -> bool:
+    try:
+        return bool(returns.holds(value))
+    except Exception:  # noqa: BLE001 - a value of another package
+        return False
+
+
+def _shown(value: object) -> str:
+    """Return a value for a message, in at most 40 characters."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 40 else f"{text[:39]}…"
+
+
+def _failure(package: str, version: str, words: str) -> PlugInError:
+    return PlugInError(f"the plug-in {package} {version} failed ({words}): {UPDATE}")
+
+
 def explained(error: BaseException) -> BaseException:
     """Return a `PlugInError` for an error that was raised in a plug-in, else the error itself."""
     if isinstance(error, StudyError):
@@ -220,4 +319,4 @@ def explained(error: BaseException) -> BaseException:
     dist = next((packages[one] for one in reversed(modules) if packages.get(one) is not None), None)
     if dist is None:
         return error
-    return PlugInError(f"the plug-in {dist.name} {dist.version} failed ({_line(error)}): {UPDATE}")
+    return _failure(dist.name, dist.version, _line(error))

@@ -22,7 +22,7 @@ from study_app.cli import data, demo, evidence, model, power, study
 from study_app.cli.devices import devices, outlets, plugins
 from study_app.cli.options import EXIT_USER_ERROR, GroupedCommands, example_of
 from study_app.discovery import explained
-from study_app.errors import StudyError, naming_the_extra
+from study_app.errors import PlugInError, StudyError, naming_the_extra
 
 BY_SIGNAL = 128  # added to a signal's number
 SHOWN = 200  # letters of a bad value that a message repeats
@@ -91,9 +91,13 @@ def main() -> None:
     except (click.Abort, KeyboardInterrupt):
         sys.exit(130)
     except StudyError as error:
+        if isinstance(error, PlugInError):
+            logging.getLogger(__name__).info("%s", error, exc_info=True)  # the terminal has the line alone
         click.echo(f"liquid-study: {_shortened(str(error))}", err=True)
         sys.exit(EXIT_USER_ERROR)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
+        if isinstance(error, SystemExit) and explained(error) is error:
+            raise
         if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG and error.filename:
             click.echo(f"liquid-study: {_shortened(str(error.filename))}: the file name is too long", err=True)
             sys.exit(EXIT_USER_ERROR)

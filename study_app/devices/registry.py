@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 from study_app.devices import DEFAULT_DEVICE
 from study_app.devices.descriptor import NOT_AVAILABLE, Backend, DeviceDescriptor, Doctor, OpenRequest
 from study_app.devices.descriptors import DEVICES as OWN
-from study_app.discovery import Registry
+from study_app.discovery import Registry, Returns
 from study_app.errors import DeviceError, DeviceNotFound
 
 if TYPE_CHECKING:
@@ -22,7 +22,11 @@ REMOVED: Final = {"falcon-socket": "falcon-emulated, or falcon"}
 """Devices of earlier versions, with their replacements."""
 
 
-DEVICES: Final = Registry("device", {device.name: device for device in OWN}, DeviceDescriptor, "name")
+RETURNS: Final = {
+    "open": Returns("a device", lambda value: callable(value.read) and callable(value.write) and callable(value.close)),
+    "probe": Returns("a list of Backend", lambda value: all(isinstance(backend, Backend) for backend in list(value))),
+}
+DEVICES: Final = Registry("device", {device.name: device for device in OWN}, DeviceDescriptor, "name", RETURNS)
 
 
 def all_devices() -> tuple[DeviceDescriptor, ...]:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Final, Literal, Protocol, TypeAlias
 
-from study_app.discovery import Registry
+from study_app.discovery import Registry, Returns
 from study_app.errors import OutletError
 from study_app.outlets.markers import Marker, Sink, SinkKind, SinkThread
 from study_app.outlets.sinks import SINKS as OWN
@@ -43,7 +43,8 @@ class OutletStatus:
     shows_force: bool = False
 
 
-SINKS: Final = Registry("outlet", {kind.name: kind for kind in OWN}, SinkKind, "name")
+IS_SINK: Final = Returns("a sink", lambda value: callable(value.send) and callable(value.close))
+SINKS: Final = Registry("outlet", {kind.name: kind for kind in OWN}, SinkKind, "name", {"open": IS_SINK})
 """The kinds of sinks by name."""
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
-from study_app.discovery import Registry
+from study_app.discovery import Registry, Returns, instance_of
 from study_app.haptics.model.ranges import later, within
 from study_app.protocol.table import (
     DIRECTIONS,
@@ -102,6 +102,8 @@ def shown_questions(items: Iterable[Question | ItemView], answers: Mapping[str, 
 Draw: TypeAlias = Callable[[], float]
 ValueType: TypeAlias = Literal["integer", "number", "text"]
 
+MOST_LETTERS: Final = 5000
+"""No answer is longer."""
 MOST: Final = 1e12
 """No greater number can be given as an answer."""
 Bound: TypeAlias = Annotated[float, within(-MOST, MOST, "answers cannot be larger")]
@@ -207,6 +209,14 @@ def plain_number(value: float) -> int | float:
     """Return a number without the digits of binary fractions; whole numbers as integers."""
     rounded = round(value, 9)
     return int(rounded) if rounded == int(rounded) else rounded
+
+
+def answer_problem(question: Question, answer: Value, context: Context) -> str | None:
+    """Return why a value is not a valid answer, as a sentence; None if it is."""
+    texts = answer if isinstance(answer, tuple) else (answer,) if isinstance(answer, str) else ()
+    if (letters := sum(map(len, texts))) > MOST_LETTERS:
+        return f"an answer to {question.kind_id} {question.id} has {letters:,} characters: at most {MOST_LETTERS:,}"
+    return question.problem(answer, context)
 
 
 def kind_id(kind: type[Question]) -> str:
@@ -536,7 +546,7 @@ class Text(Question):
 
     kind: Literal["text"] = "text"
     lines: int = Field(default=1, ge=1, le=10, description="Height of the field, in lines.")
-    longest: int = Field(default=500, ge=1, le=5000, description="Largest number of characters.")
+    longest: int = Field(default=500, ge=1, le=MOST_LETTERS, description="Largest number of characters.")
 
     def view(self, number: int, context: Context) -> ItemView:
         return self._shown(TextView, number, context, lines=self.lines, longest=self.longest)
@@ -575,7 +585,14 @@ class RecordedQuestion(Question):
 STATEMENT: Final = "statement"
 
 KINDS: Final = Registry[type[Question]](
-    "question", {kind_id(kind): kind for kind in (Choice, Number, Rating, Slider, Statement, Text)}, Question, "kind"
+    "question",
+    {kind_id(kind): kind for kind in (Choice, Number, Rating, Slider, Statement, Text)},
+    Question,
+    "kind",
+    {
+        "view": instance_of(ItemView),
+        "problem": Returns("a sentence or None", lambda value: value is None or isinstance(value, str)),
+    },
 )
 """Every kind by its id; a question of a protocol file is of one of these."""
 

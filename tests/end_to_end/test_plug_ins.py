@@ -6,7 +6,7 @@ import socket
 import subprocess
 import sys
 import venv
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,8 @@ from PySide6.QtWidgets import QApplication
 
 from study_app import cli
 from study_app.analysis.findings import all_findings
+from study_app.devices.registry import open_device
+from study_app.errors import PlugInError
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.outlets.session_outlets import Outlets
 from study_app.protocol.load import load
@@ -28,6 +30,7 @@ from tests.compiled import needs_servo
 from tests.designer.support.designer import Designer
 from tests.gui.small import ManualClock
 from tests.plug_in_packages import EXAMPLES, forget, install
+from tests.studies import rehearsed
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
@@ -371,3 +374,118 @@ def test_a_class_that_lacks_what_it_must_have_is_named(run: Any, site: Path, kin
     install(site, "toy-plug", kind, {"toy": "toy_plug:Toy"}, toy_plug=source)
     code, said, _ = run("plugins")
     assert (code, f"toy: toy_plug:Toy lacks {lacks}: define them; update" in said) == (3, True)
+
+
+IN_STUDY = {
+    "Circle": ('kind = "explore"\nmin_s = 0.2\nmax_s = 1', 'kind = "toy-plug:circle"\nturns = 1'),
+    "Limits": ('kind = "constant"\nlevels = 2\nrepetitions = 1', 'kind = "toy-plug:limits"\nlevels = 5\nseries = 2'),
+    "Grid": ('kind = "text"', 'kind = "toy-plug:grid"\nleft = "-"\nright = "+"\nlower = "sleepy"\nupper = "awake"'),
+}
+
+
+@pytest.fixture
+def study_with(site: Path, tmp_path: Path) -> Callable[[str, str, str, str], Path]:
+    """Return a function that installs an edited class of the template as toy-plug, and returns a study with it."""
+
+    def edited(kind: str, name: str, old: str, new: str) -> Path:
+        source = (TEMPLATE / f"src/liquid_study_template/{kind}.py").read_text()
+        assert source.count(old) == 1
+        changed = source.replace(old, new).replace(PACKAGE, "toy-plug")
+        install(site, "toy-plug", kind, {"toy": f"toy_plug:{name}"}, toy_plug=changed)
+        text = TOY_STUDY.replace('kind = "toy-plug:toy"', 'kind = "text"')
+        assert IN_STUDY[name][0] in text
+        (tmp_path / "toy.toml").write_text(text.replace(*IN_STUDY[name]))
+        return tmp_path / "toy.toml"
+
+    return edited
+
+
+LIMIT = "self.turns * self.turn_s"
+ANGLE = "angle = 2 * math.pi * t_s / self.turn_s\n"
+PRESENTED = "return self.levels * self.series"
+LEVELS = "return stimulus.spaced(self.levels)"
+VIEW = "return self._shown(GridView"
+
+
+@needs_servo
+@pytest.mark.parametrize(
+    ("name", "old", "new", "said"),
+    [
+        ("question Grid", VIEW, f"{VIEW[:6]} None and {VIEW[7:]}", "returned None, not of the class ItemView"),
+        ("task Circle", LIMIT, "math.nan", "limit_s of task toy-plug:circle returned nan, not a number from 0.1"),
+        ("task Circle", ANGLE, "angle = math.nan\n", "returned (nan, nan, 0.0), not three coordinates [m] or None"),
+        ("task Circle", ANGLE, "raise SystemExit(5)\n", "SystemExit: 5"),
+        ("method Limits", PRESENTED, "return 10**9", "returned 1000000000, not a whole number from 1 to 10,000"),
+        ("method Limits", LEVELS, "return ()", "levels_of of method toy-plug:limits returned (), not numbers"),
+    ],
+)
+def test_a_wrong_value_is_one_line_that_names_the_plug_in(
+    run: Any, study_with: Any, tmp_path: Path, name: str, old: str, new: str, said: str
+) -> None:
+    study, folder = study_with(*name.split(), old, new), tmp_path / "results"
+    code, _, lines = run("rehearse", study, "--participants", 1, "--results", folder)
+    assert (code, "Traceback" in lines) == (2, False)
+    line = lines.splitlines()[-1]
+    assert "the plug-in toy-plug 1.0 failed (" in line
+    assert said in line
+    assert line.endswith("): update or uninstall the plug-in")
+    assert not (folder / "data").exists() or run("verify", folder)[0] == 0
+
+
+@needs_servo
+def test_an_answer_of_a_plug_in_that_is_too_long_is_refused(run: Any, study_with: Any, tmp_path: Path) -> None:
+    study = study_with(
+        "question", "Grid", 'return f"{column} {1 + int(self.cells * draw())}"', "return 'x' * 5_000_000"
+    )
+    code, _, lines = run("rehearse", study, "--participants", 1, "--results", tmp_path / "results")
+    assert code == 2
+    assert "has 5,000,000 characters: at most 5,000" in lines
+    assert "toy-plug:grid" in lines
+    assert run("verify", tmp_path / "results")[0] == 0
+
+
+DEVICE = (TEMPLATE / "src/liquid_study_template/device.py").read_text()
+
+
+def test_a_device_that_ends_the_program_hides_no_other_and_one_that_opens_nothing_is_named(
+    run: Any, site: Path
+) -> None:
+    probes = DEVICE.replace("probe=lambda: [", "probe=lambda: exit(3) or [")
+    install(site, "toy-plug", "device", {"toy": "toy_plug:LIGHT_HAND"}, toy_plug=probes)
+    code, said, _ = run("devices")
+    assert code == 0
+    assert "the plug-in toy-plug 1.0 failed (SystemExit: 3)" in said
+    assert "falcon" in said
+    forget("toy_")
+    (site / "toy_plug.py").write_text(DEVICE.replace("return opened(LightHand())", "return None"))
+    with pytest.raises(PlugInError, match=r"toy-plug 1\.0 failed \(open of device light-hand returned None"):
+        open_device("light-hand")
+
+
+def test_a_plug_in_that_is_interrupted_at_its_import_is_a_line(run: Any, site: Path) -> None:
+    install(site, "toy-plug", "device", {"toy": "toy_plug:X"}, toy_plug="raise KeyboardInterrupt")
+    code, said, _ = run("plugins")
+    assert (code, "device    toy: KeyboardInterrupt; update or uninstall the plug-in" in said) == (3, True)
+
+
+def test_a_finding_that_returns_nothing_takes_no_other_test_away(run: Any, site: Path, tmp_path: Path) -> None:
+    source = """
+        from study_app.analysis.findings.finding import Finding
+
+        class Toy(Finding):
+            key, what, place = "toy", "toys", 0
+
+            @classmethod
+            def test(cls, answers, found):
+                return None
+    """
+    install(site, "toy-plug", "finding", {"toy": "toy_plug:Toy"}, toy_plug=source)
+    study = rehearsed(tmp_path)
+    assert run("unblind", study, "--by", "AK", "--reason", "test")[0] == 0
+    code, _, said = run("report", study, "--to", tmp_path / "report")
+    lines = said.splitlines()
+    assert code == 3
+    assert all(
+        "the plug-in toy-plug 1.0 failed (test of finding toy returned None, not a value and" in line for line in lines
+    )
+    assert "all tests of block" not in (tmp_path / "report/report.html").read_text("utf-8")

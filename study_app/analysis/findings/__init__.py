@@ -4,11 +4,17 @@ import sys
 from typing import Any, Final
 
 from study_app.analysis.findings.finding import Finding
-from study_app.discovery import Registry, modules_of
+from study_app.discovery import Registry, Returns, modules_of
 
 _held = [one for module in modules_of(sys.modules[__name__]) for one in vars(module).values()]
 _found = {one for one in _held if isinstance(one, type) and issubclass(one, Finding) and hasattr(one, "key")}
-FINDINGS: Final = Registry[type[Finding[Any]]]("finding", {one.key: one for one in _found}, Finding, "key")
+_RETURNS: Final = {
+    "test": Returns(
+        "a value and a tuple of what was not tested",
+        lambda pair: isinstance(pair, tuple) and len(pair) == 2 and isinstance(pair[1], tuple),
+    )
+}
+FINDINGS: Final = Registry[type[Finding[Any]]]("finding", {one.key: one for one in _found}, Finding, "key", _RETURNS)
 
 
 def all_findings() -> tuple[type[Finding[Any]], ...]:

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from itertools import count
+from numbers import Integral
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, TypeAlias
 
@@ -20,7 +21,7 @@ import numpy as np
 from numpy.random import Generator
 from pydantic import ConfigDict, Field
 
-from study_app.discovery import Registry
+from study_app.discovery import Registry, Returns, are_numbers, instance_of, number_between
 from study_app.errors import PlugInError
 from study_app.haptics.model.ranges import within
 from study_app.number_text import counted
@@ -613,8 +614,23 @@ class RecordedMethod(Method):
         return float(self.presentations(track.stimulus))
 
 
+MOST_PRESENTATIONS: Final = 10_000
+"""No track of a plug-in presents more comparisons."""
 KINDS: Final = Registry[type[Method]](
-    "method", {"adjustment": Adjustment, "constant": Constant, "questplus": QuestPlus, "updown": UpDown}, Method, "kind"
+    "method",
+    {"adjustment": Adjustment, "constant": Constant, "questplus": QuestPlus, "updown": UpDown},
+    Method,
+    "kind",
+    {
+        "presentations": Returns(
+            f"a whole number from 1 to {MOST_PRESENTATIONS:,}",
+            lambda value: isinstance(value, Integral) and 1 <= int(value) <= MOST_PRESENTATIONS,
+        ),
+        "levels_of": Returns("numbers, at least one", lambda values: are_numbers(values) and len(values) > 0),
+        "level": number_between(-1e12, 1e12),
+        "ended": Returns("True or False", lambda value: value in (True, False)),
+        "paper_name": instance_of(str),
+    },
 )
 
 if TYPE_CHECKING:

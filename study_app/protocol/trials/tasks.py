@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, NamedTupl
 
 from pydantic import ConfigDict, Field, model_validator
 
-from study_app.discovery import Registry
+from study_app.discovery import Registry, Returns, are_numbers, instance_of, number_between
 from study_app.errors import PlugInError
 from study_app.haptics.model.ranges import within
 from study_app.protocol.table import Localised, OfKinds, Table, invalid
@@ -313,7 +313,21 @@ class RecordedTask(Task):
         raise PlugInError(": ".join(KINDS.missing(self.kind)))
 
 
-KINDS: Final = Registry[type[Task]]("task", {"explore": Explore, "reach": Reach, "follow": Follow}, Task, "kind")
+_IS_SPAN: Final = number_between(0, 3600)
+_IS_POINT: Final = Returns(
+    "three coordinates [m] or None", lambda value: value is None or (are_numbers(value) and len(value) == 3)
+)
+_RETURNS: Final = {
+    "limit_s": number_between(0.1, 3600),
+    **dict.fromkeys(("expected_s", "shortest_s"), _IS_SPAN),
+    "least_s": Returns(f"{_IS_SPAN.permitted} or None", lambda value: value is None or _IS_SPAN.holds(value)),
+    **dict.fromkeys(("target_m", "start_m"), _IS_POINT),
+    "fastest_stroke": Returns("a Stroke of numbers", lambda value: isinstance(value, Stroke) and are_numbers(value)),
+    "summary": instance_of(str),
+}
+KINDS: Final = Registry[type[Task]](
+    "task", {"explore": Explore, "reach": Reach, "follow": Follow}, Task, "kind", _RETURNS
+)
 """Every kind by its id."""
 
 if TYPE_CHECKING:

@@ -14,6 +14,7 @@ from study_app.protocol.presented.presentation import (
     longest_delay_s,
     trial_result,
 )
+from study_app.protocol.questions import answer_problem
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.session.transitions import page_builder
 from study_app.session.transitions.events import (
@@ -248,7 +249,7 @@ def show_item(state: SessionState, event: ItemShown) -> Result:
 def record_choice(state: SessionState, event: Chosen) -> Result:
     """Record a choice; the last one counts. Answers to questions that it hides are removed."""
     _check_shown(state, event.item)
-    if (problem := state.questionnaire.item(event.item).problem(event.value, state.context)) is not None:
+    if (problem := answer_problem(state.questionnaire.item(event.item), event.value, state.context)) is not None:
         raise SessionError(problem)
     answer = state.answers.get(event.item, Answer()).chosen(event.at_s, event.value)
     line = journal.Choice(
