@@ -11,10 +11,13 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial, wraps
 from importlib import import_module
+from inspect import signature
+from operator import index
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, ParamSpec, TypeVar
 
 from study_app.errors import AnalysisError, StudyError
 
@@ -54,6 +57,91 @@ _ELSEWHERE: Final = {
 }
 
 
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class _Permitted(NamedTuple):
+    """What an argument may be: a phrase, and the function that returns it or raises an error."""
+
+    phrase: str
+    convert: Callable[[Any], Any]
+
+
+def _checked(**permitted: _Permitted) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Let a function raise a StudyError, before it does anything, for an argument that is not ``permitted``."""
+
+    def decorated(function: Callable[P, R]) -> Callable[P, R]:
+        @wraps(function)
+        def call(*values: P.args, **named: P.kwargs) -> R:
+            given = signature(function).bind(*values, **named)
+            for name in given.arguments.keys() & permitted.keys():
+                value = given.arguments[name]
+                try:
+                    given.arguments[name] = permitted[name].convert(value)
+                except (TypeError, ValueError, OverflowError) as error:
+                    text = " ".join(repr(value).split())
+                    shown = text if len(text) <= 60 else f"{text[:59]}…"
+                    raise StudyError(f"{name} = {shown} is not possible: give {permitted[name].phrase}") from error
+            return function(*given.args, **given.kwargs)
+
+        return call
+
+    return decorated
+
+
+def _instance(kinds: type | tuple[type, ...], value: Any) -> Any:
+    if not isinstance(value, kinds):
+        raise TypeError
+    return value
+
+
+def _path(value: Any) -> Any:
+    if not isinstance(value, str | Path) or not str(value) or "\0" in str(value):
+        raise TypeError
+    return value
+
+
+def _whole(least: int, most: int) -> _Permitted:
+    def convert(value: Any) -> int:
+        if isinstance(value, bool) or not least <= (number := index(value)) <= most:
+            raise ValueError
+        return number
+
+    return _Permitted(f"a whole number from {least} to {most}", convert)
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, bool | str) or getattr(value, "shape", ()) != ():
+        raise TypeError
+    return float(value)
+
+
+def _called(value: Any) -> Any:
+    if not callable(value):
+        raise TypeError
+    return value
+
+
+def _or_none(permitted: _Permitted) -> _Permitted:
+    phrase, convert = permitted
+    return _Permitted(f"{phrase}, or None", lambda value: None if value is None else convert(value))
+
+
+def _two_numbers(value: Any) -> tuple[float, float]:
+    low, high = map(_number, value)
+    return low, high
+
+
+_PATH: Final = _Permitted("a path, or a name", _path)
+_TEXT: Final = _Permitted("a text", partial(_instance, str))
+_FUNCTION: Final = _or_none(_Permitted("a function", _called))
+_PEOPLE: Final = _whole(1, 100_000)
+_SEED: Final = _whole(0, 2**63 - 1)
+_NUMBER: Final = _Permitted("a number", _number)
+_OPTIONS: Final = _or_none(_Permitted("options by name", partial(_instance, Mapping)))
+
+
 def __getattr__(name: str) -> Any:
     """Return a class that is in another module, which is imported now."""
     if name not in _ELSEWHERE:
@@ -61,6 +149,7 @@ def __getattr__(name: str) -> Any:
     return getattr(import_module(_ELSEWHERE[name]), name)
 
 
+@_checked(study=_PATH)
 def load(study: str | Path) -> Protocol:
     """Return a study, checked.
 
@@ -79,6 +168,11 @@ def load(study: str | Path) -> Protocol:
     return loading.load(study)
 
 
+@_checked(
+    scene=_PATH,
+    liquid=_TEXT,
+    motion=_Permitted("a path, or times and positions", partial(_instance, (str, Path, tuple))),
+)
 def simulate_force(
     scene: str | Path, liquid: str, motion: str | Path | tuple[ArrayLike, ArrayLike], /, **parameters: object
 ) -> np.recarray[Any, Any]:
@@ -111,13 +205,17 @@ def simulate_force(
 
     chosen = override_all(load_scene(scene, liquid), parameters)
     if isinstance(motion, tuple):
-        t_s, position_m = (np.asarray(values, np.float64) for values in motion)
+        try:
+            t_s, position_m = (np.asarray(values, np.float64) for values in motion)
+        except (TypeError, ValueError) as error:
+            raise StudyError(f"the motion is not possible ({error}): give times (n,) and positions (n, 3)") from error
         return offline.simulate(chosen, motions.Motion(t_s, position_m))
     if str(motion) in motions.NAMES or not (Path(motion).suffix or Path(motion).exists()):
         return offline.simulate(chosen, motions.programmed_motion(str(motion), rate_hz=chosen.rate_hz))
     return offline.simulate(chosen, motions.read_motion(Path(motion)))
 
 
+@_checked(study=_PATH, people=_PEOPLE, seed=_SEED, progress=_FUNCTION)
 def simulate_study(
     study: str | Path, people: int, *, seed: int, progress: Callable[[str], object] | None = None
 ) -> dict[str, pd.DataFrame]:
@@ -130,11 +228,12 @@ def simulate_study(
 
     with TemporaryDirectory(prefix="liquid-study-") as folder:
         results = Path(folder) / "results"
-        rehearse_answers(study, participants=_count(people), seed=seed, results=results, progress=progress)
+        rehearse_answers(study, participants=people, seed=seed, results=results, progress=progress)
         unblind(results, by="simulate_study", reason="simulated")
         return read(results)
 
 
+@_checked(levels=_Permitted("two numbers", _two_numbers), design=_TEXT, spacing=_TEXT)
 def fit(
     trials: pd.DataFrame,
     *,
@@ -185,6 +284,8 @@ def fit(
     from study_app.protocol.trials.designs import KINDS, default_design
     from study_app.protocol.trials.stimuli import Stimulus
 
+    if not isinstance(trials, pd.DataFrame):
+        raise AnalysisError(f"trials are a {type(trials).__name__}: give a DataFrame")
     if missing := {"level", "success"} - set(trials.columns):
         raise AnalysisError(f"trials have no column {', '.join(sorted(missing))}: each row needs level and success")
     kinds = [name for name, kind in KINDS.items() if kind.adaptive]
@@ -203,6 +304,7 @@ def fit(
     return pd.DataFrame([asdict(one) for one in thresholds_of(trials, stimulus, default_design(design))])
 
 
+@_checked(results=_PATH)
 def read(results: str | Path) -> dict[str, pd.DataFrame]:
     """Return the tables of a study folder by name, as ``export`` writes them: responses, trials and others.
 
@@ -214,6 +316,7 @@ def read(results: str | Path) -> dict[str, pd.DataFrame]:
     return {table.name: table.frame for table in deliver(load_study(Path(results)))}
 
 
+@_checked(results=_PATH, by=_TEXT, reason=_TEXT)
 def unblind(results: str | Path, *, by: str, reason: str) -> None:
     """Open the sealed key of a study folder: `read` and `report` name conditions then; name and reason are recorded.
 
@@ -228,6 +331,7 @@ def unblind(results: str | Path, *, by: str, reason: str) -> None:
         raise StudyError("the key was opened, but not everything was written: " + "; ".join(left))
 
 
+@_checked(results=_PATH, to=_PATH)
 def report(results: str | Path, to: str | Path) -> Path:
     """Write the report of a study folder into the folder ``to``; return the path of ``report.html``."""
     from study_app.analysis.report.write_report import report as write
@@ -235,6 +339,7 @@ def report(results: str | Path, to: str | Path) -> Path:
     return write(Path(results), Path(to))[0]
 
 
+@_checked(study=_PATH, people=_PEOPLE, seed=_SEED, results=_or_none(_PATH))
 def rehearse(
     study: str | Path, people: int, *, seed: int, results: str | Path | None = None, recordings: bool = True
 ) -> Path:
@@ -245,13 +350,7 @@ def rehearse(
     from study_app.session.simulated import rehearsal
 
     folder = None if results is None else Path(results)
-    return rehearsal.rehearse(study, participants=_count(people), seed=seed, results=folder, recordings=recordings)
-
-
-def _count(people: int) -> int:
-    if people < 1:
-        raise StudyError(f"{people} people: give at least 1")
-    return people
+    return rehearsal.rehearse(study, participants=people, seed=seed, results=folder, recordings=recordings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -282,6 +381,17 @@ class Session:
         return self._store.fingerprint
 
 
+@_checked(
+    study=_PATH,
+    participant=_TEXT,
+    results=_PATH,
+    seed=_SEED,
+    session=_whole(1, 99),
+    device=_TEXT,
+    answer=_FUNCTION,
+    group=_or_none(_TEXT),
+    row_of=_or_none(_TEXT),
+)
 @contextmanager
 def open_session(
     study: str | Path,
@@ -382,6 +492,7 @@ class ForceLoop:
         """Samples that `read` was called too late for."""
         return self._reader.dropped
 
+    @_checked(liquid=_TEXT)
     def set_liquid(self, liquid: str, **parameters: object) -> None:
         """Change the liquid, or only numbers of it; the force changes within the slew limit, or fades in.
 
@@ -444,6 +555,7 @@ class ForceLoop:
         self._rig = None
 
 
+@_checked(scene=_PATH, device=_TEXT, force_limit_n=_or_none(_NUMBER), options=_OPTIONS)
 @contextmanager
 def open_force(
     scene: str | Path,

@@ -17,7 +17,7 @@ import re
 import secrets
 import shutil
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Self
@@ -46,9 +46,10 @@ _NO_PROGRAM_TAKES_S = 3600.0  # time in which a program marks a folder that it c
 
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """A folder locked by this program until ``release`` or the end of a ``with`` block."""
+    """A folder locked by this program until ``release`` or the end of a ``with`` block; a fork does not release it."""
 
     marker: Path
+    process: int = field(default_factory=os.getpid)
 
     def __enter__(self) -> Self:
         return self
@@ -58,6 +59,8 @@ class Opening:
 
     def release(self) -> None:
         """Remove the marker; one that cannot be removed is ignored once this program has ended."""
+        if self.process != os.getpid():
+            return
         with contextlib.suppress(OSError):
             self.marker.unlink(missing_ok=True)
 

@@ -3,6 +3,7 @@
 import inspect
 import json
 import math
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -20,6 +21,7 @@ from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.documented import ROOT, blocks
 from tests.golden import compare
+from tests.platforms import needs_fork
 from tests.protocol.forms.mixed import mixed_file
 from tests.protocol.trials import level_studies, matching
 
@@ -103,7 +105,7 @@ def opened(**options: Any) -> None:
         (lambda: api.simulate_force("rek2024", "oil", "circle"), 'there is no liquid "oil"'),
         (lambda: api.load("nothing"), "nothing"),
         (lambda: api.read("nowhere"), "nowhere"),
-        (lambda: api.rehearse("demo", 0, seed=1), "0 people: give at least 1"),
+        (lambda: api.rehearse("demo", 0, seed=1), "people = 0 is not possible: give a whole number from 1 to 100000"),
         (lambda: opened(force_limit_n=-50.0), "= -50 is not possible"),
         (lambda: opened(force_limit_n=math.nan), "is not possible"),
         (lambda: opened(force_limit_n=9.0), "at most that of the file, 8 N"),
@@ -119,6 +121,101 @@ def test_what_cannot_be_used_is_one_line(call: Any, words: str) -> None:
     with pytest.raises(StudyError, match=words) as raised:
         call()
     assert "\n" not in str(raised.value).strip() or isinstance(raised.value, ProtocolError)
+
+
+SESSION: dict[str, Any] = {"study": "demo", "participant": "P001", "results": "nowhere", "seed": 1}
+WRONG: dict[str, tuple[Any, ...]] = {
+    "study": (None, 3, "", "de\0mo", ["demo"]),
+    "participant": (None, 7),
+    "results": (None, "a\0b", b"bytes"),
+    "seed": (None, "x", 1.5, math.nan, True, -1, 10**400, np.float64(3)),
+    "session": (None, math.nan, 0, 100, "1"),
+    "device": (None, 3),
+    "answer": (3, "left"),
+    "group": (3,),
+    "row_of": (math.nan,),
+}
+CALLS: dict[str, Any] = {
+    **{
+        f"open_session {name}": (lambda value, name=name: api.open_session(**{**SESSION, name: value}))
+        for name in WRONG
+    },
+    "load study": api.load,
+    "read results": api.read,
+    "report results": lambda value: api.report(value, "to"),
+    "report to": lambda value: api.report("nowhere", value),
+    "unblind by": lambda value: api.unblind("nowhere", by=value, reason="a test"),
+    "rehearse people": lambda value: api.rehearse("demo", value, seed=1),
+    "rehearse results": lambda value: api.rehearse("demo", 1, seed=1, results=value),
+    "simulate_study people": lambda value: api.simulate_study("demo", value, seed=1),
+    "simulate_force liquid": lambda value: api.simulate_force("rek2024", value, "circle"),
+    "simulate_force motion": lambda value: api.simulate_force("rek2024", "honey", value),
+    "open_force force_limit_n": lambda value: api.open_force("rek2024", force_limit_n=value),
+    "open_force options": lambda value: api.open_force("rek2024", options=value),
+    "fit trials": lambda value: api.fit(value, levels=(0.02, 1.0)),
+    "fit levels": lambda value: api.fit(TRIALS, levels=value),
+    "fit design": lambda value: api.fit(TRIALS, levels=(0.02, 1.0), design=value),
+}
+WRONG |= {
+    "to": (None, 3),
+    "by": (None, 3),
+    "people": (None, 1.5, math.nan, "3", 0, 10**400),
+    "liquid": (None, ["honey"]),
+    "motion": (None, 3, ([0.0], ["a"]), (1, 2, 3)),
+    "force_limit_n": ("2", np.ones(2), 10**400, True, [1.0]),
+    "options": (3, "port"),
+    "trials": (None, [1]),
+    "levels": (None, 3, (1,), ("a", "b"), (1, 2, 3)),
+}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_a_wrong_argument_is_one_sentence_that_names_it(name: str) -> None:
+    argument = name.rsplit(maxsplit=1)[-1]
+    for value in WRONG["study" if argument == "study" else argument if argument != "design" else "by"]:
+        if (name, value) == ("rehearse results", None):
+            continue
+        with pytest.raises(StudyError, match=argument) as raised:
+            CALLS[name](value)
+        assert "\n" not in str(raised.value)
+        assert len(str(raised.value)) < 200
+
+
+@pytest.mark.slow
+@needs_servo
+@needs_fork
+@pytest.mark.parametrize("ends", ["exit", "returns"])
+def test_an_observer_that_forks_writes_nothing_in_the_fork(short: Path, tmp_path: Path, ends: str) -> None:
+    """The fork ends soon, and the session goes on as if there had been none."""
+    codes: list[int] = []
+
+    def observer(question: Any) -> str | None:
+        if not codes:
+            child = os.fork()
+            if child == 0:
+                codes.append(0)
+                if ends == "exit":
+                    sys.exit(3)
+                return by_resistance(question)
+            codes.append(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+        return by_resistance(question)
+
+    process = os.getpid()
+    try:
+        with api.open_session(
+            short, "P001", results=tmp_path / "r", seed=5, answer=observer, recordings=True
+        ) as session:
+            session.run()
+    except BaseException as error:
+        if os.getpid() != process:
+            os._exit(
+                3 if isinstance(error, SystemExit) else 4 if "a fork of it cannot write to it" in str(error) else 5
+            )
+        raise
+    assert os.getpid() == process
+    assert codes == [3 if ends == "exit" else 4]
+    assert verify_study(tmp_path / "r").errors == ()
+    assert session.fingerprint
 
 
 @pytest.mark.slow
@@ -244,7 +341,14 @@ def test_a_session_of_a_participant_is_not_completed_by_simulated_answers(short:
 
 @pytest.mark.slow
 @needs_servo
-@pytest.mark.parametrize(("given", "words"), [("third", "third"), ({"which": "first"}, "'which' is not asked")])
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ("third", "third"),
+        (True, "answer True is neither a number nor a text"),
+        ({"which": "first"}, "'which' is not asked"),
+    ],
+)
 def test_an_answer_that_is_not_permitted_ends_the_block_and_loses_nothing(
     short: Path, tmp_path: Path, given: Any, words: str
 ) -> None:

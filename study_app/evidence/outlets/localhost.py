@@ -24,8 +24,10 @@ def localhost_only() -> Path:
 
     It must be called before the library is loaded.
     """
-    path = Path(tempfile.gettempdir(), f"liquid-study-lsl-{os.getpid()}.cfg")
-    path.write_text(_FILE.format(process=os.getpid()), encoding="utf-8")
+    descriptor, name = tempfile.mkstemp(prefix="liquid-study-lsl-", suffix=".cfg")
+    path = Path(name)
+    with open(descriptor, "w", encoding="utf-8") as file:
+        file.write(_FILE.format(process=os.getpid()))
     atexit.register(path.unlink, missing_ok=True)
     os.environ[VARIABLE] = str(path)
     return path

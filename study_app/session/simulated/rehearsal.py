@@ -298,9 +298,8 @@ class RehearsedSession(SimulatedParticipant):
                 case QuestionnairePage() | DesignPage() as page:
                     self._fill_in(page)
                 case _:
-                    raise SessionError(
-                        f"the rehearsal failed: {self.rig.servo.fault or self._runner.cause or self.page}"
-                    )
+                    why = self.rig.servo.fault or self._runner.cause or self._runner.stalled or self.page
+                    raise SessionError(f"the rehearsal failed: {why}")
 
     def _present(self, page: Page) -> None:
         self.page = page

@@ -224,6 +224,7 @@ class Journal:
     def __init__(self, path: Path, file: BinaryIO, clock: SessionClock) -> None:
         self.path = path
         self._real_path = os.path.realpath(path)
+        self._process = os.getpid()
         self.clock = clock
         self.file = file
         self._lines = 0
@@ -302,6 +303,8 @@ class Journal:
             it was waited for, or a line before it could not be flushed; the journal ends with the line before it and
             can be appended to again.
         """
+        if self.is_of_another_process:
+            raise StoreError(f"{self.path} is written by process {self._process}: a fork of it cannot write to it")
         if self.file.closed:
             raise StoreError(
                 f"{self.path} is closed: {event.event!r} occurred after the end of the session and was not recorded"
@@ -341,6 +344,11 @@ class Journal:
         """Whether the journal is closed: it accepts no more lines."""
         return self.file.closed
 
+    @property
+    def is_of_another_process(self) -> bool:
+        """Whether this is a fork of the process that opened it."""
+        return os.getpid() != self._process
+
     def close(self) -> None:
         """Flush lines not yet on the disk, and close the file.
 
@@ -349,6 +357,8 @@ class Journal:
         StoreError
             The last lines could not be flushed; the file is closed nevertheless.
         """
+        if self.is_of_another_process:  # no thread of it is here, and a lock may be held for ever
+            return
         with self._changed:
             self._closing = True
             self._changed.notify_all()

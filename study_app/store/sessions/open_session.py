@@ -249,6 +249,8 @@ class SessionStore:
             The last lines could not be flushed.
         """
         self._over = True
+        if self.journal.is_of_another_process:
+            return
         if self.recorder is not None:
             self.recorder.close(LEAVING_S)
         if not self.journal.is_closed:
