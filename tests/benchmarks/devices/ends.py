@@ -23,7 +23,7 @@ WAYS: Final = {
     "never left, then SIGTERM": "block = opened(); stroke(block.__enter__()); send('SIGTERM')",
 }
 """Programs by their way to end; ``opened``, ``stroke`` and ``send`` are below."""
-_BEFORE: Final = """
+PREAMBLE: Final = """
 import atexit, os, signal, sys, time
 import numpy as np
 
@@ -65,6 +65,7 @@ def send(name):
     time.sleep(5)
 
 """
+"""The beginning of each program."""
 
 
 class End(NamedTuple):
@@ -79,7 +80,7 @@ class End(NamedTuple):
 def end_program(device: str, way: str) -> End:
     """Run a program that ends in one of `WAYS`, and return what its device exerted."""
     ended = subprocess.run(
-        [sys.executable, "-c", _BEFORE + WAYS[way], device], capture_output=True, text=True, timeout=180, check=False
+        [sys.executable, "-c", PREAMBLE + WAYS[way], device], capture_output=True, text=True, timeout=180, check=False
     )
     forces: dict[str, tuple[float, ...]] = {"before": (), "at the end": ()}
     for line in ended.stdout.splitlines():
