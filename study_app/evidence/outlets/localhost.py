@@ -26,7 +26,7 @@ def localhost_only() -> Path:
     """
     descriptor, name = tempfile.mkstemp(prefix="liquid-study-lsl-", suffix=".cfg")
     path = Path(name)
-    with open(descriptor, "w", encoding="utf-8") as file:
+    with os.fdopen(descriptor, "w", encoding="utf-8") as file:
         file.write(_FILE.format(process=os.getpid()))
     atexit.register(path.unlink, missing_ok=True)
     os.environ[VARIABLE] = str(path)
