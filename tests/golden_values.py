@@ -155,7 +155,7 @@ def changed(before: Sequence[str], after: Sequence[str], *, numbered: bool = Fal
 
 def page_lines(text: str) -> Iterator[str]:
     """Yield a page's headings, paragraphs and rows of tables, without style and pictures."""
-    body = re.sub(r"<style.*?</style>|<img[^>]*>", "", text, flags=re.S)
+    body = re.sub(r"<style.*?</style>|<svg.*?</svg>|<img[^>]*>", "", text, flags=re.S)
     for row in re.split(r"</?(?:tr|p|h\d|li|div|section|title|summary|details|caption|figcaption)\b[^>]*>", body):
         cells = [re.sub(r"<[^>]+>|\s+", " ", cell).strip() for cell in re.split(r"</t[dh]>", row)]
         if any(cells):

@@ -8,15 +8,15 @@ bound.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from study_app import number_text
 from study_app.analysis.data.study_tables import Study, group_members
-from study_app.analysis.findings.finding import HOLM, TESTS, BlockAnswers, verdict
+from study_app.analysis.findings.finding import FOUND, HOLM, TESTS, BlockAnswers, verdict
 from study_app.analysis.html_page import bullets, heading, paragraph, table_of
 from study_app.analysis.levels.answers import Settings
 from study_app.analysis.levels.evaluate import READ
@@ -24,12 +24,21 @@ from study_app.analysis.levels.sensitivities import Sensitivities
 from study_app.analysis.levels.statistic import LevelStatistic
 from study_app.analysis.levels.thresholds import Exponents, ThresholdEstimate, Thresholds, thresholds_compared
 from study_app.analysis.levels.tracks import tracks
-from study_app.analysis.results import ContrastResult, LevelsResult, Results
+from study_app.analysis.results import ContrastResult, ContrastSide, LevelsResult, Results
+from study_app.analysis.statistics.effect_sizes import (
+    PRIOR_SCALE,
+    EffectSize,
+    cliffs_delta,
+    d_z,
+    hedges_g,
+    jzs_bayes_factor,
+    paired_delta,
+)
 from study_app.analysis.statistics.equivalence import STEPS, is_beyond, p_equivalent, people_beyond
 from study_app.analysis.statistics.mean_tests import SAME, Means, means_of, p_differs, resamples_for
 from study_app.analysis.statistics.outcome import SIDES, Array, Interval, clopper_pearson, holm
 from study_app.analysis.statistics.thresholds import random_effects_weights
-from study_app.analysis.wording import interval, number, p_equals, p_value
+from study_app.analysis.wording import interval, listed, number, p_equals, p_value, significant
 from study_app.protocol.model import Contrast
 
 STATISTICS: Final[Mapping[str, tuple[type[LevelStatistic[Any]], str]]] = {
@@ -53,6 +62,12 @@ WEIGHTED: Final = (
     "are estimated with a common width of the psychometric function, so their ratio may differ from the ratio "
     "in the tables. "
 )
+SIZES: Final = (
+    "Standardised effects weight participants equally: d_z is the mean difference within participants divided by its "
+    "standard deviation, g is Hedges' g of two groups; their 95 % intervals invert the noncentral t distribution. "
+    "Bayes factors are two-sided JZS factors (Rouder et al., 2009) of a difference against none, with a Cauchy prior "
+    "of scale 0.707."
+)
 MOST_NAMED: Final = 20
 
 TOO_FEW: Final = "fewer than two participants have both numbers"
@@ -74,12 +89,13 @@ class Measured:
 class Compared:
     """The ascending numbers of each group, or the differences within participants; and why others are left out.
 
-    ``shared`` is the variance of an error that all have in common.
+    ``shared`` is the variance of an error that all have in common, ``sides`` are the numbers of those compared.
     """
 
     samples: tuple[tuple[Measured, ...], ...]
     left_out: Mapping[str, str]
     shared: float = 0.0
+    sides: tuple[Mapping[str, Measured], ...] = ()
 
     @property
     def values(self) -> tuple[Array, ...]:
@@ -154,8 +170,11 @@ def _compared(
         sides, shared = _thresholds_of_two(study, contrast, math.log(10) if spacings == {"log"} else 1.0)
     members = group_members(study)
     people = [person for person in study.people if contrast.groups is None or members.get(person) in contrast.groups]
-    measure = contrast.measure.replace("_", " ")
-    what = f"no {measure}" if contrast.measure in STATISTICS else f"an answer to {contrast.measure} is missing"
+    what = (
+        f"no {contrast.measure_words}"
+        if contrast.measure in STATISTICS
+        else f"an answer to {contrast.measure} is missing"
+    )
     names = contrast.blocks * 2 if contrast.groups is not None else contrast.compared
     left_out = {
         person: f"{what} in {name}" for side, name in zip(sides[::-1], names[::-1], strict=True) for person in people
@@ -163,10 +182,10 @@ def _compared(
     }  # fmt: skip
     kept = [person for person in people if person not in left_out]
     if contrast.groups is not None:
-        samples = tuple(
-            tuple(sides[0][person] for person in kept if members[person] == group) for group in contrast.groups
-        )
+        sides = [{who: sides[0][who] for who in kept if members[who] == group} for group in contrast.groups]
+        samples = tuple(tuple(side.values()) for side in sides)
     else:
+        sides = [{person: side[person] for person in kept} for side in sides]
         samples = (
             tuple(
                 Measured(
@@ -176,8 +195,50 @@ def _compared(
                 for person in kept
             ),
         )
-    ascending = tuple(tuple(sorted(sample, key=lambda one: one.value)) for sample in samples)
-    return Compared(samples=ascending, left_out=left_out, shared=shared)
+    return Compared(samples=tuple(map(_ascending, samples)), left_out=left_out, shared=shared, sides=tuple(sides))
+
+
+def _ascending(sample: Iterable[Measured]) -> tuple[Measured, ...]:
+    return tuple(sorted(sample, key=lambda one: one.value))
+
+
+def _side(name: str, held: Mapping[str, Measured], *, ratio: bool) -> ContrastSide:
+    """Return the numbers of one side as people read them, with their mean."""
+    scale = math.exp if ratio else float
+    means = Compared(samples=(_ascending(held.values()),), left_out={}).means(0.05)
+    low, high = (None, None) if means is None else (scale(float(end[0])) for end in means.interval(0.95))
+    return ContrastSide(
+        name=name,
+        values={person: scale(one.value) for person, one in held.items()},
+        mean=None if means is None else scale(float(means.mean[0])),
+        low=low,
+        high=high,
+        sd=_sd([one.value for one in held.values()]),
+    )
+
+
+def _sd(values: Sequence[float]) -> float | None:
+    return float(np.std(values, ddof=1)) if len(values) > 1 else None
+
+
+class Standardised(NamedTuple):
+    """The standardised effect, Cliff's delta and the Bayes factor of a hypothesis; None where there is none."""
+
+    effect: EffectSize | None
+    ordinal: EffectSize | None
+    bayes_factor: float | None
+
+
+def _standardised(compared: Compared, *, is_ordinal: bool) -> Standardised:
+    """Return the standardised effects of a hypothesis, participants counting equally."""
+    first, *others = compared.values
+    if others:
+        effect, ordinal = hedges_g(first, others[0]), cliffs_delta(first, others[0])
+    else:
+        effect, ordinal = d_z(first), paired_delta(first)
+    t, sizes = None if effect is None else effect.t, [len(sample) for sample in compared.values]
+    factor = None if t is None else jzs_bayes_factor(t, *sizes)
+    return Standardised(effect, ordinal if is_ordinal else None, factor)
 
 
 def _thresholds_of_two(study: Study, contrast: Contrast, per_u: float) -> tuple[list[Mapping[str, Measured]], float]:
@@ -242,6 +303,8 @@ def _tested(
     """Return a contrast before the correction, with resamples for an alpha of ``strictest``."""
     compared = _compared(study, contrast, answers, levels)
     ratio, means = _is_ratio(contrast, levels), compared.means(strictest)
+    names = _side_names(study, contrast)
+    standardised = _standardised(compared, is_ordinal=contrast.measure not in STATISTICS)
     effect = ends = p_equal = p = p_bootstrap = statistic = None
     method, why = "none", TOO_FEW if means is None else ALIKE
     if means is not None:
@@ -271,7 +334,7 @@ def _tested(
         no_interval=why if ends is None else "",
         note=why if ends is None else "",
         contrast=contrast,
-        compared=contrast.words({block.id: block.stimulus.condition for block in study.levels if block.stimulus}),
+        compared=names,
         ratio=ratio,
         p_adjusted=None,
         members=1,
@@ -282,7 +345,21 @@ def _tested(
         not_excluded=_not_excluded(contrast, compared, ratio=ratio),
         higher=None if contrast.groups else int((compared.values[0] > SAME).sum()),
         left_out=compared.left_out,
+        sides=tuple(_side(name, held, ratio=ratio) for name, held in zip(names, compared.sides, strict=True)),
+        sd=_sd(compared.values[0].tolist()) if contrast.groups is None else None,
+        standardised=standardised.effect,
+        ordinal=standardised.ordinal,
+        bayes_factor=standardised.bayes_factor,
     )
+
+
+def _side_names(study: Study, contrast: Contrast) -> tuple[str, str]:
+    """Return the names of what is compared: titles of blocks, unless these are the same."""
+    titles = {block.id: block.title for block in study.levels} | {block.id: block.title for block in study.blocks}
+    first, second = (titles.get(block, block) for block in (*contrast.blocks, *contrast.blocks)[:2])
+    if first != second:
+        return first, second
+    return contrast.words({block.id: block.stimulus.condition for block in study.levels if block.stimulus})
 
 
 def equality_limits(contrast: Contrast, bound: float, *, ratio: bool) -> tuple[float, float | None]:
@@ -336,14 +413,40 @@ def lies_beyond(one: ContrastResult, bound: float) -> bool:
 
 
 def _difference_words(one: ContrastResult) -> str:
-    """Return the difference of a contrast that was tested, in a sentence."""
+    """Return what was found of a difference that was tested, in sentences."""
     first, second = one.compared
-    what = number_text.capitalised(one.contrast.measure_words)
-    higher = "" if one.higher is None else f"; higher in {first} in {one.higher} of {one.n} participants"
+    what, expected = number_text.capitalised(one.contrast.measure_words), one.contrast.expected
+    if one.verdict in FOUND:
+        side = "higher" if (one.effect or 0.0) > (1.0 if one.ratio else 0.0) else "lower"
+        said = f"{what} was {side} in {first} than in {second}"
+    elif expected is None:
+        said = f"{what} was not shown to differ between {first} and {second}"
+    else:
+        said = f"{what} was not shown to be {expected} in {first} than in {second}"
+    means = listed([number(side.mean) for side in one.sides if side.mean is not None])
+    higher = "" if one.higher is None else f" It was higher in {first} for {one.higher} of {one.n} participants."
+    effect = f"mean {'ratio' if one.ratio else 'difference'} {number(one.effect)}"
+    size = "" if one.standardised is None else f", {size_words(one.standardised)}"
     return (
-        f"{what}, {first} {'÷' if one.ratio else '−'} {second}: {'ratio' if one.ratio else 'mean difference'} "
-        f"{number(one.effect)}, 95 % interval {interval(one.interval)}, {p_equals(one.p_adjusted or 0.0)}, "
-        f"n = {one.n}{higher}."
+        f"{said} (means {means}; {effect}, 95 % interval {interval(one.interval)}{size}, "
+        f"{p_equals(one.p_adjusted or 0.0)}, n = {one.n}).{higher}{_bayes_words(one)}"
+    )
+
+
+def size_words(size: EffectSize | None) -> str:
+    """Return a standardised effect with its interval; a dash without any."""
+    return "–" if size is None else f"{size.name} {number(size.value)} {interval(size)}"
+
+
+def _bayes_words(one: ContrastResult) -> str:
+    """Return the Bayes factor of a difference that was not shown, in a sentence after a space; else nothing."""
+    if one.bayes_factor is None or one.verdict in FOUND:
+        return ""
+    more, less = ("with", "without") if one.bayes_factor > 1 else ("without", "with")
+    factor = significant(max(one.bayes_factor, 1 / one.bayes_factor))
+    return (
+        f" The data are {factor} times as likely {more} a difference as {less} one (JZS Bayes factor, Cauchy prior "
+        f"with scale {number(PRIOR_SCALE, 3)})."
     )
 
 
@@ -368,6 +471,8 @@ def contrast_methods(results: Results) -> Iterator[str]:
     )
     if any(one.contrast.measure == "threshold" for one in contrasts):
         yield WEIGHTED.rstrip()
+    if any(one.standardised is not None for one in contrasts):
+        yield SIZES
     if bounds := [one for one in contrasts if one.contrast.bound is not None]:
         adjusted = f", adjusted by Holm over {number_text.counted(len(bounds), 'bound')}" if len(bounds) > 1 else ""
         yield (
@@ -402,6 +507,10 @@ def contrast_section(results: Results) -> Iterator[str]:
         ("n", lambda one: str(one.n)),
         ("effect", lambda one: f"{one.effect_name} {number(one.effect)}"),
         ("95 % interval", lambda one: interval(one.interval)),
+        ("standardised", lambda one: size_words(one.standardised)),
+        ("ordinal", lambda one: size_words(one.ordinal)) if any(one.ordinal for one in results.contrasts) else None,
+        ("SD", _sd_words),
+        ("Bayes factor", lambda one: "–" if one.bayes_factor is None else significant(one.bayes_factor)),
         ("p", lambda one: p_value(one.p)),
         ("adjusted p", lambda one: p_value(one.p_adjusted)),
         ("Verdict", lambda one: one.verdict),
@@ -417,8 +526,15 @@ def contrast_section(results: Results) -> Iterator[str]:
         f"by Holm over the bounds. {WEIGHTED if weighted else ''}{LEFT_OUT}",
         "soft",
     )
+    yield paragraph(f"{SIZES} SD: between participants, of the two compared and of their difference.", "soft")
     if rows := [one for one in results.contrasts if one.left_out]:
         yield bullets([f"{question(one)}: left out {left_out_words(one)}." for one in rows])
+
+
+def _sd_words(one: ContrastResult) -> str:
+    """Return the standard deviations between participants."""
+    of_sides = listed([number(side.sd) for side in one.sides if side.sd is not None])
+    return (of_sides or "–") + ("" if one.sd is None else f"; {number(one.sd)}") + " (ln)" * one.ratio
 
 
 def contrast_rows(results: Results) -> Iterator[dict[str, Any]]:

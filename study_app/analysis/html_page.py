@@ -1,13 +1,16 @@
 """The page and its parts: one HTML file with its style and pictures inside, without scripts."""
 
 import base64
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
+from importlib import resources
 from typing import Any, TypeVar
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
+from study_app import figure_style as style
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.results import Failure, Failures
 
@@ -19,8 +22,32 @@ LONG = 32
 SHORT = 16
 """On paper, cells of more letters are."""
 
-SCALE = 0.4
-"""Pixels of the page for one of a figure: one that is two columns of print wide is 860 wide."""
+FOLDED = 12
+"""A table of more rows is folded."""
+
+PX_PER_PT, PX_BESIDE = 1.9, 1.6
+"""Pixels of the page for a point of a figure that has the room; beside an answer."""
+
+VARIABLES = {
+    style.TEXT: "text",
+    style.TEXT_SOFT: "soft",
+    style.GRID: "grid",
+    style.GROUND: "ground",
+    style.BORDER: "edge",
+    style.AXIS: "axis",
+    style.ACCENT: "accent",
+    style.BAND: "band",
+    style.PARTICIPANT: "person",
+    style.WARN: "warn",
+    style.WARN_GROUND: "warn-ground",
+    style.SEALED_GROUND: "sunk",
+    "#ffffff": "paper",
+}
+"""The colours of figures that the page has by name, since they change with light and dark."""
+COLOUR = re.compile("|".join(VARIABLES), re.IGNORECASE)
+LETTERS = re.compile(r"(<text.*?</text>)", re.DOTALL)
+HEAD = re.compile(r"^.*?(?=<svg)|<metadata>.*?</metadata>", re.DOTALL)
+SIZE = re.compile(r'<svg [^>]*?viewBox="0 0 ([0-9.]+) ([0-9.]+)"[^>]*>')
 
 
 @cache
@@ -57,16 +84,31 @@ def attempted(
     return [title, box([paragraph(f"Not there: {found.why}.")], "care")] if isinstance(found, Failure) else found
 
 
+def chunks(parts: Sequence[str]) -> list[list[str]]:
+    """Return the parts of a section with the headings that they follow."""
+    found: list[list[str]] = []
+    for part in parts:
+        if not found or part.startswith("<h3"):
+            found.append([])
+        found[-1].append(part)
+    return found
+
+
 def bullets(lines: Iterable[str]) -> Markup:
     """Return a list, empty where there are no lines."""
     return _part("bullets", lines)
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[str]], *, words: int = 1, last: int = 0) -> Markup:
-    """Return a table whose first ``words`` and ``last`` columns are words and whose others are numbers."""
+def table(
+    head: Sequence[str], rows: Iterable[Sequence[str]], *, words: int = 1, last: int = 0, folded: bool = False
+) -> Markup:
+    """Return a table whose first ``words`` and ``last`` columns are words and whose others are numbers.
+
+    One of many rows is ``folded`` in any case.
+    """
     kinds = ["" if place < words or place >= len(head) - last else "n" for place in range(len(head))]
     cells = [[(kind or _width(cell), cell) for kind, cell in zip(kinds, row, strict=True)] for row in rows]
-    return _part("table", list(zip(kinds, head, strict=True)), cells)
+    return _part("table", list(zip(kinds, head, strict=True)), cells, folded or len(cells) > FOLDED)
 
 
 def table_of(
@@ -88,13 +130,43 @@ def box(parts: Iterable[Markup], kind: str = "box") -> Markup:
     return _part("box", parts, kind)
 
 
-def picture(png: bytes, caption: str) -> Markup:
-    """Return a figure with its caption, the picture inside."""
-    width = round(SCALE * int.from_bytes(png[16:20]))  # where every PNG says it
-    return _part("picture", width, caption, base64.b64encode(png).decode("ascii"))
+def picture(one: Picture, *, beside: bool = False) -> Markup:
+    """Return a figure with its caption; its drawing is part of the page, in the page's colours and font.
+
+    One that stands ``beside`` an answer is smaller, and its caption is not part of it.
+    """
+    if "svg" not in one.files:
+        width, png = round(0.4 * int.from_bytes(one.files["png"][16:20])), one.files["png"]
+        drawing = _part("png", width, one.caption, base64.b64encode(png).decode("ascii"))
+    else:
+        drawing = inline_svg(one.files["svg"].decode(), one.caption, PX_BESIDE if beside else PX_PER_PT)
+    return _part("picture", drawing, "" if beside else one.caption)
+
+
+def inline_svg(svg: str, words: str, px_per_pt: float) -> Markup:
+    """Return the drawing of an SVG, whose colours are those of the page; white letters and their ground stay."""
+    parts = LETTERS.split(HEAD.sub("", svg))
+    parts[::2] = [COLOUR.sub(lambda match: f"var(--{VARIABLES[match[0].lower()]})", part) for part in parts[::2]]
+    parts[1::2] = [
+        COLOUR.sub(lambda match: f"var(--{VARIABLES[match[0].lower()]})", part) if "#ffffff" not in part else part
+        for part in parts[1::2]
+    ]
+    width = round(px_per_pt * float(found[1])) if (found := SIZE.search(svg)) else 600
+    view = found[0] if found else ""
+    root = re.sub(r' (?:width|height)="[^"]*"', "", view, count=2)
+    label = Markup.escape(words)
+    shown = root.replace("<svg ", f'<svg role="img" aria-label="{label}" style="width: {width}px" ', 1)
+    return Markup("".join(parts).replace(view, shown, 1))  # noqa: S704 - matplotlib escapes its texts
+
+
+@cache
+def font_face(weight: str) -> str:
+    """Return Inter in a weight of the page (Regular, Bold), as a data URI; empty where it is not installed."""
+    file = resources.files("study_app") / "gui" / "assets" / "fonts" / f"Inter-{weight}.woff"
+    return base64.b64encode(file.read_bytes()).decode("ascii") if file.is_file() else ""
 
 
 def drawn(pictures: Mapping[str, Picture], name: str) -> Iterator[Markup]:
     """Yield the figure of this name, where there is one."""
     if name in pictures:
-        yield picture(pictures[name].files["png"], pictures[name].caption)
+        yield picture(pictures[name])

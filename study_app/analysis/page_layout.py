@@ -189,12 +189,17 @@ def study_marks(study: Study) -> list[Mark]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Picture:
-    """One figure: the block it is of, its name as a file, its caption, and its bytes by form (png, svg, pdf)."""
+    """One figure: the block it is of, its name as a file, its title and caption, and its bytes by form (png, svg, pdf).
+
+    ``numbers`` are what it shows, as lines of cells with tabs between; empty where they are not known.
+    """
 
     block: str
     name: str
     caption: str
     files: dict[str, bytes]
+    title: str = ""
+    numbers: str = ""
 
 
 def attempted(
@@ -217,13 +222,14 @@ def picture_of(
     draw: Callable[[Look], Sheet],
     forms: Sequence[str],
     counts: Sequence[str] | None = None,
+    numbers: str = "",
 ) -> Picture:
     """Return the figure that ``draw`` draws in each form; ``counts`` say how many took part if not all of the study."""
     people = (counted(study.n, "participant"),) if counts is None else counts
     fonts = {form: style.fonts_for(form) for form in forms}
     drawn = {one: draw(Look(title, study_marks(study), people, one)).figure for one in dict.fromkeys(fonts.values())}
     files = {form: style.file_bytes(drawn[fonts[form]], form, f"{study.name}: {title}") for form in forms}
-    return Picture(block=block, name=name, caption=caption, files=files)
+    return Picture(block=block, name=name, caption=caption, files=files, title=title, numbers=numbers)
 
 
 def sample_words(study: Study, n: int) -> str:
@@ -248,7 +254,7 @@ class Drawing:
         return "SIMULATED participants, not people; " if self.study.simulated else ""
 
     def picture(
-        self, title: str, caption: str, draw: Callable[[Look], Sheet], counts: Sequence[str] = ("",)
+        self, title: str, caption: str, draw: Callable[[Look], Sheet], counts: Sequence[str] = ("",), numbers: str = ""
     ) -> Picture:
         """Return the figure that ``draw`` draws in each form."""
-        return picture_of(self.study, self.block.id, self.name, title, caption, draw, self.forms, counts)
+        return picture_of(self.study, self.block.id, self.name, title, caption, draw, self.forms, counts, numbers)

@@ -11,6 +11,7 @@ from typing import Any, Final, Literal, TypeAlias, TypeVar
 
 from study_app.analysis.data.blocks import Block, Decided, Item, Kind, OwnDynamics, Setting
 from study_app.analysis.data.motion import Performance
+from study_app.analysis.statistics.effect_sizes import EffectSize
 from study_app.analysis.statistics.equivalence import STEPS, Equivalence, fewest, minority
 from study_app.analysis.statistics.outcome import Outcome
 from study_app.analysis.wording import listed, ms, number, percent, significant
@@ -249,6 +250,22 @@ class LevelsResult:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ContrastSide:
+    """One of the two that a hypothesis compares: the number of each participant, and their mean with its interval.
+
+    The mean is that of the test: of logarithms where a ratio is tested, with the weights of the group means. ``sd`` is
+    the standard deviation between participants, of logarithms where a ratio is tested.
+    """
+
+    name: str
+    values: Mapping[str, float]
+    mean: float | None
+    low: float | None
+    high: float | None
+    sd: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ContrastResult(Outcome):
     """The test of what is ``compared``; ``ratio``: the effect is first ÷ second, otherwise first − second.
 
@@ -256,6 +273,9 @@ class ContrastResult(Outcome):
     compared have a higher number in the first; None between groups. ``equivalent`` says whether the effect is shown to
     stay within the study's bound, by a ``p_equivalent`` that is corrected over the hypotheses with one; None where it
     has none. ``not_excluded`` is then the largest share of people that may differ by more, by its 95 % interval.
+    ``sides`` are the numbers of those compared, ``sd`` is the standard deviation of the differences within
+    participants; ``standardised`` is d_z or g, ``ordinal`` Cliff's delta of answers to a statement, and
+    ``bayes_factor`` how much likelier the numbers are under a difference than under none.
     """
 
     contrast: Contrast
@@ -270,6 +290,11 @@ class ContrastResult(Outcome):
     not_excluded: float | None
     higher: int | None
     left_out: Mapping[str, str]
+    sides: tuple[ContrastSide, ...] = ()
+    sd: float | None = None
+    standardised: EffectSize | None = None
+    ordinal: EffectSize | None = None
+    bayes_factor: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

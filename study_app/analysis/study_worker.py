@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -13,6 +14,7 @@ from study_app.analysis.worker_messages import (
     Done,
     FigureDrawn,
     FindStudies,
+    FirstPage,
     LeaveOut,
     OpenKey,
     Order,
@@ -38,6 +40,7 @@ from study_app.workers.server import Stopped
 
 if TYPE_CHECKING:
     from study_app.analysis.data.study_tables import Study
+    from study_app.analysis.page_layout import Picture
 
 # The libraries of an evaluation are loaded where they are needed: sessions are listed before.
 
@@ -110,32 +113,42 @@ def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
 
     for number, block in enumerate(study.blocks):
         send(Progress("drawing", 0.3 + 0.7 * number / len(study.blocks)))
-        words, svg, name = "No completed session has answers here yet.", b"", block_name(study, block)
+        words, name = "No completed session has answers here yet.", block_name(study, block)
         if len(study.answers(block)):
-            picture = answer_figures.answers_picture(study, block, name, ("svg",))
-            words, svg = picture.caption, picture.files["svg"]
-        send(FigureDrawn(name=name, title=answer_figures.title(block), caption=words, svg=svg))
+            send(_figure(answer_figures.answers_picture(study, block, name, ("svg",))))
+        else:
+            send(FigureDrawn(name=name, title=answer_figures.title(block), caption=words))
         _go_on(stop)
-    _draw_questions(study, send, stop)
+    drawn = list(_draw_questions(study, send, stop))
     if study.revealed and study.n:
-        _evaluate(study, send, stop)
+        _evaluate(study, drawn, send, stop)
     else:
         from study_app.analysis.planned_exclusions import undecided  # noqa: PLC0415
 
         send(Proposed(undecided(study, None)))
 
 
-def _draw_questions(study: Study, send: Send, stop: Callable[[], bool]) -> None:
-    """Draw the figures of questions that no block of statements holds."""
+def _draw_questions(study: Study, send: Send, stop: Callable[[], bool]) -> Iterator[Picture]:
+    """Draw the figures of questions that no block of statements holds, and yield them."""
     from study_app.analysis.figures.question_figures import question_pictures  # noqa: PLC0415
     from study_app.analysis.questions import question_results  # noqa: PLC0415
 
-    found = question_results(study)
-    titles = {(one.where, one.item): f"{one.title}: {one.short}" for one in found}
-    for picture in question_pictures(study, found, ("svg",)):
-        title = titles[picture.block, picture.name.removeprefix(f"question-{picture.block}-")]
-        send(FigureDrawn(name=picture.name, title=title, caption=picture.caption, svg=picture.files["svg"]))
+    for picture in question_pictures(study, question_results(study), ("svg",)):
+        send(_figure(picture))
+        yield picture
         _go_on(stop)
+
+
+def _figure(picture: Picture, **answer: str) -> FigureDrawn:
+    """Return the message with a figure, and the answer that it shows."""
+    return FigureDrawn(
+        name=picture.name,
+        title=picture.title,
+        caption=picture.caption,
+        svg=picture.files["svg"],
+        numbers=picture.numbers,
+        **answer,
+    )
 
 
 def _study_found(study: Study) -> StudyFound:
@@ -174,25 +187,36 @@ def _study_found(study: Study) -> StudyFound:
     )
 
 
-def _evaluate(study: Study, send: Send, stop: Callable[[], bool]) -> None:
-    """Test everything, then draw again what that adds to, and what only then can be drawn."""
+def _evaluate(study: Study, drawn: list[Picture], send: Send, stop: Callable[[], bool]) -> None:
+    """Test everything, then draw again what that adds to, and what only then can be drawn: the first page on top.
+
+    ``drawn`` are the figures of questions.
+    """
     from study_app.analysis.evaluate import evaluate  # noqa: PLC0415
-    from study_app.analysis.figures import answer_figures  # noqa: PLC0415
-    from study_app.analysis.findings import all_findings  # noqa: PLC0415
+    from study_app.analysis.figures.summary_figures import numbers_of, summary_pictures  # noqa: PLC0415
     from study_app.analysis.planned_exclusions import undecided  # noqa: PLC0415
-    from study_app.analysis.report.study_figures import block_name, pictures  # noqa: PLC0415
+    from study_app.analysis.report.first_page import cards  # noqa: PLC0415
+    from study_app.analysis.report.study_figures import pictures  # noqa: PLC0415
 
     going = partial(_going, send, stop)
     going("testing", 0.0)
     results = evaluate(study, progress=lambda what, share: going(what, EVALUATION * share))
     send(Proposed(undecided(study, results)))
-    titles = {block_name(study, block): answer_figures.title(block) for block in study.blocks}
-    titles |= {one.figure_name: one.figure_title for one in all_findings() if one.figure_name}
-    for drawn, picture in enumerate(pictures(study, results, ("svg",)), start=1):
-        name = picture.name
-        title = titles.get(name) or titles.get(name.partition("-")[0], name.capitalize())
-        send(FigureDrawn(name=name, title=title, caption=picture.caption, svg=picture.files["svg"]))
-        going("drawing", EVALUATION + (1 - EVALUATION) * min(1.0, drawn / 4))
+    found = chain(pictures(study, results, ("svg",)), summary_pictures(study, results, ("svg",)))
+    for number, picture in enumerate(found, start=1):
+        drawn.append(picture)
+        send(_figure(picture))
+        going("drawing", EVALUATION + (1 - EVALUATION) * min(1.0, number / 8))
+    names = []
+    for place, card in enumerate(cards(results, numbers_of(study))):
+        figure, answer = card.figure_of(drawn), " ".join(card.sentences)
+        if figure is None:
+            shown = FigureDrawn(name=f"answer-{place}", title=card.question, caption=answer, verdict=card.verdict)
+        else:
+            shown = _figure(figure, question=card.question, verdict=card.verdict, answer=answer)
+        send(shown)
+        names.append(shown.name)
+    send(FirstPage(tuple(names)))
 
 
 def _write(order: WriteTables | WriteReport, send: Send, stop: Callable[[], bool]) -> Done:

@@ -128,12 +128,27 @@ class Proposed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FigureDrawn:
-    """A figure as SVG; one of an earlier ``name`` gives way. Without ``svg``, ``caption`` says why there is none."""
+    """A figure as SVG; one of an earlier ``name`` gives way. Without ``svg``, ``caption`` says why there is none.
+
+    ``numbers`` are what it shows, as lines with tabs. One of the first page has the ``question`` that it answers, the
+    ``verdict`` and the ``answer`` in sentences.
+    """
 
     name: str
     title: str
     caption: str
     svg: bytes = b""
+    numbers: str = ""
+    question: str = ""
+    verdict: str = ""
+    answer: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class FirstPage:
+    """The names of the figures of the first page, in its order."""
+
+    names: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +167,7 @@ class Done:
     warnings: tuple[str, ...] = ()
 
 
-Answer: TypeAlias = StudiesFound | SessionsFound | StudyFound | Proposed | FigureDrawn | Progress | Done
+Answer: TypeAlias = StudiesFound | SessionsFound | StudyFound | Proposed | FigureDrawn | FirstPage | Progress | Done
 
 
 AnalysisClient: TypeAlias = WorkerClient[Order, Answer]

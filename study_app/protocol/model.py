@@ -373,7 +373,10 @@ class Contrast(Table):
     @property
     def measure_words(self) -> str:
         """The measure in words: "threshold", "agreement with “thick”"."""
-        return self.measure.replace("_", " ") if self.measure in OF_LEVELS else f"agreement with “{self.measure}”"
+        words = {"d_prime": "sensitivity (d′)", "pse": "point of subjective equality"}
+        return (
+            words.get(self.measure, self.measure) if self.measure in OF_LEVELS else f"agreement with “{self.measure}”"
+        )
 
     def words(self, conditions: Mapping[str, str | None]) -> tuple[str, str]:
         """Return the labels of the two sides; blocks get the conditions of their stimuli if these differ."""

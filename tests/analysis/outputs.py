@@ -23,7 +23,7 @@ def figures_as_lines() -> Iterator[None]:
     """Let files of figures hold what these show."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(figure_style, "file_bytes", stub_png)
-        for name in ("pictures", "level_pictures", "question_pictures"):
+        for name in ("pictures", "summary_pictures", "level_pictures", "question_pictures"):
             patched.setattr(write_report, name, partial(vars(write_report)[name], forms=("png",)))
         yield
 

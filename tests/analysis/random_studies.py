@@ -11,8 +11,9 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.findings import all_findings
 from study_app.analysis.report import sections
+from study_app.analysis.report.first_page import first_page
 from study_app.analysis.report.methods import methods
-from study_app.analysis.report.sections import answers, block, first_page
+from study_app.analysis.report.sections import answers, block
 from study_app.analysis.report.study_figures import pictures
 from study_app.analysis.report.write_report import plain, tests_csv
 from study_app.analysis.results import Failures, Results

@@ -20,8 +20,8 @@ from study_app.analysis.planning.preregistration import preregistration
 from study_app.analysis.planning.simulated_studies import count, people, plan, together
 from study_app.analysis.planning.threshold_studies import PrecisionResult, Precisions, threshold_markdown
 from study_app.analysis.report import write_report
+from study_app.analysis.report.first_page import first_page
 from study_app.analysis.report.methods import methods
-from study_app.analysis.report.sections import first_page
 from study_app.analysis.report.write_report import report
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.thresholds import group_mean
@@ -92,9 +92,11 @@ def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_pat
     with quick_pdfs():
         page = report(delayed, tmp_path / "report", failed=pytest.fail)[0].read_text(encoding="utf-8")
     first = page[page.index('class="first"') :]
-    asked = "Threshold is higher in late (late_one) than in prompt (prompt_one); equivalent within 1.25"
+    asked = "Threshold is higher in Late than in Prompt; equivalent within 1.25"
     assert first.index(asked) < first.index("Prompt: ")
-    assert f"Threshold, late (late_one) ÷ prompt (prompt_one): ratio {found.effect:.2f}, 95 % interval" in first
+    assert f"; mean ratio {found.effect:.2f}, 95 % interval" in first
+    for side, own in zip(found.sides, (late, prompt), strict=True):
+        assert side.values == pytest.approx({person: 10 ** own[person].value for person in study.people})
 
 
 def test_thresholds_of_a_staircase_leave_nobody_out_and_name_who_did_not_do_a_block(tmp_path: Path) -> None:

@@ -15,8 +15,8 @@ from study_app.analysis.findings.statement_tests import DelayTrend, MeanTests
 from study_app.analysis.planning.power_curves import power_markdown, powers
 from study_app.analysis.planning.preregistration import preregistration
 from study_app.analysis.planning.simulated_studies import FULL, count, people, plan
+from study_app.analysis.report.first_page import first_page
 from study_app.analysis.report.methods import methods
-from study_app.analysis.report.sections import first_page
 from study_app.analysis.statistics.outcome import alpha_of_looks, error_of_every_report, holm
 from study_app.analysis.statistics.slope_tests import slope_test
 from study_app.cli import commands

@@ -17,6 +17,7 @@ from study_app.analysis.worker_messages import (
     Done,
     FigureDrawn,
     FindStudies,
+    FirstPage,
     LeaveOut,
     OpenKey,
     Order,
@@ -106,6 +107,16 @@ def test_once_open_names_are_told_and_what_tests_add_is_drawn_again(study: Path)
     assert shares == sorted(shares)
     assert shares
     assert next(one.title for one in of_kind(FigureDrawn, answers)) == "Agreement for each liquid"
+    (first,) = of_kind(FirstPage, answers)
+    shown = {one.name: one for one in of_kind(FigureDrawn, answers)}
+    asked = [shown[name] for name in first.names]
+    assert [one.question.partition(": ")[2] or one.title for one in asked] == [
+        "Which liquids were distinguished?",
+        "From which delay do participants notice a difference?",
+        "Up to which delay do answers not change by a relevant amount?",
+    ]
+    assert all(one.answer or one.caption for one in asked)
+    assert asked[0].numbers.startswith("participant\t")
 
 
 def test_trials_can_be_named_for_leaving_out_and_then_do_not_count(study: Path) -> None:

@@ -1,1 +1,1 @@
-"""Figures of answers, recognition, delays and movement."""
+"""Figures of people, answers, levels, recognition, delays and movement, and those of the first page."""

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
-from typing import Final, TypeAlias
+from typing import Final
 
 import numpy as np
 import pandas as pd
@@ -24,6 +24,7 @@ from study_app import figure_style as style
 from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.measures import COUNT_COLUMNS, LEVELS, NEUTRAL, QUARTILES, Array, by_participant, quartiles
 from study_app.analysis.data.study_tables import Study
+from study_app.analysis.figures.people_figures import WIDTH_PT
 from study_app.analysis.page_layout import MARGIN_PT, SMALL, Look, Picture, Sheet, Style, picture_of
 from study_app.analysis.statistics.thresholds import Threshold
 from study_app.errors import AnalysisError
@@ -174,25 +175,39 @@ def legend(sheet: Sheet) -> None:
         x += sheet.text_width(word, SMALL) + 30
 
 
+PLASTIC: Final = (0.7548776662, 0.5698402910)
+"""Steps that put many points evenly apart in a plane (Roberts 2018)."""
+PERSON_SPREAD: Final = 0.5
+"""How far apart the points of participants at one delay are at most, as a share of the distance of delays."""
 CURVE_LEFT_PT: Final = 30.0
 CURVE_FOOT_PT: Final = 30.0
-HEIGHT_PT: Final = 190.0
+HEIGHT_PT: Final = 196.0
 CURVE_TOP_PT: Final = 34.0
 RIGHT_PT: Final = 26.0
 
 
 @style.own_settings()
-def draw_threshold(found: Threshold, lowest_ms: float | None, look: Look) -> Sheet:
-    """Draw shares as dots, the curve, its threshold with the interval, and dashed the lowest delay with a trend."""
-    sheet = look.sheet(HEIGHT_PT, style.PAGE_WIDTH_PT / 2)
+def draw_threshold(
+    found: Threshold, shares_of: Sequence[Mapping[float, float]], lowest_ms: float | None, look: Look
+) -> Sheet:
+    """Draw shares as circles, the curve, its threshold with the interval, and dashed the lowest delay with a trend.
+
+    ``shares_of`` are each participant's shares by delay, drawn as small points.
+    """
+    sheet = look.sheet(HEIGHT_PT, WIDTH_PT)
     room = (sheet.width_pt - CURVE_LEFT_PT - RIGHT_PT, sheet.height_pt - CURVE_TOP_PT - CURVE_FOOT_PT)
     axes = sheet.axes(MARGIN_PT + CURVE_LEFT_PT, CURVE_TOP_PT, *room)
     levels, asked = np.array(found.levels), np.array(found.asked)
     span = float(np.ptp(levels)) or 1.0
     axes.set_xlim(levels.min() - 0.04 * span, levels.max() + 0.04 * span)
-    axes.set_ylim(-0.04, 1.04)
+    axes.set_ylim(-0.08, 1.08)
     sheet.scale(axes, "y", (0.0, 0.5, 1.0), [f"{share:.0%}" for share in (0.0, 0.5, 1.0)], lines=True)
     sheet.scale(axes, "x", levels)
+    step = float(np.diff(levels).min()) if len(levels) > 1 else 1.0
+    for place, own in enumerate(shares_of):
+        x, y = (PERSON_SPREAD * ((place + 1) * golden % 1 - 0.5) for golden in PLASTIC)
+        points = [(delay + step * x, share + 0.12 * y) for delay, share in own.items()]
+        axes.plot(*zip(*points, strict=True), "o", color=style.PARTICIPANT, markersize=2.2, markeredgewidth=0)
     if lowest_ms is not None:
         axes.axvline(lowest_ms, color=style.TEXT_SOFT, linewidth=0.8, dashes=(3, 2), gid="lowest")
     half = found.half_way
@@ -203,59 +218,24 @@ def draw_threshold(found: Threshold, lowest_ms: float | None, look: Look) -> She
         if found.interval is not None:
             ends = [found.interval.low, found.interval.high]
             axes.plot(ends, [half, half], color=style.BAND, linewidth=4, solid_capstyle="butt", gid="interval")
-        axes.plot([found.effect], [half], marker="D", markersize=4, color=style.ACCENT, gid="threshold")
+        axes.plot([found.effect], [half], marker="D", markersize=5, color=style.TEXT, gid="threshold", zorder=4)
+        axes.plot([found.effect] * 2, [-0.08, half], color=style.TEXT, linewidth=0.8, zorder=3)
+        words = f"{found.effect:.0f} ms"
+        if found.interval is not None:
+            words += f" [{found.interval.low:.0f}, {found.interval.high:.0f}]"
+        right = found.effect < levels.mean()
+        ground: Style = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
+        where: Style = {"ha": "left" if right else "right", "va": "bottom", "zorder": 5, "bbox": ground}
+        at = (found.effect, half)
+        offset: Style = {"xytext": (6 if right else -6, 5), "textcoords": "offset points"}
+        axes.annotate(words, at, fontproperties=sheet.font(8.5, "bold"), color=style.TEXT, **where, **offset)
     there = asked > 0
     shares = np.array(found.yes)[there] / asked[there]
     dots: Style = {"markersize": 4, "markerfacecolor": "white", "markeredgecolor": style.TEXT, "gid": "shares"}
     axes.plot(levels[there], shares, "o", **dots)
-    sheet.text(MARGIN_PT, sheet.height_pt - 5, "Added delay, ms", size=SMALL, colour=style.TEXT_SOFT)
-    return sheet
-
-
-EFFECT_PT: Final = 9.0
-EFFECT_GAP_PT: Final = 7.0
-EFFECTS_LEFT_PT: Final = 190.0
-EFFECTS_TOP_PT: Final = 26.0
-MOST_AWAY: Final = 6.3
-"""The scale of differences reaches no further: two answers of seven points differ by six at most."""
-
-EffectRow: TypeAlias = tuple[str, Sequence[tuple[str, float, float | None, float | None]]]
-"""A statement, and of each setting its name, the mean difference and the ends of its interval."""
-
-
-@style.own_settings()
-def draw_effects(rows: Sequence[EffectRow], bound: float | None, foot: str, look: Look) -> Sheet:
-    """Draw differences with their intervals as lines, a row a setting, statement by statement, about a line at 0."""
-    lines = sum(len(settings) for _, settings in rows)
-    height = lines * EFFECT_PT + len(rows) * EFFECT_GAP_PT
-    sheet = look.sheet(EFFECTS_TOP_PT + height + 30)
-    axes = sheet.axes(EFFECTS_LEFT_PT, EFFECTS_TOP_PT, sheet.width_pt - EFFECTS_LEFT_PT - MARGIN_PT - 6, height)
-    ends = [end for _, settings in rows for _, *numbers in settings for end in numbers if end is not None]
-    reach = min(MOST_AWAY, 1.08 * max(1.0, bound or 0.0, *map(abs, ends)))
-    axes.set_xlim(-reach, reach)
-    axes.set_ylim(height, 0)
-    ticks = [tick for tick in MaxNLocator(nbins=8, integer=True).tick_values(-reach, reach) if abs(tick) <= reach]
-    sheet.scale(axes, "x", ticks, [f"{tick:g}".replace("-", "−") for tick in ticks], lines=True)
-    if bound is not None:
-        axes.axvspan(-bound, bound, color=style.GRID, alpha=0.6, linewidth=0, zorder=0, gid="bound")
-    axes.axvline(0, color=style.TEXT_SOFT, linewidth=0.8, zorder=1)
-    y, means, intervals = 0.0, list[tuple[float, float]](), list[tuple[float, float, float]]()
-    for statement, settings in rows:
-        words = sheet.wrap(statement, EFFECTS_LEFT_PT - 70, LABEL_SIZE, "bold")
-        for number, line in enumerate(words):
-            top = EFFECTS_TOP_PT + y + EFFECT_GAP_PT + 6 + number * TITLE_LINE_PT
-            sheet.text(MARGIN_PT, top, line, size=LABEL_SIZE, weight="bold")
-        for place, (setting, mean, low, high) in enumerate(settings):
-            at = y + EFFECT_GAP_PT + (place + 0.5) * EFFECT_PT
-            sheet.text(EFFECTS_LEFT_PT - 6, EFFECTS_TOP_PT + at + 2.3, setting, size=SMALL, ha="right")
-            means.append((mean, at))
-            if low is not None and high is not None:
-                intervals.append((at, low, high))
-        y += EFFECT_GAP_PT + len(settings) * EFFECT_PT
-    axes.plot(*zip(*means, strict=True), "o", color=style.ACCENT, markersize=3.2, zorder=3)
-    if intervals:
-        axes.hlines(*zip(*intervals, strict=True), color=style.ACCENT, linewidth=1.2, zorder=2)
-    sheet.text(EFFECTS_LEFT_PT, sheet.height_pt - 6, foot, size=SMALL, colour=style.TEXT_SOFT)
+    sheet.text(MARGIN_PT, 28, "Answers that agree", size=SMALL, colour=style.TEXT_SOFT)
+    below = "Added delay, ms.   Small points: participants; circles: share of all; diamond: threshold, 95 % interval."
+    sheet.text(MARGIN_PT, sheet.height_pt - 5, below, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 
 
@@ -556,7 +536,8 @@ def answers_picture(
             "an upper bound of the noticeable delay."
         )
     draw = partial(draw_block, study, block, lowest)
-    return picture_of(study, block.id, name, title(block), words, draw, forms, counts(study, block))
+    numbers = study.aggregate(block).to_csv(sep="\t", index=False)
+    return picture_of(study, block.id, name, title(block), words, draw, forms, counts(study, block), numbers)
 
 
 def draw_block(study: Study, block: Block, lowest: Mapping[str, float], look: Look) -> Sheet:

@@ -207,7 +207,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         )
         yield paragraph(" ".join(_about_against(self.value)), "soft")
         head = ("Delay", *(f"{verdict} in" for verdict in VERDICTS), "what can be said")
-        yield table(head, by_delay(self.found), words=len(head))
+        yield table(head, by_delay(self.found), words=len(head), folded=True)
 
     def limits(self) -> Iterator[str]:
         against, found = self.value, self.found
@@ -332,7 +332,7 @@ class DetectionThreshold(Finding[Threshold | None]):
     kinds = ("delays",)
     waits = ("delays",)
     figure_name = "threshold"
-    figure_title = "When a delay is noticed"
+    figure_title = "Agreement against delay"
 
     @classmethod
     def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[Threshold | None, Absent]:
@@ -387,11 +387,18 @@ class DetectionThreshold(Finding[Threshold | None]):
         dashed = "" if lowest is None else f" Dashed: the lowest delay with a trend in a statement, {ms(lowest)}."
         caption = (
             f"Proportion of answers that agree (5 to 7), against the requested delay ({drawing.simulated}n = "
-            f"{threshold.n}). {curve}{dashed}"
+            f"{threshold.n}). Small points: participants. {curve}{dashed}"
         )
-        return drawing.picture(
-            self.figure_title, caption, lambda look: answer_figures.draw_threshold(threshold, lowest, look)
-        )
+        draw = partial(answer_figures.draw_threshold, threshold, self._shares(drawing), lowest)
+        return drawing.picture(self.figure_title, caption, draw, (f"n = {threshold.n}",))
+
+    def _shares(self, drawing: Drawing) -> list[dict[float, float]]:
+        """Return of each participant the share of answers that agree, by delay."""
+        answers = drawing.study.answers(drawing.block)
+        rows = answers[(answers["item"] == self.results.decided.noticed) & answers["response"].notna()]
+        delays_ms = {one.code: one.delay_ms or 0.0 for one in drawing.found.settings}
+        rows = rows.assign(delay=rows["code"].map(delays_ms).astype(float), agrees=rows["response"].astype(float) >= 5)
+        return [dict(own.groupby("delay")["agrees"].mean()) for _, own in rows.groupby("participant", sort=True)]
 
     def methods(self) -> Iterator[str]:
         if self.value is not None:
@@ -426,6 +433,7 @@ class NoticedFrom(Finding[None]):
     place = 21
     kinds = ("delays",)
     question = "From which delay do participants notice a difference?"
+    answer_figures = ("threshold", "delays")
 
     def answer(self) -> Answer:
         """Return from which delay a change shows: by primary statements, or else by exploratory ones."""
@@ -433,10 +441,11 @@ class NoticedFrom(Finding[None]):
         fitted = decided.noticed if threshold is not None and threshold.effect is not None else None
         for primary, verdict in ((True, "shown"), (False, "suggested")):
             text = self._shortest([item.id for item in self.found.items if decided.is_primary(item.id) == primary])
-            if not text and fitted is not None and decided.is_primary(fitted) == primary:
+            is_fitted = fitted is not None and decided.is_primary(fitted) == primary
+            if not text and is_fitted:
                 text = "Agreement increases with the delay, but it is not shown that any single delay is noticed."
             if text:
-                return self.answered(verdict, text, claims=True)
+                return self.answered(verdict, f"{self._threshold_words() if is_fitted else ''}{text}", claims=True)
         return self.answered("not shown", f"It is not shown that any delay is noticed. {NO_EVIDENCE}")
 
     def _shortest(self, items: Sequence[str]) -> str:
@@ -456,6 +465,17 @@ class NoticedFrom(Finding[None]):
             f"{listed(rated)}. Participants may also notice shorter delays. Mean ratings need not change."
         )
 
+    def _threshold_words(self) -> str:
+        """Return the detection threshold in a sentence, with a space."""
+        threshold = DetectionThreshold.of(self.found)
+        if threshold is None or threshold.effect is None:
+            return ""
+        item = short(self.found, self.results.decided.noticed or "")
+        return (
+            f"The detection threshold is {number(threshold.effect, 0)} ms ({_threshold_interval(threshold)}, "
+            f"n = {threshold.n}), where {percent(threshold.half_way or 0.0)} of answers agree with “{item}”. "
+        )
+
     def _correlation(self, lowest: Lowest, up_to_ms: float) -> float:
         """Return the mean rank correlation of answers to a statement and delays up to one."""
         step = next(step for step in lowest.steps.steps if step.longest_ms == up_to_ms)
@@ -470,6 +490,7 @@ class UnchangedUpTo(Finding[None]):
     place = 22
     kinds = ("delays",)
     question = "Up to which delay do answers not change by a relevant amount?"
+    answer_figures = ("effects",)
 
     def answer(self) -> Answer:
         """Return up to which delay mean answers are equivalent to those at the shortest."""
@@ -479,7 +500,9 @@ class UnchangedUpTo(Finding[None]):
             return self.answered("not tested", f"No answer: {why}.")
         at, within = common_ms(self.found), _within(against[0])
         if at is None:
-            return self.answered("not shown", f"{NO_DELAY.format(within)} {_beyond_words(against)}")
+            return self.answered(
+                "not shown", f"{NO_DELAY.format(within)} {_largest_words(self.found, against)}{_beyond_words(against)}"
+            )
         statements = all_of(len(equivalent_up_to(against)), "statement")
         share = not_excluded([one.found for one in against if one.delay_ms <= at])
         text = f"Up to {ms(at)} mean answers to {statements} stay {within}; {share}."
@@ -487,6 +510,19 @@ class UnchangedUpTo(Finding[None]):
 
 
 NO_DELAY: Final = "We could not show for any delay that the mean answers to all statements stay {}."
+
+
+def _largest_words(found: BlockResult, against: Sequence[ContrastWithControl]) -> str:
+    """Return the largest mean difference with its interval, as a sentence with a space; nothing without any."""
+    known = [one for one in against if one.found.effect is not None and one.found.interval is not None]
+    if not known:
+        return ""
+    most = max(known, key=lambda one: abs(one.found.effect or 0.0))
+    return (
+        f"The largest mean difference is {number(most.found.effect)} points (“{short(found, most.item)}” at "
+        f"{ms(most.delay_ms)}, {percent(1 - 2 * most.found.alpha)} interval {interval(most.found.interval)}, "
+        f"n = {most.found.n}). "
+    )
 
 
 def _beyond_words(against: Sequence[ContrastWithControl]) -> str:

@@ -383,6 +383,8 @@ class Finding(Generic[R]):
         The name as a file and the title of its figure; empty where it has none.
     question : str
         The question of the first page that it answers ("{kind}": what is compared); empty where it answers none.
+    answer_figures : tuple of str
+        The names of figures that may stand beside the answer; the first that was drawn does.
     """
 
     key: ClassVar[str]
@@ -397,6 +399,7 @@ class Finding(Generic[R]):
     figure_name: ClassVar[str] = ""
     figure_title: ClassVar[str] = ""
     question: ClassVar[str] = ""
+    answer_figures: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()

@@ -199,6 +199,7 @@ class Distinguished(Finding[None]):
     place = 20
     kinds = ("liquids", "views")
     question = "Which {kind} were distinguished?"
+    answer_figures = ("effects", "recognition")
 
     def answer(self) -> Answer:
         """Return which liquids were recognised by name, and which of them, or of the views, were rated differently.
@@ -228,7 +229,11 @@ class Distinguished(Finding[None]):
             text = f"No statement showed a difference between any two {found.kind}."
         if named is not None and named.found.p is not None:
             names = listed([found.names[place].lower() for place in known])
-            text = f"Recognised above chance: {names}. {text}" if names else f"{NONE_RECOGNISED} {text}"
+            hits = (
+                f"Participants named {number(named.found.statistic, 0)} of {sum(one.n for one in named.found.rates)} "
+                f"liquids correctly ({number(named.found.expected, 1)} expected by chance, {p_equals(named.found.p)})."
+            )
+            text = f"{f'Recognised above chance: {names}.' if names else NONE_RECOGNISED} {hits} {text}"
         if not verdicts:
             return self.answered("not shown", f"{text} {NO_EVIDENCE}")
         return self.answered(verdict, text, claims=True)

@@ -11,8 +11,9 @@ import numpy as np
 
 from study_app import number_text
 from study_app.analysis.data.blocks import KINDS, TRENDS
-from study_app.analysis.data.measures import medians
-from study_app.analysis.figures import answer_figures
+from study_app.analysis.data.measures import LEVELS, by_participant, medians
+from study_app.analysis.data.study_tables import group_members
+from study_app.analysis.figures.people_figures import Column, Panel, draw_people, mean_of, numbers_of_panels
 from study_app.analysis.findings.finding import (
     FDR,
     HOLM,
@@ -345,7 +346,7 @@ class Effects(Finding[tuple[Effect, ...]]):
     what = "figure of effects"
     empty = ()
     figure_name = "effects"
-    figure_title = "Differences from the first setting"
+    figure_title = "Every participant's answers"
 
     @classmethod
     def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Effect, ...], Absent]:
@@ -366,30 +367,54 @@ class Effects(Finding[tuple[Effect, ...]]):
         yield from self.drawn()
 
     def figure(self, drawing: Drawing) -> Picture | None:
-        found = self.found
-        first = name(found, found.settings[0].code)
-        bound = drawing.results.decided.equivalence_bound if found.delays_ms else None
-        rows = [
-            (
-                short(found, item),
-                [
-                    (name(found, one.code), one.mean, one.low, one.high)
-                    for one in self.value
-                    if one.item == item and one.mean is not None
-                ],
-            )
-            for item in dict.fromkeys(one.item for one in self.value)
-        ]
-        if not any(settings for _, settings in rows):
+        """Draw every participant's answers to each statement; of delays, their differences from the shortest."""
+        found, study = self.found, drawing.study
+        if not self.value:
             return None
+        over_delay = bool(found.delays_ms)
+        bound = drawing.results.decided.equivalence_bound if over_delay else None
+        answers = study.answers(drawing.block)
+        people = sorted(answers["participant"].unique())
+        codes = {column: code for code, column in reversed(drawing.block.columns.items())}
+        panels = []
+        for item in found.items:
+            values = by_participant(answers, people, drawing.block.columns, item.id)
+            shown = values[:, 1:] - values[:, :1] if over_delay else values
+            columns = []
+            for place in range(shown.shape[1]):
+                numbers = dict(zip(people, shown[:, place].tolist(), strict=True))
+                numbers = {who: value for who, value in numbers.items() if not math.isnan(value)}
+                words = name(found, codes[place + over_delay]).removesuffix(" ms")
+                columns.append(Column(name=words, values=numbers, mean=mean_of(numbers.values())))
+            panels.append(
+                Panel(
+                    title=item.short,
+                    columns=tuple(columns),
+                    places=found.delays_ms[1:],
+                    line=0.0 if over_delay else None,
+                    bound=None if bound is None else (-bound, bound),
+                    ends=None if over_delay else (LEVELS[0] - 0.5, LEVELS[-1] + 0.5),
+                )
+            )
+        first = name(found, found.settings[0].code)
+        what = f"Difference of each participant's answers from those at {first}" if over_delay else (
+            f"Each participant's answers about each {settings_noun(found)}"
+        )  # fmt: skip
         caption = (
-            f"Mean difference between the answers to each setting and those to {first} ({drawing.simulated}"
-            f"n = {found.n}). Lines: Student's 95 % interval, not corrected for the number of intervals; no line if "
-            "all differences are equal. The tests below decide what is shown."
-            + (f" Grey: the equivalence bound, ±{bound:g}." if bound else "")
+            f"{what} ({drawing.simulated}n = {found.n}). Diamonds: means with Student's 95 % interval, not corrected "
+            "for the number of intervals. The tests decide what is shown."
+            + (f" Band: the equivalence bound, ±{bound:g}." if bound else "")
         )
-        draw = partial(answer_figures.draw_effects, rows, bound, f"Difference from {first}, points of the scale")
-        return drawing.picture(self.figure_title, caption, draw, (counted(found.n, "participant"),))
+        draw = partial(
+            draw_people,
+            panels,
+            above=f"Difference from {first}, points" if over_delay else "Points of the scale",
+            below="Added delay, ms" if over_delay else "",
+            members=group_members(study),
+            shared=True,
+        )
+        title = f"Differences from {first}" if over_delay else self.figure_title
+        return drawing.picture(title, caption, draw, (f"n = {found.n}",), numbers_of_panels(panels))
 
 
 @dataclass(frozen=True, slots=True)
@@ -532,13 +557,23 @@ class MeanTests(StatementTests):
         yield from super().section()
         effects = [
             f"{short(self.found, one.item)}: "
-            + listed([f"{number(slope)} {interval(ends)}" for slope, ends in zip(it.slopes, it.intervals, strict=True)])
+            + listed(
+                [
+                    f"{number(slope)} {interval(ends)} (SD {number(sd)})"
+                    for slope, ends, sd in zip(it.slopes, it.intervals, it.sds, strict=True)
+                ]
+            )
+            + (f", intercept SD {number(it.intercept_sd)}" if it.intercept_sd is not None else "")
             for one in self.value
             if isinstance(it := one.outcome, SlopeTest) and it.slopes
         ]
         if effects:
             what = "Slopes per 100 ms of delay" if self.found.delays_ms else "Differences from the first setting"
-            yield paragraph(f"{what}, in points, with 95 % intervals: {'; '.join(effects)}.", "soft")
+            yield paragraph(
+                f"{what}, in points, with 95 % intervals and standard deviations between participants: "
+                f"{'; '.join(effects)}.",
+                "soft",
+            )
 
     @classmethod
     def tested(cls, found: BlockResult) -> bool:

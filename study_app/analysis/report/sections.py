@@ -4,8 +4,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
-from markupsafe import Markup
-
 from study_app.analysis.contrasts import answer, question
 from study_app.analysis.data.measures import number_or_none
 from study_app.analysis.data.motion import (
@@ -19,7 +17,7 @@ from study_app.analysis.data.motion import (
 from study_app.analysis.data.study_tables import By, Study, group_assignment, group_counts, group_means
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.finding import Answer, Finding
-from study_app.analysis.html_page import attempted, bullets, drawn, heading, paragraph, render, table, table_of
+from study_app.analysis.html_page import attempted, bullets, drawn, heading, paragraph, table, table_of
 from study_app.analysis.levels.evaluate import level_findings, level_limits, level_section
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.planned_exclusions import PlannedExclusions
@@ -160,26 +158,6 @@ def _mixed_up(found: BlockResult, results: Results) -> Iterator[str]:
 CLAIMS: Final[dict[int, tuple[int, int]]] = {5: (4, 2000), 12: (47, 3000), 24: (42, 3000)}
 """Participants → in how many empty studies anything in the report claims something, and of how many studies, by the
 answer model and by the ordinal probit model: ``liquid-study validate-report --studies 1000``."""
-
-LIMITS_SHOWN: Final = 6
-"""So many limits are listed on the first page; the others are folded."""
-
-
-def first_page(results: Results, limits: Sequence[str]) -> Markup:
-    """Return the table of verdicts, the limits below it, and how often the table is wrong."""
-    given, rows = answers(results), conclusions(results)
-    verdicts = table(("Part", "Question", "Verdict", "What can be said"), rows, words=4)
-    return render(
-        "first_page.html",
-        verdicts=verdicts if rows else "",
-        sentences=[
-            *filter(None, [results.decided.look_words(len(results.people))]),
-            *(of_levels(results) or (() if rows else (none_found(results),))),
-        ],
-        limits=list(limits),
-        shown=LIMITS_SHOWN,
-        empty=empty_studies(max(found.n for found in results.blocks)) if given and not results.decided.looks else "",
-    )
 
 
 def conclusions(results: Results) -> list[tuple[str, ...]]:

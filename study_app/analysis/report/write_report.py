@@ -23,9 +23,10 @@ from study_app.analysis.export.table_files import credit_lines, study_head, tabl
 from study_app.analysis.export.tables import deliver
 from study_app.analysis.figures.level_figures import level_pictures
 from study_app.analysis.figures.question_figures import question_pictures
+from study_app.analysis.figures.summary_figures import numbers_of, summary_pictures
 from study_app.analysis.findings import FINDINGS, all_findings
 from study_app.analysis.findings.finding import TESTS
-from study_app.analysis.html_page import attempted, box, bullets, heading, paragraph, render, table
+from study_app.analysis.html_page import attempted, box, bullets, chunks, font_face, heading, paragraph, render, table
 from study_app.analysis.levels.evaluate import level_entries
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.planned_exclusions import PlannedExclusions, Proposal, planned_exclusions
@@ -33,6 +34,7 @@ from study_app.analysis.planning.preregistration import FILE as PREREGISTRATION
 from study_app.analysis.planning.preregistration import deviations
 from study_app.analysis.planning.preregistration import deviations_section as preregistration_section
 from study_app.analysis.report import sections
+from study_app.analysis.report.first_page import cards, figures_shown, first_page
 from study_app.analysis.report.methods import methods, version_words
 from study_app.analysis.report.study_figures import pictures
 from study_app.analysis.results import BlockResult, Failure, Failures, LevelsResult, Progress, Results, name, silent
@@ -320,6 +322,7 @@ def _drawn(study: Study, results: Results, failures: Failures) -> Iterator[Pictu
     yield from pictures(study, results, failures=failures)
     if results.questions:
         yield from question_pictures(study, results.questions, failures=failures)
+    yield from summary_pictures(study, results, failures=failures)
     if results.levels:
         yield from level_pictures(study, results.levels, failures=failures)
 
@@ -339,13 +342,19 @@ def _page(
     planned: PlannedExclusions | None,
     failures: Failures,
 ) -> str:
+    numbers = failures.value("numbers of participants", lambda: numbers_of(study), {})
+    on_first = failures.value("first page, figures", lambda: figures_shown(cards(results, numbers), drawn), set())
+    others = [one for one in drawn if one.name not in on_first]
     sections_: list[tuple[str, Callable[[], Iterable[str]]]] = [
         ("Hypotheses", lambda: contrast_section(results)),
-        *((found.title, partial(sections.block, found, results, drawn, failures)) for found in results.blocks),
+        *((found.title, partial(sections.block, found, results, others, failures)) for found in results.blocks),
         *(
-            (title, partial(sections.question_section, where, study, results, drawn))
+            (title, partial(sections.question_section, where, study, results, others))
             for where, title in sections.places(results).items()
         ),
+    ]
+    shown = len(sections_)
+    sections_ += [
         ("What the verdicts mean", lambda: sections.verdicts_mean(results)),
         ("Groups", lambda: sections.groups(study, results)),
         ("Sites", lambda: sections.groups(study, results, "site")),
@@ -358,18 +367,28 @@ def _page(
         ("Licence and citation", lambda: (heading(2, "Licence and citation"), bullets(credit_lines(study)))),
         ("Answers, counted", lambda: sections.counts_of_answers(results)),
     ]
-    first = attempted(failures, "first page", Markup(), lambda: [sections.first_page(results, texts["limits"])])
-    made = [(title, attempted(failures, f"section “{title}”", heading(2, title), make)) for title, make in sections_]
+    first = attempted(failures, "first page", Markup(), lambda: [first_page(results, texts["limits"], numbers, drawn)])
+    made = [
+        (title, attempted(failures, f"section “{title}”", heading(2, title), make), place < shown)
+        for place, (title, make) in enumerate(sections_)
+    ]
     body = render(
         "body.html",
         title=study.title,
         facts=_facts(study),
         marks=_marks(study),
-        parts=[{"title": title, "html": html} for title, html in made if html],
+        parts=[
+            {"title": title, "html": html, "chunks": chunks(html[1:]), "open": is_open}
+            for title, html, is_open in made
+            if html
+        ],
         failures=[str(one) for one in failures.found],
         first=Markup().join(first),
     )
-    return render("page.html", title=f"{study.title}: report", body=body)
+    fonts = [(weight, font_face(name)) for weight, name in (("400", "Regular"), ("500 800", "Bold"))]
+    return render(
+        "page.html", title=f"{study.title}: report", body=body, fonts=[(weight, font) for weight, font in fonts if font]
+    )
 
 
 def _facts(study: Study) -> str:

@@ -30,12 +30,14 @@ class SlopeTest(Outcome):
     """The test of all slopes; ``effect`` is the slope where there is one, otherwise they are in ``slopes``.
 
     ``intervals`` are Student's 95 % intervals of the slopes [points per unit of the column], ``sds`` the standard
-    deviations between the participants' own slopes.
+    deviations between the participants' own slopes, ``intercept_sd`` that between their own answers where all columns
+    are 0: at no delay, or in the first setting.
     """
 
     slopes: tuple[float, ...] = ()
     intervals: tuple[Interval, ...] = ()
     sds: tuple[float, ...] = ()
+    intercept_sd: float | None = None
 
 
 def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: Direction | None = None) -> SlopeTest:
@@ -61,7 +63,8 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
         statistic_name="t" if several == 1 else "F",
         effect_name="slope" if several == 1 else "differences",
     )
-    own = rows @ np.linalg.pinv(np.column_stack([np.ones(len(design)), design]))[1:].T
+    intercepts, *slopes = np.linalg.pinv(np.column_stack([np.ones(len(design)), design])) @ rows.T
+    own = np.array(slopes).T
     covariance = np.atleast_2d(np.cov(own, rowvar=False)) if n > 1 else np.zeros((several, several))
     fewest = max(FEW, several + 1)
     if n < fewest or np.linalg.matrix_rank(covariance, tol=1e-12) < several:
@@ -93,6 +96,7 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
         slopes=tuple(means.tolist()),
         intervals=intervals,
         sds=tuple(np.sqrt(np.diag(covariance)).tolist()),
+        intercept_sd=float(np.std(intercepts, ddof=1)),
     )
 
 

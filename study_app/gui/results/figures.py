@@ -8,10 +8,20 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Literal, TypeAlias
 
-from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtCore import QBuffer, QByteArray, QIODevice, QMarginsF, QRectF, QSize, QSizeF, Qt, Signal
+from PySide6.QtGui import (
+    QColor,
+    QGuiApplication,
+    QImage,
+    QImageWriter,
+    QPageSize,
+    QPainter,
+    QPaintEvent,
+    QPdfWriter,
+    QResizeEvent,
+)
 from PySide6.QtSvg import QSvgRenderer
-from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QSizePolicy, QWidget
+from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QScrollArea, QSizePolicy, QWidget
 
 from study_app.analysis.worker_messages import FigureDrawn, Progress, StudyAt
 from study_app.gui.sessions.session_facts import SessionFacts
@@ -19,7 +29,7 @@ from study_app.gui.theme.theme import FAMILIES, SHADOW, Theme, font
 from study_app.gui.theme.themed import Coloured, remove_widget
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import Bar, Card
+from study_app.gui.widgets.cards import Bar, Card, Chip
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.number_text import counted
@@ -215,6 +225,7 @@ class FigureView(Coloured, QWidget):
         """Draw another figure; the previous one stays visible until then."""
         self._figure, self._colours = figure, colours
         size = SIZE.search(figure.svg)
+        self.width_pt = float(size[1]) if size else 516.0
         self._proportion = float(size[2]) / float(size[1]) if size else 0.5
         self.setAccessibleName(figure.title)
         self.setAccessibleDescription(figure.caption)
@@ -272,13 +283,57 @@ AT_ONCE = 2
 LEAST_WIDTH, MOST_WIDTH = 830, 1240
 
 
+VERDICTS: Mapping[str, str] = {"shown": "ok", "equivalent": "ok", "suggested": "warn"}
+FORMS = "PDF (*.pdf);;SVG (*.svg);;PNG (*.png)"
+MOST_SCALE = 2.5
+"""Pixels of the window for a point of a figure at most."""
+PNG_SCALE = 300 / 72
+"""Pixels of a PNG for a point of a figure."""
+
+
+def save_figure(figure: FigureDrawn, path: Path) -> None:
+    """Write a figure as PDF, SVG or PNG, by the ending of ``path``; OSError if it cannot be written."""
+    renderer = QSvgRenderer(figure.svg)
+    size = renderer.defaultSize()
+    if path.suffix == ".svg":
+        content = figure.svg
+    else:
+        held = QBuffer()
+        held.open(QIODevice.OpenModeFlag.WriteOnly)
+        if path.suffix == ".pdf":
+            writer = QPdfWriter(held)
+            writer.setTitle(figure.title)
+            writer.setPageSize(QPageSize(QSizeF(size), QPageSize.Unit.Point))
+            writer.setPageMargins(QMarginsF())
+            painter = QPainter(writer)
+            renderer.render(painter)
+            painter.end()
+        else:
+            QImageWriter(held, QByteArray(b"png")).write(drawn_svg(figure.svg, size, PNG_SCALE))
+        content = bytes(held.data().data())
+    path.write_bytes(content)
+
+
 class FigureCard(Card):
-    """One figure, or why it is not there; its caption is shown where that is asked for."""
+    """One figure below the answer that it shows, or why it is not there.
+
+    Its caption is shown where that is asked for. Figure and numbers can be copied, the figure saved. ``failed`` carries
+    why it was not saved.
+    """
+
+    failed = Signal(str)
 
     def __init__(self, figure: FigureDrawn, colours: Mapping[str, str]) -> None:
         super().__init__(padding=PADDING, gap=8)
         self.figure = figure
         self.drawing: FigureView | None = None
+        self.question = label("", "card", wraps=True)
+        self.answer = label("", "body", wraps=True)
+        self.answer.setTextInteractionFlags(
+            Qt.TextInteractionFlag.TextSelectableByMouse | Qt.TextInteractionFlag.TextSelectableByKeyboard
+        )
+        self._verdict = hbox(spacing=0, margins=0)
+        self.dialog: QFileDialog | None = None
         self.caption = label("", "label", "text2", wraps=True)
         self.caption.setContentsMargins(0, 0, 120, 4)
         self.caption.setTextInteractionFlags(
@@ -288,12 +343,20 @@ class FigureCard(Card):
         self.more = ActionButton("info", "Caption", role="plain", height=30)
         self.more.setCheckable(True)
         self.more.toggled.connect(self.caption.setVisible)
-        self.more.setFont(font("label"))
+        self.copy_figure = ActionButton("", "Copy figure", role="plain", height=30)
+        self.copy_figure.clicked.connect(self._copy_figure)
+        self.copy_numbers = ActionButton("", "Copy numbers", role="plain", height=30)
+        self.copy_numbers.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.figure.numbers))
+        self.save = ActionButton("download", "Save as …", role="plain", height=30)
+        self.save.clicked.connect(self._ask_where)
+        self._buttons = (self.more, self.copy_figure, self.copy_numbers, self.save)
+        for button in self._buttons:
+            button.setFont(font("label"))
         self._title = label("", "card")
-        self.column.addWidget(self._title)
         self._place = QHBoxLayout()
-        add_parts(self.column, self._place, self.caption)
-        self.more.setParent(self)  # in the corner that figures leave free
+        foot = hbox(STRETCH, *self._buttons, spacing=4, margins=0)
+        add_parts(self.column, hbox((self.question, 1), self._verdict), self.answer, self._title, self._place)
+        add_parts(self.column, self.caption, foot)
         self.show_figure(figure, colours)
 
     def show_figure(self, figure: FigureDrawn, colours: Mapping[str, str]) -> None:
@@ -301,9 +364,16 @@ class FigureCard(Card):
         self.caption.setText(figure.caption)
         has_figure = bool(figure.svg)
         self._title.setText(figure.title)
-        self._title.setVisible(not has_figure)  # a figure has its own
-        self.more.setVisible(has_figure)
-        self.more.setAccessibleName(f"Caption of {figure.title}")
+        self._title.setVisible(not has_figure and not figure.question)  # a figure has its own
+        self.question.setText(figure.question)
+        self.question.setVisible(bool(figure.question))
+        self.answer.setText(figure.answer)
+        self.answer.setVisible(bool(figure.answer))
+        self._show_verdict(figure.verdict)
+        for button in self._buttons:
+            button.setVisible(has_figure)
+            button.setAccessibleName(f"{button.text().removesuffix(' …')}: {figure.title}")
+        self.copy_numbers.setVisible(bool(figure.numbers))
         self.caption.setVisible(not has_figure or self.more.isChecked())
         if self.drawing is not None and has_figure:
             self.drawing.show_figure(figure, colours)
@@ -316,19 +386,41 @@ class FigureCard(Card):
             self.more.raise_()
 
     def fit_width(self, width: int) -> None:
+        """Make the figure so wide, a narrow one less."""
+        if self.drawing is not None:
+            width = min(width, round(MOST_SCALE * self.drawing.width_pt))
         size = QSize(width, 0 if self.drawing is None else self.drawing.heightForWidth(width))
         if self.drawing is not None and self.drawing.maximumSize() != size:
             self.drawing.setFixedSize(size)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        size = self.more.sizeHint()
-        self.more.setGeometry(
-            self.width() - size.width() - SHADOW - 6,
-            self.height() - size.height() - SHADOW - 5,
-            size.width(),
-            size.height(),
-        )
+    def _show_verdict(self, verdict: str) -> None:
+        shown = self._verdict.itemAt(0)
+        if shown is not None:
+            remove_widget(shown.widget())
+        if verdict:
+            self._verdict.addWidget(Chip(VERDICTS.get(verdict, "neutral"), "info", verdict))  # type: ignore[arg-type]
+
+    def _copy_figure(self) -> None:
+        """Copy the figure as a picture."""
+        size = QSvgRenderer(self.figure.svg).defaultSize()
+        QGuiApplication.clipboard().setImage(drawn_svg(self.figure.svg, size, PNG_SCALE))
+
+    def _ask_where(self) -> None:
+        self.dialog = dialog = QFileDialog(self, f"Save {self.figure.title}", self.figure.name, FORMS)
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.selectFile(self.figure.name)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.fileSelected.connect(lambda path: self.save_to(Path(path), dialog.selectedNameFilter()))
+        dialog.open()
+
+    def save_to(self, path: Path, form: str = "PDF") -> None:
+        """Save the figure; a path without a known ending gets that of ``form``."""
+        if path.suffix not in (".pdf", ".svg", ".png"):
+            path = path.with_name(f"{path.name}.{form[:3].lower()}")
+        try:
+            save_figure(self.figure, path)
+        except OSError as error:
+            self.failed.emit(f"{path} cannot be written ({error.strerror}): choose another folder.")
 
 
 class WorkLine(Card):
@@ -397,10 +489,11 @@ class TroubleCard(Card):
 class FiguresPanel(QScrollArea):
     """The cards of the figures; while there are none, what is going on or why.
 
-    ``asked`` carries what the button of a sentence does.
+    ``asked`` carries what the button of a sentence does, ``failed`` why a figure was not saved.
     """
 
     asked = Signal(str)
+    failed = Signal(str)
 
     def __init__(self) -> None:
         super().__init__()
@@ -441,7 +534,10 @@ class FiguresPanel(QScrollArea):
         kept = {card.figure.name: card for card in self.cards}
         self.cards = []
         for place, figure in enumerate(view.figures):
-            card = kept.pop(figure.name, None) or FigureCard(figure, view.colours)
+            card = kept.pop(figure.name, None)
+            if card is None:
+                card = FigureCard(figure, view.colours)
+                card.failed.connect(self.failed)
             self._column.insertWidget(place, card)
             self.cards.append(card)
         for gone in kept.values():

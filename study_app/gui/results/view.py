@@ -19,6 +19,7 @@ from study_app.analysis.worker_messages import (
     Done,
     FigureDrawn,
     FindStudies,
+    FirstPage,
     LeaveOut,
     OpenKey,
     Order,
@@ -429,6 +430,7 @@ class ResultsPlace(Place):
         self.exclusions.exclude_asked.connect(self._ask_leave_out)
         self.exclusions.open.clicked.connect(lambda: self._opener(self.view.exclusions_file or self.results))
         self.figures.asked.connect(self._apply_remedy)
+        self.figures.failed.connect(lambda why: self.message.emit("The figure was not saved", why))
         self.sessions.rows.opened.connect(self._open_session)
         self.sessions.rows.version_asked.connect(self.version_asked)
 
@@ -720,6 +722,10 @@ class ResultsPlace(Place):
                     colours=answer.colours,
                     trouble=None if answer.blocks else nothing,
                 )
+            case FirstPage() if newest:
+                places = {name: place for place, name in enumerate(answer.names)}
+                figures = sorted(self.view.figures, key=lambda figure: places.get(figure.name, len(places)))
+                self._update_view(figures=tuple(figures))
             case FigureDrawn() if newest:
                 self._redrawn.add(answer.name)
                 names = [figure.name for figure in self.view.figures]

@@ -71,12 +71,13 @@ def compare_captions(compared: Compared, trials: pd.DataFrame) -> None:
     people, counting = trials[trials["here"]]["participant"].nunique(), trials[trials["counts"]]
     of_names = [own for (_, question, *_), own in compared.rows.items() if question == "liquids are recognised"]
     hits = [[own[name] for name in ("statistic", "expected", "p")] for own in of_names]
+    compared_people = [[one["n"]] for one in compared.results.get("contrasts", [])]
     measures = {block["id"]: pd.DataFrame(block["measures"]).sum() for block in compared.results["blocks"]}
     for path in compared.folder.glob("*.txt"):
         errors = counting.loc[counting["block"] == path.stem, "delay_error_mean_ms"]
         sums = measures.get(path.stem.removeprefix("liquids-"), {})
         for pattern, *own in (
-            (r"(?:n = |people; |of )(\w+) participants", [people]),
+            (r"(?:n = |people; |of )(\w+) participants", [people], *compared_people),
             (r"Cannot judge: (\d+); not answered: (\d+)\.", [sums.get("cannot_judge"), sums.get("missing")]),
             (r"by (\S+) ms on average \(trials: (\S+) to (\S+) ms", [errors.mean(), errors.min(), errors.max()]),
             (r"Correct: (\d+); (\S+) expected .* p = (\S+)\)", *hits),

@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+from scipy import integrate, optimize, stats
 
 from tests.analysis.oracle.fit import Z_95, Fit, group_priors, random_effects
 from tests.analysis.oracle.recomputed import SESSION, TRIAL, Compared, Numbers, exact_share, named, quartiles, student
@@ -179,8 +180,41 @@ def _tested(compared: Compared, contrast: Numbers, trials: pd.DataFrame) -> Numb
     n = sum(map(len, samples))
     own = {"n": n, "dropped": len(members) - n, "statistic": mean / error, "p": p, "effect": scale(mean)}
     own |= named("interval", {"low": scale(mean - reach), "high": scale(mean + reach), "level": 0.95})
-    own |= {} if groups else {"higher": (samples[0]["value"] > 0).sum()}
-    return own
+    if groups:
+        held = [one["value"] for one in samples]
+    else:
+        own |= {"higher": (samples[0]["value"] > 0).sum(), "sd": samples[0]["value"].std()}
+        held = [one["value"][samples[0].index] for one in sides]
+    parts = [(random_effects if ratio else _mean)(one) for one in (samples if groups else
+             [side.loc[samples[0].index] for side in sides])]  # fmt: skip
+    for number, (values, (middle, spread)) in enumerate(zip(held, parts, strict=True)):
+        reach = stats.t.ppf(0.975, len(values) - 1) * spread
+        side = {"mean": scale(middle), "low": scale(middle - reach), "high": scale(middle + reach), "sd": values.std()}
+        own |= named(f"sides.{number}", side)
+        own |= named(f"sides.{number}.values", {str(who): scale(value) for who, value in values.items()})
+    return own | _standardised([one["value"].to_numpy() for one in samples], contrast["measure"] in TABLES or ratio)
+
+
+def _standardised(samples: Sequence[Any], measured: bool) -> Numbers:
+    """Return d_z or Hedges' g, of answers Cliff's delta, and the Bayes factor as an integral over effect sizes."""
+    first, *others = samples
+    if others:
+        n, m = map(len, samples)
+        size, freedom = n * m / (n + m), n + m - 2
+        t = stats.ttest_ind(*samples).statistic
+        bias = math.exp(math.lgamma(freedom / 2) - math.lgamma((freedom - 1) / 2)) / math.sqrt(freedom / 2)
+        signs = [np.sign(one - other) for one in first for other in others[0]]
+    else:
+        size, freedom, bias = len(first), len(first) - 1, 1.0
+        signs = list(np.sign(np.where(abs(first) < 1e-9, 0, first)))
+        t = stats.ttest_1samp(first, 0).statistic
+    scale, root = bias / math.sqrt(size), math.sqrt(size)
+    ends = [optimize.brentq(lambda at, p=p: stats.nct.sf(t, freedom, at) - p, t - 9, t + 9) for p in (0.025, 0.975)]
+    own = {"value": t * scale, "low": ends[0] * scale, "high": ends[1] * scale, "t": t}
+    prior = stats.cauchy(scale=math.sqrt(0.5))
+    over = integrate.quad(lambda d: stats.nct.pdf(t, freedom, d * root) * prior.pdf(d), -8, 8, limit=200, points=(0,))
+    found = named("standardised", own) | {"bayes_factor": over[0] / stats.t.pdf(t, freedom)}
+    return found if measured else found | {"ordinal.value": np.mean(signs)}
 
 
 def _numbers(compared: Compared, contrast: Numbers) -> list[pd.DataFrame]:

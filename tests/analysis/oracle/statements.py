@@ -186,7 +186,8 @@ def _slopes(answers: pd.DataFrame, design: Floats, direction: str | None) -> Num
     """Fit each person's least-squares slopes; Student's t tests one slope, Hotelling's T² several."""
     complete, k = answers.dropna(), design.shape[1]
     n, found = len(complete), {"n": len(complete), "dropped": len(answers) - len(complete)}
-    own = np.linalg.lstsq(np.column_stack([np.ones(len(design)), design]), complete.T, rcond=None)[0][1:].T
+    fitted = np.linalg.lstsq(np.column_stack([np.ones(len(design)), design]), complete.T, rcond=None)[0]
+    own = fitted[1:].T
     covariance = np.atleast_2d(np.cov(own.T))
     if n < max(10, k + 1) or np.linalg.matrix_rank(covariance, tol=1e-9) < k:
         return found | dict.fromkeys(("statistic", "p"), math.nan)
@@ -200,6 +201,7 @@ def _slopes(answers: pd.DataFrame, design: Floats, direction: str | None) -> Num
         found |= {"statistic": f, "p": stats.f.sf(f, k, n - k)}
     for number, ends in enumerate(intervals):
         found |= named(f"intervals.{number}", ends)
+    found["intercept_sd"] = fitted[0].std(ddof=1)
     return found | named("slopes", enumerate(own.mean(0))) | named("sds", enumerate(own.std(0, ddof=1)))
 
 

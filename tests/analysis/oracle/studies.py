@@ -68,7 +68,7 @@ def write(name: str, study: Path, to: Path, *, figures: bool = False) -> Written
     """Write the report of a study, its figures as texts alone or not at all."""
     with pytest.MonkeyPatch.context() as patched, figures_as_lines():
         if not figures:
-            for pictures in ("pictures", "level_pictures", "question_pictures"):
+            for pictures in ("pictures", "summary_pictures", "level_pictures", "question_pictures"):
                 patched.setattr(write_report, pictures, lambda *_, **__: ())
         write_report.report(study, to, failed=pytest.fail)
     return Written(study, to, FILES[name])

@@ -216,6 +216,35 @@ def all_equivalent(match: re.Match[str], told: Told) -> bool:
     )
 
 
+def threshold_is_told(match: re.Match[str], told: Told) -> bool:
+    """Check the detection threshold, its interval and how many answers agree there."""
+    found, (at, ends, n, percent, item) = told.block["threshold"], match.groups()
+    known = found["interval"]
+    interval = [] if known is None else re.findall(R, ends.partition("[")[2])
+    return (
+        is_number(at, found["effect"])
+        and int(n) == found["n"]
+        and is_number(percent, 100 * (found["guess"] + (1 - found["guess"] - found["lapse"]) / 2))
+        and names_in(item) == {told.results["decided"]["noticed"]}
+        and (known is None or all(map(is_number, interval, (known["low"], known["high"]))))
+    )
+
+
+def largest_difference(match: re.Match[str], told: Told) -> bool:
+    """Check that no mean difference from the shortest delay is larger, and its interval."""
+    mean, item, at, percent, low, high, n = match.groups()
+    known = [one for one in told.against if one["found"]["interval"] is not None]
+    (one,) = (it for it in known if {it["item"]} == names_in(item) and it["delay_ms"] == float(at))
+    ends = one["found"]["interval"]
+    return (
+        abs(one["found"]["effect"]) >= max(abs(it["found"]["effect"]) for it in known)
+        and is_number(mean, one["found"]["effect"])
+        and (is_number(low, ends["low"]) and is_number(high, ends["high"]))
+        and (is_number(percent, 100 * ends["level"]) or 100 * ends["level"] > float(percent))
+        and int(n) == one["found"]["n"]
+    )
+
+
 # ---------------------------------------------------------------------------------------------- first page: liquids
 
 
@@ -226,6 +255,18 @@ def recognised(told: Told) -> set[str]:
         return set()
     rates = [rate for rate in named["found"]["rates"] if rate["p_adjusted"] is not None]
     return {told.block["names"][rate["setting"]].lower() for rate in rates if rate["p_adjusted"] <= told.alpha}
+
+
+def names_are_counted(match: re.Match[str], told: Told) -> bool:
+    """Check how many names are right, and how many would be by chance."""
+    hits, n, expected, p = match.groups()
+    rates, found = told.block["named"]["found"]["rates"], told.block["named"]["found"]
+    return (
+        int(hits) == sum(rate["hits"] for rate in rates)
+        and int(n) == sum(rate["n"] for rate in rates)
+        and is_number(expected, found["expected"])
+        and is_p(p, found["p"])
+    )
 
 
 def listed_in(text: str) -> set[str]:
@@ -267,33 +308,61 @@ def no_statement_differs(_match: re.Match[str], told: Told) -> bool:
 # ------------------------------------------------------------------------------------------------------- hypotheses
 
 
-def a_contrast(told: Told, text: str) -> dict[str, Any]:
-    """Return the hypothesis that a sentence is about, by its beginning."""
-    for one in told.contrasts:
-        first, second = one["compared"]
-        if text.startswith(f"Agreement with “{one['contrast']['measure']}”, {first} − {second}"):
-            return one  # type: ignore[no-any-return]
-    raise AssertionError(text)
-
-
 def contrast_is_tested(match: re.Match[str], told: Told) -> bool:
     """Check every number of a hypothesis, and its verdict."""
-    one = a_contrast(told, match[0])
-    mean, low, high, p, n, _, higher, of = match.groups()
-    differences = contrast_values(told, one)
+    (one,) = told.contrasts
+    shown, lower, means, effect, size = (match[name] for name in ("shown", "lower", "means", "effect", "size"))
+    sides = [np.array([*side["values"].values()]) for side in one["sides"]]
+    differences, within = contrast_values(told, one), one["contrast"]["groups"] is None
+    mean = float(differences.mean()) if within else float(sides[0].mean() - sides[1].mean())
+    standard = mean / differences.std(ddof=1) if within else hedges_g(*sides)
     return (
-        is_number(mean, one["effect"])
-        and is_number(low, one["interval"]["low"])
-        and is_number(high, one["interval"]["high"])
-        and is_p(p, one["p_adjusted"])
-        and (one["verdict"] in DECIDED) == (one["p_adjusted"] <= told.alpha)
-        and int(n) == one["n"]
-        and (
-            higher is None
-            or (int(higher), int(of)) == (int((differences > 0).sum()), len(differences))
-        )
-        and (one["contrast"]["groups"] is not None or is_number(mean, float(differences.mean())))
-    )  # fmt: skip
+        f"“{one['contrast']['measure']}”" in match[0]
+        and all(name in match[0] for name in one["compared"])
+        and (not within or np.allclose(np.sort(sides[0] - sides[1]), np.sort(differences)))
+        and all(is_number(text, side.mean()) for text, side in zip(means.split(" and "), sides, strict=True))
+        and is_number(effect, one["effect"])
+        and is_number(effect, mean)
+        and is_number(match["low"], one["interval"]["low"])
+        and is_number(match["high"], one["interval"]["high"])
+        and match["name"] == ("d_z" if within else "g")
+        and is_number(size, standard)
+        and is_number(size, one["standardised"]["value"])
+        and is_p(match["p"], one["p_adjusted"])
+        and int(match["n"]) == one["n"]
+        and (shown is not None) == (one["verdict"] in DECIDED) == (one["p_adjusted"] <= told.alpha)
+        and (shown is None or (shown == "higher") == (mean > 0))
+        and (shown is not None or lower == one["contrast"]["expected"])
+    )
+
+
+def hedges_g(first: np.ndarray, second: np.ndarray) -> float:
+    """Return the standardised difference of two groups, corrected for its bias by the usual approximation."""
+    freedom = len(first) + len(second) - 2
+    squares = sum(((one - one.mean()) ** 2).sum() for one in (first, second))
+    exact = math.gamma(freedom / 2) / math.sqrt(freedom / 2) / math.gamma((freedom - 1) / 2)
+    return float((first.mean() - second.mean()) / math.sqrt(squares / freedom) * exact)
+
+
+def higher_for_so_many(match: re.Match[str], told: Told) -> bool:
+    """Check for how many participants the first is higher."""
+    (one,) = told.contrasts
+    differences = contrast_values(told, one)
+    return match[1] == one["compared"][0] and (int(match[2]), int(match[3])) == (
+        int((differences > 0).sum()),
+        len(differences),
+    )
+
+
+def bayes_factor(match: re.Match[str], told: Told) -> bool:
+    """Check the Bayes factor of a hypothesis that was not shown, and which side it favours."""
+    (one,) = told.contrasts
+    factor = one["bayes_factor"]
+    return (
+        one["verdict"] not in DECIDED
+        and math.isclose(float(match[1]), max(factor, 1 / factor), rel_tol=6e-3)
+        and (match[2], match[3]) == (("with", "without") if factor > 1 else ("without", "with"))
+    )
 
 
 def contrast_values(told: Told, one: Mapping[str, Any]) -> np.ndarray:
@@ -567,15 +636,28 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      lambda match, told: (int(match[1]), int(match[2])) == (beyond(told), len(told.against))),
     (rf"Up to {R} ms mean answers to (all \w+ statements|both statements|the one statement) stay within ±{R} points? "
      rf"of those at {R} ms; the data do not exclude that up to {R} % of people differ by more\.", all_equivalent),
+    (rf"The detection threshold is {R} ms \((.*), n = (\d+)\), where (?:> )?{R} % of answers agree with ({ITEM})\.",
+     threshold_is_told),
+    (rf"The largest mean difference is {R} points \(({ITEM}) at {R} ms, (?:> )?{R} % interval {ENDS}, n = (\d+)\)\.",
+     largest_difference),
     # First page: liquids
+    (rf"Participants named (\d+) of (\d+) liquids correctly \({R} expected by chance, {P}\)\.", names_are_counted),
     (r"Recognised above chance: (.*)\.", lambda match, told: listed_in(match[1]) == recognised(told)),
     (r"No liquid was shown to be recognised above chance\.", when(lambda told: not recognised(told))),
     (r"Rated differently: (.*)\.", pairs_differ),
     (r"The liquids were rated differently in (.*); the tests do not show which ones\.", statements_differ),
     (r"No statement showed a difference between any two liquids\.", no_statement_differs),
     # Hypotheses
-    (rf"Agreement with {ITEM}, .* − .*: mean difference {R}, 95 % interval {ENDS}, {P}, n = (\d+)"
-     r"(; higher in \S+ in (\d+) of (\d+) participants)?\.", contrast_is_tested),
+    (rf"Agreement with {ITEM} was (?:(?P<shown>higher|lower) in .* than in .*|not shown to (?:differ between .* and .*"
+     rf"|be (?P<lower>higher|lower) in .* than in .*)) \(means (?P<means>{R} and {R}); mean difference (?P<effect>{R})"
+     rf", 95 % interval \[(?P<low>{R}), (?P<high>{R})\], (?P<name>d_z|g) (?P<size>{R}) {ENDS}, "
+     r"p (?P<p>[<>=] \.\d{3}), n = (?P<n>\d+)\)\.", contrast_is_tested),
+    (r"It was higher in (\S+) for (\d+) of (\d+) participants\.", higher_for_so_many),
+    (r"The data are ([\d.]+) times as likely (with|without) a difference as (with|without) one \(JZS Bayes factor, "
+     r"Cauchy prior with scale 0\.707\)\.", bayes_factor),
+    (r"Standardised effects weight participants equally: d_z is .*\.", when(lambda told: bool(told.contrasts))),
+    (r"Bayes factors are two-sided JZS factors \(Rouder et al\., 2009\) of a difference against none, with a Cauchy "
+     r"prior of scale 0\.707\.", when(lambda told: bool(told.contrasts))),
     (r"The mean lies within the bound \(equivalent\); the data do not exclude that up to (\d+) % of (people differ by "
      r"more|a group are not in the sample)\.", bound_of_a_contrast("within")),
     (r"(The whole interval lies|All differences lie) beyond the bound \(not equivalent\)\.",

@@ -14,7 +14,8 @@ from study_app.analysis.findings.delays import ContrastsWithControl, LowestDelay
 from study_app.analysis.findings.finding import of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition, RecognitionResult, recognised
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, gated
-from study_app.analysis.report.sections import CLAIMS, answers, empty_studies, first_page
+from study_app.analysis.report.first_page import first_page
+from study_app.analysis.report.sections import CLAIMS, answers, empty_studies
 from study_app.analysis.results import Results
 from study_app.analysis.statistics.recognition import recognition
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study

@@ -131,7 +131,10 @@ def test_a_blinded_study_is_shown_by_code_and_by_name_once_unblinding_is_recorde
     assert (record["by"], record["reason"]) == ("AK", "collection closed")
     assert shown.chips[1].endswith("by AK: collection closed")
     assert not shown.place.unblind.isVisible()
-    assert shown.titles[:2] == ["Agreement for each liquid", "Answers against added delay"]
+    assert shown.titles[:2] == ["Every participant's answers", "Answers against added delay"]  # of the first page
+    assert "Agreement for each liquid" in shown.titles
+    questions = [card.question.text() for card in shown.place.figures.cards]
+    assert questions[0].endswith("Which liquids were distinguished?")
     assert b">Thick<" in shown.place.figures.cards[0].figure.svg
     for table in (results / "demo").rglob("*trials_data.csv"):
         assert b",force_mean_n," in table.read_bytes()

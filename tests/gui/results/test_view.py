@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QLabel
 
 from study_app import figure_style as style
@@ -97,6 +98,29 @@ def test_leaving_out_wants_a_name_and_a_reason(place, qtbot):
 
 def test_a_figure_asks_for_the_width_at_which_it_is_read_and_the_height_of_its_proportion(place):
     assert place.figures.cards[0].drawing.sizeHint() == QSize(900, 450)
+
+
+def test_an_answer_stands_above_its_figure_which_can_be_copied_and_saved(place, qtbot, tmp_path):
+    asked = {"question": "Which liquids were distinguished?", "verdict": "shown", "answer": "Water and honey were."}
+    first = replace(view().figures[0], numbers="participant\twater\nP001\t3.0\n", **asked)
+    place.show_view(view(figures=(first, *view().figures[1:])))
+    card, other = place.figures.cards
+    assert (card.question.text(), card.answer.text()) == (asked["question"], asked["answer"])
+    assert not other.question.isVisible()
+    assert not other.copy_numbers.isVisible()
+    click(qtbot, card.copy_numbers)
+    assert QGuiApplication.clipboard().text() == first.numbers
+    click(qtbot, card.copy_figure)
+    assert QGuiApplication.clipboard().image().width() == round(200 * 300 / 72)
+    QGuiApplication.clipboard().clear()
+    for name, begin in (("a.svg", b"<?xml"), ("b.png", b"\x89PNG"), ("c.pdf", b"%PDF"), ("d", b"%PDF")):
+        card.save_to(tmp_path / name)
+        (made,) = tmp_path.glob(f"{name}*")
+        assert made.read_bytes().startswith(begin)
+    assert (tmp_path / "d.pdf").is_file()
+    with qtbot.waitSignal(place.message) as told:
+        card.save_to(tmp_path / "none" / "a.png")
+    assert "cannot be written" in told.args[1]
 
 
 def test_unblinding_warns_of_sessions_that_go_on(place, qtbot):

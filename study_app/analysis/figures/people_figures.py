@@ -1,0 +1,313 @@
+"""Figures of people: each participant's numbers as small points, and beside them the mean with its interval."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+
+from study_app import figure_style as style
+from study_app.analysis.page_layout import MARGIN_PT, SMALL, Look, Sheet
+from study_app.analysis.statistics.outcome import student_interval
+
+WIDTH_PT: Final = 420.0
+"""Of a figure that stands beside its answer."""
+PANEL_PT: Final = 128.0
+SMALL_PANEL_PT: Final = 88.0
+LEAST_PANEL_PT: Final = 66.0
+"""Of a panel in one row, in two, and in more."""
+MOST_COLUMN_PT: Final = 120.0
+NARROW_PT: Final = 290.0
+"""Least width of a figure: its heading must fit."""
+OF_MANY_PT: Final = 300.0
+"""Most width of a column, and of one in which each participant has an interval."""
+ROW_GAP_PT: Final = 6.0
+LEFT_PT: Final = 34.0
+GAP_PT: Final = 12.0
+TITLE_PT: Final = 10.0
+NAME_PT: Final = 8.6
+HEAD_PT: Final = 38.0
+SPREAD: Final = 0.16
+"""How far the points of a column are apart at most, as a share of the distance of columns."""
+SPREAD_OF_ENDS: Final = 0.26
+"""The same where each participant has an interval: they stand in the order of their numbers."""
+GOLDEN: Final = 0.6180339887
+"""Steps that put many points evenly apart."""
+ASIDE: Final = 0.27
+"""How far the mean is from the points that it is of."""
+GROUPS: Final = (style.ACCENT, "#b35600", "#5d6a75", "#6d1007", "#5d8aa8", "#02256d")
+MARKERS: Final = "osD^vP"
+LEAST_TICKS: Final = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mean:
+    """A mean and the ends of its interval."""
+
+    value: float
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """What is above one name: participants' numbers, in the same order of participants everywhere, and their mean.
+
+    ``ends`` are the ends of each participant's own interval.
+    """
+
+    name: str
+    values: Mapping[str, float]
+    mean: Mean | None = None
+    ends: Mapping[str, tuple[float, float]] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Panel:
+    """Columns on one scale.
+
+    Parameters
+    ----------
+    title : what stands above it
+    places : of the columns on a numeric axis; without them columns are equally far apart
+    joined : whether the points of a participant are joined
+    share : its width as a share of all panels of a row
+    line, bound : a number, and the ends of a range, that are marked
+    log : whether the scale is logarithmic
+    ends : of the scale; without them from the numbers
+    """
+
+    title: str = ""
+    columns: tuple[Column, ...]
+    places: tuple[float, ...] = ()
+    joined: bool = True
+    share: float = 1.0
+    line: float | None = None
+    bound: tuple[float, float] | None = None
+    log: bool = False
+    ends: tuple[float, float] | None = None
+
+    @property
+    def xs(self) -> Sequence[float]:
+        """The places of the columns."""
+        return self.places or tuple(map(float, range(len(self.columns))))
+
+    @property
+    def numbers(self) -> list[float]:
+        """All numbers that the scale must hold."""
+        means = [one.mean for one in self.columns if one.mean is not None]
+        of_means = [end for mean in means for end in (mean.value, mean.low, mean.high) if end is not None]
+        own = [end for one in self.columns for ends in (one.ends or {}).values() for end in ends]
+        marks = [self.line] if self.line is not None else []
+        return [*(value for one in self.columns for value in one.values.values()), *of_means, *own, *marks]
+
+
+def numbers_of_panels(panels: Sequence[Panel]) -> str:
+    """Return the numbers of panels as lines with tabs: a row for each participant, then means and their intervals."""
+    columns = [(f"{panel.title} {one.name}".strip(), one) for panel in panels for one in panel.columns]
+    people = sorted({person for _, one in columns for person in one.values})
+    rows = [["participant", *(name for name, _ in columns)]]
+    rows += [[person, *(_cell(one.values.get(person)) for _, one in columns)] for person in people]
+    for field in ("value", "low", "high"):
+        label = {"value": "mean", "low": "95 % interval, lower end", "high": "95 % interval, upper end"}[field]
+        rows.append([label, *(_cell(getattr(one.mean, field, None)) for _, one in columns)])
+    return "".join("\t".join(row) + "\n" for row in rows)
+
+
+def _cell(value: float | None) -> str:
+    return "" if value is None else repr(float(value))
+
+
+def mean_of(values: Iterable[float]) -> Mean | None:
+    """Return the mean of numbers with Student's 95 % interval; None of none."""
+    array = np.array([*values], dtype=float)
+    if not len(array):
+        return None
+    low, high = student_interval(array)
+    return Mean(value=float(array.mean()), low=low, high=high)
+
+
+@style.own_settings()
+def draw_people(
+    panels: Sequence[Panel],
+    look: Look,
+    *,
+    above: str,
+    below: str = "",
+    members: Mapping[str, str] | None = None,
+    a_row: int = 3,
+    shared: bool = False,
+    width_pt: float = WIDTH_PT,
+) -> Sheet:
+    """Draw panels, ``a_row`` of them side by side.
+
+    Parameters
+    ----------
+    above, below : what the scale at the left shows, and what the columns are
+    members : the group of each participant, which has a colour and a marker
+    shared : whether all panels have the scale of the first one
+    """
+    groups = sorted(set((members or {}).values()))
+    panel_pt = PANEL_PT if len(panels) <= a_row else SMALL_PANEL_PT if len(panels) <= 2 * a_row else LEAST_PANEL_PT
+    ruler = Sheet(width_pt, 72, look.fonts)
+    rows = [panels[place : place + a_row] for place in range(0, len(panels), a_row)]
+    inside = width_pt - MARGIN_PT
+    widths = [_widths(row, inside, shared=shared) for row in rows]
+    if len(panels) == 1:
+        width_pt = min(width_pt, max(NARROW_PT, LEFT_PT + widths[0][0] + MARGIN_PT))
+    titles = [
+        [ruler.wrap(one.title, width, SMALL, "bold") for one, width in zip(row, wide, strict=True)]
+        for row, wide in zip(rows, widths, strict=True)
+    ]
+    names = [
+        [_names(ruler, one, width) for one, width in zip(row, wide, strict=True)]
+        for row, wide in zip(rows, widths, strict=True)
+    ]
+    title_pt = [TITLE_PT * max((len(one) for one in row), default=0) * any(one.title for one in of)
+                for row, of in zip(titles, rows, strict=True)]  # fmt: skip
+    name_pt = [NAME_PT * max(len(lines) for panel in row for lines in panel) + 8 for row in names]
+    head = HEAD_PT + (10.0 if groups else 0.0)
+    height = head + sum(title_pt) + sum(name_pt) + len(rows) * (panel_pt + ROW_GAP_PT) + (8.0 if below else 2.0)
+    sheet = look.sheet(height, width_pt)
+    sheet.text(MARGIN_PT, 28, above, size=SMALL, colour=style.TEXT_SOFT)
+    _legend(sheet, groups)
+    y = head
+    for row, wide, of_titles, of_names, title, name in zip(rows, widths, titles, names, title_pt, name_pt, strict=True):
+        x = 0.0
+        for place, (panel, width) in enumerate(zip(row, wide, strict=True)):
+            x += LEFT_PT if place == 0 or not shared else GAP_PT
+            for number, line in enumerate(of_titles[place]):
+                sheet.text(x, y + TITLE_PT * number + 5, line, size=SMALL, weight="bold")
+            axes = sheet.axes(x, y + title, width, panel_pt)
+            ends = _scale(sheet, axes, panel, panels if shared else [panel], words=place == 0 or not shared)
+            axes.set_ylim(*ends)
+            _draw_panel(sheet, axes, panel, members or {}, groups, of_names[place])
+            x += width
+        y += title + panel_pt + name + ROW_GAP_PT
+    if below:
+        sheet.text(LEFT_PT, sheet.height_pt - 4, below, size=SMALL, colour=style.TEXT_SOFT)
+    return sheet
+
+
+def _widths(row: Sequence[Panel], inside: float, *, shared: bool) -> list[float]:
+    room = inside - (LEFT_PT + (len(row) - 1) * GAP_PT if shared else len(row) * LEFT_PT)
+    total = sum(one.share for one in row)
+    most = [
+        OF_MANY_PT if any(column.ends for column in one.columns) else MOST_COLUMN_PT * len(one.columns) for one in row
+    ]
+    return [min(room * one.share / total, limit) for one, limit in zip(row, most, strict=True)]
+
+
+def _names(ruler: Sheet, panel: Panel, width: float) -> list[list[str]]:
+    """Return the names of columns, broken into lines."""
+    room = width / (len(panel.columns) or 1) - 3
+    return [ruler.wrap(one.name, room, SMALL) for one in panel.columns]
+
+
+def _legend(sheet: Sheet, groups: Sequence[str]) -> None:
+    """Write at the right what points and diamonds are, and the groups below it."""
+    x = sheet.width_pt - MARGIN_PT
+    for words, marker, size in (("mean, 95 % interval", "D", 3.6), ("participant", "o", 2.6)):
+        x -= sheet.text_width(words, SMALL)
+        sheet.text(x, 28, words, size=SMALL, colour=style.TEXT_SOFT)
+        colour = style.TEXT if marker == "D" else style.PARTICIPANT
+        sheet.line([x - 5], [25.5], marker=marker, markersize=size, markeredgewidth=0, color=colour)
+        x -= 18
+    x = sheet.width_pt - MARGIN_PT
+    for number, group in reversed([*enumerate(groups)]):
+        x -= sheet.text_width(group, SMALL)
+        sheet.text(x, 38.5, group, size=SMALL, colour=GROUPS[number % len(GROUPS)], weight="bold")
+        x -= 9
+        sheet.line([x + 4], [36], marker=MARKERS[number % len(MARKERS)], markersize=3.2,
+                   color=GROUPS[number % len(GROUPS)], linestyle="none")  # fmt: skip
+        x -= 8
+
+
+def _scale(sheet: Sheet, axes: Axes, panel: Panel, of: Sequence[Panel], *, words: bool) -> tuple[float, float]:
+    """Draw the scale of a panel; return its ends."""
+    ends = panel.ends
+    if ends is None:
+        numbers = [number for one in of for number in one.numbers if number > 0 or not panel.log]
+        low, high = min(numbers, default=0.0), max(numbers, default=1.0)
+        if panel.log:
+            factor = max((high / low) ** 0.06, 1.08)
+            ends = low / factor, high * factor
+        else:
+            room = 0.07 * ((high - low) or 1.0)
+            ends = low - room, high + room
+    if panel.log:
+        axes.set_yscale("log")
+        axes.minorticks_off()
+    ticks = scale_ticks(*ends, log=panel.log)
+    sheet.scale(axes, "y", ticks, [f"{tick:g}".replace("-", "−") if words else "" for tick in ticks], lines=True)
+    return ends
+
+
+def scale_ticks(low: float, high: float, *, log: bool) -> list[float]:
+    """Return round numbers between the ends of a scale: from 1, 2 and 5, in decades on a logarithmic one."""
+    if not log:
+        found = MaxNLocator(nbins=5, steps=[1, 2, 5, 10]).tick_values(low, high)
+        return [float(f"{tick:.12g}") for tick in found if low <= tick <= high]
+    inside: list[float] = []
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    for digits in ((1,), (1, 3), (1, 2, 5), (1, 2, 3, 5, 7), tuple(range(1, 10)), tuple(np.arange(10, 100) / 10)):
+        inside = [tick for tick in (float(f"{digit:g}e{decade}") for decade in decades for digit in digits)
+                  if low <= tick <= high]  # fmt: skip
+        if len(inside) >= LEAST_TICKS:
+            break
+    return inside
+
+
+def _draw_panel(
+    sheet: Sheet,
+    axes: Axes,
+    panel: Panel,
+    members: Mapping[str, str],
+    groups: Sequence[str],
+    names: Sequence[Sequence[str]],
+) -> None:
+    xs = np.array(panel.xs)
+    step = float(np.min(np.diff(np.unique(xs)))) if len(xs) > 1 else 1.0
+    axes.set_xlim(xs.min() - 0.55 * step, xs.max() + 0.55 * step)
+    axes.set_xticks(xs.tolist(), ["\n".join(lines) for lines in names])
+    for text in axes.get_xticklabels():
+        text.set_fontproperties(sheet.font(SMALL))
+    if panel.bound is not None:
+        axes.axhspan(*panel.bound, color=style.BAND, alpha=0.55, linewidth=0, zorder=0, gid="bound")
+    if panel.line is not None:
+        axes.axhline(panel.line, color=style.AXIS, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
+    people = sorted({person for one in panel.columns for person in one.values})
+    alone = len(panel.columns) == 1 or not panel.joined
+    offsets = dict(zip(people, _offsets(panel, people, apart=alone) * step, strict=True))
+    for person in people:
+        at = [(x + offsets[person], one.values[person])
+              for x, one in zip(xs, panel.columns, strict=True) if person in one.values]  # fmt: skip
+        number = groups.index(members[person]) if person in members else None
+        colour = style.PARTICIPANT if number is None else GROUPS[number % len(GROUPS)]
+        if panel.joined and len(at) > 1:
+            axes.plot(*zip(*at, strict=True), color=colour, linewidth=0.6, alpha=0.55, zorder=2)
+        marker = "o" if number is None else MARKERS[number % len(MARKERS)]
+        axes.plot(*zip(*at, strict=True), marker, color=colour, markersize=2.6, markeredgewidth=0, zorder=3,
+                  gid=f"person-{person}")  # fmt: skip
+    for x, one in zip(xs, panel.columns, strict=True):
+        for person, ends in (one.ends or {}).items():
+            axes.plot([x + offsets[person]] * 2, ends, color=style.PARTICIPANT, linewidth=0.5, zorder=2)
+        if one.mean is not None:
+            aside = x + (ASIDE * step if one.values else 0.0)
+            axes.plot([aside], [one.mean.value], "D", color=style.TEXT, markersize=4, zorder=5, gid="mean")
+            if one.mean.low is not None and one.mean.high is not None:
+                axes.plot([aside] * 2, [one.mean.low, one.mean.high], color=style.TEXT, linewidth=1.5, zorder=4)
+
+
+def _offsets(panel: Panel, people: Sequence[str], *, apart: bool) -> np.ndarray:
+    """Return how far each participant's points are beside their column, so that equal numbers stay visible."""
+    if len(people) < 2:
+        return np.zeros(len(people))
+    order = np.argsort(np.argsort([panel.columns[0].values.get(person, 0.0) for person in people], kind="stable"))
+    if panel.columns[0].ends is not None:
+        return np.asarray((order / (len(people) - 1) - 0.75) * 2 * SPREAD_OF_ENDS)
+    spread = SPREAD if apart else 0.5 * SPREAD
+    return np.asarray((np.arange(len(people)) * GOLDEN % 1.0 - 0.5) * 2 * spread)

@@ -1,0 +1,255 @@
+"""The figures of the first page: hypotheses, estimates of levels, ratings and scores, each with its participants."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any, Final, NamedTuple
+
+import pandas as pd
+
+from study_app import figure_style as style
+from study_app.analysis.data.blocks import QuestionPlace
+from study_app.analysis.data.study_tables import Study, group_members
+from study_app.analysis.figures.people_figures import Column, Mean, Panel, draw_people, mean_of, numbers_of_panels
+from study_app.analysis.levels.answers import Answers, Settings
+from study_app.analysis.levels.sensitivities import Sensitivities
+from study_app.analysis.levels.statistic import LevelStatistic, level_words
+from study_app.analysis.levels.thresholds import Exponents, Thresholds
+from study_app.analysis.page_layout import Look, Picture, Sheet, attempted, picture_of, sample_words
+from study_app.analysis.questions import scored
+from study_app.analysis.results import ContrastResult, Failures, LevelsResult, Results
+from study_app.number_text import capitalised
+
+MEASURES: Final[tuple[tuple[type[LevelStatistic[Any]], str, str], ...]] = (
+    (Thresholds, "threshold", "threshold"),
+    (Settings, "pse", "point of subjective equality"),
+    (Exponents, "exponent", "exponent"),
+    (Sensitivities, "d_prime", "d′"),
+)
+"""The statistics of a block of levels, the one that is its answer first: attribute and words."""
+
+MOST_PANELS: Final = 9
+"""Panels of a figure of scores or questions; more are in their tables."""
+
+
+class Estimates(NamedTuple):
+    """What a block of levels measures: the rows of the group, those of participants, and the attribute in words."""
+
+    group: list[Any]
+    own: list[Any]
+    attribute: str
+    words: str
+
+
+def estimates_of(found: LevelsResult) -> Estimates | None:
+    """Return the estimates that answer the question of a block of levels; None without any."""
+    for statistic, attribute, words in MEASURES:
+        rows = [one for one in statistic.of(found) if getattr(one, attribute) is not None]
+        if own := [one for one in rows if one.participant is not None]:
+            return Estimates([one for one in rows if one.participant is None], own, attribute, words)
+    answers = [one for one in Answers.of(found) if not one.catch]
+    own = [one for one in answers if one.participant is not None]
+    words = f"share of answers “{found.counts}”" if found.summary == "share" else f"{found.summary} of the answers"
+    return Estimates([one for one in answers if one.participant is None], own, "value", words) if own else None
+
+
+def place_of(one: Any) -> float | str | None:
+    """Return where an estimate is: its comparison, level or standard."""
+    places = (getattr(one, name, None) for name in ("comparison", "level", "standard"))
+    return next((place for place in places if place is not None), None)
+
+
+def summary_pictures(
+    study: Study, results: Results, forms: Sequence[str] = style.FORMATS, failures: Failures | None = None
+) -> Iterator[Picture]:
+    """Draw a figure of every hypothesis, of what blocks of levels measure, and of scores."""
+    yield from attempted(_pictures(study, results, forms), failures)
+
+
+def _pictures(
+    study: Study, results: Results, forms: Sequence[str]
+) -> Iterator[tuple[str, str, Callable[[], Picture | None]]]:
+    for number, one in enumerate(results.contrasts, start=1):
+        if any(side.values for side in one.sides):
+            name = f"hypothesis-{number}"
+            yield one.contrast.blocks[0], name, partial(_hypothesis, study, results, one, forms, name)
+    for found in results.levels:
+        if estimates_of(found) is not None:
+            name = f"estimates-{found.block}"
+            yield found.block, name, partial(_estimates, study, found, forms, name)
+    for where in dict.fromkeys(one.where.id for one in study.others.questions):
+        name = f"answers-{where}"
+        yield where, name, partial(_answers, study, where, forms, name)
+
+
+def _hypothesis(study: Study, results: Results, one: ContrastResult, forms: Sequence[str], name: str) -> Picture:
+    members = group_members(study)
+    shown = {person: members[person] for side in one.sides for person in side.values if person in members}
+    within = one.contrast.groups is None
+    log = one.ratio
+    columns = tuple(
+        Column(
+            name=side.name,
+            values=side.values,
+            mean=None if side.mean is None else Mean(value=side.mean, low=side.low, high=side.high),
+        )
+        for side in one.sides
+    )
+    panels = [Panel(columns=columns, joined=within, share=1.6, log=log)]
+    ends = one.interval
+    mean = None if one.effect is None else Mean(
+        value=one.effect, low=None if ends is None else ends.low, high=None if ends is None else ends.high
+    )  # fmt: skip
+    bound = one.contrast.bound
+    panels.append(
+        Panel(
+            title="",
+            columns=(Column(name=_effect_name(one), values=_differences(one) if within else {}, mean=mean),),
+            joined=False,
+            line=1.0 if log else 0.0,
+            bound=None if bound is None else (1 / bound, bound) if log else (-bound, bound),
+            log=log,
+        )
+    )
+    band = " Band: the equivalence bound." if bound is not None else ""
+    weighted = " Means are weighted as in the test." if one.contrast.measure == "threshold" else ""
+    lines = "Lines join the numbers of a participant. " if within else ""
+    caption = (
+        f"{capitalised(one.contrast.described(one.compared))}. {lines}Right: {_effect_name(one)}"
+        f"{', of each participant and on average' if within else ''}; dashed: no difference.{band}{weighted} "
+        f"{sample_words(study, one.n)}"
+    )
+    found = next((level for level in results.levels if level.block == one.contrast.blocks[0]), None)
+    draw, numbers = partial(draw_panels, panels, _scale_words(one, found), "", shown), numbers_of_panels(panels)
+    title = f"{capitalised(one.contrast.measure_words)}"
+    return picture_of(study, one.contrast.blocks[0], name, title, caption, draw, forms, (f"n = {one.n}",), numbers)
+
+
+def draw_panels(panels: Sequence[Panel], above: str, below: str, members: Mapping[str, str], look: Look) -> Sheet:
+    """Draw panels with scales of their own."""
+    return draw_people(panels, look, above=above, below=below, members=members)
+
+
+def _effect_name(one: ContrastResult) -> str:
+    first, second = one.compared
+    return f"{first} {'÷' if one.ratio else '−'} {second}"
+
+
+def _differences(one: ContrastResult) -> dict[str, float]:
+    """Return the difference, or ratio, of each participant."""
+    first, second = (side.values for side in one.sides)
+    return {who: first[who] / second[who] if one.ratio else first[who] - second[who] for who in first}
+
+
+def _scale_words(one: ContrastResult, found: LevelsResult | None) -> str:
+    """Return what the scale of a hypothesis shows."""
+    if one.contrast.measure in ("threshold", "pse") and found is not None:
+        return level_words(found)
+    return {"d_prime": "d′", "exponent": "Exponent"}.get(one.contrast.measure, "Points of the scale")
+
+
+def _estimates(study: Study, found: LevelsResult, forms: Sequence[str], name: str) -> Picture | None:
+    estimates = estimates_of(found)
+    if estimates is None:
+        return None
+    places = sorted({place_of(one) for one in estimates.own}, key=lambda place: (str(type(place)), place))
+    alone = len(places) == 1
+    log = estimates.attribute in ("threshold", "pse") and found.spacing == "log"
+
+    def column(place: float | str | None) -> Column:
+        here = [one for one in estimates.own if place_of(one) == place]
+        group = next((one for one in estimates.group if place_of(one) == place), None)
+        value = None if group is None else getattr(group, estimates.attribute)
+        ends = {one.participant: (one.low, one.high) for one in here if None not in (one.low, one.high)}
+        return Column(
+            name="" if alone or place is None else place.replace("_", " ") if isinstance(place, str) else f"{place:g}",
+            values={one.participant: getattr(one, estimates.attribute) for one in here},
+            mean=None if group is None or value is None else Mean(value=value, low=group.low, high=group.high),
+            ends=ends if alone and ends else None,
+        )
+
+    panel = Panel(columns=tuple(map(column, places)), log=log)
+    people = len({one.participant for one in estimates.own})
+    of_each = " Thin lines: the 95 % interval of each participant, in the order of the numbers." if alone else ""
+    caption = (
+        f"{found.title}: {estimates.words} of each participant, and the mean with its 95 % interval.{of_each} "
+        f"{sample_words(study, people)}"
+    )
+    words = estimates.words if estimates.words == "d′" else capitalised(estimates.words)
+    above = level_words(found) if estimates.attribute in ("threshold", "pse") else words
+    of = "Standard" if getattr(estimates.own[0], "level", None) is None else "Level"
+    below = "" if found.quantity is None or alone else f"{of}: {found.quantity} [{found.unit}]"
+    draw, numbers = partial(draw_panels, [panel], above, below, group_members(study)), numbers_of_panels([panel])
+    title = f"{found.title}: {estimates.words}"
+    return picture_of(study, found.block, name, title, caption, draw, forms, (f"n = {people}",), numbers)
+
+
+class Numbers(NamedTuple):
+    """A score or a question: each participant's number by the name of each setting.
+
+    ``bounds`` are the ends of the scale on which it was answered.
+    """
+
+    title: str
+    bounds: tuple[float, float] | None
+    is_score: bool
+    by_setting: dict[str, dict[str, float]]
+
+
+def numbers_of(study: Study) -> dict[str, list[Numbers]]:
+    """Return the scores and the answers that are numbers, by where they were asked."""
+    places = dict.fromkeys(one.where.id for one in study.others.questions)
+    return {where: numbers_at(study, where) for where in places}
+
+
+def numbers_at(study: Study, where: str) -> list[Numbers]:
+    """Return the scores of a questionnaire or, where it has none, the answers to its questions that are numbers."""
+    scores = [one for one in study.others.scores if one.where.id == where]
+    tables: list[tuple[str, tuple[float, float] | None, QuestionPlace, pd.DataFrame]]
+    if scores:
+        tables = [(one.name, None, one.where, scored(study, one).rename(columns={"score": "value"})) for one in scores]
+    else:
+        asked = [one for one in study.others.questions if one.where.id == where and one.bounds is not None]
+        tables = [
+            (one.short, None if one.question.kind_id == "number" else one.bounds, one.where, study.answers_to(one))
+            for one in asked
+        ]
+    found = []
+    for title, bounds, place, rows in tables:
+        settings: list[tuple[str | None, str]] = [(it.code, place.name(it)) for it in place.settings]
+        by_setting = {}
+        for code, words in settings or [(None, "")]:
+            here = (rows if code is None else rows[rows["code"] == code]).dropna(subset=["value"])
+            means = here.astype({"value": float}).groupby("participant")["value"].mean()
+            by_setting[words] = {str(who): float(value) for who, value in means.items()}
+        if any(by_setting.values()):
+            found.append(Numbers(title, bounds, bool(scores), by_setting))
+    return found
+
+
+def _with_room(low: float, high: float) -> tuple[float, float]:
+    return low - 0.06 * (high - low), high + 0.06 * (high - low)
+
+
+def _answers(study: Study, where: str, forms: Sequence[str], name: str) -> Picture | None:
+    found = numbers_at(study, where)[:MOST_PANELS]
+    if not found:
+        return None
+    panels = [
+        Panel(
+            title=one.title,
+            columns=tuple(
+                Column(name=words, values=values, mean=mean_of(values.values()))
+                for words, values in one.by_setting.items()
+            ),
+            ends=None if one.bounds is None else _with_room(*one.bounds),
+        )
+        for one in found
+    ]
+    people = len({who for panel in panels for one in panel.columns for who in one.values})
+    title = next(one.where.title for one in study.others.questions if one.where.id == where)
+    caption = (
+        f"{title}: the number of each participant, and the mean with Student's 95 % interval. "
+        f"{sample_words(study, people)}"
+    )
+    draw, numbers = partial(draw_panels, panels, "", "", group_members(study)), numbers_of_panels(panels)
+    return picture_of(study, where, name, title, caption, draw, forms, (f"n = {people}",), numbers)

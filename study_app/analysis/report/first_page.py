@@ -1,0 +1,248 @@
+"""The first page: an answer to each question of a study, in order, beside the figure that shows it."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+from markupsafe import Markup
+
+from study_app.analysis.contrasts import answer, question
+from study_app.analysis.figures.people_figures import Mean, mean_of
+from study_app.analysis.figures.summary_figures import MOST_PANELS, Numbers, estimates_of, place_of
+from study_app.analysis.findings import all_findings
+from study_app.analysis.html_page import picture, render
+from study_app.analysis.page_layout import Picture
+from study_app.analysis.report.sections import answers, empty_studies, none_found
+from study_app.analysis.results import LevelsResult, QuestionResult, Results
+from study_app.analysis.statistics.outcome import clopper_pearson
+from study_app.analysis.wording import interval, listed, number, significant
+
+LIMITS_SHOWN: Final = 6
+"""So many limits are listed on the first page; the others are folded."""
+
+
+NO_NUMBERS: Final[Mapping[str, Sequence[Numbers]]] = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Card:
+    """An answer of the first page: its question, verdict and sentences, and the names of figures that may show it.
+
+    The first of the ``figures`` that was drawn does; ``block`` is where they are from. Two that are small are side by
+    side.
+    """
+
+    question: str
+    verdict: str
+    sentences: tuple[str, ...]
+    block: str
+    figures: tuple[str, ...]
+    is_small: bool = False
+
+    def figure_of(self, drawn: Sequence[Picture]) -> Picture | None:
+        """Return the figure that shows the answer; None without any."""
+        for name in self.figures:
+            for one in drawn:
+                if one.name == name or (one.block == self.block and one.name.partition("-")[0] == name):
+                    return one
+        return None
+
+
+def cards(results: Results, numbers: Mapping[str, Sequence[Numbers]] = NO_NUMBERS) -> tuple[Card, ...]:
+    """Return the answers of a study, those to its hypotheses first; ``numbers`` are those of `numbers_of`."""
+    return (*_hypotheses(results), *_statements(results), *_levels(results), *_questions(results, numbers))
+
+
+def _hypotheses(results: Results) -> Iterator[Card]:
+    for place, one in enumerate(results.contrasts, start=1):
+        yield Card(
+            question=f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}: {question(one)}",
+            verdict=one.verdict,
+            sentences=(answer(one),),
+            block=one.contrast.blocks[0],
+            figures=(f"hypothesis-{place}",),
+        )
+
+
+def _statements(results: Results) -> Iterator[Card]:
+    findings = {one.key: one for one in all_findings() if one.question}
+    kinds = {found.id: found.kind for found in results.blocks}
+    for given in answers(results):
+        finding = findings[given.question]
+        yield Card(
+            question=f"{given.title}: {finding.question.format(kind=kinds[given.block])}",
+            verdict=given.verdict,
+            sentences=(given.text,),
+            block=given.block,
+            figures=finding.answer_figures,
+        )
+
+
+def _levels(results: Results) -> Iterator[Card]:
+    """Yield what blocks of levels measure, but for those whose numbers a hypothesis shows."""
+    shown = {(block, one.contrast.measure) for one in results.contrasts for block in one.contrast.blocks}
+    for found in results.levels:
+        estimates = estimates_of(found)
+        if not found.revealed:
+            yield Card(
+                question=found.title,
+                verdict="sealed",
+                sentences=("Standards, levels and correct answers are shown after unblinding.",),
+                block=found.block,
+                figures=(),
+            )
+        elif estimates is not None and (found.block, estimates.attribute) not in shown:
+            yield Card(
+                question=f"{found.title}: {estimates.words}",
+                verdict="",
+                sentences=tuple(_estimate_words(found, estimates.group, estimates.attribute, estimates.words)),
+                block=found.block,
+                figures=(f"estimates-{found.block}",),
+            )
+
+
+def _estimate_words(found: LevelsResult, group: Sequence[Any], attribute: str, words: str) -> Iterator[str]:
+    """Yield the mean of the group at each standard, or to each comparison, with its interval."""
+    of_level, is_weber = attribute in ("threshold", "pse"), found.level_kind == "weber"
+    before = "a Weber fraction of " if of_level and is_weber else ""
+    after = f" {found.unit}" if of_level and not is_weber and found.unit else ""
+    for one in group:
+        place = place_of(one)
+        where = "" if place is None or len(group) == 1 else f" for {str(place).replace('_', ' ')}"
+        if isinstance(place, float) and len(group) > 1:
+            unit = "" if found.level_kind == "weber" and attribute == "value" else found.unit or ""
+            where = f" at {place:g} {unit}".rstrip()
+        ends = "no interval" if None in (one.low, one.high) else f"95 % interval {_ends(one.low, one.high)}"
+        people = f"n = {getattr(one, 'participants', one.n)}"
+        value = f"{before}{significant(getattr(one, attribute))}{after}"
+        yield f"The mean {words}{where} was {value} ({ends}, {people})."
+
+
+def _ends(low: float, high: float) -> str:
+    return f"[{significant(low)}, {significant(high)}]"
+
+
+def _questions(results: Results, numbers_at: Mapping[str, Sequence[Numbers]]) -> Iterator[Card]:
+    """Yield the answers to questions besides statements, where these were asked, and scores in their place."""
+    levels, scores = {one.block for one in results.levels}, {one.where for one in results.scores}
+    asked_at = [one for one in results.questions if one.where not in levels]
+    in_order = sorted(asked_at, key=lambda one: one.is_form + (one.is_form and one.where not in scores))
+    for where in dict.fromkeys(one.where for one in in_order):
+        asked = [one for one in results.questions if one.where == where and one.n]
+        numbers = numbers_at.get(where, ())
+        if not asked:
+            continue
+        title, figures = asked[0].title, [f"answers-{where}"]
+        sentences = [_number_words(one) for one in numbers[:MOST_PANELS]]
+        chosen = [one for one in asked if one.measure == "counts"]
+        sentences += [_choice_words(one) for one in chosen]
+        figures += [f"question-{where}-{one.item}" for one in chosen]
+        if sentences:
+            yield Card(
+                question=title,
+                verdict="",
+                sentences=tuple(sentences),
+                block=where,
+                figures=tuple(figures),
+                is_small=asked[0].is_form,
+            )
+
+
+def _number_words(found: Numbers) -> str:
+    """Return the means of a score or question in each setting, and of two the mean difference within people."""
+    what = f"The mean score ({found.title})" if found.is_score else f"The mean of “{found.title}”"
+    means = [(name, mean, len(held)) for name, held in found.by_setting.items() if (mean := mean_of(held.values()))]
+    parts = [
+        f"{number(mean.value)}{f' for {name.lower()}' if name else ''}{_mean_ends(mean)}" for name, mean, _ in means
+    ]
+    n = max(count for *_, count in means)
+    text = f"{what} was {listed(parts)} (95 % interval{'s' * (len(parts) > 1)}, n = {n})."
+    if len(means) != 2:
+        return text
+    (first, second), (one, other) = found.by_setting, found.by_setting.values()
+    away = mean_of(np.array([other[who] - one[who] for who in one if who in other]))
+    if away is None or away.low is None:
+        return text
+    return (
+        f"{text} The mean difference ({second.lower()} − {first.lower()}) was {number(away.value)}{_mean_ends(away)}."
+    )
+
+
+def _mean_ends(mean: Mean) -> str:
+    return "" if mean.low is None or mean.high is None else f" {interval(_Ends(mean.low, mean.high))}"
+
+
+@dataclass(frozen=True, slots=True)
+class _Ends:
+    low: float
+    high: float
+
+
+def _choice_words(found: QuestionResult) -> str:
+    """Return how often each option was chosen."""
+    parts = []
+    for group in found.groups:
+        n, counts = int(group.numbers["n"]), group.numbers["counts"]
+        if not n:
+            continue
+        option = max(counts, key=lambda one: counts[one])
+        share = clopper_pearson(int(counts[option]), n)
+        of = f" ({group.name.lower()})" if len(found.groups) > 1 else ""
+        ends = f"[{100 * share.low:.0f}, {100 * share.high:.0f}] %"
+        parts.append(
+            f"{counts[option]} of {n} participants chose “{option}”{of} ({100 * counts[option] / n:.0f} %, 95 % "
+            f"interval {ends})"
+        )
+    return f"“{found.short}”: {'; '.join(parts)}."
+
+
+def first_page(
+    results: Results,
+    limits: Sequence[str],
+    numbers: Mapping[str, Sequence[Numbers]] = NO_NUMBERS,
+    drawn: Sequence[Picture] = (),
+) -> Markup:
+    """Return the answers beside their figures, what the study cannot show, and how often the page is wrong."""
+    given = cards(results, numbers)
+    shown = [(one, one.figure_of(drawn)) for one in given]
+    claimed = any(one.n for one in results.blocks) and bool(answers(results))
+    look = results.decided.look_words(len(results.people))
+    return render(
+        "first_page.html",
+        cards=[
+            {
+                "question": one.question,
+                "verdict": one.verdict,
+                "state": one.verdict.replace(" ", "-"),
+                "small": one.is_small,
+                "sentences": list(one.sentences),
+                "figure": "" if figure is None else picture(figure, beside=True),
+                "caption": "" if figure is None else figure.caption,
+            }
+            for one, figure in shown
+        ],
+        sentences=[*filter(None, [look]), *(() if given else (none_found(results),))],
+        limits=_limits_once(limits),
+        shown=LIMITS_SHOWN,
+        empty=empty_studies(max(found.n for found in results.blocks)) if claimed and not results.decided.looks else "",
+    )
+
+
+def _limits_once(limits: Sequence[str]) -> list[str]:
+    """Return the limits, each once: those of several blocks that say the same are one."""
+    blocks: dict[str, list[str]] = {}
+    for line in limits:
+        title, colon, words = line.partition(": ")
+        blocks.setdefault(words if colon else line, []).append(title if colon else "")
+    return [
+        words if titles == [""] else f"{listed(list(dict.fromkeys(titles)))}: {words}"
+        for words, titles in blocks.items()
+    ]
+
+
+def figures_shown(given: Sequence[Card], drawn: Sequence[Picture]) -> set[str]:
+    """Return the names of the figures on the first page, which its sections leave out."""
+    figures = (one.figure_of(drawn) for one in given)
+    return {one.name for one in figures if one is not None}
