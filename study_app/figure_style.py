@@ -55,8 +55,9 @@ PAGE_WIDTH_PT: Final = 7.16 * 72
 PNG_DPI: Final = 300
 FORMATS: Final = ("png", "svg", "pdf")
 
-PRINT_FONTS: Final = ("DejaVu Sans", "sans-serif")
-"""Ships with matplotlib as TrueType, so that type 42 embedding is valid; the second is for readers of an SVG."""
+FALLBACK_FONTS: Final = ("DejaVu Sans", "sans-serif")
+"""The first ships with matplotlib; the second is for readers of an SVG."""
+FONT_FOLDER: Final = resources.files("study_app") / "gui" / "assets" / "fonts"
 
 
 SETTINGS: Final[Mapping[Any, Any]] = {"svg.fonttype": "none", "svg.hashsalt": "liquid-study", "pdf.fonttype": 42}
@@ -64,7 +65,7 @@ SETTINGS: Final[Mapping[Any, Any]] = {"svg.fonttype": "none", "svg.hashsalt": "l
 
 PLOT_SETTINGS: Final[Mapping[Any, Any]] = {
     **SETTINGS,
-    "font.family": PRINT_FONTS,
+    "font.family": FALLBACK_FONTS,
     "font.size": 7.5,
     "text.color": TEXT,
     "axes.edgecolor": AXIS,
@@ -91,24 +92,20 @@ PLOT_SETTINGS: Final[Mapping[Any, Any]] = {
 
 
 @cache
-def screen_fonts() -> tuple[str, ...]:
-    """Return the families for PNG and SVG, best first: Inter where installed or shipped with the windows, DejaVu Sans.
+def fonts() -> tuple[str, ...]:
+    """Return the families of figures, best first: Inter, which ships with the windows, and what has other scripts.
 
-    Inter ships with PostScript outlines, which PDF may not embed as type 42; hence ``PRINT_FONTS`` there.
+    Inter is here as TrueType, with Latin and Greek letters alone: PDF may not embed its PostScript outlines as type 42.
+    An installed Inter gives way to it.
     """
-    if "Inter" not in font_manager.fontManager.get_font_names():
-        shipped = resources.files("study_app") / "gui" / "assets" / "fonts"
-        for weight in ("Regular", "Bold"):
-            file = Path(str(shipped / f"Inter-{weight}.otf"))
-            if not file.is_file():
-                return PRINT_FONTS
-            font_manager.fontManager.addfont(file)
-    return ("Inter", *PRINT_FONTS)
-
-
-def fonts_for(kind: str) -> tuple[str, ...]:
-    """Return the families for a file of ``kind`` (one of ``FORMATS``)."""
-    return PRINT_FONTS if kind == "pdf" else screen_fonts()
+    files = [Path(str(FONT_FOLDER / f"Inter-{weight}.ttf")) for weight in ("Regular", "Bold")]
+    if not all(file.is_file() for file in files):
+        return FALLBACK_FONTS
+    manager = font_manager.fontManager
+    manager.ttflist = [one for one in manager.ttflist if one.name != "Inter"]
+    for file in files:
+        manager.addfont(file)
+    return ("Inter", *FALLBACK_FONTS)
 
 
 @contextlib.contextmanager

@@ -57,7 +57,7 @@ def test_words_are_legible(ink: str, ground: str) -> None:
 
 
 def drawn() -> Figure:
-    sheet = Sheet(100, 40, style.PRINT_FONTS)
+    sheet = Sheet(100, 40, style.fonts())
     sheet.text(10, 20, "Text $kept$ as text")
     return sheet.figure
 
@@ -89,7 +89,7 @@ def test_the_users_settings_change_nothing_and_come_back(kind: str) -> None:
 
 
 def test_wrapping_breaks_at_spaces_and_never_loses_a_word() -> None:
-    sheet = Sheet(200, 40, style.PRINT_FONTS)
+    sheet = Sheet(200, 40, style.FALLBACK_FONTS)
     words = "The strength of the force feedback is adequate"
     lines = sheet.wrap(words, 60, 8)
     assert " ".join(lines) == words

@@ -4,7 +4,6 @@ import base64
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
-from importlib import resources
 from typing import Any, TypeVar
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
@@ -162,7 +161,7 @@ def inline_svg(svg: str, words: str, px_per_pt: float) -> Markup:
 @cache
 def font_face(weight: str) -> str:
     """Return Inter in a weight of the page (Regular, Bold), as a data URI; empty where it is not installed."""
-    file = resources.files("study_app") / "gui" / "assets" / "fonts" / f"Inter-{weight}.woff"
+    file = style.FONT_FOLDER / f"Inter-{weight}.ttf"
     return base64.b64encode(file.read_bytes()).decode("ascii") if file.is_file() else ""
 
 

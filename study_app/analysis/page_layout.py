@@ -226,9 +226,8 @@ def picture_of(
 ) -> Picture:
     """Return the figure that ``draw`` draws in each form; ``counts`` say how many took part if not all of the study."""
     people = (counted(study.n, "participant"),) if counts is None else counts
-    fonts = {form: style.fonts_for(form) for form in forms}
-    drawn = {one: draw(Look(title, study_marks(study), people, one)).figure for one in dict.fromkeys(fonts.values())}
-    files = {form: style.file_bytes(drawn[fonts[form]], form, f"{study.name}: {title}") for form in forms}
+    drawn = draw(Look(title, study_marks(study), people, style.fonts())).figure
+    files = {form: style.file_bytes(drawn, form, f"{study.name}: {title}") for form in forms}
     return Picture(block=block, name=name, caption=caption, files=files, title=title, numbers=numbers)
 
 

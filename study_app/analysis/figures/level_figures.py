@@ -2,15 +2,17 @@
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from functools import cache, partial
 from typing import Any, Final, TypeAlias, cast
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import published_words
 from study_app.analysis.data.study_tables import Study
+from study_app.analysis.figures.people_figures import scale_ticks
 from study_app.analysis.levels.answers import (
     Answers,
     LevelAnswers,
@@ -43,8 +45,6 @@ LEFT_PT: Final = 40.0
 GAP_PT: Final = 16.0
 HEAD_PT: Final = 42.0
 ROW_GAP_PT: Final = 36.0
-LEAST_LEVELS: Final = 3
-"""Ticks at 1, 2 and 5 in each decade, as long as so many lie within the axis."""
 
 
 def panels(
@@ -121,14 +121,11 @@ def _level_ticks(found: LevelsResult, ends: tuple[float, float]) -> list[float]:
         step = 10.0 ** math.floor(math.log10(high - low))
         step *= next(times for times in (0.1, 0.2, 0.5, 1.0, 2.0) if (high - low) / (step * times) <= 6)
         return [float(f"{number * step:.12g}") for number in range(math.ceil(low / step), math.floor(high / step) + 1)]
-    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-    for digits in ((1,), (1, 3), (1, 2, 5), (1, 2, 3, 5, 7), tuple(range(1, 10))):
-        found_ = [float(f"{digit}e{decade}") for decade in decades for digit in digits]
-        inside = [tick for tick in found_ if low <= tick <= high]
-        if len(inside) >= LEAST_LEVELS:
-            return inside
-    return inside
+    return scale_ticks(low, high, log=True)
 
+
+Tracked: TypeAlias = Callable[[], pd.DataFrame]
+"""Returns the tracks of a study, made once."""
 
 MOST_PEOPLE: Final = 23
 """Participants with a panel of their own; the others are in the first panel and in the table."""
@@ -144,9 +141,9 @@ BELOW: Final = 0.03
 COLOURS: Final = (style.ACCENT, "#b35600", style.TEXT, "#6d1007", "#5d8aa8", "#b75a26", "#02256d", style.AXIS)
 
 
-def level_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str) -> Picture:
+def level_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str, tracked: Tracked) -> Picture:
     """Draw the answers over levels of a block."""
-    bands = _bands(study, found)
+    bands = _bands(study, found, tracked)
     own = len(people(found)) - MOST_PEOPLE
     left_out = f" {counted(own, 'more participant')} only in the table." if own > 0 else ""
     chance = "" if found.guess_rate is None else f" Dashed: chance ({100 * found.guess_rate:.0f} %)."
@@ -157,12 +154,12 @@ def level_picture(study: Study, found: LevelsResult, forms: Sequence[str], name:
     return picture_of(study, found.block, name, found.title, caption, partial(_draw_levels, found, bands), forms)
 
 
-def _bands(study: Study, found: LevelsResult) -> Mapping[str, Array]:
+def _bands(study: Study, found: LevelsResult, tracked: Tracked) -> Mapping[str, Array]:
     """Return the bands of the participants' functions, where there is one in each panel."""
     if not Thresholds.own(found) or len(_standards(found)) > 1:
         return {}
     block = next(block for block in study.levels if block.id == found.block)
-    return psychometric_bands(block, tracks(study), people(found)[:MOST_PEOPLE], _limits(found, _places(found)))
+    return psychometric_bands(block, tracked(), people(found)[:MOST_PEOPLE], _limits(found, _places(found)))
 
 
 def _panels(found: LevelsResult, banded: bool) -> str:
@@ -365,10 +362,10 @@ CROSS_PT2: Final = 11.0
 """Areas of the marks of answers, reversals and catch trials."""
 
 
-def track_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str) -> Picture:
+def track_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str, tracked: Tracked) -> Picture:
     """Draw the tracks of a block whose levels answers chose, once the key is open."""
     block = next(block for block in study.levels if block.id == found.block)
-    shown = list(courses(block, tracks(study), MOST_PANELS))
+    shown = list(courses(block, tracked(), MOST_PANELS))
     rest = len(Thresholds.own(found)) - len(shown)
     left_out = f" {counted(rest, 'more panel')} not shown." if rest > 0 else ""
     success = "correct" if found.counts == "correct" else f"“{found.counts}”"
@@ -433,7 +430,7 @@ def _marks(
     )
 
 
-def settings_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str) -> Picture:
+def settings_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str, _tracked: Tracked) -> Picture:
     """Draw the settings of a block whose levels participants set, once the key is open."""
     rest = len(Settings.own(found)) - MOST_PANELS
     left_out = f" {counted(rest, 'more panel')} not shown." if rest > 0 else ""
@@ -527,7 +524,7 @@ def _at(found: LevelsResult) -> str:
     return "" if percent is None else f" at {percent:.3g} % {found.counts}"
 
 
-def weber_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str) -> Picture:
+def weber_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str, _tracked: Tracked) -> Picture:
     """Draw the Weber fractions of a block with thresholds at two standards or more."""
     listed = "; ".join(published_words(one) for one in found.published)
     published = f" Open circles and dotted lines: published values, {listed}." if published_fractions(found) else ""
@@ -623,7 +620,7 @@ def _fractions_frame(
     axes.hlines(ticks, *axes.get_xlim(), color=style.GRID, linewidth=0.6, zorder=0)
 
 
-Draw: TypeAlias = Callable[[Study, LevelsResult, Sequence[str], str], Picture]
+Draw: TypeAlias = Callable[[Study, LevelsResult, Sequence[str], str, Tracked], Picture]
 
 FIGURES: Final[tuple[tuple[str, Callable[[LevelsResult], object], Draw], ...]] = (
     ("levels", Answers.of, level_picture),
@@ -641,9 +638,10 @@ def level_pictures(
 
     A figure that fails is left out, and kept in ``failures``.
     """
+    tracked = cache(partial(tracks, study))
     yield from attempted(
         (
-            (found.block, name := f"{what}-{found.block}", partial(draw, study, found, forms, name))
+            (found.block, name := f"{what}-{found.block}", partial(draw, study, found, forms, name, tracked))
             for what, applies, draw in FIGURES
             for found in levels
             if applies(found)

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow
 
 def drawn(study: Study, block: Block, fonts: tuple[str, ...] = ()) -> Figure:
     words = answer_figures.counts(study, block)
-    look = Look(answer_figures.title(block), study_marks(study), words, fonts or style.screen_fonts())
+    look = Look(answer_figures.title(block), study_marks(study), words, fonts or style.fonts())
     return answer_figures.draw_block(study, block, {}, look).figure
 
 
@@ -33,7 +33,7 @@ def delays(study: Study, **look: Any) -> Figure:
     return drawn(study, study.blocks_of("delays")[0], **look)
 
 
-@pytest.mark.parametrize("fonts", [style.screen_fonts(), style.PRINT_FONTS], ids=["screen", "print"])
+@pytest.mark.parametrize("fonts", [style.fonts(), style.FALLBACK_FONTS], ids=["screen", "print"])
 @pytest.mark.parametrize("opened", [pytest.param(False, marks=pytest.mark.nightly), True], ids=["blinded", "opened"])
 @pytest.mark.parametrize("people", [pytest.param(1, marks=pytest.mark.nightly), 30])
 def test_no_text_leaves_the_figure_or_touches_another(rek: Results, fonts, opened: bool, people: int) -> None:
@@ -79,7 +79,7 @@ def test_without_a_completed_session_plot_says_so_and_writes_nothing(rek: Result
 def test_of_many_participants_some_are_drawn_and_the_median_is_of_all() -> None:
     values = np.tile(np.array([1.0, 2.0, 3.0]), (500, 1))
     values[::2] += 1
-    look = Look("Answers", [], ["n = 500"], style.PRINT_FONTS)
+    look = Look("Answers", [], ["n = 500"], style.FALLBACK_FONTS)
     figure = answer_figures.draw_answers([("Harder", values)], [0.0, 100.0, 200.0], [None], "", look).figure
     gids = {str(line.get_gid()): line for line in figure.axes[0].lines}
     drawn = [gid for gid in gids if "participant" in gid]
@@ -96,7 +96,7 @@ def shown(figure: Figure) -> list[Text]:
 
 def test_measures_of_reaches_have_a_scale_each() -> None:
     values = np.array([[0.8, 0.9, 1.0], [0.85, np.nan, 1.1]])
-    look = Look("Motion", [], ["n = 2"], style.PRINT_FONTS)
+    look = Look("Motion", [], ["n = 2"], style.FALLBACK_FONTS)
     plots = [("Time, s", values), ("Flat", np.ones((2, 3)))]
     first, second = answer_figures.draw_answers(
         plots, [0.0, 100.0, 200.0], [None, None], "", look, own_scales=True
