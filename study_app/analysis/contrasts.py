@@ -510,7 +510,7 @@ def contrast_section(results: Results) -> Iterator[str]:
         ("standardised", lambda one: size_words(one.standardised)),
         ("ordinal", lambda one: size_words(one.ordinal)) if any(one.ordinal for one in results.contrasts) else None,
         ("SD", _sd_words),
-        ("Bayes factor", lambda one: "–" if one.bayes_factor is None else significant(one.bayes_factor)),
+        ("Bayes factor BF₁₀", lambda one: "–" if one.bayes_factor is None else significant(one.bayes_factor)),
         ("p", lambda one: p_value(one.p)),
         ("adjusted p", lambda one: p_value(one.p_adjusted)),
         ("Verdict", lambda one: one.verdict),

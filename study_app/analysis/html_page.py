@@ -24,8 +24,8 @@ SHORT = 16
 FOLDED = 12
 """A table of more rows is folded."""
 
-PX_PER_PT, PX_BESIDE = 1.9, 1.6
-"""Pixels of the page for a point of a figure that has the room; beside an answer."""
+PX_PER_PT = 1.9
+"""Pixels of the page for a point of a figure that has the room."""
 
 VARIABLES = {
     style.TEXT: "text",
@@ -132,17 +132,17 @@ def box(parts: Iterable[Markup], kind: str = "box") -> Markup:
 def picture(one: Picture, *, beside: bool = False) -> Markup:
     """Return a figure with its caption; its drawing is part of the page, in the page's colours and font.
 
-    One that stands ``beside`` an answer is smaller, and its caption is not part of it.
+    The caption of one that stands ``beside`` an answer is not part of it.
     """
     if "svg" not in one.files:
         width, png = round(0.4 * int.from_bytes(one.files["png"][16:20])), one.files["png"]
         drawing = _part("png", width, one.caption, base64.b64encode(png).decode("ascii"))
     else:
-        drawing = inline_svg(one.files["svg"].decode(), one.caption, PX_BESIDE if beside else PX_PER_PT)
+        drawing = inline_svg(one.files["svg"].decode(), one.caption)
     return _part("picture", drawing, "" if beside else one.caption)
 
 
-def inline_svg(svg: str, words: str, px_per_pt: float) -> Markup:
+def inline_svg(svg: str, words: str) -> Markup:
     """Return the drawing of an SVG, whose colours are those of the page; white letters and their ground stay."""
     parts = LETTERS.split(HEAD.sub("", svg))
     parts[::2] = [COLOUR.sub(lambda match: f"var(--{VARIABLES[match[0].lower()]})", part) for part in parts[::2]]
@@ -150,7 +150,7 @@ def inline_svg(svg: str, words: str, px_per_pt: float) -> Markup:
         COLOUR.sub(lambda match: f"var(--{VARIABLES[match[0].lower()]})", part) if "#ffffff" not in part else part
         for part in parts[1::2]
     ]
-    width = round(px_per_pt * float(found[1])) if (found := SIZE.search(svg)) else 600
+    width = round(PX_PER_PT * float(found[1])) if (found := SIZE.search(svg)) else 600
     view = found[0] if found else ""
     root = re.sub(r' (?:width|height)="[^"]*"', "", view, count=2)
     label = Markup.escape(words)

@@ -120,6 +120,11 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
             "The decisions about the analysis changed between sessions, so all results are exploratory; those of the "
             "first session are used."
         )
+    if results.questions and not (results.blocks or results.levels):
+        yield (
+            "The answers to these questions are described, not tested: intervals are not corrected for the number of "
+            "questions, so that chance differences are to be expected among many."
+        )
     if study.contents > len(study.versions):
         yield (
             f"The study file was changed between sessions without a new version: {study.contents} different files were "

@@ -17,7 +17,7 @@ from markupsafe import Markup
 from study_app import __version__
 from study_app.analysis.contrasts import contrast_rows, contrast_section
 from study_app.analysis.data.blocks import Setting
-from study_app.analysis.data.study_tables import Study, load_study
+from study_app.analysis.data.study_tables import Study, group_counts, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.table_files import credit_lines, study_head, table_files
 from study_app.analysis.export.tables import deliver
@@ -399,7 +399,9 @@ def _facts(study: Study) -> str:
     when = (
         "" if not days else f"Sessions on {days[0]}." if len(days) == 1 else f"Sessions from {days[0]} to {days[-1]}."
     )
-    return f"Study {study.name}, {version_words(study)}. {people[:1].upper()}{people[1:]}. {when}"
+    groups = listed([f"{count} {group}" for group, count in group_counts(study).items()])
+    of_groups = f" ({groups})" if groups else ""
+    return f"Study {study.name}, {version_words(study)}. {people[:1].upper()}{people[1:]}{of_groups}. {when}"
 
 
 def _marks(study: Study) -> list[tuple[str, str]]:

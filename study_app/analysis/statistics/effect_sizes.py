@@ -131,7 +131,9 @@ def jzs_bayes_factor(t: float, n: int, m: int | None = None, scale: float = PRIO
     Parameters
     ----------
     t : float
-        Student's t of ``n`` differences or, with ``m``, of two groups of these sizes and equal variances.
+        Student's t of differences, or of two groups with equal variances.
+    n, m : int
+        How many differences or, with ``m``, the sizes of the groups.
     scale : float
         Of the Cauchy prior of the standardised difference.
     """
