@@ -121,7 +121,7 @@ def test_thresholds_of_a_staircase_leave_nobody_out_and_name_who_did_not_do_a_bl
     gone = study.trials[~((study.trials["participant"] == "P003") & (study.trials["block"] == "late"))]
     (found,) = (results := evaluate(replace(study, trials=gone))).contrasts
     assert (found.n, found.dropped, found.left_out) == (7, 1, {"P003": "no threshold in late"})
-    assert "Left out: P003 (no threshold in late)." in first_page(results, ())
+    assert "Excluded: P003 (no threshold in late)." in first_page(results, ())
     words = "Every participant with both numbers is included, also with a threshold beyond the levels"
     assert words in preregistration(parse(text.encode(), "delayed.toml"), "0" * 64)
 
@@ -210,7 +210,7 @@ def test_hypotheses_are_corrected_together_and_say_why_they_are_not_tested() -> 
     assert first.p is not None
     assert first.p_adjusted == pytest.approx(2 * max(first.p, first.p_bootstrap))
     assert (second.verdict, second.p) == ("not tested", None)
-    assert second.note.startswith("fewer than two participants have the numbers")
+    assert second.note.startswith("fewer than two participants have both numbers")
     assert pd.isna(second.statistic) or second.statistic is None
 
 

@@ -134,7 +134,7 @@ def test_trials_can_be_named_for_leaving_out_and_then_do_not_count(study: Path) 
 
 
 def test_what_the_store_refuses_changes_nothing(study: Path) -> None:
-    with pytest.raises(StoreError, match="no session 1 of participant P009"):
+    with pytest.raises(StoreError, match="does not contain session 1 of participant P009"):
         told(LeaveOut(folder=study, participant="P009", session=1, trial=None, by="AK", reason="x"))
     with pytest.raises(StoreError, match="reason"):
         told(OpenKey(study, "AK", " "))

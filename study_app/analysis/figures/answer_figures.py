@@ -188,7 +188,7 @@ RIGHT_PT: Final = 26.0
 
 @style.own_settings()
 def draw_threshold(
-    found: Threshold, shares_of: Sequence[Mapping[float, float]], lowest_ms: float | None, look: Look
+    found: Threshold, shares_of: Mapping[str, Mapping[float, float]], lowest_ms: float | None, look: Look
 ) -> Sheet:
     """Draw shares as circles, the curve, its threshold with the interval, and dashed the lowest delay with a trend.
 
@@ -204,10 +204,11 @@ def draw_threshold(
     sheet.scale(axes, "y", (0.0, 0.5, 1.0), [f"{share:.0%}" for share in (0.0, 0.5, 1.0)], lines=True)
     sheet.scale(axes, "x", levels)
     step = float(np.diff(levels).min()) if len(levels) > 1 else 1.0
-    for place, own in enumerate(shares_of):
+    for place, (person, own) in enumerate(shares_of.items()):
         x, y = (PERSON_SPREAD * ((place + 1) * golden % 1 - 0.5) for golden in PLASTIC)
         points = [(delay + step * x, share + 0.12 * y) for delay, share in own.items()]
-        axes.plot(*zip(*points, strict=True), "o", color=style.PARTICIPANT, markersize=2.2, markeredgewidth=0)
+        look_of_person: Style = {"color": style.PARTICIPANT, "markersize": 2.2, "markeredgewidth": 0}
+        axes.plot(*zip(*points, strict=True), "o", gid=f"person-{person}", **look_of_person)
     if lowest_ms is not None:
         axes.axvline(lowest_ms, color=style.TEXT_SOFT, linewidth=0.8, dashes=(3, 2), gid="lowest")
     half = found.half_way

@@ -392,13 +392,14 @@ class DetectionThreshold(Finding[Threshold | None]):
         draw = partial(answer_figures.draw_threshold, threshold, self._shares(drawing), lowest)
         return drawing.picture(self.figure_title, caption, draw, (f"n = {threshold.n}",))
 
-    def _shares(self, drawing: Drawing) -> list[dict[float, float]]:
+    def _shares(self, drawing: Drawing) -> dict[str, dict[float, float]]:
         """Return of each participant the share of answers that agree, by delay."""
         answers = drawing.study.answers(drawing.block)
         rows = answers[(answers["item"] == self.results.decided.noticed) & answers["response"].notna()]
         delays_ms = {one.code: one.delay_ms or 0.0 for one in drawing.found.settings}
         rows = rows.assign(delay=rows["code"].map(delays_ms).astype(float), agrees=rows["response"].astype(float) >= 5)
-        return [dict(own.groupby("delay")["agrees"].mean()) for _, own in rows.groupby("participant", sort=True)]
+        people = rows.groupby("participant", sort=True)
+        return {str(who): dict(own.groupby("delay")["agrees"].mean()) for who, own in people}
 
     def methods(self) -> Iterator[str]:
         if self.value is not None:

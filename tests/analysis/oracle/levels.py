@@ -171,8 +171,7 @@ def _tested(compared: Compared, contrast: Numbers, trials: pd.DataFrame) -> Numb
     else:
         variance = sides[0]["variance"] + sides[1]["variance"]
         samples = [pd.DataFrame({"value": sides[0]["value"] - sides[1]["value"], "variance": variance}).dropna()]
-    pairs = [random_effects(one) if ratio else (one["value"].mean(), stats.sem(one["value"])) for one in samples]
-    means, errors = zip(*pairs, strict=True)
+    means, errors = zip(*(_mean(one, weighted=ratio) for one in samples), strict=True)
     mean, error, freedom = means[0] - sum(means[1:]), math.hypot(*errors), min(map(len, samples)) - 1
     t, scale = stats.t(freedom), math.exp if ratio else float
     above, below, reach = t.sf(mean / error), t.cdf(mean / error), t.ppf(0.975) * error
@@ -180,41 +179,31 @@ def _tested(compared: Compared, contrast: Numbers, trials: pd.DataFrame) -> Numb
     n = sum(map(len, samples))
     own = {"n": n, "dropped": len(members) - n, "statistic": mean / error, "p": p, "effect": scale(mean)}
     own |= named("interval", {"low": scale(mean - reach), "high": scale(mean + reach), "level": 0.95})
-    if groups:
-        held = [one["value"] for one in samples]
-    else:
-        own |= {"higher": (samples[0]["value"] > 0).sum(), "sd": samples[0]["value"].std()}
-        held = [one["value"][samples[0].index] for one in sides]
-    parts = [(random_effects if ratio else _mean)(one) for one in (samples if groups else
-             [side.loc[samples[0].index] for side in sides])]  # fmt: skip
-    for number, (values, (middle, spread)) in enumerate(zip(held, parts, strict=True)):
-        reach = stats.t.ppf(0.975, len(values) - 1) * spread
+    held = samples if groups else [side.loc[samples[0].index] for side in sides]
+    own |= {} if groups else {"higher": (samples[0]["value"] > 0).sum(), "sd": samples[0]["value"].std()}
+    for number, (middle, spread) in enumerate(_mean(one, weighted=ratio) for one in held):
+        values, reach = held[number]["value"], stats.t.ppf(0.975, len(held[number]) - 1) * spread
         side = {"mean": scale(middle), "low": scale(middle - reach), "high": scale(middle + reach), "sd": values.std()}
-        own |= named(f"sides.{number}", side)
-        own |= named(f"sides.{number}.values", {str(who): scale(value) for who, value in values.items()})
-    return own | _standardised([one["value"].to_numpy() for one in samples], contrast["measure"] in TABLES or ratio)
+        people = {str(who): scale(value) for who, value in values.items()}
+        own |= named(f"sides.{number}", side) | named(f"sides.{number}.values", people)
+    return own | _standardised([one["value"].to_numpy() for one in samples])
 
 
-def _standardised(samples: Sequence[Any], measured: bool) -> Numbers:
-    """Return d_z or Hedges' g, of answers Cliff's delta, and the Bayes factor as an integral over effect sizes."""
-    first, *others = samples
-    if others:
-        n, m = map(len, samples)
-        size, freedom = n * m / (n + m), n + m - 2
-        t = stats.ttest_ind(*samples).statistic
-        bias = math.exp(math.lgamma(freedom / 2) - math.lgamma((freedom - 1) / 2)) / math.sqrt(freedom / 2)
-        signs = [np.sign(one - other) for one in first for other in others[0]]
-    else:
-        size, freedom, bias = len(first), len(first) - 1, 1.0
-        signs = list(np.sign(np.where(abs(first) < 1e-9, 0, first)))
-        t = stats.ttest_1samp(first, 0).statistic
-    scale, root = bias / math.sqrt(size), math.sqrt(size)
+def _mean(sample: pd.DataFrame, *, weighted: bool) -> tuple[float, float]:
+    return random_effects(sample) if weighted else (sample["value"].mean(), stats.sem(sample["value"]))
+
+
+def _standardised(samples: Sequence[Any]) -> Numbers:
+    """Return d_z or Hedges' g, and the Bayes factor as an integral over effect sizes."""
+    n, *m = map(len, samples)
+    size, freedom = (n * m[0] / (n + m[0]), n + m[0] - 2) if m else (n, n - 1)
+    t = (stats.ttest_ind(*samples) if m else stats.ttest_1samp(*samples, 0)).statistic
+    bias = math.exp(math.lgamma(freedom / 2) - math.lgamma((freedom - 1) / 2)) / math.sqrt(freedom / 2) if m else 1.0
     ends = [optimize.brentq(lambda at, p=p: stats.nct.sf(t, freedom, at) - p, t - 9, t + 9) for p in (0.025, 0.975)]
-    own = {"value": t * scale, "low": ends[0] * scale, "high": ends[1] * scale, "t": t}
-    prior = stats.cauchy(scale=math.sqrt(0.5))
-    over = integrate.quad(lambda d: stats.nct.pdf(t, freedom, d * root) * prior.pdf(d), -8, 8, limit=200, points=(0,))
-    found = named("standardised", own) | {"bayes_factor": over[0] / stats.t.pdf(t, freedom)}
-    return found if measured else found | {"ordinal.value": np.mean(signs)}
+    own = dict(zip(("value", "low", "high"), np.array([t, *ends]) * bias / math.sqrt(size), strict=True)) | {"t": t}
+    prior = stats.cauchy(scale=math.sqrt(0.5)).pdf
+    over = integrate.quad(lambda d: stats.nct.pdf(t, freedom, d * size**0.5) * prior(d), -8, 8, limit=200, points=(0,))
+    return named("standardised", own) | {"bayes_factor": over[0] / stats.t.pdf(t, freedom)}
 
 
 def _numbers(compared: Compared, contrast: Numbers) -> list[pd.DataFrame]:

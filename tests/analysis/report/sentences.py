@@ -623,14 +623,14 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (rf"Over delays of {R} to {R} ms participants already tend to rate longer delays (.*)\.", trend_is_shown),
     (r"Participants may also notice shorter delays\.", always),
     (r"Mean ratings need not change\.", always),
-    (r"Agreement rises with the delay, but no single delay is shown to be noticed\.",
+    (r"Agreement increases with the delay, but it is not shown that any single delay is noticed\.",
      when(lambda told: told.block["threshold"]["effect"] is not None)),
-    (r"No delay was shown to be noticed\.", nothing_noticed),
-    (r"That is not evidence that there is no difference\.", always),
+    (r"It is not shown that any delay is noticed\.", nothing_noticed),
+    (r"This does not show that there is no difference\.", always),
     (r"No answer: [a-z].*\.", when(lambda told: not told.against)),
     (rf"We could not show for any delay that the mean answers to all statements stay within ±{R} points? of those at "
      rf"{R} ms\.", nothing_equivalent),
-    (r"That is not evidence that they change\.", when(lambda told: beyond(told) == 0)),
+    (r"This does not show that they change\.", when(lambda told: beyond(told) == 0)),
     (r"In (\d+) of (\d+) comparisons? the whole interval lies beyond the bound \(not equivalent; not corrected for the "
      r"number of comparisons\)\.",
      lambda match, told: (int(match[1]), int(match[2])) == (beyond(told), len(told.against))),
@@ -663,9 +663,9 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (r"(The whole interval lies|All differences lie) beyond the bound \(not equivalent\)\.",
      bound_of_a_contrast("beyond")),
     (r"The mean is not shown to lie within the bound\.", bound_of_a_contrast("neither")),
-    (r"Not tested: (fewer than two participants have the numbers that are compared|the numbers do not vary between "
-     r"participants, so that no t test exists)\.", contrast_is_untested),
-    (r"Left out: .*\.", when(lambda told: any(one["left_out"] for one in told.contrasts))),
+    (r"Not tested: (fewer than two participants have both numbers|the numbers do not vary between participants, so a "
+     r"t test is not possible)\.", contrast_is_untested),
+    (r"Excluded: .*\.", when(lambda told: any(one["left_out"] for one in told.contrasts))),
     # Looks
     (rf"Looks are planned at {LOOKS}; none has been reached, so all results are exploratory\.",
      look(lambda told: people(told) < told.results["decided"]["looks"][0])),
@@ -688,15 +688,15 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (rf"{LEAD}no answers are included yet\.", when(lambda told: told.block["n"] == 0)),
     (r"The participants were SIMULATED: this report is not evidence about people\.",
      when(lambda told: told.study.simulated)),
-    (r"The protocol states no decisions about the analysis \(it has no table \[analysis\]\), so all results are "
-     r"exploratory\.", when(lambda told: not told.results["decided"]["made"])),
+    (r"The protocol does not state decisions about the analysis \(the table \[analysis\] is missing\), so all "
+     r"results are exploratory\.", when(lambda told: not told.results["decided"]["made"])),
     (r"The decisions about the analysis changed between sessions, so all results are exploratory; those of the first "
      r"session (are used|were used \(alpha = .*\))\.", when(lambda told: told.results["decided"]["changed"])),
     (r"There is only one participant: the results do not generalise to other people\.",
      when(lambda told: people(told) == 1)),
     (rf"{N} participants?: intervals of mean rank correlations and exploratory tests of means need at least 10\.",
      lambda match, told: count(match[1]) == people(told) < 10),
-    (r"An effect that is not shown here may well exist\.", always),
+    (r"Effects that are not shown here may still exist\.", always),
     (rf"{LEAD}(the .*) (?:was|were) not computed: (.*)\.", not_computed),
     (rf"{LEAD}the tests of (.*) could not have been significant with so few participants: no rearrangement of the "
      r"answers within participants gives an adjusted p that is small enough\.", out_of_reach),
@@ -705,9 +705,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      rf"of "
      r"that position\.", same_position),
     (rf"{LEAD}a comparison can count as equivalent only with at least (\d+) participants, because a smaller sample has "
-     rf"more than a (?:< )?{R} % chance of including nobody from a minority of {R} % of all people whose answers "
-     rf"differ "
-     rf"by {R} points, which shifts the mean by the bound\.", too_few_for_equivalence),
+     rf"more than a (?:< )?{R} % chance of including nobody from a minority \({R} % of all people\) whose "
+     rf"answers differ by {R} points, enough to shift the mean by the bound\.", too_few_for_equivalence),
     (r"This study has (\d+)\.", lambda match, told: int(match[1]) == told.block["n"]),
     (rf"{LEAD}(\d+) of (\d+) comparisons? with .* ms (?:is|are) undecided: the mean difference is not shown to lie "
      r"within the equivalence bound, nor beyond it\.", nobody_is_left),
@@ -743,7 +742,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"the mean by the bound\.",
      lambda match, told: int(match[1] or 1)
      == sum(one["contrast"]["bound"] is not None for one in told.contrasts)),
-    (r"Participants were left out of a hypothesis because a number is missing \(.*\)\.",
+    (r"Some participants were excluded from a hypothesis because a number is missing \(.*\)\.",
      when(lambda told: any(one["left_out"] for one in told.contrasts))),
     (r"Statements were rated on seven-point scales and treated as ordinal: answers are summarised by medians and "
      r"quartiles \(linear, Hyndman & Fan type 7\)\.", always),
@@ -755,8 +754,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"the "
      r"statistic was the sum of the statements' Friedman statistics\.",
      when(lambda told: told.block["overall"] is not None)),
-    (r"Each statement was tested by (?:Friedman's test|Wilcoxon's signed ranks) \(.*\), with p adjusted (by .*); the "
-     r"effect size is .*\.", family),
+    (r"Each statement was tested by (?:Friedman's test|Wilcoxon's signed-rank test) \(.*\), with p adjusted (by .*); "
+     r"the effect size is .*\.", family),
     (r"If a statement showed a difference, pairs were compared by Wilcoxon's signed-rank test \(exact; equal pairs "
      r"left "
      r"out\), with p adjusted by Holm over all pairs of all such statements; the effect size is the matched "
@@ -804,11 +803,10 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (r"In an exploratory analysis, the answers were treated as numbers: (?:differences between the settings were "
      r"tested "
      r"by Hotelling's T²|the participants' own slopes were tested by Student's t), in the participants who answered "
-     r"under all settings; the false discovery rate was controlled \(Benjamini–Hochberg\)\.",
+     r"in all conditions; the false discovery rate was controlled \(Benjamini–Hochberg\)\.",
      when(lambda told: any(one["outcome"]["p"] is not None for one in told.block["mixed"]))),
-    (r"Missing answers were not replaced: (\d+) participants? with a missing answer to a statement were left out of "
-     r"its "
-     r"tests over all conditions, and of those comparisons of two conditions that the missing answer concerns\.",
+    (r"Missing answers were not replaced: (\d+) participants? with a missing answer to a statement were excluded "
+     r"from its tests over all conditions, and from comparisons of two conditions that involve the missing answer\.",
      left_out),
     (rf"The sessions were run and analysed with liquid-study {re.escape(__version__)}\.", always),
 )  # fmt: skip

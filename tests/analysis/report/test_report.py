@@ -21,6 +21,25 @@ def test_the_caption_of_delays_says_what_is_dashed(of_twelve: Path) -> None:
     assert "Dashed: lowest delay at which stepping down still shows a trend" in read(of_twelve)
 
 
+def test_every_answer_stands_beside_its_figure_and_the_page_is_small(of_twelve: Path) -> None:
+    page = (of_twelve / "report.html").read_text("utf-8")
+    assert len(page) < 5e6
+    first, _, rest = page.partition('<details class="part"')
+    cards = first.split('<article class="card')[1:]
+    assert [re.search(r"<h2>(.*?) <span", card)[1].partition(": ")[2] for card in cards] == [  # type: ignore[index]
+        "Which liquids were distinguished?",
+        "From which delay do participants notice a difference?",
+        "Up to which delay do answers not change by a relevant amount?",
+    ]
+    for card in cards:
+        drawing = card[card.index("<svg") :]
+        assert {f'id="person-P{number:03d}"' in drawing for number in range(1, 13)} == {True}
+        assert "#ffffff" not in re.sub(r"<text.*?</text>", "", drawing), "colours are those of the page, light or dark"
+        assert drawing.index("</svg>") > 0
+    assert rest.count("<svg") >= 3, "the other figures are in their sections"
+    assert not set(re.findall(r'aria-label="([^"]*)"', first)) & set(re.findall(r'aria-label="([^"]*)"', rest))
+
+
 def test_while_sealed_nothing_is_told_that_blinding_hides(small: Results, tmp_path: Path) -> None:
     for number_ in range(1, 8):
         small.add(f"P{number_:03d}", lambda condition, _item: 6 if condition == "heavyzembla" else 2)
