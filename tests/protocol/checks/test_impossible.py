@@ -13,13 +13,7 @@ from study_app.protocol.warnings.study_warnings import warnings
         ("viscosityjnd", 'ball = "hidden"', 'ball = "hidden"\ndelay_ms = 50', "", "conditions.damper.delay_ms"),
         ("delaydetect", "[conditions.water]", "[conditions.water]", "Mouse", ""),
         ("forcedelay", "format = 2", "format = 2", "Mouse", "stimuli.delay.vary: Mouse does not produce force"),
-        (
-            "forcedelay",
-            "damping_nspm = 4",
-            "damping_nspm = 0.01",
-            "",
-            "stimuli.delay.vary: the condition does not",
-        ),
+        ("forcedelay", "damping_nspm = 4", "damping_nspm = 0.01", "", "stimuli.delay.vary: the condition does not"),
         ("demo", "format = 1", "format = 1", "Mouse", "blocks.liquids: Mouse does not produce force: participants see"),
         (
             "viscosityjnd",
