@@ -462,7 +462,7 @@ def test_every_fault(studied: Path, tmp_path: Path, name: str, fault: Fault) -> 
 
 
 def early_changes(calls: list[Call]) -> Iterator[str]:
-    """Yield each change that follows from an earlier one that is not on the disk yet.
+    """Yield each change that follows from an earlier one that is not on the disk yet, and what never is.
 
     A file is on the disk once it is flushed, its name once its folder is. Under a temporary name nothing counts.
     """
@@ -480,6 +480,7 @@ def early_changes(calls: list[Call]) -> Iterator[str]:
             unflushed[call.path] = call.path
         elif call.name in ("create", "rename") and not hidden:
             unflushed[call.path] = call.path.parent
+    yield from (f"{path.name} is not flushed at the end" for path in unflushed if not path.name.startswith("."))
 
 
 def recorded_disk(studied: Path, folder: Path, writer: Writer) -> Disk:
