@@ -282,6 +282,34 @@ def studies() -> None:
 
 
 @click.command()
+@click.argument("code", metavar="CODE")
+def language(code: str) -> None:
+    """Check the participant's texts in a language of the lab; begin WORKSPACE/languages/CODE.toml if there is none.
+
+    CODE is two letters, such as es. The file has a line for each text, with the English one as a comment.
+    """
+    from study_app.errors import StudyError
+    from study_app.protocol.wording.languages import LANGUAGES, language_template, read_language
+    from study_app.store.atomic import cannot_write, write_file
+    from study_app.workspace import workspace as workspace_here
+
+    if len(code) != 2 or not (code.isascii() and code.islower()):
+        raise StudyError(f"{code!r} is not a language: give two small letters, such as es")
+    file = workspace_here().folder / "languages" / f"{code}.toml"
+    if file.is_file():
+        click.echo(f"{file}: complete, {read_language(file).english_name}")
+    elif code in LANGUAGES:
+        click.echo(f"{LANGUAGES[code].english_name} ships with the program")
+    else:
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise cannot_write(file.parent, error) from error
+        write_file(file, language_template(code).encode())
+        click.echo(f"{file}: translate its texts, then run liquid-study language {code}")
+
+
+@click.command()
 @click.argument("named", metavar="[RESULTS]", required=False)
 @RESULTS
 def sessions(named: str | None, results: Path | None) -> None:

@@ -46,7 +46,7 @@ from study_app.designer.document.elements import (
     title_of,
 )
 from study_app.designer.document.fields import element_noun, label_of, node_at, rows, tags
-from study_app.designer.document.steps import AddElement, AddInstrument
+from study_app.designer.document.steps import AddElement, AddInstrument, AddLiquid, shipped_liquids
 from study_app.designer.document.study import Study
 from study_app.designer.parts import make_dense
 from study_app.gui.kit.commands import command_tip, key_cap, keys_of, with_key
@@ -209,7 +209,7 @@ class Addable:
 
     words: str
     icon: str
-    asks: AddElement | AddInstrument
+    asks: AddElement | AddInstrument | AddLiquid
     help: str = ""
 
 
@@ -234,8 +234,22 @@ def addable_elements(study: Study, selected: Path) -> tuple[Addable, ...]:
         for path in sections
     ]
     entries += _addable_questions(study, around) if not any(path[0] == QUESTIONNAIRES for path in lists) else ()
-    entries += _addable_instruments() if second else ()
+    entries += (*_addable_liquids(), *_addable_instruments()) if second else ()
     return tuple(entries)
+
+
+@cache
+def _addable_liquids() -> tuple[Addable, ...]:
+    """Return the liquids of the shipped studies."""
+    return tuple(
+        Addable(
+            words=f"{label_of(name)} liquid ({study})",
+            icon=icon_of(("liquids", name), {}),
+            asks=AddLiquid(study, name),
+            help=f"As in the shipped study {study}, with all its numbers",
+        )
+        for study, name in shipped_liquids()
+    )
 
 
 def _addable_questions(study: Study, around: Path) -> Iterator[Addable]:

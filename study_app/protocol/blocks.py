@@ -101,7 +101,9 @@ class Block(Table):
         default=(), max_length=8, description="The stimulus' standards that the block presents; default: all."
     )
     design: Kind | None = later(
-        default=None, description="How a trial is built: the name of a table in [designs], or a kind with its defaults."
+        default=None,
+        description="How a trial is built: the name of a table in [designs], or a kind with its defaults. The design "
+        "draws the order of the trials and asks its own question.",
     )
     method: Kind | None = later(
         default=None,

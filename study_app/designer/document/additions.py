@@ -57,6 +57,30 @@ def edits_to_switch(study: Study, path: Path, kind: str | None) -> tuple[Edit, .
     return (*edits, *(Set((*path, name), initial_value(after.document, (*path, name))) for name in needed))
 
 
+def edits_that_follow(study: Study, path: Path, *edits: Edit) -> tuple[Edit, ...]:
+    """Return edits of a block's design, followed by what the design fixes.
+
+    Keys that no longer belong to the block are removed; a questionnaire comes after the block, once; the first
+    condition becomes the standard.
+    """
+    if path[:1] != ("blocks",) or path[2:] != ("design",):
+        return edits
+    after = study.with_edits(*edits)[0].document
+    block = value_at(after, path[:2])
+    if not isinstance(block, Mapping):
+        return edits
+    others: list[Edit] = [Unset((*path[:2], key)) for key in refused_at(after, path[:2]) if key in block]
+    sequence, form = value_at(after, ("sequence",)), block.get("questionnaire")
+    if "design" in block:
+        others += [Unset((*path[:2], key)) for key in ("max_repeats", "min_distance", "questionnaire") if key in block]
+        if form is not None and isinstance(sequence, tuple) and path[1] in sequence and form not in sequence:
+            others.append(Insert(("sequence", sequence.index(path[1]) + 1), form))
+        conditions = block.get("conditions", ())
+        if len(conditions) > 1 and block.get("standard") not in conditions:
+            others.append(Set((*path[:2], "standard"), conditions[0]))
+    return (*edits, *others)
+
+
 def with_language(study: Study, code: str) -> tuple[Edit, ...]:
     """Return the edits that add a language: plain texts become tables, whose new texts are missing."""
     codes = languages_of(study.document)

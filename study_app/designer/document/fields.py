@@ -7,6 +7,7 @@ import re
 import string
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any, Final, Literal, TypeAlias
 
 from study_app.designer.document.toml_edits import Edit, Rename, Set, Unset
@@ -20,7 +21,10 @@ from study_app.protocol.questions import POINTS
 from study_app.protocol.source.document import Path, entries, has, names, value_at
 from study_app.protocol.source.problems import rule_of, shown_value
 from study_app.protocol.table import ALTERNATIVES, NOT_WITH, SECTIONS
-from study_app.protocol.wording.languages import languages_of
+from study_app.protocol.trials.designs import KINDS as DESIGNS
+from study_app.protocol.trials.designs import Design, default_design
+from study_app.protocol.trials.methods import KINDS as METHODS
+from study_app.protocol.wording.languages import LANGUAGES, languages_of
 
 Document = Mapping[str, Any]
 ITEMS = "items"
@@ -52,6 +56,12 @@ def references_to(document: Document, thing: Path) -> tuple[Path, ...]:
 
 def choices_at(document: Document, place: Path) -> tuple[str, ...] | None:
     """Return the permitted names of a text at ``place``; None if it is not a reference."""
+    block = value_at(document, place[:2]) if place[:1] == ("blocks",) and len(place) == 3 else None
+    if isinstance(block, Mapping) and place[2] == "standard" and block.get("conditions"):
+        return tuple(dict.fromkeys(block["conditions"]))
+    if isinstance(block, Mapping) and place[2] in {"design", "method"}:
+        kinds = METHODS if place[2] == "method" else _designs_for(block)
+        return tuple(dict.fromkeys((*names(document, f"{place[2]}s"), *kinds)))
     for pattern in CHOICES:
         if _matches_pattern(place, pattern):
             return tuple(name for section in _sections(document, pattern) for name in names(document, section))
@@ -59,6 +69,32 @@ def choices_at(document: Document, place: Path) -> tuple[str, ...] | None:
         items = (item for path, item in _items(document) if _can_name_item(place, path))
         return tuple(dict.fromkeys(str(item["id"]) for item in items))
     return None
+
+
+@cache
+def _designs() -> dict[str, Design]:
+    """Return the designs that need no key but their kind."""
+    return {
+        kind: default_design(kind)
+        for kind, design in DESIGNS.items()
+        if not any(key.is_required() for key in design.model_fields.values())
+    }
+
+
+def _designs_for(block: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the kinds of designs that a block can have: one of conditions compares them with its standard."""
+    for kind, design in _designs().items():
+        if "stimulus" in block or (design.has_standard and not design.adjusts):
+            yield kind
+
+
+def kind_note(place: Path, kind: str) -> str:
+    """Return what a paper calls a kind of design, and what it asks; for a method, how it chooses levels."""
+    if place[-1] == "design" and kind in _designs():
+        design = _designs()[kind]
+        return f"{design.paper_name}: {LANGUAGES['en'].design_questions[design.wording]}"
+    own = METHODS.own.get(kind) if place[-1] == "method" else None
+    return "" if own is None else " ".join((own.__doc__ or "").split("\n\n")[0].split()).rstrip(".")
 
 
 def sections_at(place: Path) -> tuple[str, ...]:

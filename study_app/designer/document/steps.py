@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, fields, is_dataclass, replace
+from functools import cache
 from typing import Any, Literal, TypeAlias
 
 from study_app.designer.document.additions import (
     check_values,
+    edits_that_follow,
     edits_to_add,
     edits_to_copy_with,
     edits_to_duplicate,
@@ -40,6 +42,7 @@ from study_app.designer.document.toml_text import Refused, with_own_line_ends
 from study_app.ids import free_id
 from study_app.number_text import counted
 from study_app.protocol.formats import is_format_2
+from study_app.protocol.load import read_document, shipped, source_bytes
 from study_app.protocol.questionnaires import instrument_tables
 from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.wording.languages import language_name, languages_of
@@ -89,7 +92,7 @@ class SetValue(Request):
     typing: bool = False
 
     def step(self, at: Situation) -> Step:
-        edits = (Set(self.path, self.value),)
+        edits = edits_that_follow(at.study, self.path, Set(self.path, self.value))
         return Step(f"Change {label_of(self.path[-1])}", edits, continues=self.path if self.typing else None)
 
 
@@ -129,7 +132,8 @@ class RemoveKey(Request):
     path: Path
 
     def step(self, at: Situation) -> Step:
-        return Step(f"Remove {label_of(self.path[-1])}", (Unset(self.path),))
+        edits = edits_that_follow(at.study, self.path, Unset(self.path))
+        return Step(f"Remove {label_of(self.path[-1])}", edits)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +143,8 @@ class AddKey(Request):
     path: Path
 
     def step(self, at: Situation) -> Step:
-        return Step(f"Add {label_of(self.path[-1])}", (Set(self.path, _first_value(at.study, self.path)),))
+        edits = edits_that_follow(at.study, self.path, Set(self.path, _first_value(at.study, self.path)))
+        return Step(f"Add {label_of(self.path[-1])}", edits)
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,7 +229,7 @@ class AddNamed(Request):
                 end = (*self.path, len(listed))
                 edits = (*edits, Insert(end, path[1]) if listed else Set(self.path, [path[1]]))
         else:
-            edits = (*edits, Set(self.path, path[1]))
+            edits = edits_that_follow(at.study, self.path, *edits, Set(self.path, path[1]))
         return Step(f"Add {element_noun(self.section)}", edits, path, fresh="new")
 
 
@@ -240,6 +245,34 @@ class AddInstrument(Request):
         path = ("questionnaires", free_id(taken, self.name.replace("-", "_")))
         edits = (Set(("scales", name), scale) for name, scale in scales.items() if name not in scale_names)
         return Step(f"Add {self.name}", (*edits, Set(path, table)), path)
+
+
+@cache
+def shipped_liquids() -> dict[tuple[str, str], Mapping[str, Any]]:
+    """Return the tables of the shipped studies' liquids that mean the same in format 2, by study and id."""
+    documents = {name: read_document(source_bytes(name), name)[0] for name in shipped()}
+    return {
+        (study, name): table
+        for study, document in documents.items()
+        for name, table in document.get("liquids", {}).items()
+        if is_format_2(document) or table.get("effects", "auto") != "auto"
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class AddLiquid(Request):
+    """Add a shipped study's liquid, and a condition of it where the study has conditions."""
+
+    source: str
+    name: str
+
+    def step(self, at: Situation) -> Step:
+        document = at.study.document
+        name = free_id((*names(document, "liquids"), *names(document, "conditions")), self.name)
+        edits: tuple[Edit, ...] = (Set(("liquids", name), _as_written(shipped_liquids()[self.source, self.name])),)
+        if names(document, "conditions"):
+            edits = (*edits, Set(("conditions", name), {"liquid": name}))
+        return Step(f"Add {label_of(self.name).lower()}", edits, ("liquids", name))
 
 
 @dataclass(frozen=True, slots=True)

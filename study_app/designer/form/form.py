@@ -16,7 +16,17 @@ from study_app.designer.document.elements import (
     title_of,
     usage_text,
 )
-from study_app.designer.document.fields import Choice, Row, label_of, named_at, refused_at, row_at, rows, sections_of
+from study_app.designer.document.fields import (
+    Choice,
+    Row,
+    kind_note,
+    label_of,
+    named_at,
+    refused_at,
+    row_at,
+    rows,
+    sections_of,
+)
 from study_app.designer.document.steps import AddToSession, Request, SetValue, index_of
 from study_app.designer.document.study import Study
 from study_app.designer.form.card import EDITORS
@@ -242,7 +252,7 @@ def _notes(document: Mapping[str, Any], row: Row) -> Iterator[tuple[str, str]]:
     if row.kind == "reference":
         for choice in row.choices:
             facts = (short_note(document, (section, str(choice.value))) for section in row.sections)
-            yield str(choice.value), next(filter(None, facts), "")
+            yield str(choice.value), next(filter(None, facts), "") or kind_note(row.path, str(choice.value))
 
 
 def _entries(study: Study, row: Row) -> Iterator[Entry]:

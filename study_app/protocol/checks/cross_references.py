@@ -15,7 +15,7 @@ from study_app.protocol.groups import ASSIGNMENT, SEQUENCES, sequences_in
 from study_app.protocol.questions import POINTS, Context, Question, Scale, ShowIf, Statement, question_of
 from study_app.protocol.source.document import Path, entries, names, value_at
 from study_app.protocol.source.problems import Fault, did_you_mean, unknown_name
-from study_app.protocol.wording.languages import LANGUAGES, missing_text
+from study_app.protocol.wording.languages import LANGUAGES, REFUSED, missing_text
 
 REFERENCES = {
     "conditions.*.liquid": "liquids",
@@ -208,7 +208,9 @@ def check_languages(document: Document) -> Iterator[Fault]:
     written = [(path, name) for path, name in entries(document, "study.languages.*") if isinstance(name, str)]
     for path, name in written:
         if name not in LANGUAGES:
-            known = f"known: {', '.join(LANGUAGES)}"
+            known = REFUSED.get(
+                name, f"known: {', '.join(LANGUAGES)}; liquid-study language {name} begins a file of it"
+            )
             yield Fault(path, f'the program does not have texts in "{name}"', known, permitted=tuple(LANGUAGES))
     wanted = tuple(name for _, name in written)
     texts = (texts_of_pattern for pattern in TEXTS for texts_of_pattern in entries(document, pattern)) if wanted else ()

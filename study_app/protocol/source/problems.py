@@ -55,6 +55,7 @@ class Fault(NamedTuple):
 
 _PATTERNS = {
     r"^[a-z][a-z0-9_]*$": "small letters, digits and underscores, a letter first",
+    r"^[a-z0-9][a-z0-9_]*$": "small letters, digits and underscores",
     r"^[a-z][a-z0-9]*$": "small letters and digits, a letter first, no underscore",
     r"^[a-z]{2}$": "a language of two small letters, such as en",
     r"^[A-Z]$": "one capital letter",

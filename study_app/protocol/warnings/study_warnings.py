@@ -229,7 +229,7 @@ def _analysis_warnings(protocol: Protocol) -> Iterator[str]:
     """Yield why the study may not answer its question, regardless of the answers."""
     decided = protocol.analysis
     for block in protocol.main_blocks:
-        if block.order == "fixed" and len(block.conditions) > 1:
+        if block.order == "fixed" and block.design is None and len(block.conditions) > 1:
             yield (
                 f"blocks.{block.id}.order: all participants experience the {protocol.compared_in(block.id)} in "
                 "one order, so their effect is confounded with practice and fatigue; choose shuffled, latin or "
@@ -308,12 +308,34 @@ def _condition_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
                     f"blocks.{block.id}.conditions: delays of {delay_ms:g} and {other:g} ms differ by less than "
                     f"a frame of {FRAME_MS:g} ms, which the screen cannot show"
                 )
+    if block.design is not None and block.standard is not None:
+        yield from _mixed_differences(protocol, block, block.standard)
     texts = [block.setting_label] if isinstance(block.setting_label, str) else list(block.setting_label.values())
     title_words = {word for text in texts for word in re.findall(r"\w+", text.casefold())}
     for name in sorted(
         {*block.conditions, *(liquid for condition in conditions for liquid in condition.liquid_ids)} & title_words
     ):
         yield f"blocks.{block.id}.setting_label: mentions the condition “{name}”, which participants then know"
+
+
+def _mixed_differences(protocol: Protocol, block: Block, standard: str) -> Iterator[str]:
+    """Yield conditions that differ from the standard in more than one way: either may be what participants notice."""
+    ways = {
+        "liquid": ("liquid_ids",),
+        "view": ("seen",),
+        "visual delay": (DELAY,),
+        "late or lost force": tuple(OF_LINK),
+    }
+    for name in block.conditions:
+        pair = [protocol.conditions[condition] for condition in (name, standard)]
+        differing = [
+            words for words, keys in ways.items() if len({tuple(getattr(one, key) for key in keys) for one in pair}) > 1
+        ]
+        if len(differing) > 1:
+            yield (
+                f"blocks.{block.id}.conditions: “{name}” and the standard “{standard}” differ in "
+                f"{' and '.join(differing)}: answers cannot tell which of them was noticed"
+            )
 
 
 def _forced_choice_warnings(protocol: Protocol, block: Block) -> Iterator[str]:

@@ -1,19 +1,24 @@
 """The program's own words on the participant's pages, one file for each language: everything that no protocol writes.
 
-Templates in braces are filled with ``str.format``; where grammar depends on a number there is a method.
+Templates in braces are filled with ``str.format``; where grammar depends on a number there is a method. Languages of a
+lab are complete files in the workspace's folder ``languages``, read when the program starts.
 """
 
 from __future__ import annotations
 
+import re
+import string
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Any, Final
 
 from study_app.errors import StudyError
 from study_app.number_text import exact_text, readings_of
 from study_app.protocol.source.document import Path, entries
+from study_app.protocol.source.files import without_byte_order_mark
 from study_app.protocol.source.problems import Fault, did_you_mean
+from study_app.workspace import workspace
 
 RIGHT_TO_LEFT = frozenset({"ar", "dv", "fa", "he", "ks", "ps", "sd", "ug", "ur", "yi"})
 
@@ -78,10 +83,85 @@ class Words:
 
 
 _FOLDER: Final = File(__file__).parent
-LANGUAGES: Final = {
-    code: Words(tomllib.loads((_FOLDER / f"{code}.toml").read_text(encoding="utf-8")))
-    for code in ("en", "nl", "de", "fr", "ar")
-}
+_ENGLISH: Final = tomllib.loads((_FOLDER / "en.toml").read_text(encoding="utf-8"))
+
+
+def read_language(file: File) -> Words:
+    """Return the words in a file of one language.
+
+    Raises
+    ------
+    StudyError
+        It cannot be read, or texts are missing, unknown, or have other slots than the English ones: says which.
+    """
+    try:
+        table = tomllib.loads(without_byte_order_mark(file.read_bytes()).decode("utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise StudyError(f"{file} cannot be read as TOML ({error}): correct it") from error
+    faults = [*_language_faults("", _ENGLISH, table)]
+    if table.get("language") != file.stem:
+        faults.append(f'language must be "{file.stem}", as the file\'s name')
+    if faults:
+        more = f"; and {len(faults) - _SHOWN} more" if len(faults) > _SHOWN else ""
+        raise StudyError(f"{file}: {'; '.join(faults[:_SHOWN])}{more}")
+    return Words(table)
+
+
+_SHOWN: Final = 8
+
+
+def _language_faults(place: str, english: Mapping[str, Any], table: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what is missing, unknown or wrong in a table of texts, compared with the English one."""
+    yield from (f"{place}{key} is unknown: remove it" for key in table if key not in english)
+    for key, model in english.items():
+        text = table.get(key)
+        if not text:
+            yield f"{place}{key} is missing"
+        elif isinstance(model, Mapping):
+            yield from _language_faults(f"{key}.", model, text) if isinstance(text, Mapping) else [f"{key} is no table"]
+        elif type(text) is not type(model) or (
+            isinstance(text, list) and not all(isinstance(one, str) for one in text)
+        ):
+            yield f"{place}{key} must be {'a list of texts' if isinstance(model, list) else 'a text'}"
+        elif key == "interval_coming" and len(text) != len(model):
+            yield f"{place}{key} needs {len(model)} texts"
+        elif isinstance(text, str) and (wrong := _slots(text) ^ _slots(model)):
+            yield f"{place}{key} must have the slots of “{model}”, and differs in {{{'}, {'.join(sorted(wrong))}}}"
+
+
+def _slots(text: str) -> set[str]:
+    try:
+        return {name for _, name, _, _ in string.Formatter().parse(text) if name is not None}
+    except ValueError:  # a single brace
+        return {"…"}
+
+
+def own_languages(folder: File) -> tuple[dict[str, Words], dict[str, str]]:
+    """Return the languages in a folder by code, and why the others are refused."""
+    found: dict[str, Words] = {}
+    refused: dict[str, str] = {}
+    for file in sorted(folder.glob("[a-z][a-z].toml")):
+        try:
+            found[file.stem] = read_language(file)
+        except StudyError as error:
+            refused[file.stem] = str(error)
+    return found, refused
+
+
+_OWN, REFUSED = own_languages(workspace().folder / "languages")
+LANGUAGES: Final = {code: read_language(_FOLDER / f"{code}.toml") for code in ("en", "nl", "de", "fr", "ar")} | _OWN
+
+
+def language_template(code: str) -> str:
+    """Return a file of a language without its texts; the English ones are comments."""
+    lines = (_FOLDER / "en.toml").read_text(encoding="utf-8").splitlines()[2:]
+    text = "\n".join(re.sub(r'^(\w+) = ((?:".*?"|\[.*\]))(.*)$', _empty_line, line) for line in lines)
+    return text.replace('language = ""', f'language = "{code}"', 1) + "\n"
+
+
+def _empty_line(line: re.Match[str]) -> str:
+    empty = "[]" if line[2].startswith("[") else '""'
+    return f"{line[1]} = {empty}  # {line[2]}{line[3]}"
 
 
 def languages_of(document: Mapping[str, Any]) -> tuple[str, ...]:

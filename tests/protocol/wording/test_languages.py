@@ -1,7 +1,11 @@
 """With a device without force, no page of a shipped study speaks of feeling; its file and statements stay."""
 
+import os
 import re
 import string
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -9,6 +13,7 @@ from study_app.errors import StudyError
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.without_force import SENTENCES, without_force
+from study_app.protocol.wording import languages
 from study_app.protocol.wording.languages import LANGUAGES, words
 
 
@@ -112,3 +117,84 @@ def test_a_study_of_ones_own_is_shown_as_it_is_written() -> None:
 def test_the_programs_own_questions_speak_of_no_feeling(language: str) -> None:
     said = words(language)
     assert [one for one in said.design_questions.values() if FEELING.search(one)] == []
+
+
+def spanish(folder: Path, **changed: str) -> Path:
+    """Return a file of a lab's own language: the English texts with a mark, under another code."""
+    text = re.sub(r'"([^"]*)"', r'"¡\1"', (Path(languages.__file__).parent / "en.toml").read_text("utf-8"))
+    text = text.replace('language = "¡en"', 'language = "es"')
+    for key, value in changed.items():
+        text = re.sub(rf"^{key} = .*$", value, text, flags=re.MULTILINE)
+    (folder / "es.toml").write_text(text, encoding="utf-8")
+    return folder / "es.toml"
+
+
+def test_a_labs_own_language_is_one_like_the_others(tmp_path: Path) -> None:
+    own, refused = languages.own_languages(spanish(tmp_path).parent)
+    assert refused == {}
+    assert own["es"].continue_ == "¡Continue"
+    assert own["es"].missing([5, 8]) == "¡¡Two statements still need an answer: 5 ¡and 8."
+    assert vars(own["es"]).keys() == vars(words("en")).keys()
+
+
+@pytest.mark.parametrize(
+    ("key", "line", "said"),
+    [
+        ("pause_title", "", "pause_title is missing"),
+        ("pause_title", 'pause_title = ""', "pause_title is missing"),
+        ("abx", "", "design_questions.abx is missing"),
+        ("part", 'part = "Parte {parte}"', "part must have the slots of"),
+        ("part", "part = 3", "part must be a text"),
+        ("part", 'part = "Parte {"', "part must have the slots of"),
+        ("interval_coming", 'interval_coming = ["a", "b"]', "interval_coming needs 4 texts"),
+        ("small_numbers", 'small_numbers = ["Uno", 2]', "small_numbers must be a list of texts"),
+        ("done", 'done = "Hecho"\nhola = "x"', "hola is unknown: remove it"),
+        ("language", 'language = "en"', 'language must be "es"'),
+        ("done", "done = ", "cannot be read as TOML"),
+    ],
+)
+def test_an_incomplete_language_is_refused_with_what_is_wrong(tmp_path: Path, key: str, line: str, said: str) -> None:
+    own, refused = languages.own_languages(spanish(tmp_path, **{key: line}).parent)
+    assert own == {}
+    assert said in refused["es"]
+    assert "\n" not in refused["es"]
+
+
+def test_a_template_lacks_every_text_and_is_complete_once_each_is_written(tmp_path: Path) -> None:
+    file = tmp_path / "es.toml"
+    template = languages.language_template("es")
+    file.write_text(template, encoding="utf-8")
+    with pytest.raises(StudyError, match="name is missing; english_name is missing"):
+        languages.read_language(file)
+    file.write_text(re.sub(r'(?:""|\[\])  # ("[^"]*"|\[.*?\])', r"\1", template), encoding="utf-8")
+    expected = vars(words("en")) | {"language": "es"}
+    assert vars(languages.read_language(file)) == expected
+
+
+def test_a_study_in_the_labs_language_is_checked_and_described(tmp_path: Path) -> None:
+    folder = tmp_path / "lab"
+    (folder / "languages").mkdir(parents=True)
+    spanish(folder / "languages")
+    study = tmp_path / "own.toml"
+    study.write_text(STUDY, encoding="utf-8")
+    command = [sys.executable, "-m", "study_app", "check", str(study)]
+    environment = {**os.environ, "LIQUID_STUDY_WORKSPACE": str(folder)}
+    done = subprocess.run(command, check=False, capture_output=True, text=True, env=environment)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert re.search(r"Languages +es\n", done.stdout)
+    spanish(folder / "languages", done="")
+    done = subprocess.run(command, check=False, capture_output=True, text=True, env=environment)
+    assert done.returncode == 2
+    assert "es.toml: done is missing" in done.stderr
+
+
+STUDY = """
+format = 2
+study.name = "own"
+study.languages = ["es"]
+sequence = ["feel"]
+liquids.thin.density_kg_m3 = 1000
+liquids.thick.density_kg_m3 = 1400
+tasks.explore = { kind = "explore", min_s = 1, max_s = 2, instruction = "Explora." }
+blocks.feel = { conditions = ["thin", "thick"], design = "abx", standard = "thin", repetitions = 4 }
+"""

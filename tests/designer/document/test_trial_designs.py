@@ -1,0 +1,112 @@
+"""A block of conditions with a trial design is one step; shipped liquids can be added."""
+
+import pytest
+
+from study_app.designer.document.fields import kind_note, row_at
+from study_app.designer.document.steps import AddKey, AddLiquid, RemoveKey, SetValue, Situation, shipped_liquids
+from study_app.designer.document.study import Study, read_study
+from study_app.designer.outline import addable_elements
+from study_app.protocol.warnings.study_warnings import warnings
+
+STUDY = b"""\
+format = 2
+study.name = "abx"
+sequence = ["feel"]
+[liquids.water]
+density_kg_m3 = 1001
+[liquids.slime]
+density_kg_m3 = 1399
+[tasks.explore]
+kind = "explore"
+min_s = 1
+max_s = 2
+instruction = "Explore the liquid."
+[scales.agree]
+labels.en = ["1", "2", "3", "4", "5", "6", "7"]
+[questionnaires.after]
+intro = "What did you feel?"
+scale = "agree"
+items = [{ id = "thick", text = "It felt thick.", short = "Thick" }]
+[conditions.water]
+liquid = "water"
+[conditions.slime]
+liquid = "slime"
+[conditions.late]
+liquid = "slime"
+delay_ms = 80
+[blocks.feel]
+conditions = ["water", "slime"]
+order = "constrained"
+max_repeats = 2
+repetitions = 4
+questionnaire = "after"
+"""
+DESIGN = ("blocks", "feel", "design")
+
+
+def after(study: Study, *requests: AddKey | SetValue | RemoveKey | AddLiquid) -> Study:
+    for request in requests:
+        study, _ = study.with_edits(*request.step(Situation(study)).edits)
+    return study
+
+
+@pytest.fixture
+def study() -> Study:
+    read = read_study(STUDY)
+    assert read.faults == ()
+    return read
+
+
+@pytest.mark.parametrize("kind", ["abx", "2ifc", "4ifc", "oddity", "samedifferent", "yesno"])
+def test_each_design_of_the_list_is_one_step_without_a_problem(study: Study, kind: str) -> None:
+    row = row_at(study.document, DESIGN)
+    assert row is not None
+    assert kind in [choice.value for choice in row.choices]
+    assert kind_note(DESIGN, kind).endswith("?")
+    whole = after(study, SetValue(DESIGN, kind))
+    assert whole.faults == ()
+    block = whole.document["blocks"]["feel"]
+    assert block["standard"] == "water"
+    assert not {"order", "max_repeats", "questionnaire"} & set(block)
+    assert whole.document["sequence"] == ("feel", "after"), "the questionnaire comes once, after the block"
+
+
+def test_a_design_that_is_added_and_removed_again_leaves_no_problem(study: Study) -> None:
+    added = after(study, AddKey(DESIGN))
+    assert added.faults == ()
+    removed = after(added, RemoveKey(DESIGN))
+    assert removed.faults == ()
+    assert "standard" not in removed.document["blocks"]["feel"]
+
+
+def test_the_standard_is_one_of_the_blocks_conditions(study: Study) -> None:
+    row = row_at(after(study, SetValue(DESIGN, "abx")).document, ("blocks", "feel", "standard"))
+    assert row is not None
+    assert [choice.value for choice in row.choices] == ["water", "slime"]
+    assert not any("^" in bound for bound in row.bounds)
+
+
+def warned(study: Study) -> str:
+    assert study.protocol is not None
+    return "\n".join(warnings(study.protocol))
+
+
+def test_another_liquid_and_another_delay_are_warned_of_and_a_drawn_order_is_not(study: Study) -> None:
+    good = after(study, SetValue(DESIGN, "abx"))
+    assert "in one order" not in warned(good)
+    assert "differ in" not in warned(good)
+    slip = after(good, SetValue(("blocks", "feel", "conditions"), ["water", "late"]))
+    assert "“late” and the standard “water” differ in liquid and visual delay" in warned(slip)
+
+
+def test_shipped_liquids_are_found_and_added_with_all_their_numbers(study: Study) -> None:
+    entries = {entry.words: entry for entry in addable_elements(study, ())}
+    slime = entries["Slime liquid (slime)"]
+    assert isinstance(slime.asks, AddLiquid)
+    added = after(study, slime.asks)
+    assert added.faults == ()
+    table = added.document["liquids"]["slime_2"]
+    assert dict(table) == dict(shipped_liquids()["slime", "slime"])
+    assert added.document["conditions"]["slime_2"] == {"liquid": "slime_2"}
+    for source, name in shipped_liquids():
+        assert after(study, AddLiquid(source, name)).faults == ()
