@@ -7,7 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TypeAlias
 
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSignalBlocker, Qt, Signal
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPainterPath, QPaintEvent, QPen, QRadialGradient
 from PySide6.QtWidgets import QSizePolicy, QSpacerItem, QWidget
 
@@ -129,6 +129,11 @@ class ResumeBanner(QWidget):
         margins = (SHADOW + 22, 14, SHADOW + 18, 14)
         hbox(Icon("clock", "warn", 26), (text, 1), self.resume, spacing=18, margins=margins, parent=self)
         self.hide()
+
+    def minimumSizeHint(self) -> QSize:
+        """Return the height in the present width: the minimum of words that wrap is that of the narrowest lines."""
+        hint = super().minimumSizeHint()
+        return QSize(hint.width(), self.heightForWidth(max(hint.width(), self.width())))
 
     def show_interrupted(self, session: Interrupted | None) -> None:
         self._shown = session

@@ -6,7 +6,7 @@ from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
-from PySide6.QtCore import QEvent, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QDialog, QHBoxLayout, QLayout, QSizePolicy, QWidget
 
@@ -15,6 +15,7 @@ from study_app.errors import StudyError
 from study_app.gui.application import open_here
 from study_app.gui.display.screens import screens_shown
 from study_app.gui.home.cards import (
+    LEAST_HEIGHT,
     BrokenCard,
     CardGrid,
     DeviceCard,
@@ -58,6 +59,8 @@ COLUMN_PX = 326
 MARGIN, BAR_PX = 28, 12
 NEXT_ROW_PX = 30
 """So much of the second row of cards is seen at least, which says that there is one."""
+LOW_PX = 150
+"""The least height of the sessions in a low window: a row or two."""
 CARDS_SHARE, BELOW_SHARE = 4, 3
 """How the cards and the sessions share the height."""
 
@@ -158,17 +161,18 @@ class HomePlace(Place):
         self._beside.setSpacing(18)
         add_parts(self._beside, self.device, self.lab, STRETCH)
         add_layout(self._below, self._beside)
-        self.below = QWidget()
+        self.below = _Below()
         self.below.setLayout(self._below)
         self.cards_area = scrolled(self.grid)
         self.cards_area.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Ignored)  # no more than is free
         inside = QWidget()
+        self._below_row = _row_beside_bar(self.below)
         self._page = vbox(
             _row_beside_bar(head),
             _row_beside_bar(self.banner),
             (self.waiting, 1, Qt.AlignmentFlag.AlignCenter),
             (self.cards_area, CARDS_SHARE),
-            (_row_beside_bar(self.below), BELOW_SHARE),
+            (self._below_row, BELOW_SHARE),
             spacing=14,
             parent=inside,
         )
@@ -205,7 +209,6 @@ class HomePlace(Place):
         self.waiting.hide()
         if read != self._facts:
             self._show_facts(read)
-        self.below.show()
         self.show_sessions()
 
     def _show_unread(self, error: Exception) -> None:
@@ -234,6 +237,7 @@ class HomePlace(Place):
         down_px = bar.value()
         self.grid.show_cards(cards)
         self._order_focus()
+        self._fill_next_step()
         self._arrange()
         bar.setValue(down_px)
         if held is not None:
@@ -281,9 +285,22 @@ class HomePlace(Place):
         self.sessions.show_sessions(sessions, str(results), datetime.now().astimezone())
         self._show_last(sessions)
         self.banner.show_interrupted(stopped)
+        self._fill_next_step()
+        self.below.show()
+        self._share_height()
         for card in self.grid.cards:
             if isinstance(card, StudyCard):
                 card.held.setText(session_counts_text(sessions, card.facts.protocol.study.name))
+
+    def _fill_next_step(self) -> None:
+        """Fill one button alone: that of the banner, or without an interrupted session that of the first card."""
+        cards = [card for card in self.grid.cards if isinstance(card, StudyCard | BrokenCard)]
+        first = next((card for card in cards if card.facts.draft is not None or isinstance(card, StudyCard)), None)
+        if first is None:
+            return
+        button = first.pen if first.facts.draft is not None or not isinstance(first, StudyCard) else first.new
+        if isinstance(button, ActionButton):
+            button.set_role("" if self.banner.isVisibleTo(self) else "primary")
 
     def _show_last(self, sessions: tuple[SessionFacts, ...]) -> None:
         """After a new session, show the sessions of its kind and move its study to the front."""
@@ -356,6 +373,7 @@ class HomePlace(Place):
 
     def _arrange(self) -> None:
         stacked = self.width() < STACKED_BELOW or self.sessions.is_empty
+        self.below.shares = not self.sessions.is_empty
         self._page.setStretch(self._page.count() - 1, 0 if self.sessions.is_empty else BELOW_SHARE)
         down, right = QBoxLayout.Direction.TopToBottom, QBoxLayout.Direction.LeftToRight
         self._below.setDirection(down if stacked else right)
@@ -369,12 +387,32 @@ class HomePlace(Place):
         self._share_height()
 
     def _share_height(self) -> None:
-        """Give the cards at least their first row; if the page scrolls, their whole height: one bar is enough."""
-        if (whole := self.grid.whole_height) > 0:  # cards that came just now have no height yet
+        """Give the cards at least their first row.
+
+        In a low window the lab, which the sidebar has, and most rows of the sessions give way. If the page still
+        scrolls, the cards get their whole height: one bar is enough.
+        """
+        if (whole := self.grid.whole_height) <= 0:  # cards that came just now have no height yet
+            return
+        for low, beyond in ((False, NEXT_ROW_PX), (True, NEXT_ROW_PX), (True, 0)):
+            self.lab.setVisible(not low or self.sessions.is_empty)
+            if not self.sessions.is_empty:
+                self.sessions.setMinimumHeight(LOW_PX if low else LEAST_HEIGHT)
+            self._forget_heights()
             others = self._page.totalMinimumSize().height() - self.cards_area.minimumHeight()
-            least = min(whole, self.grid.row_height + NEXT_ROW_PX)
-            self.cards_area.setMinimumHeight(least if others + least <= self.area.viewport().height() else whole)
-            self.cards_area.setMaximumHeight(whole)
+            least = min(whole, self.grid.row_height + beyond)
+            if fits := others + least <= self.area.viewport().height():
+                break
+        self.cards_area.setMinimumHeight(least if fits else whole)
+        self.cards_area.setMaximumHeight(whole)
+        self._forget_heights()
+        self._page.activate()
+
+    def _forget_heights(self) -> None:
+        """Let layouts ask for heights again, which they would do only after the next events."""
+        for layout in (self._beside, self._below, self._below_row, self._page):
+            layout.invalidate()
+        self.below.updateGeometry()
 
     def focusNextPrevChild(self, forward: bool) -> bool:
         moved = super().focusNextPrevChild(forward)
@@ -387,6 +425,21 @@ class HomePlace(Place):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._arrange()
+
+
+class _Below(QWidget):
+    """Sessions, device and lab; if they share the height with the cards, as high as there is room for.
+
+    A layout gives a widget whose words wrap the height of its hint at least: then the minimum is the hint.
+    """
+
+    shares = True
+
+    def hasHeightForWidth(self) -> bool:
+        return not self.shares and super().hasHeightForWidth()
+
+    def sizeHint(self) -> QSize:
+        return self.minimumSizeHint() if self.shares else super().sizeHint()
 
 
 def _row_beside_bar(part: QWidget | QLayout) -> QHBoxLayout:

@@ -106,6 +106,18 @@ class ActionButton(Themed, PressedByEnter):
         self.updateGeometry()  # the same text needs no layout, but an icon that appears or disappears does
         self.update()
 
+    @property
+    def role(self) -> str:
+        """The role: "primary" is filled."""
+        return self._role
+
+    def set_role(self, role: str) -> None:
+        if role != self._role:
+            self._role = role
+            self.setProperty("role", role)
+            self.style().polish(self)
+            self.update()
+
     def sizeHint(self) -> QSize:
         return QSize(round(self._content_width()) + 36, self.minimumHeight())
 

@@ -4,17 +4,19 @@ import threading
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QEvent, QSize, Qt
+from PySide6.QtCore import QEvent, QPoint, QSize, Qt
 from PySide6.QtWidgets import QApplication, QFileDialog
 
 from study_app.gui.home import view
 from study_app.gui.widgets.background import wait_for_jobs
+from study_app.gui.widgets.controls import ActionButton
 from study_app.protocol.source.files import source_bytes
 from study_app.store.drafts import Draft, delete_draft, write_draft
 from study_app.store.study_settings import keep_original
 from tests.golden import masked
 from tests.gui.home.home_window import hold, open_home
 from tests.gui.transcript import compare, story
+from tests.studies import begun
 
 pytestmark = pytest.mark.slow
 
@@ -175,6 +177,41 @@ def test_no_scroll_bar_stands_in_a_scroll_area(qtbot, tmp_path, size, held):
     home = open_home(qtbot, tmp_path, QSize(*size))
     bars = [area.verticalScrollBar() for area in (home.area, home.cards_area)]
     qtbot.waitUntil(lambda: sum(bar.maximum() > 0 for bar in bars) == 1)
+
+
+@pytest.mark.parametrize("size", [(1366, 746), (1280, 690), (1920, 1000)])
+@pytest.mark.parametrize("interrupted", [True, False])
+def test_studies_and_sessions_are_seen_at_once_and_one_button_is_filled(qtbot, tmp_path, size, interrupted):
+    hold(tmp_path / "demo", "P001")
+    if interrupted:
+        begun(tmp_path / "demo", "P002", "demo", simulated=False).close()
+    home = open_home(qtbot, tmp_path, QSize(*size))
+    qtbot.waitUntil(lambda: home.banner.isVisible() == interrupted and home.below.isVisible())
+    qtbot.wait(50)
+    assert home.area.verticalScrollBar().maximum() == 0
+    assert home.cards_area.geometry().bottom() < home.below.mapTo(home.area.widget(), QPoint(0, 0)).y()
+    assert home.cards_area.height() >= home.grid.row_height
+    table = home.sessions.rows.table
+    assert table.viewport().height() >= table.rowHeight(0), "a session is seen"
+    filled = [button for button in home.findChildren(ActionButton) if button.isVisible() and button.role == "primary"]
+    assert len(filled) == 1
+
+
+def test_no_word_on_sessions_while_they_are_read(qtbot, tmp_path, monkeypatch):
+    hold(tmp_path / "demo", "P001")
+    reading = threading.Event()
+    read = view._read_sessions
+    monkeypatch.setattr(view, "_read_sessions", lambda *given: reading.wait(10) and read(*given))
+    home = view.HomePlace(tmp_path)
+    qtbot.addWidget(home)
+    home.show()
+    home.show_studies()
+    qtbot.waitUntil(lambda: len(home.grid.cards) > 0)
+    qtbot.wait(50)
+    assert not home.sessions.isVisible(), "“No sessions yet” would be wrong"
+    reading.set()
+    qtbot.waitUntil(home.sessions.isVisible)
+    assert not home.sessions.is_empty
 
 
 def test_a_session_is_opened_by_the_keyboard_a_double_click_and_a_button(home, qtbot):
