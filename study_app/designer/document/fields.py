@@ -396,6 +396,8 @@ _OF_NUMBERS: Final = {
     "maximum": "at most {}",
     "exclusiveMaximum": "less than {}",
 }
+_NO_BOUND: Final = 1e6
+"""Numbers so large are limits of the computer, of which a form says nothing."""
 _HOLDS: Final = {
     "minimum": operator.ge, "exclusiveMinimum": operator.gt, "maximum": operator.le, "exclusiveMaximum": operator.lt,
 }  # fmt: skip
@@ -664,7 +666,8 @@ def _numbers_in(node: Node) -> Node:
 
 
 def _bound_texts(node: Node, numbers: Node) -> tuple[str, ...]:
-    phrases = [phrase.format(shown_value(numbers[key])) for key, phrase in _OF_NUMBERS.items() if key in numbers]
+    stated = {key: numbers[key] for key in _OF_NUMBERS if key in numbers and abs(numbers[key]) < _NO_BOUND}
+    phrases = [_OF_NUMBERS[key].format(shown_value(number)) for key, number in stated.items()]
     if "prefixItems" not in node:
         phrases += [phrase.format(node[key]) for key, phrase in _OF_LENGTHS.items() if key in node]
     return (*phrases, rule_of(node["pattern"])) if "pattern" in node else tuple(phrases)

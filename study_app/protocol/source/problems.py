@@ -59,6 +59,7 @@ _PATTERNS = {
     r"^[a-z][a-z0-9]*$": "small letters and digits, a letter first, no underscore",
     r"^[a-z]{2}$": "a language of two small letters, such as en",
     r"^[A-Z]$": "one capital letter",
+    r"^(tank|camera|[^\x00]+\.[0-9A-Za-z]+)$": "tank, camera, or a file such as film.mp4",
     r"^[0-9A-Za-z.+-]+$": "letters, digits, dots, plus and minus",
 }
 
