@@ -304,7 +304,7 @@ def test_the_tables_of_faults_are_complete() -> None:
     for made, name, others in ((force_dimension, "force-dimension", set()), (inverse3, "inverse3", {"slow", "torn"})):
         with open_device(f"{name}-emulated") as device, pytest.raises(DeviceError) as refused:
             device.take_fault("none of them")
-        assert tried[made] | others == set(str(refused.value).partition("choose of: ")[2].split(", "))
+        assert tried[made] | others == set(str(refused.value).partition("choose from: ")[2].split(", "))
     elsewhere = {"none", "slow", "hangs", "guarded", "saturated", "unwatched", "deaf", "unmodelled"}
     assert tried[force_dimension_library] | elsewhere == set(STANDIN)
 

@@ -69,7 +69,7 @@ class TestDoctor:
         [
             ("dropp=0.1", "choose one of: drop, truncate"),
             ("drop=1.5", "must be 0 to 1, not 1.5"),
-            ("drop", "not known; choose of: drop=CHANCE"),
+            ("drop", "not known; choose from: drop=CHANCE"),
             ("never", "never-homes, "),
             ("frozen=1", "does not come by chance"),
             ("", "not known"),
