@@ -120,6 +120,8 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
             "The decisions about the analysis changed between sessions, so all results are exploratory; those of the "
             "first session are used."
         )
+    if len({one.contrast.groups is None for one in results.contrasts}) == 2:
+        yield "Interactions between groups and blocks or conditions are not tested."
     if results.questions and not (results.blocks or results.levels):
         yield (
             "The answers to these questions are described, not tested: intervals are not corrected for the number of "

@@ -696,6 +696,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      when(lambda told: people(told) == 1)),
     (rf"{N} participants?: intervals of mean rank correlations and exploratory tests of means need at least 10\.",
      lambda match, told: count(match[1]) == people(told) < 10),
+    (r"Interactions between groups and blocks or conditions are not tested\.",
+     when(lambda told: {one["contrast"]["groups"] is None for one in told.contrasts} == {True, False})),
     (r"Effects that are not shown here may still exist\.", always),
     (rf"{LEAD}(the .*) (?:was|were) not computed: (.*)\.", not_computed),
     (rf"{LEAD}the tests of (.*) could not have been significant with so few participants: no rearrangement of the "
