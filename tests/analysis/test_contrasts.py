@@ -122,7 +122,7 @@ def test_thresholds_of_a_staircase_leave_nobody_out_and_name_who_did_not_do_a_bl
     (found,) = (results := evaluate(replace(study, trials=gone))).contrasts
     assert (found.n, found.dropped, found.left_out) == (7, 1, {"P003": "no threshold in late"})
     assert "Excluded: P003 (no threshold in late)." in first_page(results, ())
-    words = "Every participant with both numbers is included, also with a threshold beyond the levels"
+    words = "Every participant with both numbers is included, also if a threshold lies beyond the levels"
     assert words in preregistration(parse(text.encode(), "delayed.toml"), "0" * 64)
 
 

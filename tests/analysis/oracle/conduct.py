@@ -77,7 +77,7 @@ def compare_captions(compared: Compared, trials: pd.DataFrame) -> None:
         errors = counting.loc[counting["block"] == path.stem, "delay_error_mean_ms"]
         sums = measures.get(path.stem.removeprefix("liquids-"), {})
         for pattern, *own in (
-            (r"(?:n = |people; |of )(\w+) participants", [people], *compared_people),
+            (rf"(?:n = |people; |of )(\d+|{'|'.join(SMALL)}) participants", [people], *compared_people),
             (r"Cannot judge: (\d+); not answered: (\d+)\.", [sums.get("cannot_judge"), sums.get("missing")]),
             (r"by (\S+) ms on average \(trials: (\S+) to (\S+) ms", [errors.mean(), errors.min(), errors.max()]),
             (r"Correct: (\d+); (\S+) expected .* p = (\S+)\)", *hits),

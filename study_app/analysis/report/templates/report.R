@@ -92,7 +92,7 @@ equivalent <- function(what, d, row) {
 }
 for (place in seq_len(nrow(tests))) {
   row <- tests[place, ]
-  if (is.na(row$item) || is.na(row$statistic) && is.na(row$p) || grepl("stepping down", row$question)) next
+  if (is.na(row$item) || is.na(row$statistic) && is.na(row$p) || grepl("step-down", row$question)) next
   what <- paste0(row$block, " ", row$item, if (!is.na(row$comparison)) paste0(" (", row$comparison, ")"), ", ",
                  row$question, ":")
   x <- wide(row$block, row$item, row$codes, row$question == "sessions differ")
