@@ -231,7 +231,7 @@ ALIKE: Final = 0.6
 """Of the standard deviation of log widths so much is between people of one group; the rest is shared. [choice]"""
 APART: Final = (0.05, 0.1, 0.2)
 """Standard deviations of the thresholds of people of one group [range of thresholds]. [choice]"""
-MEAN_LAPSE: Final = 0.05
+MEAN_LAPSE: Final = 0.03
 """The mean lapse rates of groups are exponentially distributed with this mean. [choice]"""
 NEAR_MODE: Final = 2
 """Estimates of several people weight what they share by this power of its posterior: a lapse rate is not below zero,

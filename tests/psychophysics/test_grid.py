@@ -10,7 +10,19 @@ from scipy.stats import t as student
 
 from study_app.psychophysics.adaptive import RATIOS, Staircase, converges_to
 from study_app.psychophysics.families import CLIP, KAPPA, level_at, position, rise, success
-from study_app.psychophysics.grid import FREE_GUESSES, Grid, evenly, fit, geometric, quantile
+from study_app.psychophysics.grid import (
+    FREE_GUESSES,
+    GROUP_LAPSES,
+    MEAN_LAPSE,
+    Grid,
+    evenly,
+    fit,
+    geometric,
+    group_lapse_weights,
+    group_priors,
+    lapse_prior,
+    quantile,
+)
 from study_app.psychophysics.people import Expected, student_975
 
 LEVELS = evenly(-1.5, 0.0, 6)
@@ -53,6 +65,34 @@ def test_the_posterior_is_the_product_of_prior_and_likelihood_of_each_cell(guess
             likelihood *= p**yes * (1 - p) ** no
         by_hand[t, w, lapse, g] = likelihood * one.prior[t, w, lapse, g]
     assert fit(LEVELS, successes, failures, one).weights == pytest.approx(by_hand / by_hand.sum(), rel=1e-9)
+
+
+def test_the_prior_of_mean_lapse_rates_is_exponential_and_that_of_one_person_needs_no_group():
+    weights = group_lapse_weights()
+    assert weights.sum() == pytest.approx(1.0)
+    assert weights @ GROUP_LAPSES == pytest.approx(MEAN_LAPSE, rel=0.03)
+    assert weights[0] == pytest.approx(1 - math.exp(-0.006 / MEAN_LAPSE))  # up to half-way to the next
+    lapses = (0.0, 0.01, 0.03, 0.09, 0.16)
+    one = grid(width_prior=None, lapses=lapses, lapse_prior=lapse_prior(lapses))
+    (factors,) = group_priors([fit((), (), (), one)], (1.4, 1.5)).factors
+    of_lapse = (factors * one.lapse_prior).sum(axis=0)
+    assert of_lapse / of_lapse.sum() == pytest.approx(one.lapse_prior)
+
+
+def test_a_few_lapses_raise_the_lapse_rate_of_all_and_the_error_that_they_share():
+    lapses = (0.0, 0.01, 0.03, 0.09, 0.16)
+    one = grid(width_prior=None, lapses=lapses, lapse_prior=lapse_prior(lapses))
+
+    def priors(wrong_at_the_top):
+        successes, failures = [10, 11, 14, 18, 20, 40 - wrong_at_the_top], [10, 9, 6, 2, 0, wrong_at_the_top]
+        return group_priors([fit(LEVELS, successes, failures, one)] * 10, (1.4, 1.5))
+
+    none, many = priors(0), priors(3)
+    mean_rates = [(it.factors[0] * one.lapse_prior).sum(axis=0) @ lapses for it in (none, many)]
+    assert mean_rates[0] < 0.01
+    assert 0.04 < mean_rates[1] < 0.12  # 3 of 40
+    assert min(none.below, none.above, many.below, many.above) >= 0.0
+    assert none.below + none.above < many.below + many.above
 
 
 def test_many_answers_find_the_planted_function():

@@ -13,7 +13,7 @@ Z_95 = stats.norm.ppf(0.975)
 KAPPA = math.log10(math.log(20) / math.log(20 / 19))
 LAPSES = np.array([0.0, 0.01, 0.02, 0.03, 0.045, 0.065, 0.09, 0.12, 0.16])
 MEANS = np.array([0.002, 0.01, 0.02, 0.03, 0.045, 0.065, 0.09, 0.12])
-MEAN_PRIOR = np.diff(stats.expon.cdf([0, *(MEANS[1:] + MEANS[:-1]) / 2, np.inf], scale=0.05))
+MEAN_PRIOR = np.diff(stats.expon.cdf([0, *(MEANS[1:] + MEANS[:-1]) / 2, np.inf], scale=0.03))
 OF_LAPSE = np.diff(stats.gamma.cdf([0, *(LAPSES[1:] + LAPSES[:-1]) / 2, np.inf], 2, scale=MEANS[:, None] / 2))
 LAPSE_PRIOR = MEAN_PRIOR @ OF_LAPSE
 GUESSES = {"2ifc": np.array([0.5]), "yesno": np.array([0.01, 0.02, 0.05, 0.1, 0.2, 0.3])}
