@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from study_app.haptics.kernels.compiled import kernel, part
-from study_app.haptics.kernels.effects.added_mass import added_mass_force
+from study_app.haptics.kernels.effects.added_mass import added_mass_force, implicit_added_mass_force
 from study_app.haptics.kernels.effects.buoyancy import buoyancy_force
 from study_app.haptics.kernels.effects.current import current_velocity
 from study_app.haptics.kernels.effects.drag import drag_force
@@ -100,14 +100,19 @@ def apply_effects(model: Any, i: int, interval_s: float, delay_ticks: int) -> No
         wetted_fraction(local)
     if liquid.effects & effects.drag.BIT:
         drag_force(liquid, local, state)
-    if liquid.effects & effects.added_mass.BIT:
+    knows_force = state.kalman.on_ewma == 0 and liquid.known_force[delay_ticks] > 0.0
+    local.inertia_share = 1.0 if knows_force else liquid.inertia_share[delay_ticks]
+    local.slope_factor = liquid.known_force[delay_ticks] if knows_force else 1.0
+    if liquid.effects & effects.added_mass.BIT and not knows_force:
         added_mass_force(parameters, liquid, local, state, delay_ticks, interval_s)
     if liquid.effects & effects.history.BIT:
         basset_force(parameters, liquid, local, state, rows, delay_ticks, interval_s)
     if liquid.effects & effects.unsteady_drag.BIT:
-        unsteady_drag_force(parameters, liquid, local, state, delay_ticks, interval_s)
+        unsteady_drag_force(parameters, liquid, local, state, delay_ticks, interval_s, knows_force)
     if liquid.effects & effects.non_newtonian.BIT:
         non_newtonian_force(parameters, liquid, local, state, delay_ticks, interval_s)
+    if liquid.effects & effects.added_mass.BIT and knows_force:
+        implicit_added_mass_force(parameters, liquid, local, state, delay_ticks)
     if liquid.effects & effects.wake.BIT:
         update_wake(liquid, local, state, rows.elements, rows.segments, interval_s)
     if liquid.effects & effects.local_wake.BIT:
@@ -130,5 +135,5 @@ def write_sample(state: Record, sample: Record) -> None:
     copy(state.velocity_mps, sample.velocity_mps)
     copy(state.wake_mps, sample.wake_mps)
     copy(state.force_n, sample.force_n)
-    if state.kalman.on_ewma:
+    if state.kalman.on_ewma == 1:
         sample.limiters |= LIMITER_ESTIMATOR
