@@ -23,7 +23,7 @@ REMOVED: Final = {"falcon-socket": "falcon-emulated, or falcon"}
 
 
 RETURNS: Final = {
-    "open": Returns("a device", lambda value: callable(value.read) and callable(value.write) and callable(value.close)),
+    "open": Returns("a device", lambda value: None not in (value.read, value.write) and callable(value.close)),
     "probe": Returns("a list of Backend", lambda value: all(isinstance(backend, Backend) for backend in list(value))),
 }
 DEVICES: Final = Registry("device", {device.name: device for device in OWN}, DeviceDescriptor, "name", RETURNS)

@@ -44,7 +44,7 @@ def test_what_nobody_felt_is_kept_apart(tmp_path, device, folder):
 def test_firmware_is_for_falcons_alone(tmp_path):
     study = load("demo")
     chosen = replace(CHOSEN, results=tmp_path, device_options={"firmware": tmp_path / "file.bin"})
-    with pytest.raises(DeviceError, match="device 'mouse' takes no firmware; only these do: Novint Falcon,"):
+    with pytest.raises(DeviceError, match="device 'mouse' does not use firmware; only these do: Novint Falcon,"):
         check_choices(chosen, study)
     check_choices(replace(chosen, device="falcon"), study)
     with pytest.raises(DeviceNotFound, match="'falcon-socket:/run/f' was removed: choose falcon-emulated, or falcon"):
