@@ -125,8 +125,14 @@ def _language_faults(place: str, english: Mapping[str, Any], table: Mapping[str,
             yield f"{place}{key} must be {'a list of texts' if isinstance(model, list) else 'a text'}"
         elif key == "interval_coming" and len(text) != len(model):
             yield f"{place}{key} needs {len(model)} texts"
-        elif isinstance(text, str) and (wrong := _slots(text) ^ _slots(model)):
+        elif isinstance(text, str) and (wrong := _wrong_slots(text, model)):
             yield f"{place}{key} must have the slots of “{model}”, and differs in {{{'}, {'.join(sorted(wrong))}}}"
+
+
+def _wrong_slots(text: str, model: str) -> set[str]:
+    """Return the slots that only one of two texts has; a list may come without its count, as some grammars prefer."""
+    slots, needed = _slots(text), _slots(model)
+    return (slots - needed) | (needed - slots - ({"n"} if "list" in slots else set()))
 
 
 def _slots(text: str) -> set[str]:
