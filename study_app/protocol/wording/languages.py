@@ -118,7 +118,9 @@ def _language_faults(place: str, english: Mapping[str, Any], table: Mapping[str,
         if not text:
             yield f"{place}{key} is missing"
         elif isinstance(model, Mapping):
-            yield from _language_faults(f"{key}.", model, text) if isinstance(text, Mapping) else [f"{key} is no table"]
+            yield from (
+                _language_faults(f"{key}.", model, text) if isinstance(text, Mapping) else [f"{key} must be a table"]
+            )
         elif type(text) is not type(model) or (
             isinstance(text, list) and not all(isinstance(one, str) for one in text)
         ):
