@@ -399,7 +399,7 @@ def one_instead(story: Story) -> None:
         story.act(f"in place of {key}", lambda key=key, at=at: row("tasks", "reach", key).keys.buttons[at].click())
         task = story.designer.value("tasks", "reach")
         assert (key in task, task[other]) == (False, 1)
-    story.expect(undo="Give Count")
+    story.expect(undo="Give Number of targets")
     story.play("ctrl+z ctrl+z @blocks.liquids")
     story.expect(kept="saved")
     story.has("count = 6")
@@ -612,7 +612,7 @@ def repairs(story: Story) -> None:
     story.play("Return")
     story.expect("3 problems", undo='Use "thick"', at="Liquid")
     story.play("F8")
-    story.expect(selected="tasks.explore", at="Min")
+    story.expect(selected="tasks.explore", at="Minimum duration")
     text = DEMO.replace('languages = ["en"]', 'languages = ["en", "nl"]').replace(
         'title = "Liquids"', 'title.en = "Liquids"'
     )
