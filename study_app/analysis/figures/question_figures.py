@@ -199,9 +199,10 @@ def question_pictures(
 ) -> Iterator[Picture]:
     """Draw the figure of every question that was answered and has one, in each of ``forms``.
 
-    A figure that fails is left out, and kept in ``failures``; levels that participants set have a figure of their own.
+    A figure that fails is left out, and kept in ``failures``; blocks of levels have figures of their own once the key
+    is open.
     """
-    set_by_hand = {block.id for block in study.levels if block.design.adjusts}
+    of_levels = {block.id for block in study.levels if block.design.adjusts or study.revealed}
     yield from attempted(
         (
             (
@@ -210,7 +211,7 @@ def question_pictures(
                 partial(_picture, study, asked, found, forms, name),
             )
             for asked, found in zip(study.others.questions, answered, strict=True)
-            if found.figure is not None and found.n and found.where not in set_by_hand
+            if found.figure is not None and found.n and found.where not in of_levels
         ),
         failures,
     )

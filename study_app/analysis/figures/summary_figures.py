@@ -76,7 +76,7 @@ def _pictures(
         if estimates_of(found) is not None:
             name = f"estimates-{found.block}"
             yield found.block, name, partial(_estimates, study, found, forms, name)
-    for where in dict.fromkeys(one.where.id for one in study.others.questions):
+    for where in numbers_of(study):
         name = f"answers-{where}"
         yield where, name, partial(_answers, study, where, forms, name)
 
@@ -196,9 +196,10 @@ class Numbers(NamedTuple):
 
 
 def numbers_of(study: Study) -> dict[str, list[Numbers]]:
-    """Return the scores and the answers that are numbers, by where they were asked."""
-    places = dict.fromkeys(one.where.id for one in study.others.questions)
-    return {where: numbers_at(study, where) for where in places}
+    """Return the scores and the answers that are numbers, by where they were asked; none of blocks of levels."""
+    levels = {block.id for block in study.levels}
+    places = dict.fromkeys(one.where.id for one in study.others.questions if one.where.id not in levels)
+    return {where: found for where in places if (found := numbers_at(study, where))}
 
 
 def numbers_at(study: Study, where: str) -> list[Numbers]:
