@@ -619,7 +619,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
 @click.option(
     "--studies",
     type=click.IntRange(10, 1_000_000),
-    default=100,
+    default=60,
     show_default=True,
     help="Number of studies of 20 participants, for each protocol and seed.",
 )
