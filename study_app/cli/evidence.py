@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import secrets
 import signal
 import sys
 import threading
@@ -269,7 +270,7 @@ def _print_material_errors(to: Path | None, workers: Workers, *, solve: bool) ->
     metavar="FILE",
     help="Only measure the proportion of a delayed force that is sent.",
 )
-@click.option("--seed", default="stability", show_default=True, help="Seed of the cases.")
+@click.option("--seed", help="Seed of the cases, to repeat a run; default: a new one, which is printed.")
 @click.option("--cases", type=click.IntRange(1), metavar="N", help="Only simulate N cases of each group.")
 @click.option(
     "--only", metavar="TEXT", help='Only simulate groups with this text in their name, such as "non-Newtonian".'
@@ -283,7 +284,7 @@ def stability(
     delivered: bool,
     velocity: bool,
     delayed: Path | None,
-    seed: str,
+    seed: str | None,
     cases: int | None,
     only: str | None,
     workers: Workers,
@@ -328,6 +329,7 @@ def stability(
             measured = _measure(part, executor, show)
         present_evidence(measured, None)
         return
+    seed = seed or secrets.token_hex(4)
     chosen = groups(seed, cases) if only is None else tuple(it for it in groups(seed, cases) if only in it.name)
     if not chosen:
         names = ", ".join(group.name for group in groups(seed, cases))
@@ -341,7 +343,7 @@ def stability(
         )
         show("comparing forces")
         compared = stability_report.fidelities(executor=executor) if only is None else ()
-    shown = stability_report.evidence(swept, compared)
+    shown = stability_report.evidence(swept, compared, seed)
     click.echo(shown.text, nl=False)
     if to is not None:
         click.echo()

@@ -380,9 +380,9 @@ def _fidelity(fidelities: Sequence[Fidelity]) -> Iterator[str]:
         yield f"  {liquid:20}" + "".join(f"{cell:>16}" for cell in cells)
 
 
-def evidence(swept: Swept, fidelities: Sequence[Fidelity]) -> Evidence:
+def evidence(swept: Swept, fidelities: Sequence[Fidelity], seed: str) -> Evidence:
     """Return the summary, or of groups alone their table; the cases as CSV, the unstable ones as text, and the map."""
-    text = summary(swept, fidelities) if swept.on else group_table(swept)
+    text = f"seed {seed}\n\n{summary(swept, fidelities) if swept.on else group_table(swept)}"
     lines = ("# When the simulation is stable", "", "```", text, "```", "", "![Map](map.png)", "")
     unstable = (*(f"- unstable with safety on: `{verdict.case}`" for verdict in swept.unstable), "")
     files = {"cases.csv": _cases_csv(swept), "stability.md": "\n".join((*lines, *unstable))}

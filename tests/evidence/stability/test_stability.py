@@ -140,6 +140,30 @@ def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
 
 
 @compiled
+def test_each_run_draws_its_cases_from_a_seed_that_repeats_it(monkeypatch):
+    """Without a seed, two runs judge other cases; with the printed one, the same."""
+    judged, cases = stability.judge(parse("liquid=honey"), safe=True), []
+
+    def keep(case, safe):
+        cases.append(case)
+        return dataclasses.replace(judged, case=case, safe=safe)
+
+    monkeypatch.setattr(stability, "judge", keep)
+    monkeypatch.setattr("study_app.cli.evidence.executor_for", lambda _: ThreadPoolExecutor(1))
+    drawn = []
+    for words in ((), (), ("--seed", "SEED")):
+        said = drawn[-1][0] if words else ""
+        ran = command("--only", "second plant", "--cases", "5", *(said if it == "SEED" else it for it in words))
+        assert ran.stdout.startswith("seed ")
+        drawn.append((ran.stdout.split()[1], sorted(map(str, cases))))
+        cases.clear()
+    first, second, again = drawn
+    assert first != second == again
+    assert first[1] != second[1]
+    assert len(first[1]) == 20
+
+
+@compiled
 def test_the_table_of_limits_is_written_as_it_ships(monkeypatch, tmp_path):
     monkeypatch.setattr(
         stability, "measure_limits", lambda **_: (it for it in slope_limit_table() if it.estimator != "line")
