@@ -289,15 +289,18 @@ def _target_path(task: Task, times_s: Floats) -> Floats:
     return np.array([task.target_m(float(time_s)) for time_s in times_s])
 
 
-def rest_hand(task: Task, device: HandOrders) -> None:
-    """Move a simulated hand after a task to the start of the next interval, else to where an exploration begins.
+def rest_hand(task: Task, device: HandOrders, *, returns: bool) -> None:
+    """Move a simulated hand after a task to the start of the next interval, if that is a fixed position.
 
-    A hand that jumped there as the next trial begins would ask for forces that no person feels.
+    Otherwise it ``returns`` to the middle, where an exploration begins, or stays, and jumps there as the next trial
+    begins, which asks for forces that no person feels.
     """
     if task.start_m is not None:
         device.reach_to(*task.start_m)
-    else:
+    elif returns:
         device.reach_to(0.0, 0.0, 0.0, RETURN_S)
+    else:
+        device.rest()
 
 
 @dataclass(frozen=True, slots=True)

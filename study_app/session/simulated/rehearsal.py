@@ -342,7 +342,7 @@ class RehearsedSession(SimulatedParticipant):
                 self._adjust_level(page, setting, view, samples)
             if wants_to_go_on and page is self.page:
                 self._post(Continue(self._now_s()))
-        rest_hand(page.task, arm)
+        rest_hand(page.task, arm, returns=self._study.format > 1)  # rehearsals of format 1 keep their results
         earlier = () if interval is None or interval.number == 1 else self._features_of.get(page.trial, ())
         self._features_of[page.trial] = (*earlier, senses.features())
         if self._tell_features is not None:

@@ -133,7 +133,8 @@ def test_a_labs_own_language_is_one_like_the_others(tmp_path: Path) -> None:
     own, refused = languages.own_languages(spanish(tmp_path).parent)
     assert refused == {}
     assert own["es"].continue_ == "¡Continue"
-    assert own["es"].missing([5, 8]) == "¡¡Two statements still need an answer: ¡5 and 8."
+    said = own["es"].missing([5, 8])
+    assert said != said.replace("¡", "") == words("en").missing([5, 8])
     assert vars(own["es"]).keys() == vars(words("en")).keys()
 
 
