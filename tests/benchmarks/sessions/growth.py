@@ -13,6 +13,7 @@ import resource
 import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -74,11 +75,15 @@ def cost_of(command: Callable[[], object]) -> Cost:
     reads, writes = os.pipe()
     child = os.fork()
     if child == 0:
-        began_s = time.process_time()
-        command()
-        held = time.process_time() - began_s, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        os.write(writes, json.dumps(held).encode())
-        os._exit(0)
+        try:
+            began_s = time.process_time()
+            command()
+            held = time.process_time() - began_s, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+            os.write(writes, json.dumps(held).encode())
+        except Exception:  # noqa: BLE001 - the fork must not go on as its parent
+            traceback.print_exc()
+        finally:
+            os._exit(0)
     os.close(writes)
     with os.fdopen(reads, "rb") as told:
         content = told.read()
