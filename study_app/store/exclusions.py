@@ -201,7 +201,8 @@ def keep(folder: Path, participant: str, session: int, *, rule: str, by: str, re
             raise StoreError(f"{describe_exclusion(kept)} is excluded: include it without --rule")
         if any(row.what == kept.what and row.rule_or_person == rule for row in reversals(folder)):
             raise StoreError(f"{describe_exclusion(kept)} is kept already, although it meets the rule {rule}")
-        record = {"at": at, "by": by, "reason": reason, "exclusion": asdict(kept)}
+        key_open = bool(reveals(folder))
+        record = {"at": at, "by": by, "reason": reason, "key_open": key_open, "exclusion": kept.fields()}
         append_line(study.reversed_exclusions, json.dumps(record, ensure_ascii=False).encode() + b"\n")
     return kept
 

@@ -31,6 +31,7 @@ from study_app.store import (
     atomic,
     csv_files,
     drafts,
+    exclusions,
     folder_lock,
     output_files,
     program_log,
@@ -289,6 +290,9 @@ def called_in(function: ast.FunctionDef) -> Iterator[str]:
 WRITERS: Final = {
     "exclude": Writer(exclude),
     "include": Writer(command("include", "FOLDER/study", *OF_P008, "--session", "1", *WHO), exclude),
+    "keep": Writer(
+        lambda folder: exclusions.keep(folder / "study", "P008", 1, rule="below_chance", by="AB", reason="r") and None
+    ),
     "unblind": Writer(command("unblind", "FOLDER/study", *WHO), remedy="unblind again"),
     "withdraw": Writer(
         command("withdraw", "FOLDER/study", *OF_P008, *WHO), prepare_withdrawal, remedy="withdraw again"
