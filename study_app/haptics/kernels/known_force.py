@@ -14,6 +14,9 @@ acceleration will be
 with a_hand and a_response predicted over a part of the delay. With the other forces F₀ of this tick, F = F₀ − M a is
 solved for a: the inertia is implicit. F₀ is compared with the force asked for in the last tick and not with the force
 sent, so that a force that safety withholds does not count as a change.
+
+A hand that lets go changes the acceleration faster than the filter learns of it, and θ would take the change for an
+effect of the force. Such a surprise resets the motion and withholds the inertial forces, which then return.
 """
 
 from __future__ import annotations
@@ -22,7 +25,7 @@ import math
 from typing import Any, Final
 
 from study_app.haptics.kernels.compiled import part
-from study_app.haptics.kernels.vector import clear, square
+from study_app.haptics.kernels.vector import clear, copy, square
 from study_app.haptics.model.layout import Record
 
 STORAGE: Final = 3.0
@@ -54,15 +57,31 @@ LEARNING_PKG2S: Final = 10.0
 """Growth rate of the variance of θ [1/(kg² s)]."""
 FORGETTING_S: Final = 2.0
 """Time in which θ returns to its usual value."""
+SURPRISED: Final = 1.5
+"""Mean of Σ innovation² / its variance above which inertial forces are withheld: no sine to 3 Hz reaches it, noise of
+3 Hz in glycerin and honey at times. [choice]"""
+REGAINED_S: Final = 1.0
+"""Time in which they return afterwards."""
 NOTHING: Final = 1e-30
 
 
 @part
 def begin_known_force(parameters: Record, filtered: Record) -> None:
     """Reset motion and force."""
+    for order in range(2):
+        clear(filtered.late[order])
+        clear(filtered.ahead[order])
+    filtered.trust = 1.0
+    _begin_motion(parameters, filtered)
+
+
+@part
+def _begin_motion(parameters: Record, filtered: Record) -> None:
+    """Reset the motion to the estimated velocity without acceleration."""
     for state in range(4):
         clear(filtered.hand_motion[state])
         clear(filtered.response_motion[state])
+    copy(filtered.estimate_mps, filtered.hand_motion[1])
     p = filtered.motion_covariance
     for i in range(10):
         p[i] = 0.0
@@ -70,9 +89,6 @@ def begin_known_force(parameters: Record, filtered: Record) -> None:
     p[4] = FIRST_SPEED_MPS * FIRST_SPEED_MPS
     p[7] = FIRST_ACCELERATION_MPS2 * FIRST_ACCELERATION_MPS2
     p[9] = FIRST_JERK_MPS3 * FIRST_JERK_MPS3
-    for order in range(2):
-        clear(filtered.late[order])
-        clear(filtered.ahead[order])
     filtered.compliance_per_kg = USUAL_SHARE / parameters.mass_kg
     filtered.compliance_variance = FIRST_VARIANCE_PKG2
 
@@ -136,6 +152,12 @@ def track_motion(parameters: Record, state: Record, interval_s: float) -> float:
     filtered.compliance_per_kg = min(max(per_kg, LEAST_SHARE / parameters.mass_kg), 1.0 / parameters.mass_kg)
     learned = uncertain - gain * uncertain * responses_m2 + LEARNING_PKG2S * t
     filtered.compliance_variance = min(learned, MOST_VARIANCE_PKG2)
+    if filtered.surprise > SURPRISED:
+        filtered.trust = 0.0
+        _begin_motion(parameters, filtered)
+        copy(filtered.sent_n, filtered.asked_n)
+    else:
+        filtered.trust = min(filtered.trust + t / REGAINED_S, 1.0)
     return float(squares_m2 / (variance_m2 + responses_m2 * uncertain))
 
 

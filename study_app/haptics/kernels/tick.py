@@ -65,6 +65,7 @@ def step_model(model: Any, interval_s: float, delay_ticks: int) -> None:
     clear(state.drift_mps)
     state.returnable_j = 0.0
     state.growth = GROWS_AS_SQUARE
+    state.surprised = 0
     for i in range(parameters.liquids):
         if model.liquid_states[i].share > 0.0:
             apply_effects(model, i, interval_s, delay_ticks)
@@ -101,8 +102,10 @@ def apply_effects(model: Any, i: int, interval_s: float, delay_ticks: int) -> No
     if liquid.effects & effects.drag.BIT:
         drag_force(liquid, local, state)
     knows_force = state.kalman.on_ewma == 0 and liquid.known_force[delay_ticks] > 0.0
-    local.inertia_share = 1.0 if knows_force else liquid.inertia_share[delay_ticks]
-    local.slope_factor = liquid.known_force[delay_ticks] if knows_force else 1.0
+    local.inertia_share = state.kalman.trust if knows_force else liquid.inertia_share[delay_ticks]
+    if knows_force and state.kalman.trust < 1.0:
+        state.surprised = 1
+    local.slope_factor = 1.0 + (liquid.known_force[delay_ticks] - 1.0) * local.inertia_share if knows_force else 1.0
     if liquid.effects & effects.added_mass.BIT and not knows_force:
         added_mass_force(parameters, liquid, local, state, delay_ticks, interval_s)
     if liquid.effects & effects.history.BIT:

@@ -431,6 +431,7 @@ STATE = np.dtype(
         ("drift_mps", np.float64, (3,)),  # velocity of the current at the body, of the same liquid
         ("force_n", np.float64, (3,)),  # sum of the effects
         ("lift_n", np.float64, (3,)),  # buoyancy and weight within it
+        ("surprised", np.int64),  # 1: a surprise withholds inertial forces (`known_force`)
         ("returnable_j", np.float64),  # the greatest energy that effects can return, times the scale
         ("growth", np.int64),  # GROWS_* of the force that depends least on the speed
         ("link", LINK_STATE),
@@ -501,6 +502,7 @@ PASSIVITY = np.dtype(
         ("fast_s", np.float64),  # for how long the hand moved fast of late
         ("quiet_s", np.float64),  # for how long it has been quiet
         ("gap_s", np.float64),  # time since the last gap in the samples
+        ("surprise_j", np.float64),  # debts of surprises forgiven lately
         ("debt", np.int64),  # DEBT_*: why force is or was withheld
         ("longest_m", np.float64),  # the longest step so far
         ("strongest_n", np.float64),  # the strongest force so far

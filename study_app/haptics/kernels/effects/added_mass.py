@@ -57,7 +57,7 @@ def implicit_added_mass_force(
     for axis in range(3):
         force_n[axis] = -inertia_kg * tracks.acceleration_mps2[axis]
         state.force_n[axis] += force_n[axis]
-    state.returnable_j += 0.5 * STORAGE * inertia_kg * square(local.motion_mps)
+    state.returnable_j += 0.5 * STORAGE * local.inertia_share * inertia_kg * square(local.motion_mps)
 
 
 @part

@@ -92,7 +92,7 @@ def unsteady_drag_force(
     of_history_kg = 0.5 * law.factor_kg_rs * parameters.rules.history_rs
     stored_kg = (law.mass_kg + of_history_kg) * local.share
     if knows_force:
-        state.returnable_j += 0.5 * STORAGE * stored_kg * square(local.motion_mps)
+        state.returnable_j += 0.5 * STORAGE * local.inertia_share * stored_kg * square(local.motion_mps)
         return
     rate_per_s = liquid.smoothing_rate[delay_ticks] * law.filter_per_s
     square_m2ps2 = storing_square(parameters, local, tracks.smoothed_mps2, rate_per_s)
