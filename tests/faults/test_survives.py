@@ -83,12 +83,12 @@ def test_panels_that_fail_are_told_and_the_session_goes_on(session: tuple[dict[s
 def test_a_recorder_that_dies_is_told_at_once_and_records_the_next_trial(session: tuple[dict[str, Any], Path]) -> None:
     told, results = session
     assert told["page at the loss"] == "TaskPage"
-    assert told["recording"].endswith("lost: its thread ended: Ended: pulled.")
+    assert told["recording"].endswith("lost: its thread ended (Ended: pulled).")
     assert any("recorder" in notice for notice in told["notices"])
     assert told["force without a recording"]
     lost, after = [row for row in rows(results) if row["trial"] != "1"][:3], rows(results)[-1]
     (gone,) = [row for row in lost if row["recording_lost"] != "n/a"]
-    assert (gone["recording"], gone["recording_lost"]) == ("n/a", "its thread ended: Ended: pulled")
+    assert (gone["recording"], gone["recording_lost"]) == ("n/a", "its thread ended (Ended: pulled)")
     assert (after["recording"], after["recording_lost"]) == ("recordings/trial-004.parquet", "n/a")
 
 

@@ -67,7 +67,7 @@ def added(rows: Rows) -> Rows:
         (list, late, "300 recorded, 0 lost, 1 late, at most 5 ms between two ticks\n", 0),
         (list, without(90, 110), "20 samples lost in 1 gap; the first after 0.089 s of the stream\n", 3),
         (without(12, 13), list, "own.xdf lacks 1 marker of its journal; the first: {", 3),
-        (added, list, 'own.xdf has 1 marker that its journal lacks; the first: {"event":"note","t_s":0.5}. The', 3),
+        (added, list, 'own.xdf has 1 marker that its journal lacks; the first: {"event":"note","t_s":0.5}. Either', 3),
         (without(0, 8), list, "markers: 4 before the recording and 0 after it", 0),
         (without(0, 9999), list, "own.xdf: it does not contain markers of this study's sessions", 3),
     ],

@@ -208,5 +208,5 @@ def test_an_interrupted_session_goes_on_with_the_sealed_liquid(
     rehearsal.resume_rehearsal(session, protocol=str(study))
     assert replay(session).proved
     if becomes is not None:
-        with pytest.raises(StoreError, match="other conditions"):
+        with pytest.raises(StoreError, match="conditions that differ from this protocol"):
             begun(tmp_path / "results", "P002", study, simulated=True)

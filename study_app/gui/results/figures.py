@@ -333,6 +333,7 @@ class FigureCard(Card):
             Qt.TextInteractionFlag.TextSelectableByMouse | Qt.TextInteractionFlag.TextSelectableByKeyboard
         )
         self._verdict = hbox(spacing=0, margins=0)
+        self._chip: Chip | None = None
         self.dialog: QFileDialog | None = None
         self.caption = label("", "label", "text2", wraps=True)
         self.caption.setContentsMargins(0, 0, 120, 4)
@@ -394,11 +395,12 @@ class FigureCard(Card):
             self.drawing.setFixedSize(size)
 
     def _show_verdict(self, verdict: str) -> None:
-        shown = self._verdict.itemAt(0)
-        if shown is not None:
-            remove_widget(shown.widget())
+        if self._chip is not None:
+            remove_widget(self._chip)
+            self._chip = None
         if verdict:
-            self._verdict.addWidget(Chip(VERDICTS.get(verdict, "neutral"), "info", verdict))  # type: ignore[arg-type]
+            self._chip = Chip(VERDICTS.get(verdict, "neutral"), "info", verdict)  # type: ignore[arg-type]
+            self._verdict.addWidget(self._chip)
 
     def _copy_figure(self) -> None:
         """Copy the figure as a picture."""

@@ -95,7 +95,7 @@ def test_without_a_process_the_other_numbers_stay(qtbot: Any, designer: Any) -> 
     jnd(designer)
     part = designer.place.measures.numbers.parts[1]
     qtbot.waitUntil(lambda: part.note.text() == FAILED)
-    assert part.more.text() == "The process of the simulations does not start."
+    assert part.more.text() == "The simulation process does not start."
     assert designer.place.measures.function.legend.text() == FAILED.capitalize()
     assert designer.place.measures.numbers.parts[3].number.text() == "17"
 

@@ -233,7 +233,7 @@ def test_another_device_is_asked_for_and_a_fault_ahead_is_named(
     mouse = next(action for action in header.play.menu.actions() if action.text().startswith("Mouse"))
     mouse.trigger()
     press_f5(qtbot, likert)
-    assert "with the device Mouse? It has no force" in header.strip.words.text()
+    assert "with the device Mouse? This device does not produce force" in header.strip.words.text()
     qtbot.keyClick(header.strip.buttons["close"], Qt.Key.Key_Escape)
     assert not header.strip.isVisible()
     press_f5(qtbot, likert)

@@ -64,7 +64,7 @@ def make_two_interval(user: User) -> None:
     user.write("Varied quantity", "delay_ms")
     user.write("Levels", "50 200")
     user.add("Trial design")
-    user.choose("Kind", "2ifc")
+    user.choose("Kind", "2IFC")
     user.press("Add Item")
     user.write("Item", "later")
     user.press("Add Question")

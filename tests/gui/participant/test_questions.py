@@ -132,7 +132,7 @@ def test_nothing_is_preset_and_keys_alone_answer_and_submit_once(opening: Openin
         ("de", "1.234", "„1.234“ kann 1,234 oder 1234 bedeuten. Geben Sie 1,234 oder 1234 ein."),
         ("nl", "1.234", "“1.234” kan 1,234 of 1234 betekenen. Voer 1,234 of 1234 in."),
         ("fr", "1.234", "«\u00a01.234\u00a0» peut signifier 1,234 ou 1234. Saisissez 1,234 ou 1234."),
-        ("ar", "2,500", "يمكن أن يعني «2,500» العدد 2.5 أو 2500. أدخل 2.5 أو 2500."),
+        ("ar", "2,500", "يمكن أن يعني «2,500» العدد 2.5 أو 2500. يرجى إدخال 2.5 أو 2500."),
         ("en", "1 5", "Enter a number."),
         ("de", "1'00", "Geben Sie eine Zahl ein."),
     ],

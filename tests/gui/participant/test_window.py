@@ -31,7 +31,7 @@ PAGES: list[tuple[Page, str]] = [
     (PausePage(force_off=True), "The force is off"),
     (task_page(), "Hold the ball in the lit ring until it closes"),
     (questionnaire(chosen=(("item1", 4),)), "Liquid setting 1"),
-    (FeedbackPage(True), "Right"),
+    (FeedbackPage(True), "Correct"),
     (TroublePage("One moment", "Help comes."), "One moment"),
     (EndPage("Thank you", "You may let go."), "Thank you"),
 ]

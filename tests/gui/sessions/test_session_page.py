@@ -109,7 +109,7 @@ def test_a_page_says_what_each_trial_has_and_why_a_session_cannot_be_read(qtbot,
 
 def test_no_page_names_a_condition_of_a_sealed_study(study):
     record = read_record(next(iter(StudyFolder(study).sessions())).path)
-    assert "once the study is unblinded" in record.limits
+    assert "checked after unblinding" in record.limits
     text = repr(record)
     protocol = load("demo")
     assert [name for name in protocol.conditions if re.search(rf"\b{name}\b", text)] == []

@@ -170,7 +170,7 @@ def test_a_session_that_goes_on_with_another_device_comes_out_to_the_last_bit(tm
     comes_out(place, 2)
     receipt = json.loads((place / "receipt.json").read_text())
     (place / "receipt.json").write_text(json.dumps(receipt | {"resumed": []}))
-    with pytest.raises(StoreError, match="lacks the device since"):
+    with pytest.raises(StoreError, match="lacks the device used since"):
         replay(place)
 
 
