@@ -84,8 +84,8 @@ def make_two_interval(user: User) -> None:
 def shorten(user: User) -> None:
     """Let the task take one to two seconds."""
     user.select("Explore")
-    user.write("Min", "1")
-    user.write("Max", "2")
+    user.write("Minimum duration", "1")
+    user.write("Maximum duration", "2")
 
 
 def save(user: User, file: Path) -> None:
