@@ -224,7 +224,8 @@ def grouped(text: str, measure: str, block: str, sequence: str) -> Protocol:
 def test_power_tells_the_smallest_difference_between_groups() -> None:
     text = "\n".join(line for line in DELAYED.splitlines() if not line.startswith("contrasts"))
     protocol = grouped(text, "threshold", "late", '["late", "prompt"]')
-    found = {("late", 20): PrecisionResult([np.log([[1.3], [1 / 1.3]])], [np.full(2, 0.2)])}
+    error = math.log(1.3) / math.sqrt(2)  # the SD of the two errors is ln 1.3
+    found = {("late", 20): PrecisionResult([np.array([[error], [-error]])], [np.full(2, 0.2)])}
     told = threshold_markdown(Precisions(protocol=protocol, sizes=(3, 18), studies=10, asked=10, seed=1, found=found))
     spread = math.hypot(math.log(1.2), math.log(1.3))
     assert f"| 20 | 3 | {spread:.0%} | – | – |" in told
@@ -292,7 +293,7 @@ def test_power_plans_differences_and_equality_within_people(
     text = DELAYED
     for old, new in edits:
         text = text.replace(old, new)
-    errors = 0.2 if edits else math.log(1.3)
+    errors = (0.2 if edits else math.log(1.3)) / math.sqrt(2)  # their SD is 0.2 or ln 1.3
     found = {
         (block, 20): PrecisionResult([np.array([[errors], [-errors]])], [np.full(2, 0.2)])
         for block in ("late", "prompt")
@@ -304,7 +305,7 @@ def test_power_plans_differences_and_equality_within_people(
     )
     half, least = (spread * end for end in detectable(40, tail=0.05))
     ends = f"±{half:.2f} | ±{least:.2f}" if edits else f"×/÷ {math.exp(half):.2f} | ×/÷ {math.exp(least):.2f}"
-    assert ("SD, relative to a mean d′ of 1: of one" if edits else "SD: of one") in told
+    assert ("SD, relative to a mean d′ of 1; one" if edits else "SD; one") in told
     assert "Equivalence requires at least 14 participants, at α = 0.05. Every participant with both numbers" in told
     assert "| smallest difference | shown within the bound if truly equal |" in told
     assert told.strip().endswith(f"| {spread:.0%} | {ends} | {shown_equal(bound / spread, 40, alpha=0.05):.0%} |")

@@ -79,6 +79,7 @@ def test_what_is_excluded_is_exported_with_its_reason_and_not_counted(rek: Resul
         "rule_or_person": "AB",
         "reason": "spilled tea",
         "excluded_at": "2026-01-06T10:00:00.000+01:00",
+        "key_open": None,
     }
 
 

@@ -130,7 +130,7 @@ def test_the_report_of_a_sealed_study_shows_counts_and_times_by_code_and_no_leve
     report(sealed_levels, tmp_path)
     page = (tmp_path / "report.html").read_text()
     held = json.loads((tmp_path / "report.json").read_text())["results"]["levels"]
-    assert page.count("Not yet revealed") == len(BLOCKS)
+    assert page.count("appear here after unblinding") == len(BLOCKS)
     assert {(len(one["answers"]), one["vary"], one["level_kind"]) for one in held} == {(0, None, None)}
     assert sum(times["numbers"]["n"] for one in held for times in one["times"]) == 3 * 54
     assert not list(tmp_path.glob("levels-*"))

@@ -90,4 +90,4 @@ def test_before_unblinding_there_are_steps_and_no_level(sealed: Path, tmp_path: 
         ]
     assert levels
     assert not [level for level in levels if f"{level:.5g}" in text]
-    assert "Not yet revealed" in text
+    assert "appear here after unblinding" in text

@@ -166,7 +166,7 @@ def test_the_command_adds_the_planned_number_of_participants_and_quotes_it(
     (line,) = (line for line in registered.splitlines() if line.startswith("- Smooth (settings differ): "))
     assert "## Power with the planned 7 participants" in registered
     assert re.fullmatch(
-        r"- Smooth \(settings differ\): \d+% of studies find it if people are consistent, \d+% if typical, and \d+% if "
-        r"noisy\.",
+        r"- Smooth \(settings differ\): \d+% of studies detect it if people are consistent, \d+% if typical, and "
+        r"\d+% if noisy\.",
         line,
     )

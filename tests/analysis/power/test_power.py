@@ -105,7 +105,7 @@ def test_engine_dask_and_its_variable_are_other_words_for_a_cluster(monkeypatch:
     ("words", "said"),
     [
         (("--engine", "dask"), "--engine dask needs a cluster: give --cluster tcp://HOST:8786"),
-        (("--workers", "2", "--cluster", "tcp://lab1:8786"), "--workers and --cluster exclude each other"),
+        (("--workers", "2", "--cluster", "tcp://lab1:8786"), "--workers and --cluster cannot be combined"),
         (("--workers", "0"), "0 workers cannot compute: give 1 or more"),
         (("--jobs", "-2"), "-2 is not in the range x>=-1"),
         (("--engine", "ray"), "'ray' is not one of 'processes', 'dask'"),
@@ -180,13 +180,14 @@ def test_a_block_of_some_groups_counts_their_participants() -> None:
     assert {block.id: block.groups for block in study_plan.blocks} == {"thin": (), "thick": ("b",)}
     studies, counts = swept(study_plan)
     found = powers(study_plan, SIZES, studies, studies, 1, counts)
-    assert power_markdown(found).count("n counts participants of b; other groups do not have this block.") == 1
+    words = "n is the number of participants in b; other groups do not have this block."
+    assert power_markdown(found).count(words) == 1
 
 
 def test_a_protocol_that_compares_nothing_is_refused() -> None:
     protocol = load("demo")
     alone = {name: block.model_copy(update={"questionnaire": None}) for name, block in protocol.blocks.items()}
-    with pytest.raises(AnalysisError, match="compares nothing"):
+    with pytest.raises(AnalysisError, match="does not make a comparison"):
         plan(protocol.model_copy(update={"blocks": alone}), felt_in(protocol))
 
 

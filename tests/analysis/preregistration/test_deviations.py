@@ -88,7 +88,7 @@ def test_exclusions_by_other_rules_are_listed_and_those_by_its_own_are_not(answe
     answered.exclude("P001", trial=2, reason="sneezed")
     (line,) = evaluate_block(answered)
     assert line.startswith("an exclusion without a preregistered rule (")
-    assert line.endswith(": sneezed (AB)")
+    assert line.endswith("; sneezed; AB)")
     by_rule = Exclusion(
         participant="P002",
         session=1,

@@ -97,7 +97,7 @@ def test_another_study_mixed_in_or_an_empty_folder_is_one_clear_error(
         rek.open()
         shutil.move(tmp_path / "sub-P077", rek.folder / "data" / "sub-P077")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(AnalysisError, match="holds no sessions"):
+    with pytest.raises(AnalysisError, match="does not contain sessions"):
         report(tmp_path / "empty", tmp_path / "report")
     assert not (tmp_path / "report").exists()
 

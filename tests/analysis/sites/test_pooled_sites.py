@@ -86,7 +86,7 @@ def test_a_study_is_sealed_until_the_last_key_is_open(sealed: Path, tmp_path: Pa
 def test_a_site_whose_folder_is_missing_is_not_left_out(sealed: Path, tmp_path: Path) -> None:
     merge_sites(_copied(sealed, tmp_path), tmp_path / "pooled")
     shutil.rmtree(tmp_path / "pooled/sites/B")
-    with pytest.raises(StoreError, match=r"sites/B is missing, although sites\.json lists it"):
+    with pytest.raises(StoreError, match=r"sites/B is missing, but sites\.json lists it"):
         load_study(tmp_path / "pooled")
 
 
@@ -109,7 +109,7 @@ def test_a_site_without_the_preregistration_of_another_is_named(sealed: Path, tm
         assert compared is not None
         return compared.found
 
-    assert said(B=one) == (f"site A has no {FILE}",)
+    assert said(B=one) == (f"site A does not have {FILE}",)
     assert said(A=replace(one, precision=0.1)) == (
         "the preregistration of site B differs from the preregistration of the first site, which is used here",
     )

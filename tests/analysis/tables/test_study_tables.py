@@ -131,7 +131,7 @@ def test_a_list_of_exclusions_that_makes_no_sense_is_refused(rek: Results) -> No
 
 def test_an_empty_or_foreign_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "holiday.txt").write_text("x")
-    assert "holds no sessions" in refusal(tmp_path)
+    assert "does not contain sessions" in refusal(tmp_path)
 
 
 def test_the_folder_above_the_studies_names_them(rek: Results) -> None:
@@ -160,9 +160,9 @@ def test_the_folder_above_the_studies_names_them(rek: Results) -> None:
         (",immersive,2,4,", ",immersive,2,4,,", "cells, not"),
         (",immersive,2,4,", "\n,immersive,2,4,", "cells, not"),
         (",immersive,2,4,", ',"immersive"x,2,4,', "is not CSV in UTF-8"),
-        (",immersive,2,4,", ",imersive,2,4,", "knows no statement 'imersive'"),
-        (",L1,immersive,", ",L9,immersive,", "setting 'L9'"),
-        (",L1,immersive,", ",L1,feels_liquid,", "stands there twice"),
+        (",immersive,2,4,", ",imersive,2,4,", "does not contain statement 'imersive'"),
+        (",L1,immersive,", ",L9,immersive,", "for code 'L9'"),
+        (",L1,immersive,", ",L1,feels_liquid,", "occurs twice"),
         ("study,participant", "study,person", "does not begin with the columns"),
         ("rek2024,P001,1,", "rek2024,P007,1,", "column participant: 'P007' instead of 'P001'"),
         ("rek2024,P001,1,", "other,P001,1,", "column study: 'other' instead of 'rek2024'"),

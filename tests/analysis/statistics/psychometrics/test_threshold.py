@@ -73,7 +73,10 @@ def test_agreement_from_five_on_is_noticing_and_missing_answers_do_not_count() -
     assert (result.yes, result.asked) == ((0, 0, 0, 1, 2, 2, 1), (2, 2, 2, 2, 2, 2, 1))
     assert (result.n, result.dropped) == (2, 1)
     five = noticed(np.vstack([values, values, values]), DELAYS)
-    assert "answers of all participants are pooled, and the interval includes how far participants differ" in five.note
+    assert (
+        "answers of all participants are pooled, and the interval includes differences between participants"
+        in five.note
+    )
     assert five.effect == pytest.approx(125, abs=25)
 
 
@@ -81,7 +84,7 @@ def test_agreement_from_five_on_is_noticing_and_missing_answers_do_not_count() -
     ("yes", "note"),
     [
         ([0] * 7, "no participant noticed anything up to 300"),
-        ([5] * 7, "everybody noticed"),
+        ([5] * 7, "all participants noticed something at every level"),
         ([5, 4, 3, 2, 1, 0, 0], "the fitted threshold lies outside the levels"),
     ],
 )
