@@ -93,7 +93,7 @@ def parameter(scene: Scene, name: str) -> Parameter:
             if it.name == name:
                 return it
     raise StudyError(
-        f"this liquid currently does not have the parameter {name!r} now: select the effect to which it belongs"
+        f"this liquid currently does not have the parameter {name!r}: select the effect to which it belongs"
     )
 
 

@@ -31,8 +31,9 @@ from study_app.store.journals.journal_events import Event, Recorded
 
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 _OWN = re.compile(
-    r"journal\.jsonl|receipt\.json|checksums\.sha256|rebuilt\.txt|crash\.txt|subject-[A-Za-z0-9]+_session-\d\d_task-"
-    r"[a-z0-9]+_description-[a-z]+_data\.csv|trial-\d{3,}(_attempt-\d+)?(_interval-\d+)?(_frames)?\.\w+"
+    r"journal\.jsonl|journal-torn-\d+\.txt|receipt\.json|checksums\.sha256|rebuilt\.txt|crash\.txt|"
+    r"subject-[A-Za-z0-9]+_session-\d\d_task-[a-z0-9]+_description-[a-z]+_data\.csv|"
+    r"trial-\d{3,}(_attempt-\d+)?(_interval-\d+)?(_frames)?\.\w+"
 )
 _SYSTEM = re.compile(
     r"desktop\.ini|(?:eh)?thumbs(?:_vista)?\.db(?::.*)?|folder\.jpg|icon\r|~\$.*|~syncthing~.*|~wr[a-z]\d+\.tmp|"

@@ -312,7 +312,7 @@ def test_an_own_observer_sets_levels(tmp_path: Path) -> None:
     with api.open_session(study, "P001", results=tmp_path / "r", seed=3, answer=to_twice_the_standard) as session:
         session.run()
     with (
-        pytest.raises(SessionError, match="'more' is not a number of steps"),
+        pytest.raises(SessionError, match="'more' is not a valid number of steps"),
         api.open_session(study, "P002", results=tmp_path / "r", seed=3, answer=lambda _: "more") as session,
     ):
         session.run()
@@ -346,7 +346,7 @@ def test_a_session_of_a_participant_is_not_completed_by_simulated_answers(short:
     [
         ("third", "third"),
         (True, "answer True is neither a number nor a text"),
-        ({"which": "first"}, "'which' is not asked"),
+        ({"which": "first"}, "'which' does not occur on this page"),
     ],
 )
 def test_an_answer_that_is_not_permitted_ends_the_block_and_loses_nothing(

@@ -66,7 +66,7 @@ def test_check_notes_how_many_texts_are_still_to_translate(tmp_path: Path, liqui
     (tmp_path / "own.toml").write_text(source.replace('nl = "Welkom"', 'nl = "Welcome"'), encoding="utf-8")
     noted = liquid_study("check", "own.toml")
     assert noted.returncode == 0
-    note = "study.languages: 1 text to translate to Dutch, as in English so far: pages.consent.title"
+    note = "study.languages: 1 text to translate to Dutch, still in English: pages.consent.title"
     assert noted.stdout.endswith(f"\nNote: {note}.\n")
 
 

@@ -245,8 +245,8 @@ def test_handle_that_is_held_is_reported_and_not_kept(tmp_path, monkeypatch):
     monkeypatch.setattr("study_app.devices.registry.descriptor_of", lambda _name: real)
     done = liquid_study("devices", "bench", "scripted", "--to", str(tmp_path / "report"))
     assert done.exit_code == 3, done.output
-    assert "the handle was touched" in (tmp_path / "report" / "bench.md").read_text()
-    assert "Nothing was kept" in done.output
+    assert "somebody touched the handle" in (tmp_path / "report" / "bench.md").read_text()
+    assert "Nothing was stored for receipts" in done.output
     assert workstation.load_settings().benches == ()
 
 
@@ -292,7 +292,7 @@ def test_command_writes_its_report_and_keeps_what_it_found_of_a_real_device_alon
 
 @pytest.mark.parametrize(
     ("words", "reason"),
-    [(("mouse",), "device 'mouse' has no force to measure"), (("nothing",), "device 'nothing' is not known")],
+    [(("mouse",), "device 'mouse' does not produce force"), (("nothing",), "device 'nothing' is not known")],
 )
 def test_device_without_force_is_refused(words, reason):
     refused = liquid_study("devices", "bench", *words)

@@ -50,7 +50,7 @@ class TestDoctor:
         assert len(rows) == len(FAILURES.modes)
         found = told.output.split("FOUND")
         assert len(found) == 2
-        assert "does not home" in found[1]
+        assert "homing fails" in found[1]
         assert "cause: not every arm has passed its index" in found[1]
         assert "cure: push the grip fully in" in found[1]
 
@@ -62,7 +62,7 @@ class TestDoctor:
 
     def test_a_device_without_wires_is_not_looked_at(self):
         refused = liquid_study("doctor", "--device", "scripted")
-        assert "'scripted' is none" in str(refused.exception)
+        assert "the doctor cannot examine 'scripted'" in str(refused.exception)
 
     @pytest.mark.parametrize(
         ("fault", "words"),
@@ -144,6 +144,8 @@ class TestCalibrate:
         assert liquid_study("calibrate", "--device", "falcon-emulated", *words).exit_code == 2
 
     def test_only_a_falcon_is_calibrated(self):
-        assert "no motors" in str(liquid_study("calibrate", "--device", "mouse", "--grams", "400").exception)
+        assert "only a Falcon has motors" in str(
+            liquid_study("calibrate", "--device", "mouse", "--grams", "400").exception
+        )
         refused = liquid_study("calibrate", "--device", "falcon-emulated", "--scale")
         assert "--grams" in str(refused.exception)

@@ -117,7 +117,7 @@ class TestDeviceOfAnotherPackage:
         assert "--toy-mass TEXT" in liquid_study("run", "--help").output
         refused = liquid_study("run", "demo", "--participant", "P001", "--device", "mouse", "--toy-mass", "250")
         assert isinstance(refused.exception, DeviceError)
-        assert str(refused.exception).startswith("device 'mouse' takes no toy-mass; only these do: Toy hand:")
+        assert str(refused.exception).startswith("device 'mouse' does not use toy-mass; only these do: Toy hand:")
         found = liquid_study("devices", "doctor", "--device", "toy-hand", "--fault", "loose")
         assert found.exit_code == 3
         assert "FOUND          its string is loose" in found.output
@@ -164,5 +164,8 @@ def test_a_device_that_cannot_be_looked_for_hides_no_other(site):
         ),
     )
     found = {one.name: one for one in backends()}
-    assert found["toy-hand"].why == "it cannot be looked for: division by zero"
+    assert found["toy-hand"].why == (
+        "it cannot be looked for: the plug-in toy_blind 1.0 failed (ZeroDivisionError: division by zero): "
+        "update or uninstall the plug-in"
+    )
     assert {"mouse", "falcon", "scripted"} <= set(found)

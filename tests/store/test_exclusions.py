@@ -135,7 +135,7 @@ def test_an_exclusion_is_taken_back_and_stays_on_record(folder: Path) -> None:
 
 def test_a_reason_is_kept_as_it_can_be_read(folder: Path) -> None:
     for letter in "\0\x1b\x85\u202e":
-        with pytest.raises(StoreError, match=rf"--reason holds the character U\+{ord(letter):04X}, which cannot be"):
+        with pytest.raises(StoreError, match=rf"--reason contains the character U\+{ord(letter):04X}, which cannot be"):
             exclude(folder, "P007", 1, by="catch", reason=f"missed {letter} many")
     kept = exclude(folder, "P007", 1, by="catch", reason="missed \u2028 many\n trials ")
     assert kept.reason == "missed many trials"

@@ -210,13 +210,13 @@ def test_a_thread_that_ends_loses_its_trial_at_once_and_the_next_trial_starts_an
         with recorder.changed:
             assert recorder.changed.wait_for(lambda: recorder.lost, 10.0)
         threads[0].join(10.0)
-        assert recorder.lost == (lost_event((1, 1, None), "its thread ended: Ended: pulled"),)
+        assert recorder.lost == (lost_event((1, 1, None), "its thread ended (Ended: pulled)"),)
         recorder.append(samples_of(10))
         recorder.stop()
     record(recorder, samples_of(20), trial=2)
     recorder.close()
     missing, kept = recorder.collect_results()
-    assert missing == lost_event((1, 1, None), "its thread ended: Ended: pulled")
+    assert missing == lost_event((1, 1, None), "its thread ended (Ended: pulled)")
     assert isinstance(kept, Recorded)
     assert (kept.trial, kept.samples_recorded) == (2, 20)
 

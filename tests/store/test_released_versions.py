@@ -146,7 +146,7 @@ def test_it_is_resumed_with_a_chain_that_covers_the_lines_before(study: Path) ->
     folder.journal.write_bytes(content.replace(b'"value":4', b'"value":5', 1))  # in a line of format 1
     damage = journal.scan(folder.journal).damage
     assert damage is not None
-    assert "was written after another line" in damage
+    assert "does not continue the previous line" in damage
     folder.journal.write_bytes(content)
 
 

@@ -373,8 +373,8 @@ def wrong_responses(lines: Sequence[events.Event]) -> Iterator[str]:
             hides = any(row.kind is not None for row in line.items)  # format 2: a question may have been hidden again
             for row in line.items:
                 if not _same_answer(row, chosen.pop(row.item, events.Answer())):
-                    wrong = "differs from the answer chosen before: it was changed"
-                    yield f"{line_name} has for {row.item!r} in {where} {wrong}"
+                    wrong = "that differs from the answer chosen before: it was changed"
+                    yield f"{line_name} has an answer for {row.item!r} in {where} {wrong}"
             for item, answer in chosen.items():
                 if answer.given or not hides:
                     yield f"{line_name} lacks {item!r}, answered in {where}: it was changed"

@@ -107,7 +107,9 @@ class TestFaultsOfTheEmulator:
             servo.check()
             servo.stop()
 
-    @pytest.mark.parametrize(("unhomed", "read_errors", "cause"), [(1, 0, "no longer homed"), (0, 90, "not carry out")])
+    @pytest.mark.parametrize(
+        ("unhomed", "read_errors", "cause"), [(1, 0, "no longer homed"), (0, 90, "did not complete")]
+    )
     def test_in_use_a_lost_homing_and_failed_transfers_are_told_apart(self, unhomed, read_errors, cause):
         with EmulatedFalcon(emulator=Emulator(running=True)) as device:
             state = device.exchange

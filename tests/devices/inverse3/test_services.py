@@ -186,4 +186,4 @@ def test_a_probe_of_a_service_that_hangs_ends_soon(kind: Kind) -> None:
 )
 def test_a_probe_of_a_list_that_is_none_finds_no_device(listed: str) -> None:
     with serving(partial(answers, http(b'{"inverse3": %b}' % listed.encode()))) as port:
-        assert "lists no such Inverse3" in probe(ports=(port,)).why
+        assert "does not list this Inverse3" in probe(ports=(port,)).why

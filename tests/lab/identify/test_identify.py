@@ -137,7 +137,7 @@ def test_a_length_beyond_what_was_measured_ends_at_the_edge():
     short = paths.programmed_motion("line", moving_s=0.2)
     found = fit(override_all(TANK, {"length": 100}), "tank", ["length"], short, force_of(TANK, short))
     assert found.values["length"] == 200
-    assert any("edge of its range, 200 (no more than" in warning for warning in found.warnings)
+    assert any("edge of its range, 200 (at most" in warning for warning in found.warnings)
 
 
 def test_a_missing_effect_shows_in_residuals_that_follow_one_another():
@@ -163,9 +163,9 @@ def test_a_sharp_turn_that_velocities_from_places_blur_is_doubted():
 @pytest.mark.parametrize(
     ("names", "said"),
     [
-        ([], "no parameter is named"),
+        ([], "give at least one parameter to fit"),
         (["drag_coeficient"], "did you mean 'drag_coefficient'"),
-        (["viscosity_pa_s"], "has no initial value of viscosity_pa_s"),
+        (["viscosity_pa_s"], "does not contain an initial value of viscosity_pa_s"),
         (["breaking_angle_deg"], "is a threshold"),
         (["alpha"], "unknown parameter 'alpha'"),
         (["axes"], "unknown parameter 'axes'"),
@@ -176,7 +176,7 @@ def test_a_sharp_turn_that_velocities_from_places_blur_is_doubted():
 def test_what_cannot_be_fitted_is_said(names, said):
     with pytest.raises(StudyError, match=said):
         fit(TANK, "tank", names, REVERSE, force_of(TANK, REVERSE))
-    with pytest.raises(StudyError, match="no liquid 'lake': there is tank"):
+    with pytest.raises(StudyError, match="does not contain liquid 'lake'; its liquids: tank"):
         fit(TANK, "lake", ["drag_coefficient"], REVERSE, force_of(TANK, REVERSE))
     with pytest.raises(StudyError, match="it is a device, which may never end"):
         measured_force.read(Path("/dev/null"))  # /dev/zero would fill the memory
@@ -185,11 +185,11 @@ def test_what_cannot_be_fitted_is_said(names, said):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda m, f: (m, 0 * f), "zero throughout"),
+        (lambda m, f: (m, 0 * f), "is always zero"),
         (lambda m, f: (m, f[:-1]), r"finite and \(n, 3\)"),
         (lambda m, f: (m, f * math.nan), "finite"),
-        (lambda m, f: slowed(m, f, [0]), "one row is not a motion"),
-        (lambda m, f: slowed(m, f, [0, 1, 2, 99, 100]), "row 4 comes 0.097 s after the one before"),
+        (lambda m, f: slowed(m, f, [0]), "one row is not enough"),
+        (lambda m, f: slowed(m, f, [0, 1, 2, 99, 100]), "row 4 comes 0.097 s after the previous row"),
     ],
 )
 def test_what_was_not_measured_is_said(change, said):

@@ -131,7 +131,7 @@ def test_a_program_killed_between_claim_and_first_line_leaves_a_consistent_folde
     assert [claim.participant for claim in claims(study)] == ["P000", "P001"]
     found = verify_study(study.path)
     assert not found.errors
-    assert any("who does not contain session yet" in str(warning) for warning in found.warnings)
+    assert any("who does not have a session yet" in str(warning) for warning in found.warnings)
     with begun(study.path, "P002") as other, begun(study.path, "P001") as store:
         assert (store.lines[0].entry, other.lines[0].entry) == (2, 3)
         assert "allocated" in events(store)
@@ -165,7 +165,7 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
     assert errors() == ""
     second.unlink()
     assert "is missing, although participant P002 has entry 2" in errors()
-    with pytest.raises(StoreError, match=r"002\.json is missing, though participant P002 has entry 2"):
+    with pytest.raises(StoreError, match=r"002\.json is missing, although participant P002 has entry 2"):
         begun(study.path, "P002", 2)
     second.write_text(held[0].replace('"entry": 1', '"entry": 2'))
     assert "002.json: was changed" in errors()
