@@ -84,18 +84,18 @@ def test_a_case_is_a_line_that_reproduces_it(case):
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("plant=leg", "none of handle, arm"),
+        ("plant=leg", "not permitted: choose handle, arm"),
         ("believed=5", "between -1 and 4"),
         ("release_s=2.5", "between 0.3 and 2"),
-        ("scale", "'scale' is none"),
+        ("scale", "not 'scale'"),
         ("scales=3", "did you mean 'scale'"),
         ("delay=1.5", "whole number"),
         ("scale=thick", "a number"),
         ("delay=5", "between 0 and 4"),
         ("rate_hz=100", "between 250 and 5000"),
         ("speed_mps=nan", "between 0.01 and 5"),
-        ("liquid=mercury", "none of water"),
-        ("hand=three", "none of light"),
+        ("liquid=mercury", "not permitted: choose water"),
+        ("hand=three", "not permitted: choose light"),
     ],
 )
 def test_a_line_that_is_no_case_is_told_in_one_sentence(line, said):
