@@ -254,11 +254,7 @@ def _print_material_errors(to: Path | None, workers: Workers, *, solve: bool) ->
 @click.option(
     "--withheld", is_flag=True, help=("Only print the proportion of each liquid's force that safety holds back.")
 )
-@click.option(
-    "--delivered",
-    is_flag=True,
-    help="Only print errors and proportions of the force that acts on the hand, and errors of the force sent.",
-)
+@click.option("--delivered", is_flag=True, help="Only print the error of each liquid's force at the hand.")
 @click.option(
     "--velocity",
     is_flag=True,
@@ -356,17 +352,14 @@ def stability(
 
 def _measure(part: str, executor: Executor, show: ShowProgress) -> Evidence:
     """Return the evidence of one separate measurement."""
-    from study_app.evidence.stability import acting_force, delivered_force, velocity, withheld_force
-    from study_app.evidence.table import Evidence
+    from study_app.evidence.stability import delivered_force, velocity, withheld_force
 
     if part == "velocity":
         return velocity.evidence(velocity.measure(lambda what: show(f"measuring {what}")))
     show(f"measuring the force {part}")
     if part == "withheld":
         return withheld_force.evidence(withheld_force.measure(executor=executor))
-    acting = acting_force.evidence(acting_force.measure(executor))
-    sent = delivered_force.evidence(delivered_force.measure(executor=executor))
-    return Evidence(f"{acting.text}\n{sent.text}", {}, missed=acting.missed or sent.missed)
+    return delivered_force.evidence(delivered_force.measure(executor=executor))
 
 
 MOST_COMPARED_S = 300.0

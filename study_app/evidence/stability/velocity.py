@@ -209,17 +209,10 @@ def wiener_bound(scene: Scene, count_m: float, delay_s: float) -> float:
     return math.sqrt(max(1 - explained_n2 / variance_n2, 0.0))
 
 
-def noise_m(frequency_hz: float, seed: int) -> Floats:
-    """Return one course (`ROWS`,) of noise about strokes of a frequency with the power of ±20 mm, at 1 kHz [m]."""
-    turns, power_m2 = _spectrum(RATE_HZ, frequency_hz)
-    phase = np.random.default_rng(seed).uniform(0, 2 * math.pi, len(turns))
-    return _course(np.sqrt(2 * power_m2) * np.exp(1j * phase))
-
-
-def _spectrum(rate_hz: float, stroke_hz: float = WHOLE.frequency_hz) -> tuple[Any, Floats]:
-    """Return iω [1/s] and the power [m²] at each frequency above 0 of a motion about strokes of a frequency."""
+def _spectrum(rate_hz: float) -> tuple[Any, Floats]:
+    """Return iω [1/s] and the motion's power [m²] at each frequency above 0."""
     frequency_hz = np.fft.rfftfreq(ROWS, 1 / rate_hz)[1:-1]
-    ratio = frequency_hz / stroke_hz
+    ratio = frequency_hz / WHOLE.frequency_hz
     power_m2 = 1 / ((1 - ratio**2) ** 2 + (2 * DAMPING_RATIO * ratio) ** 2) ** 2
     return 2j * math.pi * frequency_hz, WHOLE.amplitude_m**2 / 2 * power_m2 / power_m2.sum()
 

@@ -36,9 +36,6 @@ lags. A debt that begins in fast motion, of 15 ms or more, is forgiven once the 
 the gain returns within 0.3 s. One that begins otherwise, or after a gap in the samples, is not: its oscillation would
 return with the gain.
 
-A hand that lets go causes a debt at once: the forces under way act on the handle alone. While the inertial forces are
-withheld for that reason or return (`known_force`), up to 8 mJ of debt within 2 s are forgiven.
-
 With a force link, no debt is forgiven, the gain does not recover before the next scene, and it falls further as long as
 there is a debt: with a delayed force a handle would continue to oscillate at the forgiven power, or at the gain at
 which it neither supplies nor absorbs energy.
@@ -156,8 +153,6 @@ QUIET_MPS = 0.06
 PUSHED_S = 0.2
 LEAST_PUSH_S = 0.015
 REGAINED_S = 0.3
-SURPRISE_S = 2.0
-MOST_SURPRISE_J = 8e-3
 DELIVERY_STEPS_PER_N = 2.0**14
 
 
@@ -185,7 +180,6 @@ def reset_observer(passivity: layout.Record) -> None:
     passivity.fast_s = passivity.quiet_s = 0.0
     passivity.gap_s = math.inf
     passivity.debt = layout.DEBT_NONE
-    passivity.surprise_j = 0.0
     passivity.longest_m = 0.0
     passivity.strongest_n = 0.0
     passivity.gain = 1.0
@@ -254,9 +248,6 @@ def update_observer(model: Any, safety: layout.Record, interval_s: float) -> Non
     passivity.later_balance_j = min(
         _forgive(passivity.later_balance_j, forgiven_j) + later_work_j * per_time, most_j + later_j
     )
-    passivity.surprise_j /= 1.0 + interval_s / SURPRISE_S
-    if state.surprised and parameters.link.acts == 0:
-        _forgive_surprise(passivity)
     clear(passivity.impulse_ns)
     clear(passivity.late_impulse_ns)
     clear(passivity.later_impulse_ns)
@@ -319,20 +310,6 @@ def _left_j(passivity: layout.Record) -> float:
 @part
 def _forgive(balance_j: float, forgiven_j: float) -> float:
     return min(balance_j + forgiven_j, -ALLOWANCE_J) if balance_j < -ALLOWANCE_J else balance_j
-
-
-@part
-def _forgive_surprise(passivity: layout.Record) -> None:
-    """Forgive half of the allowed debt and all beyond it, up to `MOST_SURPRISE_J` within `SURPRISE_S`."""
-    left_j = min(_left_j(passivity), INCREMENTAL_ALLOWANCE_J + passivity.fast.balance_j)
-    lacking_j = min(0.5 * ALLOWANCE_J - left_j, MOST_SURPRISE_J - passivity.surprise_j)
-    if lacking_j > 0.0:
-        passivity.surprise_j += lacking_j
-        least_j = left_j + lacking_j
-        passivity.balance_j = max(passivity.balance_j, least_j - ALLOWANCE_J)
-        passivity.late_balance_j = max(passivity.late_balance_j, least_j - ALLOWANCE_J)
-        passivity.later_balance_j = max(passivity.later_balance_j, least_j - ALLOWANCE_J)
-        passivity.fast.balance_j = max(passivity.fast.balance_j, least_j - INCREMENTAL_ALLOWANCE_J)
 
 
 @part

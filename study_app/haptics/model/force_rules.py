@@ -30,8 +30,6 @@ class ForceRules(NamedTuple):
     (`sample_validation`), ``quiet_s`` how long a hand must be quiet for its energy debt to be forgiven (`passivity`).
     ``history_rs`` is the square root of the period of the oscillation whose inertia the history force may return as
     energy: with that of 1 Hz, a handle of 200 g let go in tar oscillated at 35 Hz on energy that 35 Hz do not store.
-    ``most_known_inertia`` is the greatest inertia, as a multiple of the device's least mass, that is computed with the
-    known force instead of smoothed and limited (`kernels.known_force`); 0: none.
     """
 
     version: int
@@ -50,7 +48,6 @@ class ForceRules(NamedTuple):
     gap_ticks: float = math.inf
     quiet_s: float = math.inf
     history_rs: float = 1.0
-    most_known_inertia: float = 0.0
 
 
 VERSIONS: Final = {
@@ -77,9 +74,8 @@ VERSIONS: Final = {
         ),
     )
 }
-VERSIONS[4] = VERSIONS[3]._replace(version=4, most_known_inertia=7.0)
 
-FORCE_RULES: Final = 4
+FORCE_RULES: Final = 3
 """The version by which this program computes forces. Receipts state it: released numbers never change, new numbers are
 a new version."""
 CURRENT: Final = VERSIONS[FORCE_RULES]

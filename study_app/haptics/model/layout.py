@@ -379,7 +379,6 @@ PARAMETERS = np.dtype(
         ("count_m", np.float64),  # one encoder count of the device, hand frame
         ("mass_kg", np.float64),  # the device's least effective mass
         ("smoothing_lead", np.float64),  # share of the lag of smoothed dw/dt that is compensated
-        ("tracks_force", np.int64),  # 1: the effects of the force sent are tracked for inertial forces (`known_force`)
         ("link", LINK),
         ("rules", RULES),
     ],
@@ -400,8 +399,6 @@ LIQUID = np.dtype(
         ("effects", np.int64),  # bits of the effects it selects
         ("inertia_share", np.float64, (MOST_DELAY + 1,)),  # stable share of inertial forces, by the delay
         ("smoothing_rate", np.float64, (MOST_DELAY + 1,)),  # factor of the rates at which dw/dt is smoothed, likewise
-        # factor of the slope limit while inertial forces are those of the known force, likewise; 0: they never are
-        ("known_force", np.float64, (MOST_DELAY + 1,)),
         ("region", REGION),
         *((effect.name, record_type(effect.parameters)) for effect in EFFECTS if effect.parameters is not None),
     ],
@@ -431,7 +428,6 @@ STATE = np.dtype(
         ("drift_mps", np.float64, (3,)),  # velocity of the current at the body, of the same liquid
         ("force_n", np.float64, (3,)),  # sum of the effects
         ("lift_n", np.float64, (3,)),  # buoyancy and weight within it
-        ("surprised", np.int64),  # 1: a surprise withholds inertial forces (`known_force`)
         ("returnable_j", np.float64),  # the greatest energy that effects can return, times the scale
         ("growth", np.int64),  # GROWS_* of the force that depends least on the speed
         ("link", LINK_STATE),
@@ -456,8 +452,6 @@ LIQUID_STATE = np.dtype(
         ("late_n", np.float64, (3,)),  # delayed drag, bounded by the rest of the slope limit
         ("late_mps", np.float64),  # the speed for its limit; 0: no delayed drag
         ("prompt_nspm", np.float64),  # the slope of the drag that acts at once
-        ("inertia_share", np.float64),  # stable share of inertial forces in this tick
-        ("slope_factor", np.float64),  # factor of the slope limit in this tick
         ("inertial", np.int64),  # number of reduced inertial forces
         ("inertia_n", np.float64, (MOST_INERTIAL, 3)),  # these forces, in the order of their effects
         *((effect.name, record_type(effect.state)) for effect in EFFECTS if effect.state is not None),
@@ -502,7 +496,6 @@ PASSIVITY = np.dtype(
         ("fast_s", np.float64),  # for how long the hand moved fast of late
         ("quiet_s", np.float64),  # for how long it has been quiet
         ("gap_s", np.float64),  # time since the last gap in the samples
-        ("surprise_j", np.float64),  # debts of surprises forgiven lately
         ("debt", np.int64),  # DEBT_*: why force is or was withheld
         ("longest_m", np.float64),  # the longest step so far
         ("strongest_n", np.float64),  # the strongest force so far

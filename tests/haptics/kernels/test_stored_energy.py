@@ -1,11 +1,10 @@
-"""What liquids give back with "kalman", whose smoothing of inertia takes longer than its velocity lags."""
+"""What liquids give back with "kalman", whose added mass and history smooth for longer than its velocity lags."""
 
 import numpy as np
 import pytest
 
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.estimators import Ewma, Kalman
-from study_app.haptics.model.force_rules import VERSIONS
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import handle_limits
 from study_app.haptics.runtime.pack import pack
@@ -44,7 +43,7 @@ def test_accelerations_are_smoothed_as_suits_the_estimator(velocity, dynamics, a
 )
 def test_inertia_holds_the_energy_of_the_velocity_as_smoothed(effect, inertia_kg):
     """A hand that comes to rest gets back ½ m (|2 v₁ - v₂|² + |v₁ - v₂|²) at most, v smoothed once and twice."""
-    hand = Hand(inert(effects=(effect,)), dynamics=MEASURED, rules=VERSIONS[3])
+    hand = Hand(inert(effects=(effect,)), dynamics=MEASURED)
     share, rate = hand.model.liquids[0].inertia_share[1], hand.model.liquids[0].smoothing_rate[1]
     speeds = np.concatenate([np.full(300, 0.3), np.linspace(0.3, 0.0, 30)])
     once_mps = twice_mps = 0.0
@@ -63,7 +62,7 @@ def test_inertia_holds_the_energy_of_the_velocity_as_smoothed(effect, inertia_kg
 
 def test_no_more_energy_is_stored_than_the_hand_put_in():
     """Of random motion: the work on the added mass is at least what it may return, which is nearly all at times."""
-    hand = Hand(inert(effects=("added_mass",)), dynamics=MEASURED, rules=VERSIONS[3])
+    hand = Hand(inert(effects=("added_mass",)), dynamics=MEASURED)
     place_m = (
         0.02
         * np.random.default_rng(2).normal(size=(6, 2))

@@ -20,7 +20,6 @@ RELEASED = {
     "gap_ticks": math.inf,
     "quiet_s": math.inf,
     "history_rs": 1.0,
-    "most_known_inertia": 0.0,
 }
 
 

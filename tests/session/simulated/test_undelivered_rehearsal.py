@@ -142,7 +142,7 @@ GOO = ("viscosity_pa_s", 'viscosity_pa_s = 1.0, effects = ["unsteady_drag"]')
 DAMPER = ("damping_nspm", 'drag = { law = "linear", damping_nspm = 3 }, effects = ["drag", "added_mass"]')
 
 
-@pytest.mark.parametrize(("goo", "scale", "notes"), [(GOO, 3, 0), (GOO, 6, 1), (DAMPER, 2, 0)])
+@pytest.mark.parametrize(("goo", "scale", "notes"), [(GOO, 3, 0), (GOO, 4, 1), (DAMPER, 2, 0)])
 def test_check_notes_levels_of_a_liquid_with_inertia_that_a_rehearsal_does_not_deliver(
     goo: tuple[str, str], scale: int, notes: int, tmp_path: Path
 ) -> None:
