@@ -332,7 +332,8 @@ def test_no_level_of_a_late_force_is_clipped_though_a_limit_clips_the_force() ->
 
 
 @pytest.mark.slow
-def test_clipped_levels_make_the_error_larger() -> None:
+def test_clipped_levels_make_the_error_larger(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(simulation, "OBSERVERS", 100)
     clipped, full = plan_of(24, *CLIPPED), plan_of(24, *CLIPPED)
     found = [simulate_observers(one, 0.6, 0.02) for one in (clipped, replace(full, clipping=None))]
     assert found[0] is not None
@@ -343,7 +344,10 @@ def test_clipped_levels_make_the_error_larger() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("standard", [52, 60])
-def test_a_threshold_whose_levels_are_clipped_has_no_error_and_no_precision(standard: float) -> None:
+def test_a_threshold_whose_levels_are_clipped_has_no_error_and_no_precision(
+    standard: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(simulation, "OBSERVERS", 100)
     plan = plan_of(24, Set(("stimuli", "damping", "standards"), [standard]))
     observed, known = simulate_observers(plan, 0.19, 0.02), expected(plan)
     assert observed is not None
@@ -380,7 +384,8 @@ def test_each_standard_is_simulated_as_limits_clip_it() -> None:
 
 
 @pytest.mark.slow
-def test_more_lapses_lower_the_function_and_raise_the_error() -> None:
+def test_more_lapses_lower_the_function_and_raise_the_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(simulation, "OBSERVERS", 100)
     plan = plan_of(24)
     few, many = simulate_observers(plan, 0.2, 0.0), simulate_observers(plan, 0.2, 0.15)
     assert few is not None
