@@ -66,7 +66,8 @@ SIZES: Final = (
     "Standardised effects weight participants equally: d_z is the mean difference within participants divided by its "
     "standard deviation, g is Hedges' g of two groups; their 95 % intervals invert the noncentral t distribution. "
     "Bayes factors are two-sided JZS factors (Rouder et al., 2009) of a difference against none, with a Cauchy prior "
-    "of scale 0.707."
+    f"of scale {number(PRIOR_SCALE, 3)}. Cliff's delta is the probability of a larger answer minus the probability of "
+    "a smaller one; within participants it is the share with a larger answer minus the share with a smaller one."
 )
 MOST_NAMED: Final = 20
 

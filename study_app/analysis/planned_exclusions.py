@@ -12,7 +12,7 @@ from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.levels.tracks import below_chance, tracks
 from study_app.analysis.results import Results
-from study_app.analysis.wording import number, percent
+from study_app.analysis.wording import number, p_equals, percent
 from study_app.protocol.model import RULES
 from study_app.store.exclusions import Exclusion
 
@@ -108,7 +108,7 @@ def _below_chance(study: Study) -> Rows:
             yield (
                 (one.participant, one.session),
                 f"{one.right} of {one.n} answers in {one.block} are correct, fewer than by chance "
-                f"(p = {one.p:.1g}): were keys exchanged?",
+                f"({p_equals(one.p)}): the answer keys may have been swapped",
             )
 
 

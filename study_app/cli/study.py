@@ -289,17 +289,17 @@ def language(code: str) -> None:
     CODE is two letters, such as es. The file has a line for each text, with the English one as a comment.
     """
     from study_app.errors import StudyError
-    from study_app.protocol.wording.languages import LANGUAGES, language_template, read_language
+    from study_app.protocol.wording.languages import SHIPPED, language_template, read_language
     from study_app.store.atomic import cannot_write, write_file
     from study_app.workspace import workspace as workspace_here
 
     if len(code) != 2 or not (code.isascii() and code.islower()):
         raise StudyError(f"{code!r} is not a language: give two small letters, such as es")
     file = workspace_here().folder / "languages" / f"{code}.toml"
-    if file.is_file():
+    if code in SHIPPED:
+        click.echo(f"{SHIPPED[code].english_name} ships with the program")
+    elif file.is_file():
         click.echo(f"{file}: complete, {read_language(file).english_name}")
-    elif code in LANGUAGES:
-        click.echo(f"{LANGUAGES[code].english_name} ships with the program")
     else:
         try:
             file.parent.mkdir(parents=True, exist_ok=True)

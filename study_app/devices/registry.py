@@ -5,7 +5,7 @@ Naming and probing the devices loads no compiler, and drivers only as far as pro
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
@@ -22,9 +22,14 @@ REMOVED: Final = {"falcon-socket": "falcon-emulated, or falcon"}
 """Devices of earlier versions, with their replacements."""
 
 
+def _are_backends(value: object) -> bool:
+    """Return whether a value is a sequence of backends; an iterator would be used up by the check."""
+    return isinstance(value, Sequence) and all(isinstance(backend, Backend) for backend in value)
+
+
 RETURNS: Final = {
-    "open": Returns("a device", lambda value: None not in (value.read, value.write) and callable(value.close)),
-    "probe": Returns("a list of Backend", lambda value: all(isinstance(backend, Backend) for backend in list(value))),
+    "open": Returns("a device", lambda value: callable(value.close)),
+    "probe": Returns("a list of Backend", _are_backends),
 }
 DEVICES: Final = Registry("device", {device.name: device for device in OWN}, DeviceDescriptor, "name", RETURNS)
 
@@ -81,10 +86,10 @@ def open_device(name: str, **request: Any) -> Device:
     asked = OpenRequest(**request)
     check_options(name, asked.options)
     opened = device.open(replace(asked, argument=name.partition(":")[2]))
-    if not hasattr(opened, "failure"):  # a plug-in made for an earlier version
+    if lacking := [part for part in ("read", "write", "failure") if not hasattr(opened, part)]:
         opened.close()
         raise DeviceError(
-            f"device '{name}' does not have 'failure': let {type(opened).__name__} inherit "
+            f"device '{name}' does not have '{lacking[0]}': let {type(opened).__name__} inherit "
             "study_app.devices.base.Device"
         )
     return opened

@@ -39,7 +39,9 @@ _SYSTEM = re.compile(
     r"desktop\.ini|(?:eh)?thumbs(?:_vista)?\.db(?::.*)?|folder\.jpg|icon\r|~\$.*|~syncthing~.*|~wr[a-z]\d+\.tmp|"
     r".*\(.*conflicted copy.*\).*|.*(?-i:-(?:DESKTOP|LAPTOP)-[A-Z0-9]{4,12})(?:-\d+)?\..*|@eaDir|__MACOSX|"
     r"\$RECYCLE\.BIN|System Volume Information|lost\+found|"
-    r"(?:journal|receipt|checksums|rebuilt|crash|subject-.*_data|trial-\d{3,}\w*)(?:[ .(\[~-]|_conflict).*",
+    r"(?:journal|receipt|checksums|rebuilt|crash|subject-.*_data|trial-\d{3,}(?:_attempt-\d+)?(?:_interval-\d+)?(?:_frames)?)"
+    r"(?:\.(?:jsonl|json|sha256|txt|csv|parquet)(?:~|\.bak)|(?:[ (\[~-]|_conflict|\.sync-conflict-).*"
+    r"\.(?:jsonl|json|sha256|txt|csv|parquet))",
     re.IGNORECASE,
 )
 """Files of Windows, macOS, Office and programs that share files, and copies of a session's own files, such as "journal

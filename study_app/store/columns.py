@@ -230,7 +230,7 @@ TRIALS: tuple[Column, ...] = (
         "delivered_error",
         (
             "RMS error of the force sent divided by the RMS force of the model for the actual motion, from 0.2 s after "
-            "the fade-in;  0.05 is 5 %; n/a if the participant set the force, the study delays it, or it is below 0.05 "
+            "the fade-in; 0.05 is 5 %; n/a if the participant set the force, the study delays it, or it is below 0.05 "
             "N."
         ),
         sealed=True,

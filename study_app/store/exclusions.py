@@ -253,7 +253,11 @@ def _parse_reversal(path: Path, number: int, line: bytes) -> Reversal:
         record = parse_json(line)
         taken = Exclusion(**record["exclusion"])
         texts = (taken.participant, taken.rule_or_person, taken.reason, taken.excluded_at)
-        if all(isinstance(text, str) for text in texts) and isinstance(taken.session, int):
+        if (
+            all(isinstance(text, str) for text in texts)
+            and isinstance(taken.session, int)
+            and isinstance(taken.key_open, bool | None)
+        ):
             key_open = record.get("key_open")
             return Reversal(taken, str(record.get("at", "")), key_open if isinstance(key_open, bool) else None)
     raise StoreError(f"{path}, line {number} is not a reversed exclusion: restore it from a copy, or remove the line")

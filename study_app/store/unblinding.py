@@ -53,7 +53,6 @@ from study_app.store.journals.journal_events import Event, Recorded, SessionEnde
 from study_app.store.merged import folders_of
 from study_app.store.progress import trial_results
 from study_app.store.sessions.open_session import Place, table_files
-from study_app.store.sessions.recovery import files_beyond_journal
 from study_app.store.tables.session_tables import table_columns
 from study_app.store.tables.study_files import (
     described_study,
@@ -264,17 +263,19 @@ def _open_tables(study: StudyFolder, session: SessionFolder, key: Key) -> list[s
 def _open_files(place: Place, lines: list[Event], key: Key) -> list[str]:
     """Write the sealed columns and open the recordings; a table gets no columns that its version did not have.
 
-    The tables of a session without an end may be behind its journal: they are written whole.
+    A table of a session without an end may be behind its journal: it is written whole if its lines begin that table.
     """
     left: list[str] = []
     ours: dict[str, tuple[str, str]] = {}
-    behind = not isinstance(lines[-1], SessionEnded) and not any(files_beyond_journal(place, lines))
+    ended = isinstance(lines[-1], SessionEnded)
     before, after = (dict(table_files(place, lines, reader)) for reader in (None, key))
     for path, columns in zip(after, table_columns(lines, opened=True).values(), strict=True):
         held = read_if_there(path) or b""
         written = [replace(column, later=False) if column.sealed else column for column in columns]
         sealed, content = (align_columns(held, whole[path], written)[0] for whole in (before, after))
-        if held not in (sealed, content) and not behind:
+        whole_lines = held[: held.rfind(b"\n") + 1]
+        is_behind = not ended and any(table.startswith(whole_lines) for table in (sealed, content))
+        if held not in (sealed, content) and not is_behind:
             left.append(
                 f"{path} differs from the journal, so it was not changed: "
                 f"rebuild it with liquid-study rebuild {place.folder.path}"

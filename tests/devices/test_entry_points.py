@@ -169,3 +169,18 @@ def test_a_device_that_cannot_be_looked_for_hides_no_other(site):
         "update or uninstall the plug-in"
     )
     assert {"mouse", "falcon", "scripted"} <= set(found)
+
+
+def test_a_probe_that_returns_an_iterator_is_a_fault_of_its_plug_in(site):
+    install(
+        site,
+        "toy_once",
+        "device",
+        {"toy": "toy_once:TOY"},
+        toy_once=DESCRIPTOR.replace(
+            '[Backend("toy-hand", "a string", state=READY, can="moves by itself, as a toy does")]', "iter([])"
+        ),
+    )
+    found = {one.name: one for one in backends()}
+    assert "toy_once 1.0 failed (probe of device toy-hand returned" in found["toy-hand"].why
+    assert "not a list of Backend" in found["toy-hand"].why

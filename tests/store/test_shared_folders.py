@@ -51,7 +51,10 @@ def test_files_of_systems_are_noted_and_leave_the_fingerprint(study: Path) -> No
     found = verify_study(study)
     assert found.errors == ()
     assert {Path(one.place).name for one in found.warnings} == {Path(name).name for name in OF_SYSTEMS}
-    added = ("more.csv", "recordings/trial-099.parquet", "recordings/trial-001_attempt-2.parquet")
+    added = (
+        "more.csv", "receipt.txt", "journal.jsonl.orig", "recordings/trial-099.parquet",
+        "recordings/trial-001_attempt-2.parquet", "recordings/trial-001_extra.parquet",
+    )  # fmt: skip
     for name in added:
         (session_of(study) / name).write_bytes(b"1\n")
     said = {one.place: one.message for one in verify_study(study).errors}
@@ -65,7 +68,7 @@ def test_copies_of_sessions_are_no_sessions(study: Path) -> None:
     found = verify_study(study)
     assert found.errors == ()
     assert [one.message for one in found.warnings] == [
-        "is not the folder of a session, so it is ignored: a copy of one?"
+        "is ignored because it is not a session folder; it may be a copy of one"
     ] * 2
     assert found.sessions == 1
 

@@ -288,7 +288,7 @@ def _why_not(folder: Path, row: Mapping[Any, Any]) -> str:
     if pd.isna(row["recording"]):
         return "a recording was not stored"
     if pd.isna(row["duration_s"]):
-        return "the duration of the trial is zero"
+        return "the trial does not have a recorded duration"
     return "" if _file(folder, row).is_file() else "recording is not in the folder"
 
 

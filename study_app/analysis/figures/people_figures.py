@@ -13,6 +13,8 @@ from study_app import figure_style as style
 from study_app.analysis.page_layout import MARGIN_PT, SMALL, Look, Sheet
 from study_app.analysis.statistics.outcome import student_interval
 
+A_ROW: Final = 3
+"""Panels side by side."""
 WIDTH_PT: Final = 420.0
 """Of a figure that stands beside its answer."""
 PANEL_PT: Final = 128.0
@@ -138,22 +140,21 @@ def draw_people(
     above: str,
     below: str = "",
     members: Mapping[str, str] | None = None,
-    a_row: int = 3,
     shared: bool = False,
-    width_pt: float = WIDTH_PT,
 ) -> Sheet:
-    """Draw panels, ``a_row`` of them side by side.
+    """Draw panels, `A_ROW` of them side by side.
 
     Parameters
     ----------
     above, below : what the scale at the left shows, and what the columns are
     members : the group of each participant, which has a colour and a marker
-    shared : whether all panels have the scale of the first one
+    shared : whether all panels have one scale
     """
     groups = sorted(set((members or {}).values()))
-    panel_pt = PANEL_PT if len(panels) <= a_row else SMALL_PANEL_PT if len(panels) <= 2 * a_row else LEAST_PANEL_PT
+    panel_pt = PANEL_PT if len(panels) <= A_ROW else SMALL_PANEL_PT if len(panels) <= 2 * A_ROW else LEAST_PANEL_PT
+    width_pt = WIDTH_PT
     ruler = Sheet(width_pt, 72, look.fonts)
-    rows = [panels[place : place + a_row] for place in range(0, len(panels), a_row)]
+    rows = [panels[place : place + A_ROW] for place in range(0, len(panels), A_ROW)]
     inside = width_pt - MARGIN_PT
     widths = [_widths(row, inside, shared=shared) for row in rows]
     if len(panels) == 1:

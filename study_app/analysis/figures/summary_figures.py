@@ -1,6 +1,6 @@
 """The figures of the first page: hypotheses, estimates of levels, ratings and scores, each with its participants."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any, Final, NamedTuple
 
@@ -14,7 +14,7 @@ from study_app.analysis.levels.answers import Answers, Settings
 from study_app.analysis.levels.sensitivities import Sensitivities
 from study_app.analysis.levels.statistic import LevelStatistic, level_words
 from study_app.analysis.levels.thresholds import Exponents, Thresholds
-from study_app.analysis.page_layout import Look, Picture, Sheet, attempted, picture_of, sample_words
+from study_app.analysis.page_layout import Picture, attempted, picture_of, sample_words
 from study_app.analysis.questions import scored
 from study_app.analysis.results import ContrastResult, Failures, LevelsResult, Results
 from study_app.number_text import capitalised
@@ -119,14 +119,12 @@ def _hypothesis(study: Study, results: Results, one: ContrastResult, forms: Sequ
         f"{sample_words(study, one.n)}"
     )
     found = next((level for level in results.levels if level.block == one.contrast.blocks[0]), None)
-    draw, numbers = partial(draw_panels, panels, _scale_words(one, found), "", shown), numbers_of_panels(panels)
+    draw, numbers = (
+        partial(draw_people, panels, above=_scale_words(one, found), members=shown),
+        numbers_of_panels(panels),
+    )
     title = f"{capitalised(one.contrast.measure_words)}"
     return picture_of(study, one.contrast.blocks[0], name, title, caption, draw, forms, (f"n = {one.n}",), numbers)
-
-
-def draw_panels(panels: Sequence[Panel], above: str, below: str, members: Mapping[str, str], look: Look) -> Sheet:
-    """Draw panels with scales of their own."""
-    return draw_people(panels, look, above=above, below=below, members=members)
 
 
 def _effect_name(one: ContrastResult) -> str:
@@ -178,7 +176,10 @@ def _estimates(study: Study, found: LevelsResult, forms: Sequence[str], name: st
     above = level_words(found) if estimates.attribute in ("threshold", "pse") else words
     of = "Standard" if getattr(estimates.own[0], "level", None) is None else "Level"
     below = "" if found.quantity is None or alone else f"{of}: {found.quantity} [{found.unit}]"
-    draw, numbers = partial(draw_panels, [panel], above, below, group_members(study)), numbers_of_panels([panel])
+    draw, numbers = (
+        partial(draw_people, [panel], above=above, below=below, members=group_members(study)),
+        numbers_of_panels([panel]),
+    )
     title = f"{found.title}: {estimates.words}"
     return picture_of(study, found.block, name, title, caption, draw, forms, (f"n = {people}",), numbers)
 
@@ -252,5 +253,5 @@ def _answers(study: Study, where: str, forms: Sequence[str], name: str) -> Pictu
         f"{title}: the number of each participant, and the mean with Student's 95 % interval. "
         f"{sample_words(study, people)}"
     )
-    draw, numbers = partial(draw_panels, panels, "", "", group_members(study)), numbers_of_panels(panels)
+    draw, numbers = partial(draw_people, panels, above="", members=group_members(study)), numbers_of_panels(panels)
     return picture_of(study, where, name, title, caption, draw, forms, (f"n = {people}",), numbers)

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from study_app import number_text
 from study_app.analysis.data.blocks import Block
+from study_app.analysis.data.measures import AGREEMENT
 from study_app.analysis.data.motion import OF_REACHES
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.findings.finding import (
@@ -397,7 +398,7 @@ class DetectionThreshold(Finding[Threshold | None]):
         answers = drawing.study.answers(drawing.block)
         rows = answers[(answers["item"] == self.results.decided.noticed) & answers["response"].notna()]
         delays_ms = {one.code: one.delay_ms or 0.0 for one in drawing.found.settings}
-        rows = rows.assign(delay=rows["code"].map(delays_ms).astype(float), agrees=rows["response"].astype(float) >= 5)
+        rows = rows.assign(delay=rows["code"].map(delays_ms).astype(float), agrees=rows["response"].isin(AGREEMENT))
         people = rows.groupby("participant", sort=True)
         return {str(who): dict(own.groupby("delay")["agrees"].mean()) for who, own in people}
 

@@ -86,13 +86,18 @@ class BelowChance:
 
 
 def below_chance(found: pd.DataFrame, blocks: Iterable[LevelBlock]) -> Iterator[BelowChance]:
-    """Yield where answers are correct less often than by chance (binomial p below `BELOW_CHANCE_P`)."""
+    """Yield where answers are correct less often than by chance (binomial p below `BELOW_CHANCE_P`).
+
+    Chance is known of designs with a guess rate alone: elsewhere a preference makes answers of few correct.
+    """
     by_id = {block.id: block for block in blocks}
     answered = found[found["analysed"].fillna(False) & found["right"].notna()]
     of_blocks: Iterable[tuple[Any, pd.DataFrame]] = answered.groupby(["participant", "session", "block"])
     for (who, session, block), rows in of_blocks:
+        if (chance := by_id[block].design.guess_rate) is None:
+            continue
         right, n = int(rows["right"].sum()), len(rows)
-        p = float(binom.cdf(right, n, by_id[block].design.guess_rate or 0.5))
+        p = float(binom.cdf(right, n, chance))
         if p < BELOW_CHANCE_P:
             yield BelowChance(participant=str(who), session=int(session), block=str(block), right=right, n=n, p=p)
 

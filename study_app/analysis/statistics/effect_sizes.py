@@ -21,6 +21,8 @@ from study_app.analysis.statistics.outcome import Array
 PRIOR_SCALE: Final = math.sqrt(2) / 2
 """Scale of the Cauchy prior of the standardised difference ("medium")."""
 LEVEL: Final = 0.95
+LARGEST_LOG: Final = 700.0
+"""Logarithm of the largest Bayes factor, which a float can hold."""
 SAME: Final = 1e-9
 
 
@@ -97,25 +99,28 @@ def cliffs_delta(first: Array, second: Array) -> EffectSize | None:
     of_cells = float(((signs - delta) ** 2).sum())
     variance = (m**2 * of_rows + n**2 * of_columns - of_cells) / (n * m * (n - 1) * (m - 1))
     least = (1 - delta**2) / (n * m - 1)
-    return _of_signs(delta, max(variance, least), n + m - 2)
+    return _of_signs(delta, max(variance, least), n + m - 2, min(n, m))
 
 
 def paired_delta(differences: Array) -> EffectSize | None:
     """Return how many more participants have a positive difference than a negative one, as a share of all.
 
-    None if there are fewer than two.
+    None if there are fewer than two, or all are zero.
     """
     n = len(differences)
-    if n < 2:
-        return None
     signs = np.where(np.abs(differences) < SAME, 0.0, np.sign(differences))
-    return _of_signs(float(signs.mean()), float(signs.var(ddof=1)) / n, n - 1)
+    if n < 2 or not signs.any():
+        return None
+    return _of_signs(float(signs.mean()), float(signs.var(ddof=1)) / n, n - 1, n)
 
 
-def _of_signs(delta: float, variance: float, freedom: int) -> EffectSize:
-    """Return delta with the interval that cannot leave −1 to 1; at ±1 it ends at that of a single exception."""
+def _of_signs(delta: float, variance: float, freedom: int, cases: int) -> EffectSize:
+    """Return delta with an interval that cannot leave −1 to 1.
+
+    At ±1, where the variance is zero, it ends at the bound of Clopper and Pearson (1934) for ``cases`` of ``cases``.
+    """
     if 1 - abs(delta) < SAME:
-        end = 2 * (1 - LEVEL) ** (1 / (freedom + 1)) - 1
+        end = 2 * ((1 - LEVEL) / 2) ** (1 / cases) - 1
         ends = (end, 1.0) if delta > 0 else (-1.0, -end)
         return EffectSize(name="Cliff's delta", value=delta, low=ends[0], high=ends[1])
     t = float(student.ppf((1 + LEVEL) / 2, freedom))
@@ -142,10 +147,12 @@ def jzs_bayes_factor(t: float, n: int, m: int | None = None, scale: float = PRIO
     def log_likelihood(g: float) -> float:
         return -0.5 * math.log1p(size * g) - (freedom + 1) / 2 * math.log1p(t**2 / ((1 + size * g) * freedom))
 
-    def density(log_g: float) -> float:
+    def log_density(log_g: float) -> float:
         g = math.exp(log_g)
         prior = math.log(scale) - 0.5 * math.log(2 * math.pi) - 0.5 * log_g - scale**2 / (2 * g)
-        return math.exp(log_likelihood(g) + prior - none)
+        return log_likelihood(g) + prior - none
 
     none = -(freedom + 1) / 2 * math.log1p(t**2 / freedom)
-    return float(quad(density, -12, 25, limit=400, points=(-4, 0, 4))[0])
+    peak = max(log_density(float(log_g)) for log_g in np.linspace(-12, 25, 371))
+    area = quad(lambda log_g: math.exp(log_density(log_g) - peak), -12, 25, limit=400, points=(-4, 0, 4))[0]
+    return math.exp(min(math.log(area) + peak, LARGEST_LOG))

@@ -24,6 +24,7 @@ from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QScrollArea, QSizePolicy, QWidget
 
 from study_app.analysis.worker_messages import FigureDrawn, Progress, StudyAt
+from study_app.errors import StoreError
 from study_app.gui.sessions.session_facts import SessionFacts
 from study_app.gui.theme.theme import FAMILIES, SHADOW, Theme, font
 from study_app.gui.theme.themed import Coloured, remove_widget
@@ -33,6 +34,7 @@ from study_app.gui.widgets.cards import Bar, Card, Chip
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.number_text import counted
+from study_app.store.atomic import write_file
 from study_app.store.exclusions import Exclusion
 
 NAMED: int = 5
@@ -292,15 +294,15 @@ PNG_SCALE = 300 / 72
 
 
 def save_figure(figure: FigureDrawn, path: Path) -> None:
-    """Write a figure as PDF, SVG or PNG, by the ending of ``path``; OSError if it cannot be written."""
+    """Write a figure as PDF, SVG or PNG, by the ending of ``path``; StoreError if it cannot be written."""
     renderer = QSvgRenderer(figure.svg)
     size = renderer.defaultSize()
-    if path.suffix == ".svg":
+    if (ending := path.suffix.lower()) == ".svg":
         content = figure.svg
     else:
         held = QBuffer()
         held.open(QIODevice.OpenModeFlag.WriteOnly)
-        if path.suffix == ".pdf":
+        if ending == ".pdf":
             writer = QPdfWriter(held)
             writer.setTitle(figure.title)
             writer.setPageSize(QPageSize(QSizeF(size), QPageSize.Unit.Point))
@@ -311,7 +313,7 @@ def save_figure(figure: FigureDrawn, path: Path) -> None:
         else:
             QImageWriter(held, QByteArray(b"png")).write(drawn_svg(figure.svg, size, PNG_SCALE))
         content = bytes(held.data().data())
-    path.write_bytes(content)
+    write_file(path, content)
 
 
 class FigureCard(Card):
@@ -417,12 +419,12 @@ class FigureCard(Card):
 
     def save_to(self, path: Path, form: str = "PDF") -> None:
         """Save the figure; a path without a known ending gets that of ``form``."""
-        if path.suffix not in (".pdf", ".svg", ".png"):
+        if path.suffix.lower() not in (".pdf", ".svg", ".png"):
             path = path.with_name(f"{path.name}.{form[:3].lower()}")
         try:
             save_figure(self.figure, path)
-        except OSError as error:
-            self.failed.emit(f"{path} cannot be written ({error.strerror}): choose another folder.")
+        except StoreError as error:
+            self.failed.emit(f"{error}.")
 
 
 class WorkLine(Card):

@@ -104,7 +104,7 @@ _INDICES: Final = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 _SHAPES: Final = (1.354, 1.413, 1.458, 1.442, 1.420, 1.382, 1.320, 1.240, 1.140, 1.0)
 
 StressPa: TypeAlias = Annotated[
-    float, within(0, 5000, "liquids have less than solids; toothpaste has 50 to 200 Pa", what="Yield stress τ_y [Pa].")
+    float, within(0, 5000, "materials with more are solids; toothpaste has 50 to 200 Pa", what="Yield stress τ_y [Pa].")
 ]
 ConsistencyPaSn: TypeAlias = Annotated[
     float, within(1e-4, 1e5, "water has 0.001 Pa·s, ketchup 10 Pa·sⁿ", what="Consistency K [Pa·sⁿ].")

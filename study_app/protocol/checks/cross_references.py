@@ -207,9 +207,9 @@ def check_languages(document: Document) -> Iterator[Fault]:
     """Check that every text exists in exactly the study's languages."""
     written = [(path, name) for path, name in entries(document, "study.languages.*") if isinstance(name, str)]
     for path, name in written:
-        if name not in LANGUAGES:
+        if name not in LANGUAGES or name in REFUSED:
             known = REFUSED.get(
-                name, f"known: {', '.join(LANGUAGES)}; liquid-study language {name} begins a file of it"
+                name, f"known: {', '.join(LANGUAGES)}; liquid-study language {name} begins a file for it"
             )
             yield Fault(path, f'the program does not have texts in "{name}"', known, permitted=tuple(LANGUAGES))
     wanted = tuple(name for _, name in written)

@@ -100,7 +100,7 @@ def read_language(file: File) -> Words:
         raise StudyError(f"{file} cannot be read as TOML ({error}): correct it") from error
     faults = [*_language_faults("", _ENGLISH, table)]
     if table.get("language") != file.stem:
-        faults.append(f'language must be "{file.stem}", as the file\'s name')
+        faults.append(f'language must be "{file.stem}", like the file name')
     if faults:
         more = f"; and {len(faults) - _SHOWN} more" if len(faults) > _SHOWN else ""
         raise StudyError(f"{file}: {'; '.join(faults[:_SHOWN])}{more}")
@@ -128,7 +128,7 @@ def _language_faults(place: str, english: Mapping[str, Any], table: Mapping[str,
         elif key == "interval_coming" and len(text) != len(model):
             yield f"{place}{key} needs {len(model)} texts"
         elif isinstance(text, str) and (wrong := _wrong_slots(text, model)):
-            yield f"{place}{key} must have the slots of “{model}”, and differs in {{{'}, {'.join(sorted(wrong))}}}"
+            yield f"{place}{key} must contain the same slots as “{model}”; different: {{{'}, {'.join(sorted(wrong))}}}"
 
 
 def _wrong_slots(text: str, model: str) -> set[str]:
@@ -139,16 +139,24 @@ def _wrong_slots(text: str, model: str) -> set[str]:
 
 def _slots(text: str) -> set[str]:
     try:
-        return {name for _, name, _, _ in string.Formatter().parse(text) if name is not None}
+        slots = [(name, form, conversion) for _, name, form, conversion in string.Formatter().parse(text)]
     except ValueError:  # a single brace
         return {"…"}
+    return {f"{name}{'!' if conversion else ''}{form}" for name, form, conversion in slots if name is not None}
 
 
 def own_languages(folder: File) -> tuple[dict[str, Words], dict[str, str]]:
     """Return the languages in a folder by code, and why the others are refused."""
     found: dict[str, Words] = {}
     refused: dict[str, str] = {}
-    for file in sorted(folder.glob("[a-z][a-z].toml")):
+    try:
+        files = sorted(folder.glob("[a-z][a-z].toml"))
+    except OSError as error:
+        return {}, {folder.name: f"{folder} cannot be read ({error.strerror})"}
+    for file in files:
+        if file.stem in SHIPPED:
+            refused[file.stem] = f"{file}: the program contains this language; remove the file"
+            continue
         try:
             found[file.stem] = read_language(file)
         except StudyError as error:
@@ -156,8 +164,9 @@ def own_languages(folder: File) -> tuple[dict[str, Words], dict[str, str]]:
     return found, refused
 
 
+SHIPPED: Final = {code: read_language(_FOLDER / f"{code}.toml") for code in ("en", "nl", "de", "fr", "ar")}
 _OWN, REFUSED = own_languages(workspace().folder / "languages")
-LANGUAGES: Final = {code: read_language(_FOLDER / f"{code}.toml") for code in ("en", "nl", "de", "fr", "ar")} | _OWN
+LANGUAGES: Final = SHIPPED | _OWN
 
 
 def language_template(code: str) -> str:

@@ -93,7 +93,7 @@ class Key:
 def sealed_hash(folder: Path) -> str | None:
     """Return the SHA-256 of a study's sealed key, as in its receipts; None if the key is missing or unreadable."""
     try:
-        return hashlib.sha256(read_own(StudyFolder(folder).key, folder)).hexdigest()
+        return hashlib.sha256(journal.as_written(read_own(StudyFolder(folder).key, folder))).hexdigest()
     except StoreError:
         return None
 

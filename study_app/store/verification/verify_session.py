@@ -501,7 +501,7 @@ def _check_checksums(
             elif hashes[name] == listed[name]:
                 continue
             elif hashes[name] == opened_hashes.get(listed[name]) or _is_opened_table(place, lines, path, listed[name]):
-                findings.warning(path, f"is opened, but its checksum is not: {INTERRUPTED}")
+                findings.warning(path, f"is unsealed, but its checksum was not updated: {INTERRUPTED}")
             else:
                 content = read_regular(path)
                 same_text = hashlib.sha256(journal.as_written(content)).hexdigest() == listed[name]

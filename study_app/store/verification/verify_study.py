@@ -131,7 +131,7 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findi
     places = {place for session in study.sessions() for place in (session.path, session.path.parent)}
     for path in {*study.data.glob("sub-*"), *study.data.glob("sub-*/ses-*")} - places:
         if path.is_dir() and (path.name.startswith("sub-") or path.parent in places):
-            findings.warning(path, "is not the folder of a session, so it is ignored: a copy of one?")
+            findings.warning(path, "is ignored because it is not a session folder; it may be a copy of one")
     for path in (*temporary_files(folder), *temporary_files(study.data)):
         findings.warning(path, "is an incomplete file left by a killed program, or is being written")
     return sessions

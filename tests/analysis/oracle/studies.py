@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study_app.analysis.report import write_report
+from study_app.analysis.report import study_figures, write_report
 from study_app.protocol.load import load
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.columns import INTERVALS, RESPONSES, TRIALS_2
@@ -66,11 +66,12 @@ class Written:
 
 def write(name: str, study: Path, to: Path, *, figures: bool = False) -> Written:
     """Write the report of a study, its figures as texts alone or not at all."""
-    with pytest.MonkeyPatch.context() as patched, figures_as_lines():
+    with figures_as_lines(), pytest.MonkeyPatch.context() as patched:
         if not figures:
             for pictures in ("pictures", "summary_pictures", "level_pictures", "question_pictures"):
                 patched.setattr(write_report, pictures, lambda *_, **__: ())
         write_report.report(study, to, failed=pytest.fail)
+    assert write_report.pictures is study_figures.pictures, "a patch that stays would change later reports"
     return Written(study, to, FILES[name])
 
 

@@ -17,6 +17,6 @@ def of_twelve(tmp_path_factory: pytest.TempPathFactory) -> Path:
     def make(folder: Path) -> None:
         results = twelve(make_results(folder / "rek2024", load("rek2024")))
         results.open()
-        assert report(results.folder, folder / "report")[0].name == "report.html"
+        assert report(results.folder, folder / "report", failed=pytest.fail)[0].name == "report.html"
 
     return once(tmp_path_factory, "twelve", make) / "report"

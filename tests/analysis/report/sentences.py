@@ -658,6 +658,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (r"Standardised effects weight participants equally: d_z is .*\.", when(lambda told: bool(told.contrasts))),
     (r"Bayes factors are two-sided JZS factors \(Rouder et al\., 2009\) of a difference against none, with a Cauchy "
      r"prior of scale 0\.707\.", when(lambda told: bool(told.contrasts))),
+    (r"Cliff's delta is the probability of a larger answer minus the probability of a smaller one; within participants "
+     r"it is .*\.", when(lambda told: bool(told.contrasts))),
     (r"The mean lies within the bound \(equivalent\); the data do not exclude that up to (\d+) % of (people differ by "
      r"more|a group are not in the sample)\.", bound_of_a_contrast("within")),
     (r"(The whole interval lies|All differences lie) beyond the bound \(not equivalent\)\.",

@@ -21,7 +21,6 @@ def test_the_caption_of_delays_says_what_is_dashed(of_twelve: Path) -> None:
     assert "Dashed: lowest delay with a trend (step-down test" in read(of_twelve)
 
 
-@pytest.mark.nightly  # failed once in the whole circle, and passes alone: the cause is not known
 def test_every_answer_stands_beside_its_figure_and_the_page_is_small(of_twelve: Path) -> None:
     page = (of_twelve / "report.html").read_text("utf-8")
     assert len(page) < 5e6

@@ -4,9 +4,16 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import norm
+from scipy.stats import binomtest, norm
 
-from study_app.analysis.statistics.effect_sizes import cliffs_delta, d_z, hedges_g, jzs_bayes_factor, paired_delta
+from study_app.analysis.statistics.effect_sizes import (
+    LARGEST_LOG,
+    cliffs_delta,
+    d_z,
+    hedges_g,
+    jzs_bayes_factor,
+    paired_delta,
+)
 
 SLEEP = np.array([0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0.0, 2.0])
 SLEEP_2 = np.array([1.9, 0.8, 1.1, 0.1, -0.1, 4.4, 5.5, 1.6, 4.6, 3.4])
@@ -49,7 +56,12 @@ def test_delta_is_counted() -> None:
     all_higher = paired_delta(np.ones(10))
     assert all_higher is not None
     assert (all_higher.value, all_higher.high) == (1.0, 1.0)
-    assert all_higher.low == pytest.approx(2 * 0.05**0.1 - 1)  # the one-sided Clopper–Pearson end of 10 of 10
+    assert all_higher.low == pytest.approx(2 * binomtest(10, 10).proportion_ci(method="exact").low - 1)
+    assert paired_delta(np.zeros(12)) is None
+
+
+def test_a_bayes_factor_beyond_what_a_float_holds_is_the_largest_one() -> None:
+    assert jzs_bayes_factor(1e8, 60) == jzs_bayes_factor(60.0, 2000) == math.exp(LARGEST_LOG)
 
 
 def test_intervals_hold_as_often_as_they_claim() -> None:

@@ -113,7 +113,7 @@ def test_an_answer_stands_above_its_figure_which_can_be_copied_and_saved(place, 
     click(qtbot, card.copy_figure)
     assert QGuiApplication.clipboard().image().width() == round(200 * 300 / 72)
     QGuiApplication.clipboard().clear()
-    for name, begin in (("a.svg", b"<?xml"), ("b.png", b"\x89PNG"), ("c.pdf", b"%PDF"), ("d", b"%PDF")):
+    for name, begin in (("a.svg", b"<?xml"), ("b.png", b"\x89PNG"), ("c.PDF", b"%PDF"), ("d", b"%PDF")):
         card.save_to(tmp_path / name)
         (made,) = tmp_path.glob(f"{name}*")
         assert made.read_bytes().startswith(begin)

@@ -1,11 +1,13 @@
 """With a device without force, no page of a shipped study speaks of feeling; its file and statements stay."""
 
+import errno
 import os
 import re
 import string
 import subprocess
 import sys
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
@@ -144,9 +146,10 @@ def test_a_labs_own_language_is_one_like_the_others(tmp_path: Path) -> None:
         ("pause_title", "", "pause_title is missing"),
         ("pause_title", 'pause_title = ""', "pause_title is missing"),
         ("abx", "", "design_questions.abx is missing"),
-        ("part", 'part = "Parte {parte}"', "part must have the slots of"),
+        ("part", 'part = "Parte {parte}"', "part must contain the same slots as"),
+        ("part", 'part = "Parte {part:d} de {parts}"', "part must contain the same slots as"),
         ("part", "part = 3", "part must be a text"),
-        ("part", 'part = "Parte {"', "part must have the slots of"),
+        ("part", 'part = "Parte {"', "part must contain the same slots as"),
         ("interval_coming", 'interval_coming = ["a", "b"]', "interval_coming needs 4 texts"),
         ("small_numbers", 'small_numbers = ["Uno", 2]', "small_numbers must be a list of texts"),
         ("done", 'done = "Hecho"\nhola = "x"', "hola is unknown: remove it"),
@@ -159,6 +162,21 @@ def test_an_incomplete_language_is_refused_with_what_is_wrong(tmp_path: Path, ke
     assert own == {}
     assert said in refused["es"]
     assert "\n" not in refused["es"]
+
+
+def test_a_file_of_a_shipped_language_or_a_folder_that_cannot_be_read_changes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "de.toml").write_bytes((Path(languages.__file__).parent / "de.toml").read_bytes())
+    own, refused = languages.own_languages(tmp_path)
+    assert (own, list(refused)) == ({}, ["de"])
+    assert "remove the file" in refused["de"]
+
+    def fail(_folder: Path, _pattern: str) -> NoReturn:
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(Path, "glob", fail)
+    assert languages.own_languages(tmp_path)[0] == {}
 
 
 def test_a_template_lacks_every_text_and_is_complete_once_each_is_written(tmp_path: Path) -> None:

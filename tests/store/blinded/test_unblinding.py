@@ -112,6 +112,25 @@ def test_opening_again_changes_no_table_and_finishes_what_was_broken_off(
     assert tables_in(folder) == held
 
 
+def test_a_table_of_a_session_that_goes_on_is_completed_and_a_changed_one_is_left(
+    tmp_path: Path, start: Start, attend: Attend
+) -> None:
+    """The first table lacks its last line, as after a crash; in the second somebody changed a cell."""
+    with start() as store:
+        attend(store)
+    behind, changed = (store.folder.table("brackish", name) for name in ("responses", "trials"))
+    first, *rows = changed.read_bytes().splitlines(keepends=True)
+    by_hand = first + b"".join([rows[0].replace(b"complete", b"repaired"), *rows[1:]])
+    assert by_hand != changed.read_bytes()
+    changed.write_bytes(by_hand)
+    whole = behind.read_bytes()
+    behind.write_bytes(b"".join(whole.splitlines(keepends=True)[:-1]))
+    (left,) = unblind(tmp_path / "study", "AB", "done").left
+    assert left.startswith(f"{changed} differs from the journal, so it was not changed")
+    assert changed.read_bytes() == by_hand
+    assert len(behind.read_bytes().splitlines()) == len(whole.splitlines())
+
+
 def test_a_session_goes_on_as_it_began(tmp_path: Path, protocol: Protocol, start: Start, attend: Attend) -> None:
     """Sealed before and after the key was opened: the tables have everything once it was."""
     with start() as store:
