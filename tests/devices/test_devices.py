@@ -19,7 +19,7 @@ from tests.devices.subjects import MS, Ticks, write
 SETTINGS = rig.RigSettings(workspace_m=(0.1, 0.06, 0.06), force_limit_n=8.0, elements=100, random=stream(1, "tremor"))
 
 
-def test_a_device_without_failure_is_closed_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_device_without_the_parts_of_a_device_is_closed_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
     class Bare:
         closed = False
 
@@ -28,7 +28,7 @@ def test_a_device_without_failure_is_closed_and_named(monkeypatch: pytest.Monkey
 
     bare: Any = Bare()
     monkeypatch.setattr(registry, "descriptor_of", lambda _: replace(descriptor_of("mouse"), open=lambda _: bare))
-    with pytest.raises(DeviceError, match="device 'mouse' does not have 'failure': let Bare inherit"):
+    with pytest.raises(DeviceError, match="device 'mouse' does not have 'read': let Bare inherit"):
         open_device("mouse")
     assert bare.closed
 
