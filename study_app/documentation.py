@@ -16,20 +16,20 @@ INDEX: Final = "index"
 ELSE: Final = "do"
 """The section of pages that no section lists."""
 
-LISTS: Final = ("commands", "data-dictionary", "kinds", "protocol-format")
+_LISTS: Final = ("commands", "data-dictionary", "kinds", "protocol-format")
 """Pages that consist of generated lists."""
 
-FOLDERS: Final = {"decisions": "look-up"}
+_FOLDERS: Final = {"decisions": "look-up"}
 """The section of pages in a folder that no section lists."""
 
 _GENERATED: Final = re.compile(r"<!-- generated: ([\w.]+):(\w+) -->")
 _LISTED: Final = re.compile(r"^- \[[^]]+\]\(([\w/-]+)\.md\)", re.MULTILINE)
 _TITLE: Final = re.compile(r"^# (.+)$", re.MULTILINE)
 
-GLOSSARY: Final = "glossary"
-"""The page that shows the words of `SYNONYMS`; a search leaves them out."""
+_GLOSSARY: Final = "glossary"
+"""The page that shows the words of `_SYNONYMS`; a search leaves them out."""
 
-SYNONYMS: Final = "search-words.txt"
+_SYNONYMS: Final = "search-words.txt"
 """The file of words that no page has to contain: in each line a page, perhaps its anchor, and the words about it."""
 
 _ROW: Final = re.compile(r"^([\w/-]+)(?:#([\w-]+))?: (.+)$", re.MULTILINE)
@@ -91,7 +91,7 @@ def sections() -> dict[str, tuple[str, ...]]:
         placed.update(listed[section])
     for name in known:
         if name not in placed:
-            listed[FOLDERS.get(name.split("/")[0], ELSE)].append(name)
+            listed[_FOLDERS.get(name.split("/")[0], ELSE)].append(name)
     return {section: tuple(pages) for section, pages in listed.items()}
 
 
@@ -130,7 +130,7 @@ def search(words: str) -> tuple[Section, ...]:
     typed = frozenset(stems)
     for one in score:
         score[one] *= 2 if any(it == typed or (len(it) > 1 and it <= typed) for it in one.phrases) else 1
-        score[one] *= 0.5 if one.page.split("/")[0] in FOLDERS else 0.65 if one.page in LISTS else 1
+        score[one] *= 0.5 if one.page.split("/")[0] in _FOLDERS else 0.65 if one.page in _LISTS else 1
     best: dict[str, Section] = {}
     for one in sorted(score, key=lambda one: -score[one]):
         if score[one] > 0.3 * max(score.values()):
@@ -160,12 +160,12 @@ def plain(text: str) -> str:
 
 @cache
 def synonyms() -> tuple[tuple[str, str, str], ...]:
-    """Return page, anchor and words of each line of `SYNONYMS`."""
-    return tuple(_ROW.findall((folder() / SYNONYMS).read_text(encoding="utf-8")))
+    """Return page, anchor and words of each line of `_SYNONYMS`."""
+    return tuple(_ROW.findall((folder() / _SYNONYMS).read_text(encoding="utf-8")))
 
 
 def index_markdown() -> str:
-    """Return the words of `SYNONYMS` with links to their sections, as Markdown."""
+    """Return the words of `_SYNONYMS` with links to their sections, as Markdown."""
     rows = sorted(synonyms(), key=lambda row: row[2].casefold())
     return "\n".join(f"- {said}: [{_heading(*place)}]({'.md#'.join(place).rstrip('#')})" for *place, said in rows)
 
@@ -183,7 +183,7 @@ def _sections() -> tuple[Section, ...]:
     """Return every section of every page, in the order of the book, with its synonyms."""
     made: list[Section] = []
     for name in (*(page for pages in sections().values() for page in pages), *sections(), INDEX):
-        text, title_of_page = source(name) if name == GLOSSARY else page(name), plain(title(name))
+        text, title_of_page = source(name) if name == _GLOSSARY else page(name), plain(title(name))
         headings = [found for found in _FENCED_OR_HEADING.finditer(text) if found[1]]
         for found, ends in zip(headings, [*(one.start() for one in headings[1:]), len(text)], strict=True):
             heading = plain(found[1])

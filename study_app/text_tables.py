@@ -53,18 +53,18 @@ def decoded(content: bytes, first_line: int = 1) -> str:
 
 def separator_of(header: str, names: Collection[str]) -> str:
     """Return the separator with which a header has most of these names; the comma if all have equally many."""
-    return max(_SEPARATORS, key=lambda separator: len({*fields_of(header, separator)} & {*names}))
+    return max(_SEPARATORS, key=lambda separator: len({*_fields_of(header, separator)} & {*names}))
 
 
-def names_of(header: str, separator: str) -> tuple[str, ...]:
+def _names_of(header: str, separator: str) -> tuple[str, ...]:
     """Return the names in a header, without empty columns at its end."""
-    names = fields_of(header, separator)
+    names = _fields_of(header, separator)
     while names and not names[-1]:
         names = names[:-1]
     return names
 
 
-def fields_of(line: str, separator: str) -> tuple[str, ...]:
+def _fields_of(line: str, separator: str) -> tuple[str, ...]:
     """Return the fields of one line, without spaces around them."""
     return tuple(field.strip() for field in next(csv.reader([line], delimiter=separator), []))
 
@@ -92,7 +92,7 @@ def split(text: str, names: Collection[str], *, comment: str = "") -> TextTable:
             begin = reader.line_num + 1
     except csv.Error as error:
         raise ValueError(f"line {begin} is not CSV ({error})") from error
-    return TextTable(names_of(header, separator), tuple(lines[1:]))
+    return TextTable(_names_of(header, separator), tuple(lines[1:]))
 
 
 def wrong_length(fields: Sequence[str], columns: int) -> str:
@@ -139,7 +139,7 @@ def number_in(field: str, decimal_sign: str = ".") -> float | None:
     return value if math.isfinite(value := float(plain)) else None
 
 
-def numbers_at(line: Line, places: Sequence[int], columns: int, decimal_sign: str = ".") -> list[float]:
+def _numbers_at(line: Line, places: Sequence[int], columns: int, decimal_sign: str = ".") -> list[float]:
     """Return the numbers of a row at these places.
 
     Raises
@@ -176,7 +176,7 @@ def rows_of(table: TextTable, places: Sequence[int]) -> list[list[float]]:
             texts = ", ".join(map(_shown, _at(first.fields, places)))
             raise ValueError(f"line {first.number}: {texts}: not a number; remove a row of units, and use SI units")
         sign = decimal_sign_of(table.lines, places)
-    return [numbers_at(line, places, columns, sign) for line in table.lines]
+    return [_numbers_at(line, places, columns, sign) for line in table.lines]
 
 
 def _at(fields: Sequence[str], places: Iterable[int]) -> Iterator[str]:

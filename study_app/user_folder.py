@@ -7,8 +7,8 @@ from typing import Final
 from platformdirs import user_config_path, user_data_path
 
 FOLDER_VARIABLE: Final = "LIQUID_STUDY_CONFIG"
-DATA_VARIABLE: Final = "LIQUID_STUDY_DATA"
-SETTINGS_NAME: Final = "machine.json"
+_DATA_VARIABLE: Final = "LIQUID_STUDY_DATA"
+_SETTINGS_NAME: Final = "machine.json"
 
 
 def user_folder() -> Path:
@@ -20,11 +20,11 @@ def user_folder() -> Path:
 
 def data_folder() -> Path:
     """Return where the program keeps drafts and earlier contents of studies; it need not exist yet."""
-    if own := os.environ.get(DATA_VARIABLE):
+    if own := os.environ.get(_DATA_VARIABLE):
         return Path(own)
     return user_data_path("liquid-study", appauthor=False)
 
 
 def settings_file() -> Path:
     """Return where the settings of this machine are, or would be."""
-    return user_folder() / SETTINGS_NAME
+    return user_folder() / _SETTINGS_NAME

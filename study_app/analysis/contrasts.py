@@ -41,7 +41,7 @@ from study_app.analysis.statistics.thresholds import random_effects_weights
 from study_app.analysis.wording import interval, listed, number, p_equals, p_value, significant
 from study_app.protocol.model import Contrast
 
-STATISTICS: Final[Mapping[str, tuple[type[LevelStatistic[Any]], str]]] = {
+_STATISTICS: Final[Mapping[str, tuple[type[LevelStatistic[Any]], str]]] = {
     "threshold": (Thresholds, "threshold"),
     "exponent": (Exponents, "exponent"),
     "d_prime": (Sensitivities, "d_prime"),
@@ -57,22 +57,22 @@ LEFT_OUT: Final = (
     "lists excluded participants with the reason."
 )
 """Who is compared, in power, preregistration and report."""
-WEIGHTED: Final = (
+_WEIGHTED: Final = (
     "Thresholds are weighted as in the group mean. Thresholds of two blocks with the same levels and design "
     "are estimated with a common width of the psychometric function, so their ratio may differ from the ratio "
     "in the tables. "
 )
-SIZES: Final = (
+_SIZES: Final = (
     "Standardised effects weight participants equally: d_z is the mean difference within participants divided by its "
     "standard deviation, g is Hedges' g of two groups; their 95 % intervals invert the noncentral t distribution. "
     "Bayes factors are two-sided JZS factors (Rouder et al., 2009) of a difference against none, with a Cauchy prior "
     f"of scale {number(PRIOR_SCALE, 3)}. Cliff's delta is the probability of a larger answer minus the probability of "
     "a smaller one; within participants it is the share with a larger answer minus the share with a smaller one."
 )
-MOST_NAMED: Final = 20
+_MOST_NAMED: Final = 20
 
-TOO_FEW: Final = "fewer than two participants have both numbers"
-ALIKE: Final = "the numbers do not vary between participants, so a t test is not possible"
+_TOO_FEW: Final = "fewer than two participants have both numbers"
+_ALIKE: Final = "the numbers do not vary between participants, so a t test is not possible"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -173,7 +173,7 @@ def _compared(
     people = [person for person in study.people if contrast.groups is None or members.get(person) in contrast.groups]
     what = (
         f"no {contrast.measure_words}"
-        if contrast.measure in STATISTICS
+        if contrast.measure in _STATISTICS
         else f"an answer to {contrast.measure} is missing"
     )
     names = contrast.blocks * 2 if contrast.groups is not None else contrast.compared
@@ -222,7 +222,7 @@ def _sd(values: Sequence[float]) -> float | None:
     return float(np.std(values, ddof=1)) if len(values) > 1 else None
 
 
-class Standardised(NamedTuple):
+class _Standardised(NamedTuple):
     """The standardised effect, Cliff's delta and the Bayes factor of a hypothesis; None where there is none."""
 
     effect: EffectSize | None
@@ -230,7 +230,7 @@ class Standardised(NamedTuple):
     bayes_factor: float | None
 
 
-def _standardised(compared: Compared, *, is_ordinal: bool) -> Standardised:
+def _standardised(compared: Compared, *, is_ordinal: bool) -> _Standardised:
     """Return the standardised effects of a hypothesis, participants counting equally."""
     first, *others = compared.values
     if others:
@@ -239,7 +239,7 @@ def _standardised(compared: Compared, *, is_ordinal: bool) -> Standardised:
         effect, ordinal = d_z(first), paired_delta(first)
     t, sizes = None if effect is None else effect.t, [len(sample) for sample in compared.values]
     factor = None if t is None else jzs_bayes_factor(t, *sizes)
-    return Standardised(effect, ordinal if is_ordinal else None, factor)
+    return _Standardised(effect, ordinal if is_ordinal else None, factor)
 
 
 def _thresholds_of_two(study: Study, contrast: Contrast, per_u: float) -> tuple[list[Mapping[str, Measured]], float]:
@@ -260,7 +260,7 @@ def _values(
     levels: Sequence[LevelsResult],
 ) -> Mapping[str, Measured]:
     """Return each participant's number in a block: the mean over standards, or over the conditions of statements."""
-    if contrast.measure not in STATISTICS:
+    if contrast.measure not in _STATISTICS:
         asked = next(found for found in answers if found.block.id == block)
         codes = [setting.code for setting in asked.block.settings if condition in (None, setting.condition)]
         rows = asked.values[contrast.measure][:, sorted({asked.block.columns[code] for code in codes})].mean(axis=1)
@@ -270,7 +270,7 @@ def _values(
             if not math.isnan(row)
         }
     found = next(level for level in levels if level.block == block)
-    statistic, attribute = STATISTICS[contrast.measure]
+    statistic, attribute = _STATISTICS[contrast.measure]
     ratio = _is_ratio(contrast, levels)
     numbers: dict[str, list[Measured]] = {}
     for row in statistic.own(found):
@@ -305,9 +305,9 @@ def _tested(
     compared = _compared(study, contrast, answers, levels)
     ratio, means = _is_ratio(contrast, levels), compared.means(strictest)
     names = _side_names(study, contrast)
-    standardised = _standardised(compared, is_ordinal=contrast.measure not in STATISTICS)
+    standardised = _standardised(compared, is_ordinal=contrast.measure not in _STATISTICS)
     effect = ends = p_equal = p = p_bootstrap = statistic = None
-    method, why = "none", TOO_FEW if means is None else ALIKE
+    method, why = "none", _TOO_FEW if means is None else _ALIKE
     if means is not None:
         mean, (low, high) = float(means.mean[0]), (float(end[0]) for end in means.interval(0.95))
         effect = math.exp(mean) if ratio else mean
@@ -365,7 +365,7 @@ def _side_names(study: Study, contrast: Contrast) -> tuple[str, str]:
 
 def equality_limits(contrast: Contrast, bound: float, *, ratio: bool) -> tuple[float, float | None]:
     """Return the bound on the scale of the test, and the largest difference that the scale permits (None: any)."""
-    return abs(math.log(bound)) if ratio else bound, None if contrast.measure in STATISTICS else STEPS
+    return abs(math.log(bound)) if ratio else bound, None if contrast.measure in _STATISTICS else STEPS
 
 
 def _not_excluded(contrast: Contrast, compared: Compared, *, ratio: bool) -> float | None:
@@ -387,7 +387,7 @@ def question(one: ContrastResult) -> str:
 def answer(one: ContrastResult) -> str:
     """Return what is found, in sentences."""
     sentences = [f"Not tested: {one.note}." if one.p_adjusted is None else _difference_words(one)]
-    if one.contrast.bound is not None and lies_beyond(one, one.contrast.bound):
+    if one.contrast.bound is not None and _lies_beyond(one, one.contrast.bound):
         what = "All differences lie" if one.interval is None else "The whole interval lies"
         sentences.append(f"{what} beyond the bound (not equivalent).")
     elif one.equivalent:
@@ -399,11 +399,11 @@ def answer(one: ContrastResult) -> str:
     elif one.equivalent is not None:
         sentences.append("The mean is not shown to lie within the bound.")
     if one.left_out:
-        sentences.append(f"Excluded: {left_out_words(one)}.")
+        sentences.append(f"Excluded: {_left_out_words(one)}.")
     return " ".join(sentences)
 
 
-def lies_beyond(one: ContrastResult, bound: float) -> bool:
+def _lies_beyond(one: ContrastResult, bound: float) -> bool:
     """Return whether the whole 95 % interval, or the difference that all participants have, lies beyond the bound."""
     reach, _ = equality_limits(one.contrast, bound, ratio=one.ratio)
     if one.ratio and one.effect is not None:
@@ -427,14 +427,14 @@ def _difference_words(one: ContrastResult) -> str:
     means = listed([number(side.mean) for side in one.sides if side.mean is not None])
     higher = "" if one.higher is None else f" It was higher in {first} for {one.higher} of {one.n} participants."
     effect = f"mean {'ratio' if one.ratio else 'difference'} {number(one.effect)}"
-    size = "" if one.standardised is None else f", {size_words(one.standardised)}"
+    size = "" if one.standardised is None else f", {_size_words(one.standardised)}"
     return (
         f"{said} (means {means}; {effect}, 95 % interval {interval(one.interval)}{size}, "
         f"{p_equals(one.p_adjusted or 0.0)}, n = {one.n}).{higher}{_bayes_words(one)}"
     )
 
 
-def size_words(size: EffectSize | None) -> str:
+def _size_words(size: EffectSize | None) -> str:
     """Return a standardised effect with its interval; a dash without any."""
     return "–" if size is None else f"{size.name} {number(size.value)} {interval(size)}"
 
@@ -471,9 +471,9 @@ def contrast_methods(results: Results) -> Iterator[str]:
         f"one (Gaffke 2005) had to agree: p is the larger of both{holm_words * (len(contrasts) > 1)}."
     )
     if any(one.contrast.measure == "threshold" for one in contrasts):
-        yield WEIGHTED.rstrip()
+        yield _WEIGHTED.rstrip()
     if any(one.standardised is not None for one in contrasts):
-        yield SIZES
+        yield _SIZES
     if bounds := [one for one in contrasts if one.contrast.bound is not None]:
         adjusted = f", adjusted by Holm over {number_text.counted(len(bounds), 'bound')}" if len(bounds) > 1 else ""
         yield (
@@ -481,17 +481,17 @@ def contrast_methods(results: Results) -> Iterator[str]:
             f"{adjusted}, and requires that the sample is large enough to contain a member of a minority that shifts "
             "the mean by the bound."
         )
-    if gone := {f"{question(one)}: {left_out_words(one)}": None for one in contrasts if one.left_out}:
+    if gone := {f"{question(one)}: {_left_out_words(one)}": None for one in contrasts if one.left_out}:
         yield f"Some participants were excluded from a hypothesis because a number is missing ({'; '.join(gone)})."
 
 
-def left_out_words(one: ContrastResult) -> str:
+def _left_out_words(one: ContrastResult) -> str:
     """Return who is left out of a contrast and why."""
     by_reason: dict[str, list[str]] = {}
     for person, reason in one.left_out.items():
         by_reason.setdefault(reason, []).append(person)
     return "; ".join(
-        f"{', '.join(people[:MOST_NAMED])}{f' and {len(people) - MOST_NAMED} more' * (len(people) > MOST_NAMED)} "
+        f"{', '.join(people[:_MOST_NAMED])}{f' and {len(people) - _MOST_NAMED} more' * (len(people) > _MOST_NAMED)} "
         f"({reason})"
         for reason, people in by_reason.items()
     )
@@ -508,8 +508,8 @@ def contrast_section(results: Results) -> Iterator[str]:
         ("n", lambda one: str(one.n)),
         ("effect", lambda one: f"{one.effect_name} {number(one.effect)}"),
         ("95 % interval", lambda one: interval(one.interval)),
-        ("standardised", lambda one: size_words(one.standardised)),
-        ("ordinal", lambda one: size_words(one.ordinal)) if any(one.ordinal for one in results.contrasts) else None,
+        ("standardised", lambda one: _size_words(one.standardised)),
+        ("ordinal", lambda one: _size_words(one.ordinal)) if any(one.ordinal for one in results.contrasts) else None,
         ("SD", _sd_words),
         ("Bayes factor BF₁₀", lambda one: "–" if one.bayes_factor is None else significant(one.bayes_factor)),
         ("p", lambda one: p_value(one.p)),
@@ -524,12 +524,12 @@ def contrast_section(results: Results) -> Iterator[str]:
         "together with a bootstrap that adds a participant like the most extreme one; adjusted p is the larger "
         f"p, adjusted by Holm over {number_text.counted(len(results.contrasts), 'test')}. “Equivalent” means "
         "that both tests show, with enough participants, that the mean lies within the stated bound, adjusted "
-        f"by Holm over the bounds. {WEIGHTED if weighted else ''}{LEFT_OUT}",
+        f"by Holm over the bounds. {_WEIGHTED if weighted else ''}{LEFT_OUT}",
         "soft",
     )
-    yield paragraph(f"{SIZES} SD: between participants, of the two compared and of their difference.", "soft")
+    yield paragraph(f"{_SIZES} SD: between participants, of the two compared and of their difference.", "soft")
     if rows := [one for one in results.contrasts if one.left_out]:
-        yield bullets([f"{question(one)}: left out {left_out_words(one)}." for one in rows])
+        yield bullets([f"{question(one)}: left out {_left_out_words(one)}." for one in rows])
 
 
 def _sd_words(one: ContrastResult) -> str:
@@ -547,7 +547,7 @@ def contrast_rows(results: Results) -> Iterator[dict[str, Any]]:
             **{name: getattr(one, name) for name in ("statistic", "p", "effect_name", "effect", "method")},
             "block": one.contrast.blocks[0],
             "question": question(one),
-            "item": None if one.contrast.measure in STATISTICS else one.contrast.measure,
+            "item": None if one.contrast.measure in _STATISTICS else one.contrast.measure,
             "p_adjusted": one.p_adjusted,
             "low": None if ends is None else ends.low,
             "high": None if ends is None else ends.high,

@@ -18,16 +18,16 @@ T = TypeVar("T")
 LONG = 32
 """Cells of more letters are broken into lines."""
 
-SHORT = 16
+_SHORT = 16
 """On paper, cells of more letters are."""
 
-FOLDED = 12
+_FOLDED = 12
 """A table of more rows is folded."""
 
-PX_PER_PT = 1.9
+_PX_PER_PT = 1.9
 """Pixels of the page for a point of a figure that has the room."""
 
-VARIABLES = {
+_VARIABLES = {
     style.TEXT: "text",
     style.TEXT_SOFT: "soft",
     style.GRID: "grid",
@@ -43,10 +43,10 @@ VARIABLES = {
     "#ffffff": "paper",
 }
 """The colours of figures that the page has by name, since they change with light and dark."""
-COLOUR = re.compile("|".join(VARIABLES), re.IGNORECASE)
-LETTERS = re.compile(r"(<text.*?</text>)", re.DOTALL)
+_COLOUR = re.compile("|".join(_VARIABLES), re.IGNORECASE)
+_LETTERS = re.compile(r"(<text.*?</text>)", re.DOTALL)
 HEAD = re.compile(r"^.*?(?=<svg)|<metadata>.*?</metadata>", re.DOTALL)
-SIZE = re.compile(r'<svg [^>]*?viewBox="0 0 ([0-9.]+) ([0-9.]+)"[^>]*>')
+_SIZE = re.compile(r'<svg [^>]*?viewBox="0 0 ([0-9.]+) ([0-9.]+)"[^>]*>')
 
 
 @cache
@@ -107,7 +107,7 @@ def table(
     """
     kinds = ["" if place < words or place >= len(head) - last else "n" for place in range(len(head))]
     cells = [[(kind or _width(cell), cell) for kind, cell in zip(kinds, row, strict=True)] for row in rows]
-    return _part("table", list(zip(kinds, head, strict=True)), cells, folded or len(cells) > FOLDED)
+    return _part("table", list(zip(kinds, head, strict=True)), cells, folded or len(cells) > _FOLDED)
 
 
 def table_of(
@@ -121,7 +121,7 @@ def table_of(
 
 def _width(words: str) -> str:
     """Return the class of a cell of words; only sentences are broken into lines."""
-    return "long" if len(words) > LONG else "words" if len(words) > SHORT else ""
+    return "long" if len(words) > LONG else "words" if len(words) > _SHORT else ""
 
 
 def box(parts: Iterable[Markup], kind: str = "box") -> Markup:
@@ -138,19 +138,19 @@ def picture(one: Picture, *, beside: bool = False) -> Markup:
         width, png = round(0.4 * int.from_bytes(one.files["png"][16:20])), one.files["png"]
         drawing = _part("png", width, one.caption, base64.b64encode(png).decode("ascii"))
     else:
-        drawing = inline_svg(one.files["svg"].decode(), one.caption)
+        drawing = _inline_svg(one.files["svg"].decode(), one.caption)
     return _part("picture", drawing, "" if beside else one.caption)
 
 
-def inline_svg(svg: str, words: str) -> Markup:
+def _inline_svg(svg: str, words: str) -> Markup:
     """Return the drawing of an SVG, whose colours are those of the page; white letters and their ground stay."""
-    parts = LETTERS.split(HEAD.sub("", svg))
-    parts[::2] = [COLOUR.sub(lambda match: f"var(--{VARIABLES[match[0].lower()]})", part) for part in parts[::2]]
+    parts = _LETTERS.split(HEAD.sub("", svg))
+    parts[::2] = [_COLOUR.sub(lambda match: f"var(--{_VARIABLES[match[0].lower()]})", part) for part in parts[::2]]
     parts[1::2] = [
-        COLOUR.sub(lambda match: f"var(--{VARIABLES[match[0].lower()]})", part) if "#ffffff" not in part else part
+        _COLOUR.sub(lambda match: f"var(--{_VARIABLES[match[0].lower()]})", part) if "#ffffff" not in part else part
         for part in parts[1::2]
     ]
-    width = round(PX_PER_PT * float(found[1])) if (found := SIZE.search(svg)) else 600
+    width = round(_PX_PER_PT * float(found[1])) if (found := _SIZE.search(svg)) else 600
     view = found[0] if found else ""
     root = re.sub(r' (?:width|height)="[^"]*"', "", view, count=2)
     label = Markup.escape(words)

@@ -16,7 +16,7 @@ from study_app.analysis.wording import number, p_equals, percent
 from study_app.protocol.model import RULES
 from study_app.store.exclusions import Exclusion
 
-TABLES: Final = ("responses", "trials", "participants", "answered", "intervals")
+_TABLES: Final = ("responses", "trials", "participants", "answered", "intervals")
 SESSION: Final = ["participant", "session"]
 
 
@@ -99,10 +99,10 @@ def proposals(study: Study, results: Results | None) -> tuple[Proposal, ...]:
     return tuple(sorted((*excluded, *decided), key=lambda one: (*one.what, one.rule)))
 
 
-Rows = Iterator[tuple[Any, str]]
+_Rows = Iterator[tuple[Any, str]]
 
 
-def _below_chance(study: Study) -> Rows:
+def _below_chance(study: Study) -> _Rows:
     if study.revealed and study.levels:
         for one in below_chance(tracks(replace(study, with_below_chance=True)), study.levels):
             yield (
@@ -112,7 +112,7 @@ def _below_chance(study: Study) -> Rows:
             )
 
 
-def _beyond_levels(study: Study, results: Results | None) -> Rows:
+def _beyond_levels(study: Study, results: Results | None) -> _Rows:
     sessions = study.participants[study.participants["counted"]]
     for block in () if results is None else results.levels:
         for row in block.statistics.get("thresholds", ()):
@@ -121,7 +121,7 @@ def _beyond_levels(study: Study, results: Results | None) -> Rows:
                     yield (row.participant, session), f"the threshold in {block.block} lies {row.beyond} the levels"
 
 
-def _constant(study: Study, limit: float | None) -> Rows:
+def _constant(study: Study, limit: float | None) -> _Rows:
     answers = study.responses[study.responses["counted"] & study.responses["response"].notna()]
     for session, rows in answers.groupby(SESSION):
         share = rows["response"].value_counts(normalize=True).max()
@@ -129,7 +129,7 @@ def _constant(study: Study, limit: float | None) -> Rows:
             yield session, f"{percent(share)} of {len(rows)} answers to statements are equal"
 
 
-def _fast(study: Study, limit: float | None) -> Rows:
+def _fast(study: Study, limit: float | None) -> _Rows:
     answers = study.answered[study.answered["counted"]]
     times = (answers["first_choice_s"] - answers["onset_s"]).astype("Float64")
     for session, some in times.dropna().groupby([answers[name] for name in SESSION]):
@@ -164,5 +164,5 @@ def _without(study: Study, sessions: Collection[tuple[str, int]]) -> Study:
         stays = pd.Series([what not in sessions for what in of_rows], index=table.index, dtype=bool)
         return table.assign(counted=table["counted"] & stays)
 
-    tables: dict[str, Any] = {name: masked(getattr(study, name)) for name in TABLES}
+    tables: dict[str, Any] = {name: masked(getattr(study, name)) for name in _TABLES}
     return replace(study, **tables)

@@ -48,7 +48,7 @@ def counts_of_missing(answers: pd.DataFrame) -> dict[str, Any]:
     }
 
 
-def quartile_cells(numbers: Numbers) -> dict[str, str]:
+def _quartile_cells(numbers: Numbers) -> dict[str, str]:
     """Return median and quartiles as cells."""
     low, high = numbers["q1"], numbers["q3"]
     return {
@@ -73,12 +73,12 @@ def _distribution_cells(_asked: PlacedQuestion, numbers: Numbers) -> dict[str, s
     return {
         "n": str(numbers["n"]),
         "missing": str(numbers["missing"]),
-        **quartile_cells(numbers),
+        **_quartile_cells(numbers),
         "range": "–" if least is None else f"{number(least, 1)} – {number(most, 1)}",
     }
 
 
-DISTRIBUTION: Final = Measure("distribution", _distribution, _distribution_cells)
+_DISTRIBUTION: Final = Measure("distribution", _distribution, _distribution_cells)
 
 
 def _option_counts(asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
@@ -101,7 +101,7 @@ def _option_cells(asked: PlacedQuestion, numbers: Numbers) -> dict[str, str]:
     }
 
 
-OPTION_COUNTS: Final = Measure("counts", _option_counts, _option_cells)
+_OPTION_COUNTS: Final = Measure("counts", _option_counts, _option_cells)
 
 
 def _point_counts(asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
@@ -118,11 +118,11 @@ def _point_cells(_asked: PlacedQuestion, numbers: Numbers) -> dict[str, str]:
         **{point: str(count) for point, count in numbers["counts"].items()},
         "n": str(numbers["n"]),
         "missing": str(numbers["missing"] + numbers["cannot_judge"]),
-        **quartile_cells(numbers),
+        **_quartile_cells(numbers),
     }
 
 
-POINT_COUNTS: Final = Measure("rating", _point_counts, _point_cells)
+_POINT_COUNTS: Final = Measure("rating", _point_counts, _point_cells)
 
 
 def _texts(_asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
@@ -131,10 +131,10 @@ def _texts(_asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
     return {**counts_of_missing(answers), "texts": [f"{person}: {text}" for person, text in pairs]}
 
 
-TEXTS: Final = Measure("texts", _texts, None)
+_TEXTS: Final = Measure("texts", _texts, None)
 
 
-MEASURES: Final = {one.id: one for one in (POINT_COUNTS, OPTION_COUNTS, DISTRIBUTION, TEXTS)}
+MEASURES: Final = {one.id: one for one in (_POINT_COUNTS, _OPTION_COUNTS, _DISTRIBUTION, _TEXTS)}
 """Every measure by the id that a kind of question names it by."""
 
 _ONE: Final = ["participant", "session", "trial"]

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 Send: TypeAlias = Callable[[Answer], object]
 
-EVALUATION: Final = 0.7
+_EVALUATION: Final = 0.7
 """The share of an evaluation in what comes after the first figures; the rest is drawing."""
 
 
@@ -200,13 +200,13 @@ def _evaluate(study: Study, drawn: list[Picture], send: Send, stop: Callable[[],
 
     going = partial(_going, send, stop)
     going("testing", 0.0)
-    results = evaluate(study, progress=lambda what, share: going(what, EVALUATION * share))
+    results = evaluate(study, progress=lambda what, share: going(what, _EVALUATION * share))
     send(Proposed(undecided(study, results)))
     found = chain(pictures(study, results, ("svg",)), summary_pictures(study, results, ("svg",)))
     for number, picture in enumerate(found, start=1):
         drawn.append(picture)
         send(_figure(picture))
-        going("drawing", EVALUATION + (1 - EVALUATION) * min(1.0, number / 8))
+        going("drawing", _EVALUATION + (1 - _EVALUATION) * min(1.0, number / 8))
     names = []
     for place, card in enumerate(cards(results, numbers_of(study))):
         figure, answer = card.figure_of(drawn), " ".join(card.sentences)

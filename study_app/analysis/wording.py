@@ -8,9 +8,9 @@ from typing import Final, Protocol
 
 from study_app.number_text import MINUS, exact_text
 
-DIGITS: Final = 3
+_DIGITS: Final = 3
 """Significant digits that a sentence or a cell shows."""
-NUMBERS: Final = (
+_NUMBERS: Final = (
     *("no", "one", "two", "three", "four", "five", "six"),
     *("seven", "eight", "nine", "ten", "eleven", "twelve"),
 )
@@ -30,7 +30,7 @@ class Ends(Protocol):
 
 def counted(number: int, noun: str) -> str:
     """Return "three statements", "1 statement"."""
-    text = NUMBERS[number] if 1 < number < len(NUMBERS) else str(number)
+    text = _NUMBERS[number] if 1 < number < len(_NUMBERS) else str(number)
     return f"{text} {noun}" + ("" if number == 1 else "s")
 
 
@@ -42,17 +42,17 @@ def all_of(number: int, noun: str) -> str:
 
 
 def number(value: float | None, decimals: int = 2) -> str:
-    """Return a number with so many decimals, fewer beyond `DIGITS` digits, and a real minus sign; a dash for None."""
+    """Return a number with so many decimals, fewer beyond `_DIGITS` digits, and a real minus sign; a dash for None."""
     if value is None:
         return "–"
     whole = len(f"{abs(value):.0f}") if abs(value) >= 1 else 0
-    text = f"{value:.{max(0, min(decimals, DIGITS - whole))}f}"
+    text = f"{value:.{max(0, min(decimals, _DIGITS - whole))}f}"
     return "0" + text[2:] if text.strip("-0.") == "" and text.startswith("-") else text.replace("-", "−")
 
 
 def significant(value: float) -> str:
-    """Return a number with at most `DIGITS` significant digits, without trailing zeros: 0.00305, 1.25, 1."""
-    return exact_text(float(f"{value:.{DIGITS}g}")).replace("-", MINUS)
+    """Return a number with at most `_DIGITS` significant digits, without trailing zeros: 0.00305, 1.25, 1."""
+    return exact_text(float(f"{value:.{_DIGITS}g}")).replace("-", MINUS)
 
 
 def p_value(p: float | None) -> str:
@@ -76,7 +76,7 @@ def interval(ends: Ends | None, decimals: int = 2) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a share in percent with at most `DIGITS` digits, never rounded to 0 or 100: 90 %, 95.8 %, > 99.9 %."""
+    """Return a share in percent with at most `_DIGITS` digits, never rounded to 0 or 100: 90 %, 95.8 %, > 99.9 %."""
     if 0.9995 <= share < 1:
         return "> 99.9 %"
     return "< 0.1 %" if 0 < share < 0.0005 else f"{significant(100 * share)} %"

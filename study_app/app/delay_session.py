@@ -52,8 +52,8 @@ from study_app.session.tasks import TankView, TaskView
 from study_app.store.recordings import read_frames
 from study_app.store.sessions.open_session import SessionStore
 
-SIZE_PX: Final = (1920, 1080)
-OPERATOR_PX: Final = (1600, 900)
+_SIZE_PX: Final = (1920, 1080)
+_OPERATOR_PX: Final = (1600, 900)
 LEAST_S, MOST_S = 0.5, 600.0
 
 _STUDY: Final = """
@@ -153,7 +153,7 @@ def measure_delays(
                 ):
                     shown.extend(_Showing(Path(folder), seconds, refresh_hz, background).run())
                 progress(f"{shown[-1].screen}, {BESIDE[background]}")
-    return Delayed(machine_here(), seconds, SIZE_PX, tuple(shown))
+    return Delayed(machine_here(), seconds, _SIZE_PX, tuple(shown))
 
 
 class _Showing:
@@ -211,8 +211,8 @@ class _Showing:
 
     def _resize_windows(self, bridge: SessionBridge) -> None:
         if self._refresh_hz is not None:
-            bridge.participant.setGeometry(0, 0, *SIZE_PX)
-        bridge.operator.resize(*OPERATOR_PX)
+            bridge.participant.setGeometry(0, 0, *_SIZE_PX)
+        bridge.operator.resize(*_OPERATOR_PX)
         if self._load == "none":
             bridge.operator.hide()
 
@@ -250,8 +250,8 @@ class _Showing:
 
 
 FRAME_MS, TRACE_MS, TILES_MS = 16, 33, 500
-HEARTBEAT_MS = 100  # Python handles Ctrl+C only while it runs; Qt waits outside Python
-LONGEST_FRAME_TICKS = 100
+_HEARTBEAT_MS = 100  # Python handles Ctrl+C only while it runs; Qt waits outside Python
+_LONGEST_FRAME_TICKS = 100
 
 T = TypeVar("T")
 
@@ -271,7 +271,7 @@ class WindowsThread(QObject):
         super().__init__()
         paints = load != "none"
         self._application = application_here() if paints else QCoreApplication.instance() or QCoreApplication([])
-        self._painting = Painting() if paints else None
+        self._painting = _Painting() if paints else None
         self._asked.connect(self._call, Qt.ConnectionType.QueuedConnection)
 
     @property
@@ -282,7 +282,7 @@ class WindowsThread(QObject):
         """Run ``work`` in another thread while the windows live in this one; return its result or raise its error."""
         loop, heart = QEventLoop(), QTimer()
         heart.timeout.connect(lambda: None)
-        heart.start(HEARTBEAT_MS)
+        heart.start(_HEARTBEAT_MS)
         with collecting_in_this_thread(), ThreadPoolExecutor(1, thread_name_prefix="timing") as thread:
             if self._painting is not None:
                 self._painting.open_windows()
@@ -326,7 +326,7 @@ class WindowsThread(QObject):
         timer.start(period_ms)
 
 
-class Painting(QObject):
+class _Painting(QObject):
     """Both windows of a session, painting as in a trial: the ball 60 times a second, the hand's traces 30 times.
 
     What they show is a servo of their own in virtual time, so that they do the same whatever is timed with them.
@@ -406,7 +406,7 @@ class Painting(QObject):
         """Advance the hand by the time since the last frame and draw it."""
         now_ns = self._servo.now_ns()
         behind = (time.monotonic_ns() - self._began_ns) // 1_000_000 - now_ns // 1_000_000
-        self._servo.advance(int(min(max(behind, 1), LONGEST_FRAME_TICKS)))
+        self._servo.advance(int(min(max(behind, 1), _LONGEST_FRAME_TICKS)))
         self.health.add_samples(self._reader.read())
         position_m, shown_ns = self._servo.telemetry.position_at(self._servo.now_ns())
         self.health.add_hand_position(self._servo.now_ns() * 1e-9, position_m)

@@ -177,9 +177,9 @@ class CrashTrace:
                 self._path.unlink()
 
 
-HEARTBEAT_MS = 100  # the longest delay before Python handles a signal
+_HEARTBEAT_MS = 100  # the longest delay before Python handles a signal
 BY_SIGNAL_S = 2.0  # the longest wait for threads when a signal ends the program; the force is zero before
-HANG_UP = 1  # the number of SIGHUP, for a log-off on any system
+_HANG_UP = 1  # the number of SIGHUP, for a log-off on any system
 
 
 class Patience:
@@ -222,9 +222,9 @@ def ending_on_signals(end: Callable[[int], None]) -> Iterator[None]:
     def log_off(manager: QSessionManager) -> None:
         manager.setRestartHint(QSessionManager.RestartHint.RestartNever)
         if not heard:
-            heard.append(HANG_UP)
+            heard.append(_HANG_UP)
             disable_collection()
-            end(HANG_UP)
+            end(_HANG_UP)
 
     before = {number: signal.signal(number, hear) for number in ENDING_SIGNALS}
     logging_off = log_off_signal()
@@ -232,7 +232,7 @@ def ending_on_signals(end: Callable[[int], None]) -> Iterator[None]:
     logging_off.connect(log_off, Qt.ConnectionType.DirectConnection)
     heart = QTimer()
     heart.timeout.connect(lambda: None)  # Python handles signals only while it runs; Qt waits outside Python
-    heart.start(HEARTBEAT_MS)
+    heart.start(_HEARTBEAT_MS)
     try:
         yield
     finally:

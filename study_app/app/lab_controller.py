@@ -39,10 +39,10 @@ from study_app.lab.programmed_paths import TITLES
 if TYPE_CHECKING:
     from study_app.lab.live import Live
 
-SMALLEST_N = 0.001
+_SMALLEST_N = 0.001
 
 
-def cost_rows(costs: Costs) -> tuple[CostRow, ...]:
+def _cost_rows(costs: Costs) -> tuple[CostRow, ...]:
     """Return the cost of each part of a tick, the most expensive first, then the absent parts with the reasons."""
     rows = [CostRow(NAMED[it.effect].label, it.ns) for it in costs.effects if it.ns is not None]
     rows.append(CostRow("Servo alone", costs.rest_ns))
@@ -50,13 +50,13 @@ def cost_rows(costs: Costs) -> tuple[CostRow, ...]:
     return (*sorted(rows, key=lambda row: -(row.ns or 0.0)), *absent)
 
 
-def error_rows(errors: Errors) -> tuple[ErrorRow, ...]:
+def _error_rows(errors: Errors) -> tuple[ErrorRow, ...]:
     """Return the differences between a setting's force and its definition."""
     without = ", ".join(NAMED[it].label.lower() for it in errors.left_out)
     share = f"{errors.wake:.0e}".replace("e-0", "e−").replace("e-", "e−") if errors.wake else "0"
     wake, force = "no wake" if errors.wake is None else share, "no drag"
     if errors.force_n is not None:
-        force = f"< {SMALLEST_N:g} N" if errors.force_n < SMALLEST_N else f"{errors.force_n:.3f} N"
+        force = f"< {_SMALLEST_N:g} N" if errors.force_n < _SMALLEST_N else f"{errors.force_n:.3f} N"
     note = f"of drag and wake; no reference for {without}" if without else "along programmed paths"
     return (
         ErrorRow(measure="Wake, of Σ|e|/S", value=wake, note=note),
@@ -70,7 +70,7 @@ def error_rows(errors: Errors) -> tuple[ErrorRow, ...]:
 log = logging.getLogger(__name__)
 
 
-class Prices:
+class _Prices:
     """What the felt setting costs and how true it is, as far as it was answered."""
 
     def __init__(self, make_appraiser: Callable[[], AppraisalClient]) -> None:
@@ -210,7 +210,7 @@ class LabOpening(QObject):
             self._start_opening()
 
 
-class LabSaving(QObject):
+class _LabSaving(QObject):
     """The liquids at hand; writes presets, one at a time, and looks which liquids there are then.
 
     ``said`` tells what was written or opened last. ``failed`` carries what was met instead.
@@ -273,10 +273,10 @@ class LabSaving(QObject):
         self.liquids = tuple(dict.fromkeys((*self.liquids, *written)))
 
 
-INITIAL_A: Final = Choice(source="rek2024", liquid="water", title="Water")
-INITIAL_B: Final = Choice(source="rek2024", liquid="light_oil", title="Light oil")
-FRAME_MS: Final = 33
-APPRAISE_AFTER_MS: Final = 300
+_INITIAL_A: Final = Choice(source="rek2024", liquid="water", title="Water")
+_INITIAL_B: Final = Choice(source="rek2024", liquid="light_oil", title="Light oil")
+_FRAME_MS: Final = 33
+_APPRAISE_AFTER_MS: Final = 300
 COMPILING: Final = "Compiling the force model (once after each installation or update; about a minute)"
 
 
@@ -308,19 +308,19 @@ class LabController(QObject):
         self.place = place
         self.live: Live | None = None
         self.device = device
-        self.bench = Workbench(INITIAL_A.setting(), INITIAL_B.setting()) if bench is None else bench
+        self.bench = Workbench(_INITIAL_A.setting(), _INITIAL_B.setting()) if bench is None else bench
         self.trouble = self.study = ""
         self._refused: tuple[str, str] | None = None
         self._entered = False
-        self._prices = Prices(make_appraiser)
+        self._prices = _Prices(make_appraiser)
         self._opening = LabOpening(open_live, options)
-        self._saving = LabSaving(available_liquids() if liquids is None else liquids)
+        self._saving = _LabSaving(available_liquids() if liquids is None else liquids)
         self.chance = chance if chance is not None else random.SystemRandom()
         self._said = ""
         self.uncaught = UncaughtExceptions(self._handle_uncaught)
-        self.frames = self._make_timer(FRAME_MS, self._draw_frame)
+        self.frames = self._make_timer(_FRAME_MS, self._draw_frame)
         self._due = self._make_timer(0, self._draw_frame, once=True)
-        self._cost_due = self._make_timer(APPRAISE_AFTER_MS, self._request_prices, once=True)
+        self._cost_due = self._make_timer(_APPRAISE_AFTER_MS, self._request_prices, once=True)
         self._connect()
 
     def _make_timer(self, interval_ms: int, slot: Callable[[], None], *, once: bool = False) -> QTimer:
@@ -470,9 +470,9 @@ class LabController(QObject):
                 diagnosable=described.doctor is not None,
             ),
             paths=tuple(TITLES.items()),
-            cost=() if costs is None else cost_rows(costs),
+            cost=() if costs is None else _cost_rows(costs),
             tick_ns=None if costs is None else costs.tick_ns,
-            errors=() if self._prices.errors is None else error_rows(self._prices.errors),
+            errors=() if self._prices.errors is None else _error_rows(self._prices.errors),
             measuring=self._prices.waits or self._cost_due.isActive(),
             force_on=reading is not None and reading.force_on,
             busy="" if opening is None else progress or f"Opening {title_of(opening)}",

@@ -142,7 +142,7 @@ def load_modules() -> None:
 
 
 LOOK_AFTER_MS = 300  # the window is painted by then
-JOBS_PATIENCE_S = 5.0
+_JOBS_PATIENCE_S = 5.0
 
 
 def run_home_window(
@@ -426,7 +426,7 @@ class MainController(QObject):
         self.devices.stop_looking(patience.left_s)
         for live in self._called_off:
             live.wait(patience.left_s)
-        wait_for_jobs(min(patience.left_s, JOBS_PATIENCE_S))
+        wait_for_jobs(min(patience.left_s, _JOBS_PATIENCE_S))
 
     def end_by_signal(self, number: int) -> None:
         self.code = 128 + number

@@ -15,7 +15,7 @@ from PySide6.QtCore import QTimer
 
 MOST_PERIODS: Final = 4  # the longest wait of a task for free time
 MOST_SHARE: Final = 0.15  # the largest share of the time that a task may use; slower tasks run less often
-FORGETS: Final = 0.9  # the decay of a task's worst duration per run
+_FORGETS: Final = 0.9  # the decay of a task's worst duration per run
 
 
 @dataclass(slots=True, kw_only=True)
@@ -65,12 +65,12 @@ class FrameBudget:
     def _run_task(self, work: DeferredTask, began_ns: int) -> None:
         work.done_ns = began_ns
         work.do()
-        work.took_ns = max(self._now_ns() - began_ns, round(FORGETS * work.took_ns))
+        work.took_ns = max(self._now_ns() - began_ns, round(_FORGETS * work.took_ns))
 
 
-PERIOD_MS = 200
+_PERIOD_MS = 200
 YOUNG, OLDEST = 1, 2  # generations; collecting up to the first takes no time
-LONG_S = 0.02
+_LONG_S = 0.02
 MOST_FROZEN = 500_000  # objects; the modules of home, designer, lab and session have 170 000
 _session_runs = threading.Event()
 
@@ -88,7 +88,7 @@ def collect_if_due() -> int | None:
 def _collect() -> None:
     """Collect what is due; after a long full collection skip all present objects, up to a bound between sessions."""
     began_s = time.thread_time()
-    if collect_if_due() == OLDEST and time.thread_time() - began_s > LONG_S:
+    if collect_if_due() == OLDEST and time.thread_time() - began_s > _LONG_S:
         gc.freeze()
         if not _session_runs.is_set() and gc.get_freeze_count() > MOST_FROZEN:
             gc.unfreeze()
@@ -126,7 +126,7 @@ def collecting_in_this_thread() -> Iterator[None]:
     gc.disable()
     timer = QTimer()
     timer.timeout.connect(_collect)
-    timer.start(PERIOD_MS)
+    timer.start(_PERIOD_MS)
     try:
         yield
     finally:

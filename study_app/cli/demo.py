@@ -17,7 +17,7 @@ DEVICE: Final = "falcon-emulated"
 PARTICIPANTS: Final = ("P001", "P002")
 SEED: Final = 4
 """Every trial of the two is within the limits that the study sets for a valid trial."""
-UNSEEN_PLATFORMS: Final = ("offscreen", "minimal", "minimalegl")
+_UNSEEN_PLATFORMS: Final = ("offscreen", "minimal", "minimalegl")
 """Qt platforms whose windows nobody sees."""
 
 
@@ -69,12 +69,12 @@ def _compile_everything(protocol: Path) -> None:
     from study_app.workers.executors import Workers, open_executor
 
     with open_executor(Workers(1)) as executor:
-        servo = executor.submit(run_servo, protocol, "scripted", ticks=1)
-        run_servo(protocol, DEVICE, ticks=0)
+        servo = executor.submit(_run_servo, protocol, "scripted", ticks=1)
+        _run_servo(protocol, DEVICE, ticks=0)
         servo.result()
 
 
-def run_servo(protocol: Path, device: str, *, ticks: int) -> None:
+def _run_servo(protocol: Path, device: str, *, ticks: int) -> None:
     """Open a simulated device as a session does, run the servo for some ticks, and close both."""
     from study_app.protocol.load import load
     from study_app.session.simulated.rehearsal import rehearsal_rig
@@ -126,7 +126,7 @@ def _show_results(study: Path) -> int:
     platform = os.environ.get("QT_QPA_PLATFORM", "").partition(":")[0]
     try:
         check_display()
-        if platform not in UNSEEN_PLATFORMS:
+        if platform not in _UNSEEN_PLATFORMS:
             from study_app import app
 
             click.echo("The program opens with these results; close its window to finish")

@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 
 _WIDTH = 100
 _PREPARING = "Preparing …"
-FIRMWARE = click.option("--firmware", type=click.Path(path_type=Path), metavar="PATH", help="Firmware file.")
+_FIRMWARE = click.option("--firmware", type=click.Path(path_type=Path), metavar="PATH", help="Firmware file.")
 DEVICE = click.option("--device", "name", default="falcon", show_default=True, metavar="NAME", help="The device.")
-OFF = "off"
+_OFF = "off"
 
 
 @click.group(invoke_without_command=True)
@@ -105,7 +105,7 @@ def doctor(name: str, faults: tuple[str, ...], to: Path | None, device_options: 
 
 @devices.command()
 @DEVICE
-@FIRMWARE
+@_FIRMWARE
 @click.option("--grams", type=click.FloatRange(110, 600), metavar="G", help="Use a weight of 110 to 600 grams.")
 @click.option("--scale", is_flag=True, help="Use a luggage scale instead.")
 @click.option("--geometry", metavar="NAME", help="libnifalcon (default), zm-redux or martin-hillier.")
@@ -310,10 +310,12 @@ def _ask_emulator(emulator: Emulator, weight_n: float) -> Ask:
 
 
 @click.command()
-@click.option("--markers", type=click.Choice((OFF, "on")), help="Markers of events over the Lab Streaming Layer (LSL).")
+@click.option(
+    "--markers", type=click.Choice((_OFF, "on")), help="Markers of events over the Lab Streaming Layer (LSL)."
+)
 @click.option(
     "--samples",
-    type=click.Choice((OFF, "single-blind", "always")),
+    type=click.Choice((_OFF, "single-blind", "always")),
     help="Samples over LSL; single-blind: not in double-blind studies.",
 )
 @click.option(
@@ -330,13 +332,13 @@ def outlets(markers: str | None, samples: str | None, triggers: str | None) -> N
     if samples is not None:
         changes["lsl_samples"] = samples
     if triggers is not None:
-        changes["triggers"] = "" if triggers == OFF else triggers
-        if triggers != OFF and not is_port(triggers):
+        changes["triggers"] = "" if triggers == _OFF else triggers
+        if triggers != _OFF and not is_port(triggers):
             examples = " or ".join(port_examples())
             raise OutletError(f"--triggers '{triggers}' is not the address of a port: use one like {examples}, or off")
     if changes:
         settings = type(settings).model_validate(settings.model_dump() | changes)
         workstation.save_settings(settings)
-    click.echo(f"markers over LSL: {'on' if settings.lsl_markers else OFF}")
+    click.echo(f"markers over LSL: {'on' if settings.lsl_markers else _OFF}")
     click.echo(f"samples over LSL: {settings.lsl_samples}")
-    click.echo(f"triggers: {settings.triggers or OFF}")
+    click.echo(f"triggers: {settings.triggers or _OFF}")

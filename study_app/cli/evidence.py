@@ -41,10 +41,10 @@ if TYPE_CHECKING:
     from study_app.haptics.model.motion import Motion
     from study_app.haptics.model.scene import Scene
 
-EXIT_UNDECIDED = 4
+_EXIT_UNDECIDED = 4
 
 
-def present_evidence(result: Evidence, to: Path | None, *, with_text: bool = True) -> None:
+def _present_evidence(result: Evidence, to: Path | None, *, with_text: bool = True) -> None:
     """Print evidence and write it into a folder, if one was given.
 
     The exit code is 3 if a limit is missed, and 4 if one is undecided. ``with_text``: print the text in any case, not
@@ -58,11 +58,11 @@ def present_evidence(result: Evidence, to: Path | None, *, with_text: bool = Tru
         click.echo(result.closing)
     exit_if(result.missed)
     if result.undecided:
-        click.get_current_context().exit(EXIT_UNDECIDED)
+        click.get_current_context().exit(_EXIT_UNDECIDED)
 
 
-DEFAULT_PATH = "stir"
-REAL = "physical2"
+_DEFAULT_PATH = "stir"
+_REAL = "physical2"
 
 
 @click.command()
@@ -70,7 +70,7 @@ REAL = "physical2"
 @click.option("--liquid", metavar="NAME", help="Name of the liquid; default: water of rek2024, and honey of physical2.")
 @click.option(
     "--path",
-    default=DEFAULT_PATH,
+    default=_DEFAULT_PATH,
     show_default=True,
     metavar="PATH",
     help="Motion CSV, or a programmed path: stir, circle, reverse, reach …",
@@ -93,7 +93,7 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
     """
     if every:
         exclude_each_other(liquids=every, liquid=liquid)
-        exclude_each_other(liquids=every, path=None if path == DEFAULT_PATH else path)
+        exclude_each_other(liquids=every, path=None if path == _DEFAULT_PATH else path)
         _print_survey(scene, to)
         return
     from study_app.evidence.accuracy.accuracy_report import evidence
@@ -101,14 +101,14 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
 
     numerical, physical, notes = _scenes_to_compare(scene, liquid)
     subject = numerical or physical
-    motion = motion_along(path, subject) if subject is not None else None
+    motion = _motion_along(path, subject) if subject is not None else None
     if motion is None:
         raise click.UsageError(f"nothing can be measured: {'; '.join(notes)}")
     make_output_folder(to)
-    named = "stirring" if path == DEFAULT_PATH else path
+    named = "stirring" if path == _DEFAULT_PATH else path
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
         measured = measure(numerical, physical, motion, named=named, notes=notes, progress=show)
-    present_evidence(evidence(measured), to, with_text=False)
+    _present_evidence(evidence(measured), to, with_text=False)
 
 
 def _print_survey(file: str | None, to: Path | None) -> None:
@@ -118,10 +118,10 @@ def _print_survey(file: str | None, to: Path | None) -> None:
 
     make_output_folder(to)
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
-        errors = survey(load_scenes(file or REAL), show)
+        errors = survey(load_scenes(file or _REAL), show)
     if not errors:
         raise click.UsageError(f"{file}: its liquids do not have a viscosity, so there is no physical reference")
-    present_evidence(evidence(errors), to, with_text=False)
+    _present_evidence(evidence(errors), to, with_text=False)
 
 
 def _scenes_to_compare(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scene | None, tuple[str, ...]]:
@@ -129,9 +129,9 @@ def _scenes_to_compare(scene: str | None, liquid: str | None) -> tuple[Scene | N
     from study_app.protocol.load import load_scene, load_scenes
 
     if scene is None and liquid is None:
-        return load_scene("rek2024", "water"), load_scene(REAL, "honey"), ()
+        return load_scene("rek2024", "water"), load_scene(_REAL, "honey"), ()
     if scene is None:
-        thesis, real = load_scenes("rek2024"), load_scenes(REAL)
+        thesis, real = load_scenes("rek2024"), load_scenes(_REAL)
         if liquid in thesis or liquid in real:
             return thesis.get(liquid or ""), real.get(liquid or ""), ()
         known = ", ".join(dict.fromkeys([*thesis, *real]))
@@ -149,13 +149,13 @@ def _scenes_to_compare(scene: str | None, liquid: str | None) -> tuple[Scene | N
     return chosen, chosen, ()
 
 
-def motion_along(path: str, scene: Scene) -> Motion:
+def _motion_along(path: str, scene: Scene) -> Motion:
     """Return the motion of a path's name or a motion file, at the scene's rate."""
     from study_app.evidence.reference_solutions import stir
     from study_app.haptics.model import motion
     from study_app.lab.identify.measured_force import at_rate
 
-    if path == DEFAULT_PATH:
+    if path == _DEFAULT_PATH:
         return stir(scene.scale, scene.rate_hz)
     programmed = path in motion.NAMES or not (Path(path).suffix or Path(path).exists())
     return (
@@ -215,7 +215,7 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
     if score:
         with progress(lambda text: click.echo(text, err=True)) as show:
             scored = fits.score_all(show)
-        present_evidence(scored, to)
+        _present_evidence(scored, to)
         return
     if materials:
         _print_material_errors(to, workers, solve=solve)
@@ -232,7 +232,7 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
         else:
             result = fits.evidence(tables, drag, fits.fit_all(tables, show))
     echo_files(solved)
-    present_evidence(result, to, with_text=False)
+    _present_evidence(result, to, with_text=False)
 
 
 def _print_material_errors(to: Path | None, workers: Workers, *, solve: bool) -> None:
@@ -242,7 +242,7 @@ def _print_material_errors(to: Path | None, workers: Workers, *, solve: bool) ->
     if solve and to is not None:
         with progress(lambda text: click.echo(text, err=True)) as show, executor_for(workers) as executor:
             click.echo(solve_materials(to, executor, show))
-    present_evidence(evidence(stored_materials(to if solve else None)), to, with_text=False)
+    _present_evidence(evidence(stored_materials(to if solve else None)), to, with_text=False)
 
 
 @click.command()
@@ -310,20 +310,20 @@ def stability(
             limits = stability_report.limits(
                 executor, lambda done, of: show(f"{done} of {of} limits", done / of), table.name
             )
-        present_evidence(limits, table.parent)
+        _present_evidence(limits, table.parent)
         return
     if delayed is not None:
         from study_app.evidence.stability import force_delay
 
         with progress() as show:
             entries = force_delay.measure(progress=lambda done: show(f"{done} delays"))
-        present_evidence(force_delay.evidence(entries, delayed.name), delayed.parent)
+        _present_evidence(force_delay.evidence(entries, delayed.name), delayed.parent)
         return
     if any(parts.values()):
         part = next(name for name, chosen in parts.items() if chosen)
         with progress() as show, executor_for(workers) as executor:
             measured = _measure(part, executor, show)
-        present_evidence(measured, None)
+        _present_evidence(measured, None)
         return
     seed = seed or secrets.token_hex(4)
     chosen = groups(seed, cases) if only is None else tuple(it for it in groups(seed, cases) if only in it.name)
@@ -362,8 +362,8 @@ def _measure(part: str, executor: Executor, show: ShowProgress) -> Evidence:
     return delivered_force.evidence(delivered_force.measure(executor=executor))
 
 
-MOST_COMPARED_S = 300.0
-LOAD = click.Choice(("none", "gui", "gui+cpu"))
+_MOST_COMPARED_S = 300.0
+_LOAD = click.Choice(("none", "gui", "gui+cpu"))
 
 
 @click.command()
@@ -376,7 +376,7 @@ LOAD = click.Choice(("none", "gui", "gui+cpu"))
     help=("Duration for each loop, or for each delay."),
 )
 @click.option(
-    "--load", type=LOAD, default="none", show_default=True, help="Also paint both windows; also keep all cores busy."
+    "--load", type=_LOAD, default="none", show_default=True, help="Also paint both windows; also keep all cores busy."
 )
 @click.option(
     "--spin", "spin_us", type=float, metavar="US", help="Poll the clock for this time before a deadline [µs]."
@@ -445,7 +445,7 @@ def timing(
 
             localhost_only()
             lateness = streams.stream(seconds, ending=ending, progress=show)
-            compared = streams.compare(min(seconds, MOST_COMPARED_S), ending=ending, progress=show)
+            compared = streams.compare(min(seconds, _MOST_COMPARED_S), ending=ending, progress=show)
             return streams.evidence(lateness, compared)
         from study_app.evidence.outlets import triggers as ports
 
@@ -458,8 +458,8 @@ def timing(
         with progress(partial(click.echo, err=True)) as show:
             result = evidence(measure_delays(seconds, load, progress=show))
     else:
-        windows = windows_thread(load) if load != "none" or not other else None
-        with ending_by_signal() as (ending, _), progress(partial(click.echo, err=True)) as show:
+        windows = _windows_thread(load) if load != "none" or not other else None
+        with _ending_by_signal() as (ending, _), progress(partial(click.echo, err=True)) as show:
             if other:
                 result = under_load(load, windows, partial(measured, ending, show))
             else:
@@ -467,7 +467,7 @@ def timing(
 
                 timed = measurement.timing(seconds, load, windows, spin_us=spin_us, ending=ending, progress=show)
                 result = report.evidence(timed)
-    present_evidence(result, to)
+    _present_evidence(result, to)
 
 
 def _choose_display() -> None:
@@ -476,7 +476,7 @@ def _choose_display() -> None:
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
 
 
-def windows_thread(load: LoadName) -> WindowsThread | None:
+def _windows_thread(load: LoadName) -> WindowsThread | None:
     """Return the windows' thread; None without Qt or if the load paints no windows."""
     try:
         from study_app.app.delay_session import WindowsThread
@@ -488,7 +488,7 @@ def windows_thread(load: LoadName) -> WindowsThread | None:
 
 
 @contextmanager
-def ending_by_signal() -> Iterator[tuple[threading.Event, list[int]]]:
+def _ending_by_signal() -> Iterator[tuple[threading.Event, list[int]]]:
     """Set an event on Ctrl+C or a request to terminate; yield it with the list of received signals."""
     ending = threading.Event()
     received: list[int] = []
@@ -511,7 +511,7 @@ def ending_by_signal() -> Iterator[tuple[threading.Event, list[int]]]:
 @click.option("--virtual", is_flag=True, help="Run in virtual time, in which a day takes minutes.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the faults.")
 @click.option(
-    "--load", type=LOAD, default="none", help="Also paint both windows of a session; also keep all cores busy."
+    "--load", type=_LOAD, default="none", help="Also paint both windows of a session; also keep all cores busy."
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for the report.")
 @click.pass_context
@@ -528,20 +528,20 @@ def soak(
 
     scenes = load_scenes(protocol)
     make_output_folder(to)
-    with ending_by_signal() as (ending, received):
+    with _ending_by_signal() as (ending, received):
         result = under_load(
             load,
-            windows_thread(load) if load != "none" else None,
+            _windows_thread(load) if load != "none" else None,
             lambda: soak_servo(scenes, hours, virtual=virtual, seed=seed, ending=ending, progress=click.echo),
         )
     if result.ticks > 0:
         click.echo()
-    present_evidence(result.evidence(), to)
+    _present_evidence(result.evidence(), to)
     if received:
         context.exit(128 + received[0])
 
 
-SAID_EVERY_S: Final = 20.0
+_SAID_EVERY_S: Final = 20.0
 """Progress is written so often where it is no line of a terminal."""
 
 
@@ -552,12 +552,12 @@ def _timed_lines() -> Callable[[str], None]:
 
 
 def _at_intervals(say: Callable[[str], None]) -> Callable[[str], None]:
-    """Return a function that says a text at most once in `SAID_EVERY_S`."""
+    """Return a function that says a text at most once in `_SAID_EVERY_S`."""
     said = -math.inf
 
     def say_sometimes(text: str) -> None:
         nonlocal said
-        if time.monotonic() - said >= SAID_EVERY_S:
+        if time.monotonic() - said >= _SAID_EVERY_S:
             said = time.monotonic()
             say(text)
 
@@ -606,7 +606,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
                 show(f"{done} studies")
     except KeyboardInterrupt:
         click.echo("ended early", err=True)
-    present_evidence(evidence(rates, f"{done} studies in {time.monotonic() - begun:.0f} s"), to)
+    _present_evidence(evidence(rates, f"{done} studies in {time.monotonic() - begun:.0f} s"), to)
 
 
 @click.command()
@@ -653,7 +653,7 @@ def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], worke
     used_s = sum(os.times()[:4])  # with the workers', which have ended
     took = f"{time.monotonic() - begun:.0f} s, {used_s:.0f} s of processor time"
     heading = f"{studies} studies of each protocol and seed ({', '.join(map(str, seeds))}), in {took}"
-    present_evidence(evidence(verdicts, heading), to)
+    _present_evidence(evidence(verdicts, heading), to)
 
 
 @click.command("delay-thresholds")
@@ -670,4 +670,4 @@ def delay_thresholds(people: int, seed: int, to: Path | None) -> None:
     with progress() as show:
         show("simulating people")
         comparison = compare(people, seed)
-    present_evidence(evidence(comparison), to)
+    _present_evidence(evidence(comparison), to)

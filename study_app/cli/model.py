@@ -13,15 +13,15 @@ from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, MOST_DELAY
 if TYPE_CHECKING:
     from study_app.haptics.model.scene import Scene
 
-LIQUID = click.option("--liquid", required=True, metavar="NAME", help="ID of the liquid in that file.")
-INITIAL = click.option(
+_LIQUID = click.option("--liquid", required=True, metavar="NAME", help="ID of the liquid in that file.")
+_INITIAL = click.option(
     "--set", "changes", multiple=True, metavar="NAME=VALUE", help="Initial value, or a fixed parameter."
 )
 
 
 @click.command()
 @SCENE_FILE
-@LIQUID
+@_LIQUID
 @click.option("--path", required=True, metavar="PATH", help="Motion CSV, or a programmed path: circle, line, stop …")
 @click.option("--to", required=True, type=Target(), metavar="CSV", help="File to write.")
 @click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Override a parameter; repeatable.")
@@ -95,9 +95,9 @@ def figures(to: Path) -> None:
     metavar="CSV",
     help="Motion and force, or a flow curve.",
 )
-@LIQUID
+@_LIQUID
 @click.option("--fit", "names", required=True, metavar="NAMES", help="Parameters, such as drag_coefficient,length.")
-@INITIAL
+@_INITIAL
 @click.option(
     "--velocity",
     type=click.Choice(["centred", "scene"]),

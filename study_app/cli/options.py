@@ -25,10 +25,10 @@ GROUPS: Final = {
     "Devices": "devices outlets plugins",
     "Help": "docs",
 }
-REMOVED: Final = {"emulate-falcon": "--device falcon-emulated runs the Falcon's driver on an emulated Falcon"}
-RENAMED: Final = {"run": {"--by": "--operator"}, "resume": {"--by": "--operator"}, "merge": {"--site": ""}}
+_REMOVED: Final = {"emulate-falcon": "--device falcon-emulated runs the Falcon's driver on an emulated Falcon"}
+_RENAMED: Final = {"run": {"--by": "--operator"}, "resume": {"--by": "--operator"}, "merge": {"--site": ""}}
 """Options of earlier versions by command, and what they are now; "": what followed them stands alone."""
-SAMPLES: Final = {
+_SAMPLES: Final = {
     "FILE": "rek2024",
     "RESULTS": "rek2024",
     "SESSION": "rek2024/P007/1",
@@ -48,7 +48,7 @@ SAMPLES: Final = {
     "--hours": "1",
 }
 """Values of arguments and of required options in examples."""
-LONGEST: Final = 150
+_LONGEST: Final = 150
 """Characters of a command's first sentence in ``--help``, which wraps it."""
 Command = TypeVar("Command", bound=Callable[..., Any])
 FILE = click.argument("protocol", metavar="FILE")
@@ -65,9 +65,9 @@ class GroupedCommands(click.Group):
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
         """Return a command by its name."""
-        if args and args[0] in REMOVED:
-            ctx.fail(f"'{args[0]}' is no longer a command: {REMOVED[args[0]]}")
-        for old, new in RENAMED.get(args[0] if args else "", {}).items():
+        if args and args[0] in _REMOVED:
+            ctx.fail(f"'{args[0]}' is no longer a command: {_REMOVED[args[0]]}")
+        for old, new in _RENAMED.get(args[0] if args else "", {}).items():
             if any(word.partition("=")[0] == old for word in args):
                 click.echo(f"{old} is {new} now" if new else f"{old} is no longer needed", err=True)
             renamed = [word for word in args if word != old or new]
@@ -81,7 +81,7 @@ class GroupedCommands(click.Group):
             listed = [(name, self.commands[name]) for name in names.split()]
             with formatter.section(heading):
                 formatter.write_dl(
-                    [(name.ljust(width), command.get_short_help_str(LONGEST)) for name, command in listed]
+                    [(name.ljust(width), command.get_short_help_str(_LONGEST)) for name, command in listed]
                 )
 
 
@@ -100,10 +100,10 @@ def example_of(ctx: click.Context) -> str:
             if isinstance(parameter, click.Option)
             else (parameter.metavar or parameter.name or "").strip("[]")
         )
-        if isinstance(parameter, click.Argument) and (parameter.required or name in SAMPLES):
-            parts.append(SAMPLES.get(name, name))
+        if isinstance(parameter, click.Argument) and (parameter.required or name in _SAMPLES):
+            parts.append(_SAMPLES.get(name, name))
         elif isinstance(parameter, click.Option) and parameter.required:
-            parts += [name, SAMPLES.get(name, str(parameter.metavar))]
+            parts += [name, _SAMPLES.get(name, str(parameter.metavar))]
     return " ".join((ctx.command_path, *parts)) if parts else ""
 
 
@@ -151,7 +151,7 @@ def takes_session(function: Command) -> Command:
     @RESULTS
     @wraps(function)
     def run(*arguments: Any, session: str, results: Path | None, **options: Any) -> Any:
-        return function(*arguments, session=session_at(session, results), **options)
+        return function(*arguments, session=_session_at(session, results), **options)
 
     return run  # type: ignore[return-value]
 
@@ -169,7 +169,7 @@ def study_at(named: str | None, results: Path | None) -> Path:
     return inside if path.name == named and not path.is_dir() and inside.is_dir() else path
 
 
-def session_at(named: str, results: Path | None) -> Path:
+def _session_at(named: str, results: Path | None) -> Path:
     """Return a session's folder: a path, or STUDY/PARTICIPANT/NUMBER as ``sessions`` lists it (default: number 1).
 
     With ``results``, a study's folder, the name is PARTICIPANT/NUMBER.

@@ -20,9 +20,9 @@ from study_app.protocol.trials import designs, methods
 from study_app.protocol.warnings import delayed_force
 
 PROGRAM = "liquid-study"
-LEAST_DELAY_MS = 10
-LOOPS = (("kalman", "light"), ("ewma", "light"), ("kalman", "middle"), ("kalman", "firm"))
-DEVICE_KINDS = {"felt": "with force", "seen": "without force", "simulated": "simulated: its hand moves by itself"}
+_LEAST_DELAY_MS = 10
+_LOOPS = (("kalman", "light"), ("ewma", "light"), ("kalman", "middle"), ("kalman", "firm"))
+_DEVICE_KINDS = {"felt": "with force", "seen": "without force", "simulated": "simulated: its hand moves by itself"}
 
 
 def kinds_markdown() -> str:
@@ -49,7 +49,7 @@ def kinds_markdown() -> str:
 def delayed_force_markdown() -> str:
     """Return the delivered share of a delayed force and the longest delay with 95 %, by liquid and hand."""
     entries = [entry for entry in delayed_force.stored_table() if entry.estimator == "kalman"]
-    delays = [delay for delay in sorted({entry.delay_ms for entry in entries}) if delay >= LEAST_DELAY_MS]
+    delays = [delay for delay in sorted({entry.delay_ms for entry in entries}) if delay >= _LEAST_DELAY_MS]
     left = {(entry.liquid, entry.hand, entry.delay_ms): f"{entry.left_percent:.0f}" for entry in entries}
     liquids = dict.fromkeys(entry.liquid for entry in entries)
     labels = {liquid: liquid.replace("physical2_", "`physical2`: ").replace("_", " ") for liquid in liquids}
@@ -58,7 +58,7 @@ def delayed_force_markdown() -> str:
         for name in liquids
     )
     longest = (
-        (labels[name], *(f"{delayed_force.longest_delay_ms(name, *how):g}" for how in LOOPS)) for name in liquids
+        (labels[name], *(f"{delayed_force.longest_delay_ms(name, *how):g}" for how in _LOOPS)) for name in liquids
     )
     tables = (
         (
@@ -66,7 +66,7 @@ def delayed_force_markdown() -> str:
             ("liquid", *(f"{delay:g} ms" for delay in delays)),
             shares,
         ),
-        ("Longest delay [ms] at which at most 5 % is held back", ("liquid", *map(", ".join, LOOPS)), longest),
+        ("Longest delay [ms] at which at most 5 % is held back", ("liquid", *map(", ".join, _LOOPS)), longest),
     )
     return "\n".join(line for heading, columns, rows in tables for line in _table_lines(heading, columns, rows))
 
@@ -114,7 +114,7 @@ def _limiter_rows() -> Iterator[tuple[str, ...]]:
 def _device_rows() -> Iterator[tuple[str, ...]]:
     for device in DEVICES:
         options = ", ".join(f"`--{option.name}`" for option in device.options)
-        yield f"`{device.name}`", device.title, DEVICE_KINDS[device.kind], options
+        yield f"`{device.name}`", device.title, _DEVICE_KINDS[device.kind], options
 
 
 def _check_rows() -> Iterator[tuple[str, ...]]:

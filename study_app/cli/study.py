@@ -24,9 +24,9 @@ from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, MOST_DELAY
 from study_app.number_text import counted
 
 SEED = click.IntRange(0, 2**31 - 1)
-WINDOWED = click.option("--windowed", is_flag=True, help="Show the participant's window in a frame, not full-screen.")
-SCREEN = click.option("--screen", type=click.IntRange(1), help="Number of the participant's screen.")
-OPERATOR = click.option("--operator", default="", metavar="INITIALS", help="Name or initials of the operator.")
+_WINDOWED = click.option("--windowed", is_flag=True, help="Show the participant's window in a frame, not full-screen.")
+_SCREEN = click.option("--screen", type=click.IntRange(1), help="Number of the participant's screen.")
+_OPERATOR = click.option("--operator", default="", metavar="INITIALS", help="Name or initials of the operator.")
 
 
 @click.command()
@@ -146,13 +146,13 @@ def design(protocol: str, participants: int, first: str, seed: int) -> None:
 @click.option("--seed", type=SEED, help="Seed of all random choices; default: drawn at random, shown and recorded.")
 @click.option("--device", cls=DeviceName, default=DEFAULT_DEVICE, show_default=True, help="Haptic or input device.")
 @click.option("--language", metavar="LANG", help="Language of the pages; default: the first of the protocol.")
-@OPERATOR
+@_OPERATOR
 @click.option(
     "--row-of", metavar="ID", help="ID of a participant who is replaced, whose order (and place in the group) is used."
 )
 @click.option("--group", metavar="GROUP", help="Group of the participant, in a study with pre-existing groups.")
-@WINDOWED
-@SCREEN
+@_WINDOWED
+@_SCREEN
 @click.option("--pilot", is_flag=True, help="Pilot session: in a marked window, stored in results/<study>-pilot.")
 @click.option("--no-recordings", is_flag=True, help="Store only answers and trial rows, not every sample and frame.")
 @RESULTS
@@ -223,9 +223,9 @@ def rehearse(
 @takes_session
 @click.option("--protocol", metavar="FILE", help="Protocol of the session; default: found among the known protocols.")
 @click.option("--device", cls=DeviceName, help="Device; default: the device of the interrupted session.")
-@OPERATOR
-@WINDOWED
-@SCREEN
+@_OPERATOR
+@_WINDOWED
+@_SCREEN
 def resume(session: Path, **chosen: Any) -> None:
     """Resume an interrupted session at the interrupted trial, with the same order and seed."""
     from study_app import app
@@ -348,7 +348,7 @@ def _study_folders(results: Path) -> Iterator[Path]:
         yield from study_folders(results)
 
 
-SECTIONS_SHOWN: Final = 5
+_SECTIONS_SHOWN: Final = 5
 
 
 @click.command()
@@ -364,7 +364,7 @@ def docs(search_words: tuple[str, ...]) -> None:
     if not typed or typed in documentation.names():
         click.echo(documentation.page(typed) if typed else "\n".join(documentation.names()))
         return
-    sections = documentation.search(typed)[:SECTIONS_SHOWN]
+    sections = documentation.search(typed)[:_SECTIONS_SHOWN]
     if not sections:
         raise click.UsageError(f"none of the pages contains a word of {typed!r}: liquid-study docs lists the pages")
     best, *others = sections

@@ -45,7 +45,7 @@ from study_app.protocol.source.files import protocol_file
 from study_app.store.drafts import draft_of
 from study_app.store.study_settings import keep_original
 
-REST_MS: Final = 200
+_REST_MS: Final = 200
 
 
 class DesignerController(QObject):
@@ -67,7 +67,7 @@ class DesignerController(QObject):
         self._choices: tuple[StudyChoice, ...] = ()
         self._repairs = RepairSearch(self)
         self._resting = QTimer(self)
-        self._resting.setInterval(REST_MS)
+        self._resting.setInterval(_REST_MS)
         self._resting.setSingleShot(True)
         self._resting.timeout.connect(self.show_outline)
         place.entered.connect(self.enter)

@@ -37,7 +37,7 @@ from study_app.gui.widgets.labels import label
 from study_app.protocol.source.document import Path
 
 
-class VisibleLine(NamedTuple):
+class _VisibleLine(NamedTuple):
     """The number of a line from 0, how far down it is, and its height [px]."""
 
     number: int
@@ -45,7 +45,7 @@ class VisibleLine(NamedTuple):
     height: float
 
 
-def visible_lines(text: QPlainTextEdit) -> list[VisibleLine]:
+def _visible_lines(text: QPlainTextEdit) -> list[_VisibleLine]:
     """Return the visible lines."""
     lines = []
     block, offset = text.firstVisibleBlock(), text.contentOffset()
@@ -53,7 +53,7 @@ def visible_lines(text: QPlainTextEdit) -> list[VisibleLine]:
         place = text.blockBoundingGeometry(block).translated(offset)
         if place.top() > text.viewport().height():
             break
-        lines.append(VisibleLine(number=block.blockNumber(), top=place.top(), height=place.height()))
+        lines.append(_VisibleLine(number=block.blockNumber(), top=place.top(), height=place.height()))
         block = block.next()
     return lines
 
@@ -86,7 +86,7 @@ def _line_number(text: str, place: int) -> int:
     return text.count("\n", 0, place)
 
 
-LETTERS_PX = 13
+_LETTERS_PX = 13
 _PIECES = r"(#.*$)|(^\s*\[.*?\]\]?)|(\"\"\"|\"(?:[^\"\\]|\\.)*\"|'[^']*')"
 
 
@@ -117,7 +117,7 @@ class Colours(QSyntaxHighlighter):
 class _Gutter(QWidget):
     """The numbers of the lines."""
 
-    def __init__(self, editor: FileEditor) -> None:
+    def __init__(self, editor: _FileEditor) -> None:
         super().__init__(editor)
         self._editor = editor
 
@@ -128,7 +128,7 @@ class _Gutter(QWidget):
         self._editor.paint_gutter(QPainter(self), event.rect())
 
 
-class FileEditor(Coloured, QPlainTextEdit):
+class _FileEditor(Coloured, QPlainTextEdit):
     """The text; ``typed`` carries it within moments. While it is hidden, it is not brought up to date."""
 
     typed = Signal(str)
@@ -140,7 +140,7 @@ class FileEditor(Coloured, QPlainTextEdit):
         self._showing = False
         self._late: bool | None = None
         fixed = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
-        fixed.setPixelSize(LETTERS_PX)
+        fixed.setPixelSize(_LETTERS_PX)
         fixed.setStyleHint(QFont.StyleHint.Monospace)
         self.setFont(fixed)
         self.setAccessibleName("Text of the file")
@@ -233,7 +233,7 @@ class FileEditor(Coloured, QPlainTextEdit):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self.viewport())
         width = self.viewport().width()
-        for line, top, height in visible_lines(self):
+        for line, top, height in _visible_lines(self):
             if line in self.shown.faulty:
                 painter.fillRect(QRectF(0, top, width, height), QColor(self.theme.bad_bg))
             elif self._is_selected(line):
@@ -252,7 +252,7 @@ class FileEditor(Coloured, QPlainTextEdit):
     def paint_gutter(self, painter: QPainter, _place: QRect) -> None:
         painter.setFont(self.font())
         width = self._gutter.width()
-        for line, top, height in visible_lines(self):
+        for line, top, height in _visible_lines(self):
             faulty = line in self.shown.faulty
             painter.setPen(QColor(self.theme.bad if faulty else self.theme.text2))
             painter.drawText(QRectF(0, top, width - 10, height), Qt.AlignmentFlag.AlignRight, str(line + 1))
@@ -294,7 +294,7 @@ class FileCard(Card):
         super().__init__(padding=14, gap=8)
         self.setAccessibleName("File")
         self.name = cut_text("", "label", "text2", right=True)
-        self.editor = FileEditor()
+        self.editor = _FileEditor()
         self.setFocusProxy(self.editor)
         self.aside = QWidget()
         kept = Icon("check", "ok", 16), label("comments and order are kept", "small", "text2")

@@ -25,10 +25,10 @@ from study_app.gui.widgets.controls import ActionButton, Choice, IconButton, Pre
 from study_app.gui.widgets.labels import label
 from study_app.number_text import counted
 
-MOST_PROBLEMS = 6
-KEEP = (("keep", "Keep as pilot"), ("delete", "Delete"))
-ROLES = {"play": "primary", "copy": "primary", "stop": "danger", "delete": "danger"}
-ICONS = {"play": "play", "stop": "stop", "keep": "save", "delete": "trash"}
+_MOST_PROBLEMS = 6
+_KEEP = (("keep", "Keep as pilot"), ("delete", "Delete"))
+_ROLES = {"play": "primary", "copy": "primary", "stop": "danger", "delete": "danger"}
+_ICONS = {"play": "play", "stop": "stop", "keep": "save", "delete": "trash"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +91,8 @@ class NoticeCard(Card):
         self._lines = [label(line, "label", "text2", wraps=True) for line in notice.listed]
         add_parts(self._listed, *self._lines)
         for action, text in notice.actions:
-            icon, cap = ICONS.get(action, "") if self._of_playing else "", key_cap("stop") if action == "stop" else ""
-            made = ActionButton(icon, text, cap=cap, role=ROLES.get(action, ""), height=36)
+            icon, cap = _ICONS.get(action, "") if self._of_playing else "", key_cap("stop") if action == "stop" else ""
+            made = ActionButton(icon, text, cap=cap, role=_ROLES.get(action, ""), height=36)
             made.clicked.connect(lambda _checked=False, action=action: self.asked.emit(action))
             self._buttons.addWidget(made)
             made.show()  # at once: a hidden part cannot take the focus
@@ -143,10 +143,10 @@ def device_question(title: str, step: str, *, has_force: bool) -> Notice:
 
 def refusal_notice(problems: tuple[str, ...]) -> Notice:
     """Return the notice with the problems that prevent playing from here."""
-    more = (f"and {len(problems) - MOST_PROBLEMS} more",) if len(problems) > MOST_PROBLEMS else ()
+    more = (f"and {len(problems) - _MOST_PROBLEMS} more",) if len(problems) > _MOST_PROBLEMS else ()
     sentence = "The study cannot be played from here: correct these problems first"
     actions = (("problems", "Show problems"), ("close", "Close"))
-    return Notice(sentence, actions, "bad", "warning", (*problems[:MOST_PROBLEMS], *more))
+    return Notice(sentence, actions, "bad", "warning", (*problems[:_MOST_PROBLEMS], *more))
 
 
 def playing_notice(step: str, title: str) -> Notice:
@@ -157,7 +157,7 @@ def playing_notice(step: str, title: str) -> Notice:
 
 def ended_notice(step: str, how: str) -> Notice:
     """Return the question whether the data of a played pilot are kept."""
-    return Notice(f"Played from {step}: {how}. Its data are deleted unless you save them.", KEEP, "neutral", "flag")
+    return Notice(f"Played from {step}: {how}. Its data are deleted unless you save them.", _KEEP, "neutral", "flag")
 
 
 def kept_notice(folder: str) -> Notice:
@@ -168,7 +168,7 @@ def kept_notice(folder: str) -> Notice:
 PLAY, PLAY_NARROW = "Play from here", "Play"
 
 
-class PlayControls(QWidget):
+class _PlayControls(QWidget):
     """Signals: ``asked``, ``device_chosen`` (name)."""
 
     asked = Signal()
@@ -205,8 +205,8 @@ class PlayControls(QWidget):
         self.device.setEnabled(not playing)
 
 
-NO_FILE: Final = FileText()
-NO_VERSION: Final = VersionChip()
+_NO_FILE: Final = FileText()
+_NO_VERSION: Final = VersionChip()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -239,7 +239,7 @@ class HeaderState:
     redo: str = ""
     can_save: bool = False  # whether the file differs and may be written
     read_only: bool = False  # whether the study cannot be changed
-    version: VersionChip = NO_VERSION  # the chip of the version, and what the button that saves says
+    version: VersionChip = _NO_VERSION  # the chip of the version, and what the button that saves says
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,7 +248,7 @@ class DesignerView:
 
     header: HeaderState = HeaderState()
     form: Form | None = None
-    file: FileText = NO_FILE
+    file: FileText = _NO_FILE
     problems: tuple[ProblemRow, ...] = ()
     banner: Notice | None = None
 
@@ -262,13 +262,13 @@ def problems_chip(count: int, warnings: int) -> tuple[Tone, str, str]:
     return "ok", "check", "No problems"
 
 
-OPENS = {
+_OPENS = {
     Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown, Qt.Key.Key_Home, Qt.Key.Key_End,
     Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space, Qt.Key.Key_F4,
 }  # fmt: skip
 
 
-class StudyList(Choice):
+class _StudyList(Choice):
     """The studies that can be opened; keys open the list, none of them opens another study."""
 
     def add_study(self, study: StudyChoice, *, opened: bool) -> None:
@@ -284,7 +284,7 @@ class StudyList(Choice):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         shift_or_pad = Qt.KeyboardModifier.KeypadModifier | Qt.KeyboardModifier.ShiftModifier
         letter = event.text().strip() if event.text().isprintable() else ""
-        if (event.key() in OPENS or letter) and not event.modifiers() & ~shift_or_pad:
+        if (event.key() in _OPENS or letter) and not event.modifiers() & ~shift_or_pad:
             self.showPopup()
             if letter:
                 self.view().keyboardSearch(letter)
@@ -293,13 +293,13 @@ class StudyList(Choice):
 
 
 NEW, OPEN = "\0new", "\0open"
-WIDE_FROM = 1180
+_WIDE_FROM = 1180
 NAME_MOST_PX, NAME_EDGES_PX = 300, 60
 WIDEST_PROBLEMS, WIDEST_DRAFT, WIDEST_VERSION = "88 problems", "Draft kept 88:88", "1.8, was 1.8"
 """What there is room for in each chip, so that nothing moves where it says other words."""
 
 
-class ChipButton(Themed, PressedByEnter):
+class _ChipButton(Themed, PressedByEnter):
     """A chip that is pressed; ``does`` says what follows."""
 
     def __init__(self, does: str) -> None:
@@ -353,21 +353,21 @@ class DesignerHeader(QWidget):
         self.setAccessibleName("Header")
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.state = HeaderState()
-        self.study = StudyList()
+        self.study = _StudyList()
         self.study.setAccessibleName("Study")
         self.study.setFont(font("body"))
         self.study.setMinimumWidth(150)
         self.study.setMaxVisibleItems(24)
         self.study.setPlaceholderText("Choose a study")
-        self.problems = ChipButton("show the list")
+        self.problems = _ChipButton("show the list")
         self.problems.setToolTip(f"{command_tip('problems')}; {command_tip('next problem')}")
-        self.version = ChipButton("show the changes")
+        self.version = _ChipButton("show the changes")
         self.draft = Chip("neutral", "save", "")
         self.keys = IconButton("question", "Keys")
         self.undo = IconButton("undo", "Undo")
         self.redo = IconButton("redo", "Redo")
         self.save = ActionButton("save", "Save", role="primary")
-        self.play = PlayControls()
+        self.play = _PlayControls()
         self.strip = NoticeCard(of_playing=True)
         self.strip.setAccessibleName("Playing")
         self.strip.left.connect(self.play.play.setFocus)
@@ -442,7 +442,7 @@ class DesignerHeader(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self.play.play.show_action("play", PLAY if self.width() >= WIDE_FROM else PLAY_NARROW)
+        self.play.play.show_action("play", PLAY if self.width() >= _WIDE_FROM else PLAY_NARROW)
         self._make_room()
 
     def _choose_study(self, at: int) -> None:

@@ -36,12 +36,12 @@ from study_app.workers.server import Crashed
 
 log = logging.getLogger(__name__)
 
-ANEW: Final = "simulating …"
-IDLE_MS: Final = 20
-REST_MS: Final = 800
-LOOK_MS: Final = 100
-MOST_PARTICIPANTS: Final = 500
-FAILED: Final = "the simulation process does not start"
+_ANEW: Final = "simulating …"
+_IDLE_MS: Final = 20
+_REST_MS: Final = 800
+_LOOK_MS: Final = 100
+_MOST_PARTICIPANTS: Final = 500
+_FAILED: Final = "the simulation process does not start"
 
 
 class MeasuresController(QObject):
@@ -59,9 +59,9 @@ class MeasuresController(QObject):
         self._wanted: Simulation | None = None
         self._failed = ""
         self._answers: dict[Simulation, Simulated] = {}
-        self.rest = delayed_call(self, REST_MS, self._send_order)
+        self.rest = delayed_call(self, _REST_MS, self._send_order)
         self._look = QTimer(self)
-        self._look.setInterval(LOOK_MS)
+        self._look.setInterval(_LOOK_MS)
         self._look.timeout.connect(self._take_answers)
         self._sound: Study | None = None
         self._participants: int | None = None
@@ -69,7 +69,7 @@ class MeasuresController(QObject):
         self._lapses = LAPSES
         self._focus = Focus()
         self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
-        self._idle = delayed_call(self, IDLE_MS, self.show_measures)
+        self._idle = delayed_call(self, _IDLE_MS, self.show_measures)
         editing.opened_other.connect(self._forget_study)
         editing.changed.connect(self._idle.start)
         repairs.found.connect(self._keep_repairs)
@@ -177,7 +177,7 @@ class MeasuresController(QObject):
                 self._client = self.make()
             except OSError as error:  # no process could be started: the designer works without these numbers
                 log.info("the worker of simulations does not start: %s", error)
-                self._show_failure(FAILED)
+                self._show_failure(_FAILED)
                 return
         self._ordered = self._client.order(self._wanted)
         self._look.start()
@@ -217,7 +217,7 @@ class MeasuresController(QObject):
         if self._failed:
             return Simulated(warnings=self.warnings, failed=self._failed)
         of_block = (answer for key, answer in reversed(self._answers.items()) if key.block == wanted.block)
-        return replace(next(of_block, Simulated()), warnings=self.warnings, waiting=ANEW)
+        return replace(next(of_block, Simulated()), warnings=self.warnings, waiting=_ANEW)
 
     def _close(self) -> None:
         self.rest.stop()
@@ -232,7 +232,7 @@ class MeasuresController(QObject):
 
     def _take_participants(self, number: float) -> None:
         if (opened := self._editing.opened) is not None:
-            asked = min(MOST_PARTICIPANTS, max(2, round(number)))
+            asked = min(_MOST_PARTICIPANTS, max(2, round(number)))
             self._participants = None if asked == participants_of(opened.study) else asked
             self.show_measures()
 

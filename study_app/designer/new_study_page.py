@@ -111,7 +111,7 @@ def known_answers() -> dict[str, KnownAnswer]:
     return {name: KnownAnswer(**values) for name, values in answers.items()}
 
 
-COPY: Final = "copy"
+_COPY: Final = "copy"
 TEMPLATES: Final[Mapping[str, tuple[str, str]]] = {
     "compare-liquids": (
         "Compare liquids",
@@ -135,10 +135,10 @@ TEMPLATES: Final[Mapping[str, tuple[str, str]]] = {
 """Title and question of each template, in the order in which they are shown."""
 
 
-SHIPPED: Final = "shipped study"
-PLANNED: Final = " planned"
+_SHIPPED: Final = "shipped study"
+_PLANNED: Final = " planned"
 """Follows a number of participants; a picture of people says the same."""
-STEPS: Final = ("pages", "blocks", "questionnaires")
+_STEPS: Final = ("pages", "blocks", "questionnaires")
 """Sections whose tables are steps of a session."""
 
 
@@ -173,7 +173,7 @@ class TemplateChoice:
     questions: tuple[OwnQuestion, ...] = ()  # beyond title, name and languages
 
 
-def languages_offered() -> tuple[tuple[str, str], ...]:
+def _languages_offered() -> tuple[tuple[str, str], ...]:
     """Return code and name of each language of the participant's pages."""
     return tuple((code, language.english_name) for code, language in LANGUAGES.items())
 
@@ -197,7 +197,7 @@ def template_choice(name: str, study: Study) -> TemplateChoice:
             duration(step_duration_s(protocol, step, language)),
         )
         for step in protocol.steps
-        for section in STEPS
+        for section in _STEPS
         if step in names(document, section)
     )
     blind = "Double-blind" if protocol.study.blinding == "double" else "Single-blind"
@@ -205,7 +205,7 @@ def template_choice(name: str, study: Study) -> TemplateChoice:
     return replace(choice, figures=tuple(_figure_texts(protocol)), tags=tags, session=tuple(session))
 
 
-def copy_choice(source: str, document: Mapping[str, Any], note: str, name: str) -> TemplateChoice:
+def _copy_choice(source: str, document: Mapping[str, Any], note: str, name: str) -> TemplateChoice:
     """Return the description of a study that can be copied."""
     title, description = _title_and_description(document)
     return TemplateChoice(
@@ -225,7 +225,7 @@ def _figure_texts(protocol: Protocol) -> Iterator[tuple[str, str]]:
     yield "clock", duration(expected_duration_s(protocol))
     people = None if protocol.analysis is None else protocol.analysis.participants
     if people is not None:
-        yield "people", f"{people}{PLANNED}"
+        yield "people", f"{people}{_PLANNED}"
     yield "layers", counted(trials, "trial")
 
 
@@ -334,11 +334,11 @@ def new_choices(source: str = "") -> tuple[TemplateChoice, ...]:
     copied = dict.fromkeys([source, *shipped()] if source and not source.startswith("template:") else shipped())
     for name in copied:
         file = shipped_file(name) if name in shipped() else protocol_file(name)
-        note = SHIPPED if name in shipped() else str(file.name)
+        note = _SHIPPED if name in shipped() else str(file.name)
         document, _places = read_document(file.read_bytes(), name)
-        stem = re.sub(f"{COPY}[0-9]*$", "", short_name_of(file.stem)) or "study"
-        free = free_short_name(taken, f"{stem[: MAX_SHORT_NAME - len(COPY)]}{COPY}")
-        choices.append(copy_choice(name, document, note, free))
+        stem = re.sub(f"{_COPY}[0-9]*$", "", short_name_of(file.stem)) or "study"
+        free = free_short_name(taken, f"{stem[: MAX_SHORT_NAME - len(_COPY)]}{_COPY}")
+        choices.append(_copy_choice(name, document, note, free))
     return tuple(choices)
 
 
@@ -359,10 +359,10 @@ def _protocol_file(source: str) -> Path | None:
         return None
 
 
-DEEP: Final = "#142E40"
+_DEEP: Final = "#142E40"
 
 
-def paint_picture(painter: QPainter, name: str, body: QRectF) -> None:
+def _paint_picture(painter: QPainter, name: str, body: QRectF) -> None:
     """Paint the picture of a template into the upper part of its card: what a participant feels or answers."""
     ground = QPainterPath()
     ground.addRoundedRect(body.adjusted(0, 0, 0, RADIUS_CARD), RADIUS_CARD, RADIUS_CARD)
@@ -373,7 +373,7 @@ def paint_picture(painter: QPainter, name: str, body: QRectF) -> None:
     else:
         water = QLinearGradient(body.topLeft(), body.bottomLeft())
         water.setColorAt(0, QColor(TANK.water_light))
-        water.setColorAt(1, QColor(DEEP))
+        water.setColorAt(1, QColor(_DEEP))
         painter.fillPath(ground, water)
         glass = QColor(TANK.glass)
         glass.setAlpha(70)
@@ -390,7 +390,7 @@ def paint_picture(painter: QPainter, name: str, body: QRectF) -> None:
 
 
 PICTURE_PX, CARD_WORDS_PX, COPY_PX = 150, 132, 76
-RING = 4
+_RING = 4
 """The room around a card for the ring [px]."""
 
 
@@ -403,7 +403,7 @@ class Picture(QWidget):
         self.setFixedHeight(PICTURE_PX)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        paint_picture(smooth_painter(self), self.name, QRectF(self.rect()))
+        _paint_picture(smooth_painter(self), self.name, QRectF(self.rect()))
 
 
 class TemplateButton(Themed, QAbstractButton):
@@ -425,7 +425,7 @@ class TemplateButton(Themed, QAbstractButton):
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setFixedHeight(2 * RING + (COPY_PX if choice.copy else PICTURE_PX + CARD_WORDS_PX))
+        self.setFixedHeight(2 * _RING + (COPY_PX if choice.copy else PICTURE_PX + CARD_WORDS_PX))
         picture = choice.source.removeprefix("template:")
         self._empty = not choice.copy and not FOLDER.joinpath(f"{picture}.svg").exists()
         if choice.copy:
@@ -442,19 +442,19 @@ class TemplateButton(Themed, QAbstractButton):
             )
             below = vbox(title, described, STRETCH, counts, spacing=4, margins=(16, 10, 16, 10))
             picture_row = (hbox(STRETCH, above, STRETCH, margins=(0, 70, 0, 8)),) if self._empty else (above,)
-            vbox(*picture_row, (below, 1), spacing=0, margins=RING + 1, parent=self)
+            vbox(*picture_row, (below, 1), spacing=0, margins=_RING + 1, parent=self)
         for part in self.findChildren(QWidget):
             part.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
 
     @staticmethod
     def _figure_parts(icon: str, spoken: str) -> tuple[QWidget | int, ...]:
-        return Icon(icon, "text2", 16), label(spoken.removesuffix(PLANNED), "small", "text2", weight=500), 8
+        return Icon(icon, "text2", 16), label(spoken.removesuffix(_PLANNED), "small", "text2", weight=500), 8
 
     def _lay_out_copy(self) -> None:
-        sign = Icon("lock" if self.choice.note == SHIPPED else "layers", "text2", 18)
+        sign = Icon("lock" if self.choice.note == _SHIPPED else "layers", "text2", 18)
         title = Clamped(self.choice.title, 2, "label", steady=False)
         texts = vbox(STRETCH, title, cut_text(self.choice.note), STRETCH, spacing=0)
-        hbox(sign, (texts, 1), spacing=14, margins=(RING + 22, RING, RING + 12, RING), parent=self)
+        hbox(sign, (texts, 1), spacing=14, margins=(_RING + 22, _RING, _RING + 12, _RING), parent=self)
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
@@ -464,8 +464,10 @@ class TemplateButton(Themed, QAbstractButton):
         t, painter = self.theme, smooth_painter(self)
         if self.hasFocus():
             painter.setPen(QPen(QColor(t.accent), 2))
-            painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), RADIUS_CARD + RING, RADIUS_CARD + RING)
-        body = QRectF(self.rect()).adjusted(RING + 1, RING + 1, -RING - 1, -RING - 1)
+            painter.drawRoundedRect(
+                QRectF(self.rect()).adjusted(1, 1, -1, -1), RADIUS_CARD + _RING, RADIUS_CARD + _RING
+            )
+        body = QRectF(self.rect()).adjusted(_RING + 1, _RING + 1, -_RING - 1, -_RING - 1)
         marked, empty = self.isChecked(), self._empty
         fill_rounded(painter, body, RADIUS_CARD, t.hover if self.underMouse() or (empty and not marked) else t.surface)
         style = Qt.PenStyle.DashLine if empty and not marked else Qt.PenStyle.SolidLine
@@ -474,10 +476,10 @@ class TemplateButton(Themed, QAbstractButton):
         painter.drawRoundedRect(body, RADIUS_CARD, RADIUS_CARD)
 
 
-TICKS = 4
+_TICKS = 4
 
 
-class RecoveryBar(Themed, QWidget):
+class _RecoveryBar(Themed, QWidget):
     """An axis from 0 with the middle 90 % of what is found as a bar, and the planted value as a line."""
 
     def __init__(self, shown: KnownAnswer) -> None:
@@ -505,14 +507,14 @@ class RecoveryBar(Themed, QWidget):
         painter.drawLine(QPointF(place(shown.planted), 3), QPointF(place(shown.planted), 28))
         painter.setFont(font("small", tabular=True))
         painter.setPen(QColor(t.text2))
-        for tick in range(TICKS + 1):
-            value = shown.most * tick / TICKS
-            label = f"{value:g} {shown.unit}" if tick == TICKS else f"{value:g}"
+        for tick in range(_TICKS + 1):
+            value = shown.most * tick / _TICKS
+            label = f"{value:g} {shown.unit}" if tick == _TICKS else f"{value:g}"
             painter.drawText(QRectF(place(value) - 30, 30, 60, 16), Qt.AlignmentFlag.AlignCenter, label)
 
 
 FIELD_PX, WORDS_PX = 36, 112
-NAME_HINT: Final = "small letters and digits"
+_NAME_HINT: Final = "small letters and digits"
 
 
 class Questions(Themed, QWidget):
@@ -534,7 +536,7 @@ class Questions(Themed, QWidget):
             self._add_field(row, title, field)
         box = QWidget()
         checks = grid_of(2, 2, margins=0, parent=box)
-        for at, (code, name) in enumerate(languages_offered()):
+        for at, (code, name) in enumerate(_languages_offered()):
             made = Check(name)
             made.setFont(font("label", weight=400))
             made.setAccessibleName(f"Language {name}")
@@ -591,7 +593,7 @@ class Questions(Themed, QWidget):
             name_scroll_bars(beside)
 
     def _show_proposed_name(self) -> None:
-        self.name.setPlaceholderText(self._proposed or NAME_HINT)
+        self.name.setPlaceholderText(self._proposed or _NAME_HINT)
 
     def _show_first_texts(self) -> None:
         """Show the language of the template's texts if none of the template's languages is chosen."""
@@ -600,7 +602,7 @@ class Questions(Themed, QWidget):
         without = bool(languages and chosen) and set(languages).isdisjoint(chosen)
         if without:
             self.first_texts.setText(
-                f"The texts are still in {dict(languages_offered())[languages[0]]}: translate them."
+                f"The texts are still in {dict(_languages_offered())[languages[0]]}: translate them."
             )
         self.first_texts.setVisible(without)
 
@@ -636,7 +638,7 @@ class Questions(Themed, QWidget):
 
 
 SIDE_PX, SIDE_NARROW_PX, NARROW_BELOW = 400, 330, 1200
-LOW_BELOW = 880
+_LOW_BELOW = 880
 ACROSS, COPIES_ACROSS = 3, 4
 
 
@@ -658,7 +660,7 @@ class NoStudyCard(Card):
         add_parts(self.column, (STRETCH, 2), *centred, (STRETCH, 3))
 
 
-class ChosenCard(Card):
+class _ChosenCard(Card):
     """The chosen template: description, session, known answer and questions."""
 
     def __init__(self) -> None:
@@ -700,7 +702,7 @@ class ChosenCard(Card):
             add_parts(
                 column,
                 head,
-                RecoveryBar(choice.recovery),
+                _RecoveryBar(choice.recovery),
                 label(choice.recovery.sentence, "small", "text2", wraps=True),
                 Rule(),
             )
@@ -713,7 +715,7 @@ class ChosenCard(Card):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self.inside.removeWidget(self.begin)
-        self.inside.insertWidget(1 if self.height() < LOW_BELOW else 2, self.begin)
+        self.inside.insertWidget(1 if self.height() < _LOW_BELOW else 2, self.begin)
 
 
 def _column(of: QWidget, *parts: QWidget | QLayout) -> QVBoxLayout:
@@ -745,7 +747,7 @@ class NewStudyPage(Themed, QWidget):
         parts = (self.back, label("New study", "title"), (aside, 1), self.file)
         head = hbox(*parts, spacing=12, margins=(SHADOW, 0, SHADOW, 0))
         self.area = scrolled(QWidget())
-        self.card = ChosenCard()
+        self.card = _ChosenCard()
         self.name, self.make, self.refusal = self.card.questions.name, self.card.make, self.card.refusal
         vbox(head, (hbox((self.area, 1), self.card, spacing=12), 1), spacing=12, margins=0, parent=self)
         self.card.make.clicked.connect(self._ask_to_begin)
@@ -755,15 +757,15 @@ class NewStudyPage(Themed, QWidget):
     def show_choices(self, choices: tuple[TemplateChoice, ...], chosen: str) -> None:
         self._choices = choices
         inside = QWidget()
-        column = vbox(spacing=12, margins=(0, 0, 12 - RING, 0), parent=inside)
+        column = vbox(spacing=12, margins=(0, 0, 12 - _RING, 0), parent=inside)
         self.buttons = []
         for heading, aside, copies, across in (
             ("Templates", "", False, ACROSS),
             ("Or a copy of a study", "including comments; the original does not change", True, COPIES_ACROSS),
         ):
             labels = label(heading, "card"), label(aside, "small", "text2")
-            add_layout(column, hbox(*labels, STRETCH, spacing=10, margins=(RING, 0, 0, 0)))
-            grid = grid_of(14 - 2 * RING, 14 - 2 * RING)
+            add_layout(column, hbox(*labels, STRETCH, spacing=10, margins=(_RING, 0, 0, 0)))
+            grid = grid_of(14 - 2 * _RING, 14 - 2 * _RING)
             columns = across if self.width() >= NARROW_BELOW else 2
             for at, choice in enumerate(choice for choice in choices if choice.copy == copies):
                 made = TemplateButton(choice)

@@ -65,20 +65,20 @@ from study_app.protocol.questionnaires import instrument, instruments
 from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.wording.languages import languages_of
 
-ICONS: Final = {
+_ICONS: Final = {
     "pages": "file", "blocks": "layers", "tasks": "route", "questionnaires": "list", "liquids": "drop",
     "conditions": "columns", "scales": "scale", "stimuli": "pulse", "designs": "columns", "methods": "bars",
     "sequence": "bars", "sequences": "bars", "groups": "people", "study": "file", "device": "device", "scene": "drop",
     "limits": "check", "analysis": "bars", "simulated_participants": "people",
 }  # fmt: skip
 """The icon of each section; a section that is not listed has a ring."""
-PAGES: Final[Mapping[Any, str]] = {"consent": "pen", "break": "pause", "debrief": "flag"}
+_PAGES: Final[Mapping[Any, str]] = {"consent": "pen", "break": "pause", "debrief": "flag"}
 """The icon of a page by its kind, where it is not that of every page."""
-SECTIONS: Final = ("Session, in order", "Elements", "Settings")
+_SECTIONS: Final = ("Session, in order", "Elements", "Settings")
 """The headings; above them is the study itself, with its title, description and languages."""
-SESSION, PARTS, SETTINGS = SECTIONS
-QUESTIONNAIRES: Final = "questionnaires"
-FORCE_LIMIT: Final = ("device", "force_limit_n")
+SESSION, PARTS, SETTINGS = _SECTIONS
+_QUESTIONNAIRES: Final = "questionnaires"
+_FORCE_LIMIT: Final = ("device", "force_limit_n")
 
 ElementPath: TypeAlias = Path
 """The path of an element, as windows hand it on."""
@@ -153,8 +153,8 @@ def icon_of(path: Path, document: Mapping[str, Any]) -> str:
     """Return the icon of an element."""
     if len(path) == 2 and path[0] == "pages":
         value = value_at(document, path)
-        return PAGES.get(str(value.get("kind")), ICONS["pages"]) if isinstance(value, Mapping) else ICONS["pages"]
-    return "list" if "items" in path else ICONS.get(str(path[0]), "ring") if path else "ring"
+        return _PAGES.get(str(value.get("kind")), _ICONS["pages"]) if isinstance(value, Mapping) else _ICONS["pages"]
+    return "list" if "items" in path else _ICONS.get(str(path[0]), "ring") if path else "ring"
 
 
 def _outline_row(study: Study, element: Element, times_s: Mapping[str, float], *, in_session: bool) -> OutlineRow:
@@ -166,12 +166,12 @@ def _outline_row(study: Study, element: Element, times_s: Mapping[str, float], *
         note = duration(times_s[element.id]) if element.id in times_s else ""
     elif in_session:
         note = short_note(study.document, path)
-    elif element.depth == 0 and kind in SECTIONS_OF_TABLES:
+    elif element.depth == 0 and kind in _SECTIONS_OF_TABLES:
         count = len(names(study.document, kind))
         note = str(count) if count else "none"
     elif path == FIRST:
         note = " ".join(languages_of(study.document)).upper()
-    elif path == ("device",) and isinstance(limit := value_at(study.document, FORCE_LIMIT), int | float):
+    elif path == ("device",) and isinstance(limit := value_at(study.document, _FORCE_LIMIT), int | float):
         note = f"{limit:g} N"
     faults = counted(element.faults, "problem") if element.faults else ""
     sort = element_noun(kind) if len(path) == 2 else "question" if "items" in path else ""
@@ -194,7 +194,7 @@ def _outline_row(study: Study, element: Element, times_s: Mapping[str, float], *
     )
 
 
-SECTIONS_OF_TABLES: Final = frozenset(ICONS) - {
+_SECTIONS_OF_TABLES: Final = frozenset(_ICONS) - {
     *OWN, "study", "device", "scene", "limits", "analysis", "simulated_participants"
 }  # fmt: skip
 
@@ -233,7 +233,7 @@ def addable_elements(study: Study, selected: Path) -> tuple[Addable, ...]:
         )
         for path in sections
     ]
-    entries += _addable_questions(study, around) if not any(path[0] == QUESTIONNAIRES for path in lists) else ()
+    entries += _addable_questions(study, around) if not any(path[0] == _QUESTIONNAIRES for path in lists) else ()
     entries += (*_addable_liquids(), *_addable_instruments()) if second else ()
     return tuple(entries)
 
@@ -258,11 +258,11 @@ def _addable_questions(study: Study, around: Path) -> Iterator[Addable]:
     Where there are several, each says of which it is.
     """
     named = value_at(study.document, (*around, "questionnaire")) if around else None
-    tables = names(study.document, QUESTIONNAIRES)
-    every = [name for name in tables if value_at(study.document, (QUESTIONNAIRES, name, "instrument")) is None]
+    tables = names(study.document, _QUESTIONNAIRES)
+    every = [name for name in tables if value_at(study.document, (_QUESTIONNAIRES, name, "instrument")) is None]
     for name in (named,) if named in every else every:
-        first = _addable_entry(study, (QUESTIONNAIRES, str(name), "items"))
-        title = title_of(study.document, (QUESTIONNAIRES, str(name)))
+        first = _addable_entry(study, (_QUESTIONNAIRES, str(name), "items"))
+        title = title_of(study.document, (_QUESTIONNAIRES, str(name)))
         yield first if len(every) == 1 else replace(first, words=f"{first.words} of {title}")
 
 
@@ -290,7 +290,7 @@ def _addable_entry(study: Study, path: Path) -> Addable:
 
 
 WIDTH, HIGHEST, ADD_ROW_PX, HELP_PX = 360, 520, 34, 78
-MOVES = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
+_MOVES = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
 
 
 class AddList(Themed, QFrame):
@@ -360,7 +360,7 @@ class AddList(Themed, QFrame):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
-            if event.key() in MOVES:
+            if event.key() in _MOVES:
                 self.list.keyPressEvent(event)
                 return True
             if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
@@ -370,13 +370,13 @@ class AddList(Themed, QFrame):
 
 
 ROW_PX, HEADING_PX = 32, 38
-INDENT = 20
+_INDENT = 20
 """So wide is the grip at the left of a row that can be dragged."""
 ROW_ROLE = Qt.ItemDataRole.UserRole + 1
-Index = QModelIndex | QPersistentModelIndex
+_Index = QModelIndex | QPersistentModelIndex
 
 
-class RowPainter(QStyledItemDelegate):
+class _RowPainter(QStyledItemDelegate):
     """Paints rows; the tree says the theme and whether rows may be moved."""
 
     def __init__(self, tree: "Tree") -> None:
@@ -388,10 +388,10 @@ class RowPainter(QStyledItemDelegate):
     def theme(self) -> Theme:
         return self.tree.theme
 
-    def sizeHint(self, option: QStyleOptionViewItem, index: Index) -> QSize:
+    def sizeHint(self, option: QStyleOptionViewItem, index: _Index) -> QSize:
         return QSize(100, HEADING_PX if not index.data(ROW_ROLE).path else ROW_PX)
 
-    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: _Index) -> None:
         """Paint the heading of a section, or an element with icon, title, time and faults."""
         row = index.data(ROW_ROLE)
         place = QRectF(option.rect)  # type: ignore[attr-defined]  # missing in the stubs
@@ -410,7 +410,7 @@ class RowPainter(QStyledItemDelegate):
         painter.restore()
 
     def _paint_element(
-        self, painter: QPainter, place: QRectF, row: OutlineRow, state: QStyle.StateFlag, index: Index
+        self, painter: QPainter, place: QRectF, row: OutlineRow, state: QStyle.StateFlag, index: _Index
     ) -> None:
         t = self.theme
         assert t is not None  # noqa: S101 - `paint` saw it
@@ -427,9 +427,9 @@ class RowPainter(QStyledItemDelegate):
                 painter.setPen(QPen(QColor(t.accent), 2))
                 painter.setBrush(Qt.BrushStyle.NoBrush)
                 painter.drawRoundedRect(place.adjusted(1, 2, -1, -2), RADIUS_CONTROL - 2, RADIUS_CONTROL - 2)
-        x = sign_right(row) - INDENT
+        x = _sign_right(row) - _INDENT
         if row.step and self.movable and (chosen or pointed):
-            paint_grip(painter, QRectF(x - 8, place.top(), 8, place.height()), t.text2)
+            _paint_grip(painter, QRectF(x - 8, place.top(), 8, place.height()), t.text2)
         if self.tree.model().hasChildren(index):
             chevron = "chevron_down" if self.tree.isExpanded(index) else "chevron"
             draw_icon(painter, chevron, QRectF(x + 2, place.center().y() - 7, 14, 14), t.text2, 2.0)
@@ -455,12 +455,12 @@ class RowPainter(QStyledItemDelegate):
         painter.drawText(room, middle, title)
 
 
-def sign_right(row: OutlineRow) -> float:
+def _sign_right(row: OutlineRow) -> float:
     """Return the right edge of the sign that shows whether a row is expanded [px]."""
-    return 12.0 + INDENT * row.depth
+    return 12.0 + _INDENT * row.depth
 
 
-def paint_grip(painter: QPainter, place: QRectF, ink: str) -> None:
+def _paint_grip(painter: QPainter, place: QRectF, ink: str) -> None:
     """Paint the six dots of a drag handle."""
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(QColor(ink))
@@ -470,8 +470,8 @@ def paint_grip(painter: QPainter, place: QRectF, ink: str) -> None:
             painter.drawEllipse(QRectF(middle.x() + across - 1.1, middle.y() + down - 1.1, 2.2, 2.2))
 
 
-LINE_PX = 2.0
-EDGE_PX = 24
+_LINE_PX = 2.0
+_EDGE_PX = 24
 
 
 class Tree(Themed, QTreeView):
@@ -497,7 +497,7 @@ class Tree(Themed, QTreeView):
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setMouseTracking(True)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
-        self.rows = RowPainter(self)
+        self.rows = _RowPainter(self)
         self.setItemDelegate(self.rows)
         self.setStyleSheet("QTreeView { background: transparent; border: none; outline: none; }")
         self.dragged: ElementPath = ()
@@ -519,7 +519,7 @@ class Tree(Themed, QTreeView):
         index = self.indexAt(event.position().toPoint())
         row = index.data(ROW_ROLE) if index.isValid() else None
         self._pressed = None
-        arrow = row is not None and self.model().hasChildren(index) and event.position().x() < sign_right(row)
+        arrow = row is not None and self.model().hasChildren(index) and event.position().x() < _sign_right(row)
         self.arrow_pressed = arrow
         plain = event.button() == Qt.MouseButton.LeftButton and not event.modifiers()
         if plain and row is not None and row.step and self.rows.movable:
@@ -537,8 +537,8 @@ class Tree(Themed, QTreeView):
             self.viewport().setCursor(Qt.CursorShape.ClosedHandCursor)
         if self.dragged:
             bar, height = self.verticalScrollBar(), self.viewport().height()
-            if at.y() < EDGE_PX or at.y() > height - EDGE_PX:
-                bar.setValue(bar.value() + (-12 if at.y() < EDGE_PX else 12))
+            if at.y() < _EDGE_PX or at.y() > height - _EDGE_PX:
+                bar.setValue(bar.value() + (-12 if at.y() < _EDGE_PX else 12))
             self.target = self._drop_target(at)
             self.viewport().update()
 
@@ -586,7 +586,7 @@ class Tree(Themed, QTreeView):
         if self.target is not None:
             painter = QPainter(self.viewport())
             y = min(max(self.target[1], 1.0), self.viewport().height() - 1.0)
-            place = QRectF(6, y - LINE_PX / 2, self.viewport().width() - 12, LINE_PX)
+            place = QRectF(6, y - _LINE_PX / 2, self.viewport().width() - 12, _LINE_PX)
             painter.fillRect(place, QColor(self.theme.accent))
 
 
@@ -722,7 +722,7 @@ class OutlineCard(Coloured, Card):
             waiting[:0] = [self.items.index(row, 0, index) for row in range(self.items.rowCount(index))]
         return indexes
 
-    def _row_key(self, index: Index) -> object:
+    def _row_key(self, index: _Index) -> object:
         row, parent = index.data(ROW_ROLE), index.parent()
         return row.path, row.depth, parent.data(ROW_ROLE).path if parent.isValid() else None
 

@@ -116,7 +116,7 @@ def _problem_row(study: Study, fault: Fault, line: int | None) -> ProblemRow:
     )
 
 
-REST_MS: Final = 500
+_REST_MS: Final = 500
 """So long after the last edit the search begins: each repair is tried on the whole study."""
 
 
@@ -141,7 +141,7 @@ class RepairSearch(QObject):
         self._study, self._known, self._problems = study, {}, problems
         self._waiting = list(problems) if study.is_toml else []
         if self._waiting:
-            self._timer.start(REST_MS)
+            self._timer.start(_REST_MS)
         else:
             self._timer.stop()
 

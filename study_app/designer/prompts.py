@@ -19,8 +19,8 @@ from study_app.gui.widgets.labels import label, set_ink
 from study_app.number_text import capitalised, typed_numbers
 from study_app.protocol.source.document import Path, names, value_at
 
-HIGHEST = 560
-PLACES_PX = 200
+_HIGHEST = 560
+_PLACES_PX = 200
 
 
 class Prompt(Card):
@@ -32,7 +32,7 @@ class Prompt(Card):
     def __init__(self, title: str, explanation: str) -> None:
         super().__init__(title, padding=20, gap=10)
         self.setAccessibleName(title)
-        self.setMaximumHeight(HIGHEST)
+        self.setMaximumHeight(_HIGHEST)
         said = label(explanation, "body", "text2", wraps=True)
         self.column.addWidget(said)
         self.cancel = ActionButton("", "Cancel", height=40)
@@ -75,7 +75,7 @@ class DeleteCard(Prompt):
         area.setWidgetResizable(True)
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         area.setWidget(inside)
-        area.setFixedHeight(min(PLACES_PX, inside.sizeHint().height()))
+        area.setFixedHeight(min(_PLACES_PX, inside.sizeHint().height()))
         self.column.addWidget(area)
         gone = (
             element for element in with_references(document, path, study.needs) if element != path and len(element) == 2

@@ -24,8 +24,8 @@ from study_app.store.drafts import draft_of
 from study_app.store.study_settings import keep_original
 from study_app.store.study_versions import ChangedOutsideError, kept_versions
 
-DRAFT_MS: Final = 50
-RETRY_MS: Final = 2_000
+_DRAFT_MS: Final = 50
+_RETRY_MS: Final = 2_000
 
 
 class Saving(QObject):
@@ -53,7 +53,7 @@ class Saving(QObject):
         self.card: SaveCard | None = None
         self._others, self._trouble = 0, ""
         self._drafting = QTimer(self)
-        self._drafting.setInterval(DRAFT_MS)
+        self._drafting.setInterval(_DRAFT_MS)
         self._drafting.timeout.connect(self.write_draft)
         application = QGuiApplication.instance()
         assert isinstance(application, QGuiApplication)  # noqa: S101 - a window has one
@@ -69,7 +69,7 @@ class Saving(QObject):
         self.banner, opened = None, self.editing.opened
         if opened is None:
             return
-        self._drafting.start(DRAFT_MS)
+        self._drafting.start(_DRAFT_MS)
         self._others, self._trouble = opened.keeper.others, ""
         self.offer_to_discard()
         self.banner = _banner_notice(opened) or self._notice
@@ -253,14 +253,14 @@ class Saving(QObject):
         try:
             written = opened.write_draft(None if at_once else time.monotonic())
         except StudyError as error:
-            self._drafting.setInterval(RETRY_MS)
+            self._drafting.setInterval(_RETRY_MS)
             if self._trouble != str(error):
                 self._trouble = str(error)
                 self.place.message.emit("The draft is not up to date", f"{error}.")
             return
         if self._trouble:
             self._trouble = ""
-            self._drafting.setInterval(DRAFT_MS)
+            self._drafting.setInterval(_DRAFT_MS)
         if opened.keeper.others > self._others:
             self._others = opened.keeper.others
             said = "Another window of the program also edits this study; its unsaved edits are kept as a version"

@@ -21,7 +21,7 @@ from study_app.store.study_versions import Kept, kept_content
 
 FILE: Final = "file"
 """The key of what the file holds."""
-MOST_KEPT: Final = 40
+_MOST_KEPT: Final = 40
 _STATED: Final = re.compile(r"""^\s*version\s*=\s*["']([^"']+)""", re.MULTILINE)
 
 
@@ -78,7 +78,7 @@ def version_choices(
     choices += [
         (run.hash, f"{run.version}: {run_counts(run)}, last {_time_text(run.last, now)}") for run in reversed(known)
     ]
-    saved = [version for version in kept if version.hash not in ran][-MOST_KEPT:]
+    saved = [version for version in kept if version.hash not in ran][-_MOST_KEPT:]
     choices += [(version.hash, _kept_label(version, now)) for version in reversed(saved)]
     return tuple(choices)
 
@@ -100,7 +100,7 @@ def _time_text(moment: str, now: datetime) -> str:
     return f"{text[:1].lower()}{text[1:]}"
 
 
-NAMED_AT_MOST: Final = 3
+_NAMED_AT_MOST: Final = 3
 """So many elements with edits that were not saved are named."""
 
 
@@ -121,5 +121,5 @@ def edited_elements_text(saved: str, draft: str, folder: Path) -> str:
         label_of(path[1]) if path[0] == "study" else title_of(study.document, element_of(study, path))
         for path in places
     )
-    named, more = list(titles)[:NAMED_AT_MOST], len(titles) - NAMED_AT_MOST
+    named, more = list(titles)[:_NAMED_AT_MOST], len(titles) - _NAMED_AT_MOST
     return f": {', '.join(named) or 'comments, order or notation'}{f' and {more} more' if more > 0 else ''}"

@@ -41,7 +41,7 @@ from study_app.store.receipt import without_conditions
 from study_app.store.study_runs import Run, keep_run_content, recorded_items, run_of, runs_of_study, source_of
 from study_app.store.study_versions import content_hash, kept_content, kept_versions
 
-LOOK_MS: Final = 150
+_LOOK_MS: Final = 150
 
 
 class KnownRuns(QObject):
@@ -60,7 +60,7 @@ class KnownRuns(QObject):
         self.chip = VersionChip()
         self._reader = Background(self)
         self._reader.done.connect(self._take_runs)
-        self._resting = delayed_call(self, LOOK_MS, self._show_standing)
+        self._resting = delayed_call(self, _LOOK_MS, self._show_standing)
         editing.opened_other.connect(self._forget_runs)
         editing.edited.connect(self._resting.start)
 
@@ -104,17 +104,17 @@ def _read_runs(results: Path, study: str, file: Path) -> tuple[str, tuple[Run, .
     return study, known, recorded_items(known)
 
 
-NOTHING = "There is no version to compare with, because the study has not been run or saved before."
-LETTERS_PX = 12
+_NOTHING = "There is no version to compare with, because the study has not been run or saved before."
+_LETTERS_PX = 12
 
 
-class DifferenceText(Coloured, QPlainTextEdit):
+class _DifferenceText(Coloured, QPlainTextEdit):
     """A difference of texts, to be read and copied: lines that are gone begin with "-", new ones with "+"."""
 
     def __init__(self) -> None:
         super().__init__()
         fixed = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
-        fixed.setPixelSize(LETTERS_PX)
+        fixed.setPixelSize(_LETTERS_PX)
         self.setFont(fixed)
         self.setAccessibleName("Differences")
         self.setReadOnly(True)
@@ -150,7 +150,7 @@ class SaveCard(Prompt):
             f"This study was run: {sessions}. A version that was run is never overwritten, so the study is "
             "saved under another number.",
         )
-        self.difference = DifferenceText()
+        self.difference = _DifferenceText()
         self.difference.show_lines(difference.lines)
         self.column.addWidget(self.difference, 1)
         self.difference.setVisible(bool(difference.lines))
@@ -216,16 +216,16 @@ def _field(name: str, text: str, width: int) -> QLineEdit:
     return made
 
 
-TAB: Final = "changes"
-REST_MS: Final = 200
-NO_COPY: Final = (
+_TAB: Final = "changes"
+_REST_MS: Final = 200
+_NO_COPY: Final = (
     "No copy of this version is kept on this computer. The differences come from a receipt, which does not "
     "contain the conditions."
 )
-FAULTY: Final = (
+_FAULTY: Final = (
     "No copy of this version is kept on this computer: correct the problems of the study to list differences."
 )
-EQUAL: Final = "The study does not differ from this version."
+_EQUAL: Final = "The study does not differ from this version."
 
 
 class Version(NamedTuple):
@@ -248,13 +248,13 @@ def version_of(opened: Document, run: Run) -> Version:
     return Version(source, run)
 
 
-def kept_version(hash_: str) -> Version:
+def _kept_version(hash_: str) -> Version:
     """Return a saved version."""
     content = kept_content(hash_)
     return Version(None if content is None else content.decode("utf-8", "replace"))
 
 
-def file_version(file: Path) -> Version:
+def _file_version(file: Path) -> Version:
     """Return the present content of a study's file."""
     try:
         return Version(file.read_bytes().decode("utf-8", "replace"))
@@ -267,14 +267,14 @@ def compare(version: Version, study: Study) -> Comparison:
     if version.source is None:
         held = None if version.run is None else version.run.protocol
         if held is None or study.protocol is None:
-            return Comparison((), FAULTY)
-        return Comparison(differences(held, json.loads(json.dumps(without_conditions(study.protocol)))), NO_COPY)
+            return Comparison((), _FAULTY)
+        return Comparison(differences(held, json.loads(json.dumps(without_conditions(study.protocol)))), _NO_COPY)
     now = study.text
     if unbundle(version.source.encode())[1]:  # kept with its liquid files
         now = with_liquid_files(now.encode(), study.folder).decode()
     before, after = (with_line_feeds(text).split("\n") for text in (version.source, now))
     _, _, *lines = unified_diff(before, after, lineterm="") if before != after else ("", "")
-    return Comparison(tuple(lines), "" if lines else EQUAL)
+    return Comparison(tuple(lines), "" if lines else _EQUAL)
 
 
 def latest_run(known: Iterable[Run]) -> Run | None:
@@ -300,17 +300,17 @@ class Changes(Card):
         self.restore = small_button("undo", "Restore", height=34)
         self.restore.setToolTip("Restore the text of this version, in one step")
         self.note = label("", "label", "text2", wraps=True)
-        self.difference = DifferenceText()
+        self.difference = _DifferenceText()
         self.top = QWidget()
         of = label("Compare with", "label")
         hbox(of, (self.version, 1), self.restore, spacing=10, margins=0, parent=self.top)
-        self.nothing = label(NOTHING, "body", "text2", wraps=True)
+        self.nothing = label(_NOTHING, "body", "text2", wraps=True)
         add_parts(self.column, self.top, self.nothing, self.note, (self.difference, 1))
         self.setFocusProxy(self.version)
         for part in (self.top, self.note, self.difference):
             part.hide()
-        place.pane.add_page(PanePage(name=TAB, words="Changes", body=self, with_facts=False))
-        self._resting = delayed_call(self, REST_MS, self.compare_now)
+        place.pane.add_page(PanePage(name=_TAB, words="Changes", body=self, with_facts=False))
+        self._resting = delayed_call(self, _REST_MS, self.compare_now)
         place.pane.tab_shown.connect(lambda _tab: self.compare_now())
         place.header.version.clicked.connect(lambda: self.compare_with(""))
         editing.opened_other.connect(self._forget_choice)
@@ -321,7 +321,7 @@ class Changes(Card):
 
     def compare_with(self, key: str) -> None:
         self._wanted = key or self._wanted
-        self.place.show_tab(TAB)
+        self.place.show_tab(_TAB)
         self.compare_now()
 
     def compare_with_session(self, study: str, folder: Path) -> None:
@@ -340,7 +340,7 @@ class Changes(Card):
     def compare_now(self) -> None:
         """Compare again if the tab is shown."""
         opened = self.editing.opened
-        if opened is None or self.place.pane.tab != TAB:
+        if opened is None or self.place.pane.tab != _TAB:
             return
         before, self._choices = (self._choices, self.chosen), self._version_choices(opened)
         keys = [key for key, _ in self._choices]
@@ -382,9 +382,9 @@ class Changes(Card):
 
     def _version(self, opened: Document, key: str) -> Version:
         if key == FILE:
-            return file_version(opened.file)
+            return _file_version(opened.file)
         run = next((run for run in self._known_runs() if run.hash == key), None)
-        return kept_version(key) if run is None else version_of(opened, run)
+        return _kept_version(key) if run is None else version_of(opened, run)
 
     def _restore_version(self) -> None:
         self.place.flush()

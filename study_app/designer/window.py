@@ -46,7 +46,7 @@ from study_app.gui.widgets.main_view import Place, last_focused
 
 FACTS_FROM, FACTS_FROM_OWN, FACTS_LEAST = 740, 560, 110
 """The height of the window and of the pane from which there is room for facts, and what they need themselves [px]."""
-ASIDE_GAP = 24
+_ASIDE_GAP = 24
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +64,7 @@ class PanePage:
     tip: str = ""  # the tip of its tab
 
 
-class RightPane(QWidget):
+class _RightPane(QWidget):
     """Tabs, the page of the chosen one, and the facts; ``tab_shown`` carries the name of a tab when it is shown."""
 
     tab_shown = Signal(str)
@@ -107,7 +107,7 @@ class RightPane(QWidget):
         """Put the page's controls to the right of the tabs, or below them if there is no room."""
         page = next((page for page in self.pages if page.name == self.tab), None)
         if page is not None and page.aside is not None:
-            room = self.width() - 2 * SHADOW - self.tabs.sizeHint().width() - ASIDE_GAP
+            room = self.width() - 2 * SHADOW - self.tabs.sizeHint().width() - _ASIDE_GAP
             row = self._asides if page.aside.sizeHint().width() <= room else self._below
             if row.indexOf(page.aside) < 0:
                 row.addWidget(page.aside)
@@ -134,12 +134,12 @@ class RightPane(QWidget):
 
 OUTLINE_PX, DRAWER_PX = 284, 320
 DRAWER_BELOW, ONE_PANE_BELOW = 1400, 1130
-GAP = 14 - 2 * SHADOW
-FORM_SHARE = 44
+_GAP = 14 - 2 * SHADOW
+_FORM_SHARE = 44
 """Percent of the width that the form takes beside the views."""
 
 
-class Crumb(PressedByEnter):
+class _Crumb(PressedByEnter):
     """A step of the path; its words end in "…" where its room is too small."""
 
     def __init__(self, text: str, least_px: int) -> None:
@@ -165,7 +165,7 @@ class Crumb(PressedByEnter):
         self.setText(self.fontMetrics().elidedText(self.whole, Qt.TextElideMode.ElideRight, room))
 
 
-class PathBar(QWidget):
+class _PathBar(QWidget):
     """The way to the element of the form, where the outline is a drawer; ``open_asked`` carries a path."""
 
     outline_asked = Signal()
@@ -178,7 +178,7 @@ class PathBar(QWidget):
         self.outline.setAccessibleName(command_tip("outline"))
         self.outline.setToolTip(command_tip("outline"))
         self.outline.clicked.connect(self.outline_asked)
-        self.steps: list[Crumb] = []
+        self.steps: list[_Crumb] = []
         self._parts: list[QWidget] = []
         self._shown: object = None
         self._steps = hbox(spacing=0)
@@ -193,7 +193,7 @@ class PathBar(QWidget):
         self.steps, self._parts = [], []
         for path, title in form.around:
             sign = Icon("chevron", "text2", 14)
-            made = Crumb(title, 56 if path == form.path else 104)
+            made = _Crumb(title, 56 if path == form.path else 104)
             made.clicked.connect(lambda _checked=False, path=path: self.open_asked.emit(path))
             for part in (sign, made):
                 self._steps.addWidget(part)
@@ -201,7 +201,7 @@ class PathBar(QWidget):
             self._parts += [sign, made]
 
 
-SHORTCUT = Qt.FocusReason.ShortcutFocusReason
+_SHORTCUT = Qt.FocusReason.ShortcutFocusReason
 
 
 def focus_stops(part: QWidget) -> Iterator[QWidget]:
@@ -222,11 +222,11 @@ def _reading_order(part: QWidget, other: QWidget) -> int:
     return first.left() - second.left()
 
 
-class Arrangement(QWidget):
+class _Arrangement(QWidget):
     """Places outline, form, pane and problems; ``used`` is that of the first three that had the keyboard last."""
 
     def __init__(
-        self, header: DesignerHeader, outline: OutlineCard, form: FormCard, pane: RightPane, file: FileCard,
+        self, header: DesignerHeader, outline: OutlineCard, form: FormCard, pane: _RightPane, file: FileCard,
         problems: ProblemsCard,
     ) -> None:  # fmt: skip
         super().__init__()
@@ -237,18 +237,18 @@ class Arrangement(QWidget):
         self.used: QWidget = form
         self.drawer = False
         self._width = DRAWER_BELOW
-        self.path = PathBar()
+        self.path = _PathBar()
         self.path.outline_asked.connect(self.toggle_drawer)
         self.sides = Segments("Side")
         self.sides.tips = {"form": command_tip("form"), "pane": command_tip("views")}
         self.sides.chosen.connect(lambda side: self.show_side(str(side)))
         self.prompts = vbox()
         self._left = vbox((form, 1), spacing=12 - 2 * SHADOW)
-        self._across = hbox((self._left, FORM_SHARE), (pane, 100 - FORM_SHARE), spacing=GAP)
+        self._across = hbox((self._left, _FORM_SHARE), (pane, 100 - _FORM_SHARE), spacing=_GAP)
         self.top = QWidget()
         hbox((self.path, 1), self.sides, margins=(SHADOW, 0, SHADOW, 0), parent=self.top)
         self._right = vbox(self.top, self.prompts, (self._across, 1), problems, spacing=12 - 2 * SHADOW)
-        self._whole = hbox(outline, (self._right, 1), spacing=GAP, margins=0, parent=self)
+        self._whole = hbox(outline, (self._right, 1), spacing=_GAP, margins=0, parent=self)
         outline.setFixedWidth(OUTLINE_PX)
         application = QApplication.instance()
         assert isinstance(application, QApplication)  # noqa: S101 - a window has one
@@ -279,7 +279,7 @@ class Arrangement(QWidget):
         self.sides.setVisible(single)
         self.sides.show_values((("form", "Form"), ("pane", "Views")), self.side)
         self.form.setVisible(not single or self.side == "form")
-        self._across.setStretch(0, FORM_SHARE if self.form.isVisibleTo(self) else 0)  # an empty layout would take room
+        self._across.setStretch(0, _FORM_SHARE if self.form.isVisibleTo(self) else 0)  # an empty layout would take room
         self.pane.setVisible(not single or self.side == "pane")
         self.pane.make_room()
 
@@ -336,7 +336,7 @@ class Arrangement(QWidget):
     # the keyboard
 
     def focus_header(self) -> None:
-        self.header.study.setFocus(SHORTCUT)
+        self.header.study.setFocus(_SHORTCUT)
 
     def focus_form(self) -> None:
         self.show_side("form")
@@ -372,21 +372,21 @@ class Arrangement(QWidget):
         """Focus the page of the right pane, and from within the pane its tabs."""
         pane = self.pane
         if pane.isAncestorOf(pane.window().focusWidget() or self.header):
-            pane.tabs.setFocus(SHORTCUT)
+            pane.tabs.setFocus(_SHORTCUT)
         else:
             self._focus_page()
 
     def _focus_tabs(self) -> None:
         """Focus the tabs of the right pane; Tab then goes to the controls beside them and to the page."""
         self.show_side("pane")
-        self.pane.tabs.setFocus(SHORTCUT)
+        self.pane.tabs.setFocus(_SHORTCUT)
 
     def _focus_page(self) -> None:
         self.show_side("pane")
         pane = self.pane
         page = next(page for page in pane.pages if page.name == pane.tab)
         part = page.body.focusProxy() or page.body
-        (part if part.isVisible() else pane.tabs).setFocus(SHORTCUT)
+        (part if part.isVisible() else pane.tabs).setFocus(_SHORTCUT)
 
     def show_tab(self, name: str) -> None:
         self.pane.show_tab(name)
@@ -394,7 +394,7 @@ class Arrangement(QWidget):
 
     def focus_problems(self) -> None:
         self.problems.show()
-        self.problems.next.setFocus(SHORTCUT)
+        self.problems.next.setFocus(_SHORTCUT)
 
     def switch_to_file(self) -> None:
         """Focus the file, and from there return to the last focus in the form."""
@@ -404,7 +404,7 @@ class Arrangement(QWidget):
         last = self.form.focusWidget()  # if the file covered the form, Qt returns the focus to the form
         self.show_side("form")
         if last is not None and last.isVisible() and last.isEnabled():
-            last.setFocus(SHORTCUT)
+            last.setFocus(_SHORTCUT)
         else:
             self.form.focus_first()
 
@@ -437,7 +437,7 @@ class DesignerPlace(Place):
         self.header, self.banner = DesignerHeader(), NoticeCard(of_playing=False)
         self.form, self.file, self.problems = FormCard(), FileCard(), ProblemsCard()
         self.outline, self.new_page = OutlineCard(), NewStudyPage()
-        self.pane = RightPane()
+        self.pane = _RightPane()
         self.measures = MeasuresPage()
         self.pane.add_page(
             PanePage(
@@ -447,7 +447,7 @@ class DesignerPlace(Place):
         self.pane.add_page(
             PanePage(name="file", words="File", body=self.file, aside=self.file.aside, tip=command_tip("file"))
         )
-        self.parts = Arrangement(self.header, self.outline, self.form, self.pane, self.file, self.problems)
+        self.parts = _Arrangement(self.header, self.outline, self.form, self.pane, self.file, self.problems)
         self.sides = self.parts.sides
         self.adding, self.nothing = AddList(self), NoStudyCard()
         self._lay_out()

@@ -9,7 +9,7 @@ from typing import Final
 from study_app.devices import WITHOUT_FORCE
 from study_app.devices.descriptor import READY, Backend, DeviceDescriptor, DeviceOption, framed, later, opened
 
-FIRMWARE: Final = DeviceOption(
+_FIRMWARE: Final = DeviceOption(
     name="firmware",
     title="Falcon's firmware",
     help="The Falcon's own program, needed if it was switched off since its last use. Its owner has the file.",
@@ -19,8 +19,8 @@ FIRMWARE: Final = DeviceOption(
     placeholder="Not needed if the firmware is already loaded",
     file_filter="Firmware (*.bin);;All files (*)",
 )
-BY_COMMAND: Final = replace(FIRMWARE, in_windows=False)
-DHD_LIBRARY: Final = DeviceOption(
+BY_COMMAND: Final = replace(_FIRMWARE, in_windows=False)
+_DHD_LIBRARY: Final = DeviceOption(
     name="dhd-library",
     title="Force Dimension's library",
     help="Path of the Force Dimension SDK's library (libdrd.so, libdrd.dylib, drd64.dll).",
@@ -85,7 +85,7 @@ DEVICES: Final = (
         "falcon.failures:FAILURES",
         ("falcon.transport:probe", "falcon.transport:probe_ftdi"),
         "simulated hand; the Falcon's own driver with an emulated Falcon",
-        options=(FIRMWARE,),
+        options=(_FIRMWARE,),
         emulated_options=(BY_COMMAND,),
     ),
     *_felt_and_emulated(
@@ -96,7 +96,7 @@ DEVICES: Final = (
         "force_dimension.library:FAILURES",
         ("force_dimension.library:probe",),
         "simulated hand; the Force Dimension driver with emulated library functions; does not need a C compiler",
-        options=(DHD_LIBRARY,),
+        options=(_DHD_LIBRARY,),
     ),
     *_felt_and_emulated(
         "inverse3",

@@ -11,9 +11,9 @@ from typing import Final, Literal
 from study_app.errors import DeviceError, DeviceNotFound
 
 State = Literal["ok", "found", "not checked"]
-ORDER: Final[tuple[State, ...]] = ("found", "not checked", "ok")
+_ORDER: Final[tuple[State, ...]] = ("found", "not checked", "ok")
 WIDTH: Final = 100
-NOTHING_WRONG: Final = "No problems were found."
+_NOTHING_WRONG: Final = "No problems were found."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +54,7 @@ class Report:
     @property
     def in_order(self) -> tuple[Finding, ...]:
         """All findings: failures first, then those that could not be checked."""
-        return tuple(sorted(self.findings, key=lambda finding: ORDER.index(finding.state)))
+        return tuple(sorted(self.findings, key=lambda finding: _ORDER.index(finding.state)))
 
     @property
     def unseen(self) -> tuple[Finding, ...]:
@@ -70,7 +70,7 @@ class Report:
             return f"Found: {len(self.found)}."
         if self.unseen:
             return f"Nothing wrong was found. Not checked: {'; '.join(finding.tested for finding in self.unseen)}."
-        return NOTHING_WRONG
+        return _NOTHING_WRONG
 
 
 def report_lines(report: Report) -> list[str]:
@@ -121,7 +121,7 @@ class DeviceFailure(DeviceError):
         super().__init__(message)
 
 
-class DeviceFailureNotFound(DeviceFailure, DeviceNotFound):
+class _DeviceFailureNotFound(DeviceFailure, DeviceNotFound):
     """There is no device, or no software that could find it."""
 
 
@@ -148,7 +148,7 @@ class FailureTable:
         return f"{known.symptom}{detail}: {known.cause}; {known.cure}"
 
     def failure(self, mode: str, seen: str = "") -> DeviceFailure:
-        kind = DeviceFailureNotFound if mode in self.not_found else DeviceFailure
+        kind = _DeviceFailureNotFound if mode in self.not_found else DeviceFailure
         return kind(mode, f"{self.device} cannot be used: {self.sentence(mode, seen)}")
 
     def findings(self, observed: Container[str] = (), passed: Container[str] = ()) -> tuple[Finding, ...]:

@@ -34,10 +34,10 @@ RUNS, RELEASED, FINISHED = range(3)
 FIRST_CAUSE: Final = 3
 """First value of a driver's own causes for ending the exchange."""
 LEAVE_S: Final = 0.5  # a read or a write takes a few milliseconds at most
-SILENT_NS: Final = 40_000_000  # after 50 ms without a new position the servo ends the force
+_SILENT_NS: Final = 40_000_000  # after 50 ms without a new position the servo ends the force
 SECONDS: Final = 3.0
-LEAST_HZ: Final = 900.0
-MOVE: Final = "Hold the handle and move it a little …"
+_LEAST_HZ: Final = 900.0
+_MOVE: Final = "Hold the handle and move it a little …"
 _CHUNK_S = 0.25
 
 COMMON: Final[list[tuple[Any, ...]]] = [
@@ -222,7 +222,7 @@ class FramedDevice(Device):
         state = self.exchange
         if state.unguarded:
             return "unguarded"
-        silent = state.ticks and state.now_ns - state.fresh_ns > SILENT_NS
+        silent = state.ticks and state.now_ns - state.fresh_ns > _SILENT_NS
         return self.silent if state.ended == RUNS and silent else self.causes.get(int(state.ended))
 
     @property
@@ -321,17 +321,17 @@ def examine(
     except DeviceFailure as failed:
         return Report((), table.findings({failed.mode}, table.before(failed.mode)), str(failed))
     with device:
-        progress(MOVE)
-        samples, fault_found = run_at_rest(device, seconds)
-        modes, fresh_hz = device.appeared(samples), fresh_rate_hz(samples)
+        progress(_MOVE)
+        samples, fault_found = _run_at_rest(device, seconds)
+        modes, fresh_hz = device.appeared(samples), _fresh_rate_hz(samples)
         seen = (*device.observed(), f"new positions per second: {fresh_hz:.0f}")
-    if not modes and fresh_hz < LEAST_HZ:
+    if not modes and fresh_hz < _LEAST_HZ:
         modes = {"rate"}
     passed = {mode.id for mode in table.modes} if fault_found is None else table.before(device.running)
     return Report(seen, table.findings(modes, passed), fault_found)
 
 
-def run_at_rest(device: Device, seconds: float) -> tuple[Any, str | None]:
+def _run_at_rest(device: Device, seconds: float) -> tuple[Any, str | None]:
     """Run an open device without force; a simulated hand moves in virtual time.
 
     Return the samples (n,) and the reason why the servo stopped itself, or None.
@@ -355,6 +355,6 @@ def run_at_rest(device: Device, seconds: float) -> tuple[Any, str | None]:
     return np.concatenate(kept), fault
 
 
-def fresh_rate_hz(samples: Any) -> float:
+def _fresh_rate_hz(samples: Any) -> float:
     """Return the number of new positions per second in samples at 1 kHz."""
     return float(samples["fresh"].sum()) / max(len(samples), 1) * 1000.0

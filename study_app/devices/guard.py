@@ -1,7 +1,7 @@
 """The guard: a small process that ends a device's force if the program dies.
 
 A device without a watchdog may keep its last force. So a child process waits on a pipe from the program; if the pipe
-ends without ``WORD``, the program has died, and the child calls the driver's function that opens the device and ends
+ends without ``_WORD``, the program has died, and the child calls the driver's function that opens the device and ends
 its force. Run as ``python -m study_app.devices.guard NAME MODULE:FUNCTION ARGUMENT...``.
 """
 
@@ -20,7 +20,7 @@ from study_app.ending_signals import ENDING_SIGNALS
 from study_app.errors import DeviceError
 from study_app.haptics.runtime.clocks.grants import allow_suspension, refuse_suspension
 
-WORD: Final = b"done\n"
+_WORD: Final = b"done\n"
 READY: Final = b"ready\n"
 PATIENCE_S: Final = 10.0
 """Time in which the guard tries to open the device [s]: the system needs a moment to release it from a dead program."""
@@ -96,7 +96,7 @@ class Guard:
 
     def stand_down(self) -> None:
         """Dismiss the guard: the force is zero and the device closed. A second call does nothing."""
-        self._end(WORD)
+        self._end(_WORD)
 
     def release(self) -> None:
         """Make the guard end the force after the device is closed; wait for its end."""
@@ -169,13 +169,13 @@ def _close(child: subprocess.Popen[bytes]) -> None:
 
 
 def watch_program(name: str, ends_force: str, *arguments: str) -> int:
-    """Wait for the end of the standard input; without ``WORD`` in it, end the device's force. Return an exit code."""
+    """Wait for the end of the standard input; without ``_WORD`` in it, end the device's force. Return an exit code."""
     for number in ENDING_SIGNALS:
         signal.signal(number, signal.SIG_IGN)  # it ends when the program has ended
     end_force = pkgutil.resolve_name(ends_force)
     sys.stdout.buffer.write(READY)
     sys.stdout.flush()
-    if sys.stdin.buffer.read().endswith(WORD):
+    if sys.stdin.buffer.read().endswith(_WORD):
         return 0
     ends_s = time.monotonic() + PATIENCE_S
     while True:

@@ -23,10 +23,10 @@ from study_app.haptics.model.ranges import Vector
 
 STAY, POINT, HOLD, REACH, FOLLOW = range(5)
 
-WAVES = 3  # tremor: waves per axis
-LONGEST_STEP_S = 0.05  # longest simulated time after a pause of the loop [s]
+_WAVES = 3  # tremor: waves per axis
+_LONGEST_STEP_S = 0.05  # longest simulated time after a pause of the loop [s]
 
-ORDER = np.dtype(
+_ORDER = np.dtype(
     [
         ("kind", np.int64),  # STAY ... FOLLOW
         ("target_m", np.float64, (3,)),  # of POINT, HOLD and REACH
@@ -37,14 +37,14 @@ ORDER = np.dtype(
     align=True,
 )
 
-MOTION_ROW = np.dtype([("t_s", np.float64), ("position_m", np.float64, (3,))], align=True)
+_MOTION_ROW = np.dtype([("t_s", np.float64), ("position_m", np.float64, (3,))], align=True)
 
 HAND = np.dtype(
     [
         ("serial", np.int64),  # of the posted order; odd while it is being written
-        ("posted", ORDER),
+        ("posted", _ORDER),
         ("taken", np.int64),  # serial of the order in force
-        ("order", ORDER),
+        ("order", _ORDER),
         ("began_ns", np.int64),
         ("began_m", np.float64, (3,)),  # position of the hand when the order began
         ("row", np.int64),  # of FOLLOW: the row before now
@@ -55,17 +55,17 @@ HAND = np.dtype(
         ("place_m", np.float64, (3,)),  # its position: aim and tremor
         ("was_m", np.float64, (3,)),  # its previous place
         ("tremor_m", np.float64),  # amplitude of each wave
-        ("tremor_hz", np.float64, (3, WAVES)),
-        ("tremor_turn", np.float64, (3, WAVES)),  # phase at time 0, in turns
+        ("tremor_hz", np.float64, (3, _WAVES)),
+        ("tremor_turn", np.float64, (3, _WAVES)),  # phase at time 0, in turns
     ],
     align=True,
 )
 
-_row_at = record_at(MOTION_ROW)
-_ROW_BYTES = MOTION_ROW.itemsize
+_row_at = record_at(_MOTION_ROW)
+_ROW_BYTES = _MOTION_ROW.itemsize
 
-REACH_START_S = 0.3  # a reach takes this time [s], and
-REACH_PACE_MPS = 0.25  # this time per distance [s/m]: 60 mm in 0.54 s with a peak of 0.21 m/s
+_REACH_START_S = 0.3  # a reach takes this time [s], and
+_REACH_PACE_MPS = 0.25  # this time per distance [s/m]: 60 mm in 0.54 s with a peak of 0.21 m/s
 
 
 @kernel
@@ -103,7 +103,7 @@ def move_hand(hand: Any, now_ns: int, elapsed_s: float) -> None:
 @kernel
 def move_held_handle(simulated: Any, now_ns: int, elapsed_s: float) -> None:
     """Update ``simulated.hand`` and its ``simulated.handle`` to ``now_ns``, ``elapsed_s`` after the last call."""
-    elapsed_s = min(max(elapsed_s, 0.0), LONGEST_STEP_S)
+    elapsed_s = min(max(elapsed_s, 0.0), _LONGEST_STEP_S)
     move_hand(simulated.hand, now_ns, elapsed_s)
     move(simulated.handle, simulated.hand.was_m, simulated.hand.place_m, elapsed_s)
 
@@ -129,7 +129,7 @@ def _take_order(hand: Any, now_ns: int) -> None:
         way = hand.order.target_m[i] - hand.aim_m[i]
         square += way * way
     if hand.order.kind == REACH and hand.order.duration_ns <= 0:
-        hand.order.duration_ns = int(1e9 * (REACH_START_S + math.sqrt(square) / REACH_PACE_MPS))
+        hand.order.duration_ns = int(1e9 * (_REACH_START_S + math.sqrt(square) / _REACH_PACE_MPS))
 
 
 @kernel
@@ -173,7 +173,7 @@ def _follow(hand: Any, since_s: float) -> None:
 def tremor(hand: Any, axis: int, time_s: float) -> Any:
     """Return the displacement by physiological tremor (8 to 12 Hz) along ``axis`` [m]."""
     offset = 0.0
-    for k in range(WAVES):
+    for k in range(_WAVES):
         turn = hand.tremor_hz[axis, k] * time_s + hand.tremor_turn[axis, k]
         offset += wave(turn)
     return hand.tremor_m * offset
@@ -187,7 +187,7 @@ def wave(turn: float) -> float:
     return -(0.225 * (arch * abs(arch) - arch) + arch)
 
 
-TREMOR_HZ = (8.0, 12.0)
+_TREMOR_HZ = (8.0, 12.0)
 
 _KEPT_MOTIONS = 8
 
@@ -204,7 +204,7 @@ class HandOrders:
     def __init__(self, state: Any, workspace_m: tuple[float, float, float]) -> None:
         self.workspace_m = workspace_m
         self.state = state
-        self._order = records(ORDER, 1)
+        self._order = records(_ORDER, 1)
         self._motions: list[Any] = []
 
     @property
@@ -257,7 +257,7 @@ class HandOrders:
             raise DeviceError(
                 f"a motion's times must increase; row {row} is at {times[row]} s, after {times[row - 1]} s"
             )
-        motion = records(MOTION_ROW, times.size)
+        motion = records(_MOTION_ROW, times.size)
         motion.t_s, motion.position_m = times, places
         # The servo may still read the last motion, which is kept until several newer ones were given.
         self._motions = [*self._motions[1 - _KEPT_MOTIONS :], motion]
@@ -292,9 +292,9 @@ class HandOrders:
         draw = (random or Random(0)).random  # noqa: S311 - a hand trembles, it keeps no secrets
         hand = self.state.hand
         hand.tremor_m = tremor_m
-        lowest, highest = TREMOR_HZ
-        hand.tremor_hz = [[lowest + (highest - lowest) * draw() for _ in range(WAVES)] for _ in range(3)]
-        hand.tremor_turn = [[draw() for _ in range(WAVES)] for _ in range(3)]
+        lowest, highest = _TREMOR_HZ
+        hand.tremor_hz = [[lowest + (highest - lowest) * draw() for _ in range(_WAVES)] for _ in range(3)]
+        hand.tremor_turn = [[draw() for _ in range(_WAVES)] for _ in range(3)]
 
     def _inside(self, x_m: float, y_m: float, z_m: float) -> Vector:
         """Return the nearest place the handle can reach."""

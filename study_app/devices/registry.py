@@ -18,7 +18,7 @@ from study_app.errors import DeviceError, DeviceNotFound
 if TYPE_CHECKING:
     from study_app.devices.base import Device
 
-REMOVED: Final = {"falcon-socket": "falcon-emulated, or falcon"}
+_REMOVED: Final = {"falcon-socket": "falcon-emulated, or falcon"}
 """Devices of earlier versions, with their replacements."""
 
 
@@ -27,11 +27,11 @@ def _are_backends(value: object) -> bool:
     return isinstance(value, Sequence) and all(isinstance(backend, Backend) for backend in value)
 
 
-RETURNS: Final = {
+_RETURNS: Final = {
     "open": Returns("a device", lambda value: callable(value.close)),
     "probe": Returns("a list of Backend", _are_backends),
 }
-DEVICES: Final = Registry("device", {device.name: device for device in OWN}, DeviceDescriptor, "name", RETURNS)
+DEVICES: Final = Registry("device", {device.name: device for device in OWN}, DeviceDescriptor, "name", _RETURNS)
 
 
 def all_devices() -> tuple[DeviceDescriptor, ...]:
@@ -54,8 +54,8 @@ def descriptor_of(name: str) -> DeviceDescriptor:
     """
     kind, _, argument = name.partition(":")
     descriptor = DEVICES.get(kind)
-    if descriptor is None and kind in REMOVED:
-        raise DeviceNotFound(f"device '{name}' was removed: choose {REMOVED[kind]}")
+    if descriptor is None and kind in _REMOVED:
+        raise DeviceNotFound(f"device '{name}' was removed: choose {_REMOVED[kind]}")
     if descriptor is None or (argument and not descriptor.argument):
         known = ", ".join(device.usage for device in all_devices())
         raise DeviceNotFound(f"device '{name}' is not known; choose one of: {known}")

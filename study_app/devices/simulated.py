@@ -22,7 +22,7 @@ from study_app.haptics.kernels.plant import HANDLE, measure, new_handle, push, r
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import MEASURED_VELOCITY, records
 
-SIMULATED = np.dtype(
+_SIMULATED = np.dtype(
     [
         ("handle", HANDLE),
         ("hand", HAND),
@@ -34,11 +34,11 @@ SIMULATED = np.dtype(
     ],
     align=True,
 )
-_simulated_at = c_functions.record_at(SIMULATED)
-POINTED_MASS_KG = 0.2
-POINTED_STIFFNESS_NPM = 400.0  # 8 N hold the handle back by 20 mm, a fifth of the workspace
-POINTED_DAMPING_NSPM = 27.0  # 1.5 times critical
-LAG_S = 0.010
+_simulated_at = c_functions.record_at(_SIMULATED)
+_POINTED_MASS_KG = 0.2
+_POINTED_STIFFNESS_NPM = 400.0  # 8 N hold the handle back by 20 mm, a fifth of the workspace
+_POINTED_DAMPING_NSPM = 27.0  # 1.5 times critical
+_LAG_S = 0.010
 
 
 class SimulatedDevice(HandOrders, Device):
@@ -53,7 +53,7 @@ class SimulatedDevice(HandOrders, Device):
     name = ""
 
     def __init__(self, handle: Any, workspace_m: tuple[float, float, float], force_limit_n: float) -> None:
-        self._memory = records(SIMULATED, 1)
+        self._memory = records(_SIMULATED, 1)
         super().__init__(self._memory[0], workspace_m)
         self.force_limit_n = force_limit_n
         self.state.handle = handle
@@ -144,10 +144,10 @@ class PointedDevice(SimulatedDevice):
         self, workspace_m: tuple[float, float, float] = (0.05, 0.05, 0.05), force_limit_n: float = 8.0
     ) -> None:
         handle = new_handle(
-            mass_kg=POINTED_MASS_KG, stiffness_npm=POINTED_STIFFNESS_NPM, damping_nspm=POINTED_DAMPING_NSPM
+            mass_kg=_POINTED_MASS_KG, stiffness_npm=_POINTED_STIFFNESS_NPM, damping_nspm=_POINTED_DAMPING_NSPM
         )
         super().__init__(handle, workspace_m, force_limit_n)
-        self.state.hand.lag_s = LAG_S
+        self.state.hand.lag_s = _LAG_S
 
     def point_to(self, x_m: float, y_m: float, z_m: float) -> None:
         """Set the pointer's place [m, hand frame]; a place outside the workspace counts as its border."""
@@ -160,9 +160,9 @@ class MouseDevice(PointedDevice):
     name = "mouse"
 
 
-MASS_KG = 0.2
-VISCOUS_NSPM = 0.5
-COULOMB_N = 0.1
+_MASS_KG = 0.2
+_VISCOUS_NSPM = 0.5
+_COULOMB_N = 0.1
 STIFFNESS_NPM = 500.0
 DAMPING_NSPM = 30.0
 QUANTUM_M = 38e-6  # one count of a Falcon at the knee
@@ -172,9 +172,9 @@ TREMOR_M = 5e-5  # three waves of this amplitude per axis: 0.06 mm RMS, at most 
 def new_scripted_handle(quantum_m: float) -> Any:
     """Return the handle in a simulated participant's hand, with encoders of this count [m]."""
     return new_handle(
-        mass_kg=MASS_KG,
-        viscous_nspm=VISCOUS_NSPM,
-        coulomb_n=COULOMB_N,
+        mass_kg=_MASS_KG,
+        viscous_nspm=_VISCOUS_NSPM,
+        coulomb_n=_COULOMB_N,
         stiffness_npm=STIFFNESS_NPM,
         damping_nspm=DAMPING_NSPM,
         quantum_m=quantum_m,

@@ -20,22 +20,22 @@ from study_app.session.preflight import PredictedDelivery
 from study_app.session.simulated.predicted_delivery import predicted_delivery
 from study_app.workers.server import Send, Stop
 
-BATCHES: Final = 60
-RAMP_MPS2: Final = 2.0
+_BATCHES: Final = 60
+_RAMP_MPS2: Final = 2.0
 _RAMP_S: Final = 0.5
 _COMPARED: Final[tuple[Effect, ...]] = ("drag", "wake")
 _MOTIONS: Final = (
     ("reverse", {"revolutions": 1.0, "against_s": 0.7, "rest_s": 0.5}),
     ("zigzag", {"leg_s": 0.25, "legs": 8.0}),
 )
-LASTS_S: Final = 2.0
+_LASTS_S: Final = 2.0
 HAND_M: Final = 0.03
 HAND_HZ: Final = 2.0
 FINE_M: Final = 10e-6
 """An encoder count at the handle that is finer than the assumed one."""
 
 
-def costs(scene: Scene, *, batches: int = BATCHES) -> Costs:
+def costs(scene: Scene, *, batches: int = _BATCHES) -> Costs:
     """Measure the computation time of a scene with one liquid."""
     found = measure(scene, batches=batches)
     liquid = resolve(scene).liquids[0]
@@ -66,18 +66,18 @@ def errors(scene: Scene) -> Errors:
         force_n = max(newtons for _, newtons in found)
         wake = max(share for share, _ in found) if "wake" in kept else None
     left_out = tuple(effect for effect in liquid.effects if effect not in kept)
-    return Errors(wake=wake, force_n=force_n, lag_s=lag_s(scene), left_out=left_out)
+    return Errors(wake=wake, force_n=force_n, lag_s=_lag_s(scene), left_out=left_out)
 
 
-def lag_s(scene: Scene) -> float:
+def _lag_s(scene: Scene) -> float:
     """Return the lag of a scene's velocity [s] under constant acceleration: (v − v_filtered)/a."""
     t_s = np.arange(round(_RAMP_S * scene.rate_hz) + 1) / scene.rate_hz
     rest = np.zeros_like(t_s)
-    motion = Motion(t_s, np.column_stack([0.5 * RAMP_MPS2 * t_s**2, rest, rest]))
+    motion = Motion(t_s, np.column_stack([0.5 * _RAMP_MPS2 * t_s**2, rest, rest]))
     still = scene.model_copy(update={"liquids": (), "knee": Knee(law="none"), "origin_m": (0.0, 0.0, 0.0)})
     seen = simulate(still, motion)
     last = len(t_s) // 4  # of the end, at which the filter has settled
-    return float(np.mean(RAMP_MPS2 * t_s[-last:] - seen["vx_mps"][-last:])) / RAMP_MPS2
+    return float(np.mean(_RAMP_MPS2 * t_s[-last:] - seen["vx_mps"][-last:])) / _RAMP_MPS2
 
 
 def velocity_errors(scene: Scene, dynamics: Dynamics) -> tuple[float, float]:
@@ -94,7 +94,7 @@ def velocity_errors(scene: Scene, dynamics: Dynamics) -> tuple[float, float]:
 
 
 def _velocity_error(scene: Scene, dynamics: Dynamics, count_m: float) -> float:
-    t_s = np.arange(round(LASTS_S * scene.rate_hz)) / scene.rate_hz
+    t_s = np.arange(round(_LASTS_S * scene.rate_hz)) / scene.rate_hz
     turns = 2.0 * math.pi * HAND_HZ * t_s
     rest = np.zeros_like(t_s)
     counted_m = scene.scale * count_m * np.rint(HAND_M * np.sin(turns) / count_m)
@@ -124,7 +124,7 @@ def withheld_share(scene: Scene, stroke: Stroke, dynamics: Dynamics) -> float:
     The stroke is centred on the device's origin, and the loop is that of a device of these ``dynamics``.
     F_a is the force after norm clamp and fades, F_b the force after slope limits, passivity controller and slew limit.
     """
-    t_s = np.arange(round(LASTS_S * scene.rate_hz)) / scene.rate_hz
+    t_s = np.arange(round(_LASTS_S * scene.rate_hz)) / scene.rate_hz
     along_m = scene.scale * stroke.amplitude_m * np.cos(2.0 * math.pi * stroke.frequency_hz * t_s)
     still = np.zeros_like(t_s)
     position_m = np.add(scene.origin_m, np.column_stack((along_m, still, still)))

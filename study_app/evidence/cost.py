@@ -18,9 +18,9 @@ from study_app.haptics.model.motion import Floats
 from study_app.haptics.model.scene import Effect, Liquid, Scene
 from study_app.haptics.runtime.pack import pack
 
-BATCH: Final = 1_000
-BATCHES: Final = 200
-WARM_UP: Final = 10_000
+_BATCH: Final = 1_000
+_BATCHES: Final = 200
+_WARM_UP: Final = 10_000
 
 
 class Cost(NamedTuple):
@@ -34,7 +34,7 @@ class Cost(NamedTuple):
     effects_ns: Mapping[tuple[str, Effect], float]
 
 
-def measure(scene: Scene, *, batches: int = BATCHES) -> Cost:
+def measure(scene: Scene, *, batches: int = _BATCHES) -> Cost:
     """Measure a scene and its variants in alternating batches, so that other load on the machine affects all alike."""
     scene = resolve(scene)
     rest = scene.model_copy(update={"liquids": ()})
@@ -50,7 +50,7 @@ def measure(scene: Scene, *, batches: int = BATCHES) -> Cost:
     return Cost(cost_ns[scene], cost_ns[rest], effects_ns)
 
 
-def report(scene: Scene, *, batches: int = BATCHES) -> str:
+def report(scene: Scene, *, batches: int = _BATCHES) -> str:
     """Return the effects of a scene, with reasons and computation times, as text."""
     cost = measure(scene, batches=batches)
     percent = 100 * cost.scene_ns * 1e-9 * scene.rate_hz
@@ -60,7 +60,7 @@ def report(scene: Scene, *, batches: int = BATCHES) -> str:
     )
 
 
-def hand(ticks: int = WARM_UP) -> Floats:
+def hand(ticks: int = _WARM_UP) -> Floats:
     """Return positions (ticks, 3) of a hand [m] at 1 kHz: circles of 30 mm that slow down, turn back and rest."""
     t_s = np.arange(ticks) / 1000
     angle = 4 * np.sin(2 * np.pi * np.minimum(t_s % 10, 8.0) / 4)
@@ -76,12 +76,12 @@ class TickTimer:
         self._positions_m = hand()
         self._ticks = 0
         self.costs_ns: list[float] = []
-        self.run(WARM_UP)
+        self.run(_WARM_UP)
 
     def batch(self) -> None:
         began = time.perf_counter_ns()
-        self.run(BATCH)
-        self.costs_ns.append((time.perf_counter_ns() - began) / BATCH)
+        self.run(_BATCH)
+        self.costs_ns.append((time.perf_counter_ns() - began) / _BATCH)
 
     def run(self, ticks: int) -> None:
         _take(self._model, self._safety[0], self._sample[0], self._positions_m, self._ticks, ticks)

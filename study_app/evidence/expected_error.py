@@ -40,7 +40,7 @@ from study_app.haptics.model.scene import Effect, Everywhere, Scene
 from study_app.haptics.runtime.offline import samples_along
 from study_app.lab.identify.measured_force import vectors_x
 
-SETTLED: Final = 2 / 3
+_SETTLED: Final = 2 / 3
 """After this share of the strokes the flow no longer depends on their start."""
 
 
@@ -122,7 +122,7 @@ def _of_one(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, C
         against = f"the definition of {' and '.join(kept).replace('_', ' ') or 'nothing'}"
     if not true_n.any():
         return 0.0, 0.0, Causes(), against
-    truth = Truth(name="", source="", cases=(Case(motion, true_n, motion.t_s >= SETTLED * motion.t_s[-1]),))
+    truth = Truth(name="", source="", cases=(Case(motion, true_n, motion.t_s >= _SETTLED * motion.t_s[-1]),))
     steps_n = [true_n, *_forces(alone, motion, Dynamics(delay_ticks / alone.rate_hz, COUNT_M))]
     law, acceleration, velocity, limits = (
         error_of([true_n + after_n - before_n], truth).rms for before_n, after_n in itertools.pairwise(steps_n)

@@ -93,7 +93,7 @@ def lowered(velocity_mps: Floats, knee: Knee) -> Floats:
     return velocity_mps * (wanted / speed)
 
 
-WAKE_LIST = np.dtype(
+_WAKE_LIST = np.dtype(
     [
         ("length", np.int64),  # N
         ("scaling", np.float64),
@@ -112,7 +112,7 @@ WAKE_LIST = np.dtype(
     ],
     align=True,
 )
-ELEMENT = np.dtype(
+_ELEMENT = np.dtype(
     [
         ("velocity_mps", np.float64, (3,)),
         ("speed_mps", np.float64),  # 0: an element at rest
@@ -122,17 +122,17 @@ ELEMENT = np.dtype(
     ],
     align=True,
 )
-REST_MPS: Final = 1e-3
+_REST_MPS: Final = 1e-3
 
 
 def new_wake_list(wake: Wake, rate_hz: float) -> tuple[Any, Any]:
-    """Return the empty list of a wake: `WAKE_LIST` (1,) and its elements (N,) `ELEMENT`."""
-    made, length = records(WAKE_LIST, 1), max(1, math.floor(wake.length * rate_hz / 1000))
+    """Return the empty list of a wake: `_WAKE_LIST` (1,) and its elements (N,) `_ELEMENT`."""
+    made, length = records(_WAKE_LIST, 1), max(1, math.floor(wake.length * rate_hz / 1000))
     made.length, made.scaling = length, max(wake.scaling * rate_hz / 1000, length)
     made.exponent, made.resolution_m = wake.exponent, wake.resolution_m
     made.breaking_cosine = math.cos(math.radians(wake.breaking_angle_deg))
     made.breaking_span_m, made.log_decay_pns = wake.breaking_span_m, math.log(wake.decay) * 1e-6
-    return made, records(ELEMENT, length)
+    return made, records(_ELEMENT, length)
 
 
 def wakes(
@@ -160,7 +160,7 @@ def store_element(wake: Any, elements: Any, h_mps: Any, position_m: Any, interva
     speed_mps = norm(h_mps)
     wake.age_ns += interval_ns
     wake.arc_m += speed_mps * (interval_ns * 1e-9)
-    rests = speed_mps < REST_MPS
+    rests = speed_mps < _REST_MPS
     if not rests and wake.stored > 0 and distance(position_m, wake.stored_at_m) < wake.resolution_m:
         return
     if not rests and _breaks(wake, elements, h_mps, speed_mps):
@@ -291,8 +291,8 @@ def _gain(fill: float, exponent: float) -> float:
     return float(fill ** (exponent - 1.0) if exponent >= 1.0 else (fill**2 + 0.05**2) ** ((exponent - 1.0) / 2.0))
 
 
-RATES_PER_S: Final = np.array([0.0212334, 0.257773, 1.39978, 7.11516, 36.0112, 182.242, 927.902])
-WEIGHTS_RPS: Final = np.array([0.33973, 0.52101, 1.09144, 2.44114, 5.48942, 12.3529, 28.26937])
+_RATES_PER_S: Final = np.array([0.0212334, 0.257773, 1.39978, 7.11516, 36.0112, 182.242, 927.902])
+_WEIGHTS_RPS: Final = np.array([0.33973, 0.52101, 1.09144, 2.44114, 5.48942, 12.3529, 28.26937])
 
 
 class Constants(NamedTuple):
@@ -342,7 +342,7 @@ def late_mps(
     found = np.empty_like(w_mps)
     z, s = w_mps[0].copy(), w_mps[0].copy()
     y = (over_stokes(math.sqrt((z**2).sum()) * diameter_m / nu_m2ps) - 1) * z
-    m = np.zeros((len(RATES_PER_S), len(z)))
+    m = np.zeros((len(_RATES_PER_S), len(z)))
     for k in range(len(w_mps)):
         w, dw, dt = w_mps[k], acceleration_mps2[k], interval_s[k]
         z2, s2 = (z**2).sum(), (s**2).sum()
@@ -356,16 +356,16 @@ def late_mps(
         z = z - math.expm1(-of.c_z * u_mps / diameter_m * dt) * (w - z)
         s = s - math.expm1(-of.c_s * u_mps / diameter_m * dt) * (w - s)
         remembered = 2 * math.sqrt(dt) * dw
-        for i in range(len(RATES_PER_S)):
-            decay_per_s = RATES_PER_S[i] + of.c_m * u_mps / diameter_m
+        for i in range(len(_RATES_PER_S)):
+            decay_per_s = _RATES_PER_S[i] + of.c_m * u_mps / diameter_m
             gained_s = -math.expm1(-decay_per_s * dt) / decay_per_s
             m[i] = math.exp(-decay_per_s * dt) * m[i] + gained_s * dw
-            remembered = remembered + WEIGHTS_RPS[i] * (m[i] - gained_s * dw)
+            remembered = remembered + _WEIGHTS_RPS[i] * (m[i] - gained_s * dw)
         found[k] = y + diameter_m / (2 * math.sqrt(math.pi * nu_m2ps)) * remembered
     return found
 
 
-STEPS: Final = 50
+_STEPS: Final = 50
 """Of the elastic state, in a tick."""
 
 
@@ -408,8 +408,8 @@ def _strains(w_mps: Any, interval_s: Any, per_m: float, slack_m: float) -> Any:
     strains = np.zeros(w_mps.shape)
     strain, ahead_m = np.zeros(3), np.zeros(3)
     for k in range(len(w_mps)):
-        step_m = w_mps[k] * (interval_s[k] / STEPS)
-        for _ in range(STEPS):
+        step_m = w_mps[k] * (interval_s[k] / _STEPS)
+        for _ in range(_STEPS):
             ahead_m += step_m
             distance_m = math.sqrt(np.sum(ahead_m**2))
             slipped_m = max(distance_m - slack_m, 0.0)

@@ -35,11 +35,11 @@ def without_buoyancy(scene: Scene) -> Scene:
     return with_effects(scene, *(name for name in scene.liquids[0].effects if name != "buoyancy"))
 
 
-RADIUS_M: Final = 0.03
-TURNS: Final = 1.5
-STIRRING_S: Final = 3.0
-REST_S: Final = 1.0
-STRETCHES: Final = 3
+_RADIUS_M: Final = 0.03
+_TURNS: Final = 1.5
+_STIRRING_S: Final = 3.0
+_REST_S: Final = 1.0
+_STRETCHES: Final = 3
 
 
 def stir(scale: float, rate_hz: float) -> Motion:
@@ -48,14 +48,14 @@ def stir(scale: float, rate_hz: float) -> Motion:
     Each segment has minimum jerk (Flash & Hogan 1985) with a small vertical motion: up to 0.18 m/s at the hand. In the
     scene, it is ``scale`` times as large.
     """
-    each_s = STIRRING_S + REST_S
-    t_s = np.arange(round(STRETCHES * each_s * rate_hz) + 1) / rate_hz
-    stretch = np.minimum(np.floor(t_s / each_s + 1e-9), STRETCHES - 1)
-    phase = np.clip((t_s - stretch * each_s) / STIRRING_S, 0.0, 1.0)
+    each_s = _STIRRING_S + _REST_S
+    t_s = np.arange(round(_STRETCHES * each_s * rate_hz) + 1) / rate_hz
+    stretch = np.minimum(np.floor(t_s / each_s + 1e-9), _STRETCHES - 1)
+    phase = np.clip((t_s - stretch * each_s) / _STIRRING_S, 0.0, 1.0)
     forth = np.where(stretch % 2 == 0, 1.0, -1.0)
-    angle = 2 * math.pi * TURNS * (phase**3 * (10 - 15 * phase + 6 * phase**2) * forth + (forth < 0))
-    angular_per_s = 2 * math.pi * TURNS * forth * 30 * phase**2 * (1 - phase) ** 2 / STIRRING_S
-    radius_m = scale * RADIUS_M
+    angle = 2 * math.pi * _TURNS * (phase**3 * (10 - 15 * phase + 6 * phase**2) * forth + (forth < 0))
+    angular_per_s = 2 * math.pi * _TURNS * forth * 30 * phase**2 * (1 - phase) ** 2 / _STIRRING_S
+    radius_m = scale * _RADIUS_M
     position_m = radius_m * np.column_stack([np.cos(angle), 0.1 * np.cos(2 * angle), np.sin(angle)])
     along = radius_m * np.column_stack([-np.sin(angle), -0.2 * np.sin(2 * angle), np.cos(angle)])
     return Motion(t_s, position_m, velocity_mps=along * angular_per_s[:, np.newaxis])
@@ -112,11 +112,11 @@ Pennsylvania. Its lowest point (Re 0.0588, C_d 492) is left out: it is 20 % abov
 two are still 8 to 9 % above Oseen's law, and those around Re 1 to 2 some 4 to 7 % above the fluid solver: differences
 between laws of the Reynolds number that are as small cannot be separated from the scatter of the experiments."""
 
-OSEEN_REYNOLDS: Final = 0.5
-CREEPING_REYNOLDS: Final = 0.01
-START_S: Final = 2.0
-UNCOUNTED_S: Final = 0.01  # after a step the force of the added mass is infinite for an instant
-SPEEDS: Final = 60
+_OSEEN_REYNOLDS: Final = 0.5
+_CREEPING_REYNOLDS: Final = 0.01
+_START_S: Final = 2.0
+_UNCOUNTED_S: Final = 0.01  # after a step the force of the added mass is infinite for an instant
+_SPEEDS: Final = 60
 CYCLES: Final = 6
 
 
@@ -174,7 +174,7 @@ def steady(scene: Scene) -> Truth | None:
     liquid, diameter_m = scene.liquids[0], scene.body.diameter_m
     per_mps = liquid.density_kg_m3 * diameter_m / (liquid.viscosity_pa_s or math.nan)
     fastest_mps = scene.motion_in(liquid).speed_mps or 0.0
-    speeds = np.linspace(0, fastest_mps, SPEEDS + 1)[1:]
+    speeds = np.linspace(0, fastest_mps, _SPEEDS + 1)[1:]
     known = speeds[(speeds * per_mps >= DRAG_POINTS[0][0]) & (speeds * per_mps <= DRAG_POINTS[-1][0])]
     if len(known) == 0:
         return None
@@ -185,10 +185,10 @@ def steady(scene: Scene) -> Truth | None:
         motion = along_x(t_s, t_s * speed_mps, np.full(2, speed_mps))
         cases.append(Case(motion, vectors_x(np.full(2, -force_n)), np.array([False, True])))
     between = f"Re {known[0] * per_mps:.2g} to {known[-1] * per_mps:.2g}"
-    slow = [(reynolds, drag) for reynolds, drag in DRAG_POINTS if reynolds < OSEEN_REYNOLDS]
+    slow = [(reynolds, drag) for reynolds, drag in DRAG_POINTS if reynolds < _OSEEN_REYNOLDS]
     above = max(drag * reynolds / 24 / (1 + 3 / 16 * reynolds) - 1 for reynolds, drag in slow)  # C_d of Oseen 1910
     scatter = f", which lie up to {100 * above:.0f} % above Oseen's law of slow flow"
-    low = scatter if known[0] * per_mps < OSEEN_REYNOLDS else ""
+    low = scatter if known[0] * per_mps < _OSEEN_REYNOLDS else ""
     return Truth(name="steady drag", source=f"experiments with spheres, {between}{low}", cases=tuple(cases))
 
 
@@ -220,7 +220,7 @@ def start(scene: Scene) -> Truth:
     """
     liquid, radius_m = scene.liquids[0], scene.body.diameter_m / 2
     tick_s, speed_mps = 1 / scene.rate_hz, creeping_mps(scene)
-    t_s = np.arange(round(START_S * scene.rate_hz) + 1) * tick_s
+    t_s = np.arange(round(_START_S * scene.rate_hz) + 1) * tick_s
     mu = liquid.viscosity_pa_s or math.nan
     velocity_mps = np.where(t_s > 0, speed_mps, 0.0)
     spread = 2 * (np.sqrt(t_s) - np.sqrt(np.maximum(t_s - tick_s, 0.0))) / tick_s
@@ -228,13 +228,13 @@ def start(scene: Scene) -> Truth:
     force_n = -6 * math.pi * mu * radius_m * speed_mps * (1 + history)
     motion = along_x(t_s, speed_mps * np.maximum(t_s - tick_s / 2, 0.0), velocity_mps)
     source = "exact for creeping flow (Basset 1888), from 10 ms after the start on"
-    return Truth(name="start", source=source, cases=(Case(motion, vectors_x(force_n), t_s >= UNCOUNTED_S),))
+    return Truth(name="start", source=source, cases=(Case(motion, vectors_x(force_n), t_s >= _UNCOUNTED_S),))
 
 
 def creeping_mps(scene: Scene) -> float:
     """Return a speed [m/s] of creeping flow: Re = 0.01."""
     liquid = scene.liquids[0]
-    return CREEPING_REYNOLDS * (liquid.viscosity_pa_s or math.nan) / (liquid.density_kg_m3 * scene.body.diameter_m)
+    return _CREEPING_REYNOLDS * (liquid.viscosity_pa_s or math.nan) / (liquid.density_kg_m3 * scene.body.diameter_m)
 
 
 def strokes_per_s(scene: Scene) -> float:

@@ -17,8 +17,8 @@ from study_app.store.output_files import write_files
 
 TURN_S: Final = 0.25
 """How long a loop runs until it is another's turn."""
-LEAST_S: Final = 0.5
-MOST_S: Final = 3600.0
+_LEAST_S: Final = 0.5
+_MOST_S: Final = 3600.0
 
 Arm = TypeVar("Arm")
 Found = TypeVar("Found")
@@ -120,8 +120,8 @@ def check_seconds(seconds: float, what: str) -> None:
     StudyError
         It is.
     """
-    if not LEAST_S <= seconds <= MOST_S:
-        raise StudyError(f"{what} for {LEAST_S:g} to {MOST_S:g} s, not {seconds:g}")
+    if not _LEAST_S <= seconds <= _MOST_S:
+        raise StudyError(f"{what} for {_LEAST_S:g} to {_MOST_S:g} s, not {seconds:g}")
 
 
 def take_turns(

@@ -26,15 +26,15 @@ from study_app.haptics.runtime.offline import Table, simulate
 from study_app.store.atomic import make_folder
 from study_app.store.output_files import write_files
 
-RATE_HZ: Final = 1000.0
+_RATE_HZ: Final = 1000.0
 LENGTH: Final = 5000
-RESOLUTIONS_M: Final = (0.0, 1.5e-3, 3.5e-3)
+_RESOLUTIONS_M: Final = (0.0, 1.5e-3, 3.5e-3)
 """Of Fig. 7: at 1 m/s every tick, every second and every fourth one leaves an element."""
 EXPONENTS: Final = (0.25, 0.5, 1.0, 2.0, 4.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class _Run:
     """One motion through one liquid; ``label`` names it in its figure."""
 
     label: str
@@ -54,7 +54,7 @@ class ThesisFigure:
     number: int
     title: str
     caption: str
-    runs: tuple[Run, ...]
+    runs: tuple[_Run, ...]
     events: tuple[tuple[float, str], ...] = ()
 
     @property
@@ -69,53 +69,53 @@ def tank(**wake: Any) -> Scene:
 
 
 def _scene(liquid: Liquid) -> Scene:
-    return Scene(rate_hz=RATE_HZ, velocity=Given(), liquids=(liquid,))
+    return Scene(rate_hz=_RATE_HZ, velocity=Given(), liquids=(liquid,))
 
 
 def figure_3() -> ThesisFigure:
     """Return Fig. 3: three circles with drag alone."""
-    motion = paths.circle(RATE_HZ)
+    motion = paths.circle(_RATE_HZ)
     return ThesisFigure(
         3,
         "Three circles, drag alone",
         "The body performs three circles at constant speed and stops. With drag alone the force keeps its size, always "
         "opposes the motion, and is zero on the tick after the stop.",
-        (Run("drag", _scene(Liquid(id="liquid", density_kg_m3=1000)), motion),),
+        (_Run("drag", _scene(Liquid(id="liquid", density_kg_m3=1000)), motion),),
         ((_stop_s(motion), "stop"),),
     )
 
 
 def figure_4() -> ThesisFigure:
     """Return Fig. 4: three circles with the wake."""
-    motion = paths.circle(RATE_HZ)
+    motion = paths.circle(_RATE_HZ)
     return ThesisFigure(
         4,
         "Three circles, drag and wake",
         "The same motion with the wake. The liquid takes up the motion: the speed relative to it falls linearly while "
         "the tail fills, and the force as its square. After the stop the liquid pushes on along the former motion, a "
         "little weaker than the drag at first, and falls to zero as the tail empties.",
-        (Run("drag and wake", tank(), motion),),
+        (_Run("drag and wake", tank(), motion),),
         ((_stop_s(motion), "stop"),),
     )
 
 
 def figure_5() -> ThesisFigure:
     """Return Fig. 5: three circles, then against the flow."""
-    motion = paths.reverse(RATE_HZ)
-    turn_s = _stop_s(paths.circle(RATE_HZ))
+    motion = paths.reverse(_RATE_HZ)
+    turn_s = _stop_s(paths.circle(_RATE_HZ))
     return ThesisFigure(
         5,
         "Three circles, then 2 s against the flow",
         "After the circles the body turns back against the whirlpool it has made: the force jumps far above the plain "
         "drag, then falls as the tail takes up the new direction, and falls again after the stop.",
-        (Run("drag and wake", tank(), motion),),
+        (_Run("drag and wake", tank(), motion),),
         ((turn_s, "turn back"), (_stop_s(motion), "stop")),
     )
 
 
-def figure_6() -> ThesisFigure:
+def _figure_6() -> ThesisFigure:
     """Return Fig. 6: steps that alternate by 90°, with two breaking angles."""
-    motion = paths.zigzag(RATE_HZ)
+    motion = paths.zigzag(_RATE_HZ)
     return ThesisFigure(
         6,
         "Steps alternating by 90°",
@@ -123,37 +123,37 @@ def figure_6() -> ThesisFigure:
         "new segment, the directions partly cancel, and the wake stays limited. With 100° the whole path is "
         "one segment that always follows the newest direction, one tick late at each turn, and the force falls toward "
         "zero.",
-        tuple(Run(f"breaking angle {angle}°", tank(breaking_angle_deg=angle), motion) for angle in (45, 100)),
+        tuple(_Run(f"breaking angle {angle}°", tank(breaking_angle_deg=angle), motion) for angle in (45, 100)),
     )
 
 
-def figure_7() -> ThesisFigure:
+def _figure_7() -> ThesisFigure:
     """Return Fig. 7: a straight line at three resolutions of the tail."""
-    motion = paths.line(RATE_HZ, moving_s=12.0)
+    motion = paths.line(_RATE_HZ, moving_s=12.0)
     labels = ("every tick", "1.5 mm", "3.5 mm")
     return ThesisFigure(
         7,
         "A straight line at three resolutions of the tail",
         "The body moves straight at constant speed. A coarser resolution stores fewer elements (here every second, "
         "every fourth tick), so the tail fills more slowly and the force falls later.",
-        tuple(Run(label, tank(resolution_m=step), motion) for label, step in zip(labels, RESOLUTIONS_M, strict=True)),
+        tuple(_Run(label, tank(resolution_m=step), motion) for label, step in zip(labels, _RESOLUTIONS_M, strict=True)),
     )
 
 
 def figure_8() -> ThesisFigure:
     """Return Fig. 8: a straight line with five responses of the wake."""
-    motion = paths.line(RATE_HZ, moving_s=8.0)
+    motion = paths.line(_RATE_HZ, moving_s=8.0)
     return ThesisFigure(
         8,
         "A straight line with five responses of the wake",
         "The body moves straight at constant speed. The wake builds up as the share of the tail that is filled, "
         "to the power y: y below 1 gives way at once, y = 4 keeps the full drag for long and gives way near the end. "
         "The decay of the elements leaves all of them a little below the speed of the body.",
-        tuple(Run(f"y = {exponent:g}", tank(exponent=exponent), motion) for exponent in EXPONENTS),
+        tuple(_Run(f"y = {exponent:g}", tank(exponent=exponent), motion) for exponent in EXPONENTS),
     )
 
 
-FIGURES: Final[tuple[Callable[[], ThesisFigure], ...]] = (figure_3, figure_4, figure_5, figure_6, figure_7, figure_8)
+FIGURES: Final[tuple[Callable[[], ThesisFigure], ...]] = (figure_3, figure_4, figure_5, _figure_6, _figure_7, figure_8)
 
 
 def _stop_s(motion: Motion) -> float:
@@ -162,16 +162,16 @@ def _stop_s(motion: Motion) -> float:
     return float(motion.t_s[int(np.argmax(rests))])
 
 
-PLOT_PT: Final = 128.0
-TOP_PT: Final = 46.0
-FOOT_PT: Final = 32.0
-LINE_PT: Final = 11.0
-SIDE_PT: Final = 30.0
-RIGHT_PT: Final = 16.0
-GAP_PT: Final = 40.0
-HEADING_PT: Final = 14.0
-CAPTION_LETTERS: Final = 118
-ARROW_S: Final = 2.75
+_PLOT_PT: Final = 128.0
+_TOP_PT: Final = 46.0
+_FOOT_PT: Final = 32.0
+_LINE_PT: Final = 11.0
+_SIDE_PT: Final = 30.0
+_RIGHT_PT: Final = 16.0
+_GAP_PT: Final = 40.0
+_HEADING_PT: Final = 14.0
+_CAPTION_LETTERS: Final = 118
+_ARROW_S: Final = 2.75
 _COMPONENTS: Final = {"x": ("fx_n", "right"), "y": ("fy_n", "up"), "z": ("fz_n", "toward you")}
 
 
@@ -200,22 +200,22 @@ def figures(to: Path) -> tuple[Path, ...]:
 @style.own_settings(style.PLOT_SETTINGS)
 def draw(shown: ThesisFigure) -> Figure:
     """Draw one figure: title, force over time, what explains it (the path, or the liquid's speed), caption."""
-    caption = textwrap.wrap(shown.caption, CAPTION_LETTERS)
-    height_pt = TOP_PT + PLOT_PT + FOOT_PT + LINE_PT * len(caption)
+    caption = textwrap.wrap(shown.caption, _CAPTION_LETTERS)
+    height_pt = _TOP_PT + _PLOT_PT + _FOOT_PT + _LINE_PT * len(caption)
     figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, height_pt / 72), facecolor="white")
 
     def write(left_pt: float, down_pt: float, text: str, **look: Any) -> None:
         figure.text(left_pt / style.PAGE_WIDTH_PT, 1 - down_pt / height_pt, text, va="top", **look)
 
     def place(left_pt: float, width_pt: float) -> Axes:
-        bottom = 1 - (TOP_PT + PLOT_PT) / height_pt
+        bottom = 1 - (_TOP_PT + _PLOT_PT) / height_pt
         return figure.add_axes(
-            (left_pt / style.PAGE_WIDTH_PT, bottom, width_pt / style.PAGE_WIDTH_PT, PLOT_PT / height_pt)
+            (left_pt / style.PAGE_WIDTH_PT, bottom, width_pt / style.PAGE_WIDTH_PT, _PLOT_PT / height_pt)
         )
 
-    write(SIDE_PT, 6, f"Fig. {shown.number}", fontsize=9, fontweight="bold")
-    write(SIDE_PT + 38, 6, shown.title, fontsize=9)
-    write(SIDE_PT, TOP_PT + PLOT_PT + FOOT_PT - 6, "\n".join(caption), color=style.TEXT_SOFT, linespacing=1.25)
+    write(_SIDE_PT, 6, f"Fig. {shown.number}", fontsize=9, fontweight="bold")
+    write(_SIDE_PT + 38, 6, shown.title, fontsize=9)
+    write(_SIDE_PT, _TOP_PT + _PLOT_PT + _FOOT_PT - 6, "\n".join(caption), color=style.TEXT_SOFT, linespacing=1.25)
     if len(shown.runs) > 2:
         _compare(place, shown)
     else:
@@ -225,22 +225,22 @@ def draw(shown: ThesisFigure) -> Figure:
 
 def _take_apart(place: Callable[[float, float], Axes], shown: ThesisFigure) -> None:
     """Draw the axes of each run's force in a plot of its own, and their path."""
-    path_pt = PLOT_PT
-    width_pt = (style.PAGE_WIDTH_PT - SIDE_PT - path_pt - RIGHT_PT) / len(shown.runs) - GAP_PT
+    path_pt = _PLOT_PT
+    width_pt = (style.PAGE_WIDTH_PT - _SIDE_PT - path_pt - _RIGHT_PT) / len(shown.runs) - _GAP_PT
     plots = []
     for number, run in enumerate(shown.runs):
-        plots.append(place(SIDE_PT + number * (width_pt + GAP_PT), width_pt))
+        plots.append(place(_SIDE_PT + number * (width_pt + _GAP_PT), width_pt))
         _components(plots[-1], run, shown.events, several=len(shown.runs) > 1)
     limits = np.array([plot.get_ylim() for plot in plots])
     for plot in plots:
         plot.set_ylim(limits[:, 0].min() * 1.08, limits[:, 1].max() * 1.08)
-    _path(place(style.PAGE_WIDTH_PT - RIGHT_PT - path_pt, path_pt), shown.runs[0])
+    _path(place(style.PAGE_WIDTH_PT - _RIGHT_PT - path_pt, path_pt), shown.runs[0])
 
 
 def _compare(place: Callable[[float, float], Axes], shown: ThesisFigure) -> None:
     """Draw the force of all runs along the straight motion, and how much of its speed the liquid takes up."""
-    width_pt = (style.PAGE_WIDTH_PT - SIDE_PT - GAP_PT - RIGHT_PT) / 2
-    force, liquid = place(SIDE_PT, width_pt), place(SIDE_PT + width_pt + GAP_PT, width_pt)
+    width_pt = (style.PAGE_WIDTH_PT - _SIDE_PT - _GAP_PT - _RIGHT_PT) / 2
+    force, liquid = place(_SIDE_PT, width_pt), place(_SIDE_PT + width_pt + _GAP_PT, width_pt)
     colours = style.STEPS if len(shown.runs) == len(style.STEPS) else style.STEPS[::2]
     for run, colour in zip(shown.runs, colours, strict=True):
         table = run.table
@@ -249,7 +249,7 @@ def _compare(place: Callable[[float, float], Axes], shown: ThesisFigure) -> None
     headings = ("Force along x [N]; along y and z it is zero", "Speed of the liquid over that of the body")
     for axes, heading in zip((force, liquid), headings, strict=True):
         _time_axis(axes, float(shown.runs[0].table.t_s[-1]))
-        axes.set_title(heading, pad=HEADING_PT)
+        axes.set_title(heading, pad=_HEADING_PT)
         _name_curves(axes, shorter=len(shown.runs) > 3)
 
 
@@ -279,11 +279,11 @@ def _name_curves(axes: Axes, *, shorter: bool = False) -> None:
     )
 
 
-def _components(axes: Axes, run: Run, events: Sequence[tuple[float, str]], *, several: bool) -> None:
+def _components(axes: Axes, run: _Run, events: Sequence[tuple[float, str]], *, several: bool) -> None:
     """Draw the force of one run, a line per axis."""
     table = run.table
     _time_axis(axes, float(table.t_s[-1]))
-    axes.set_title(f"Force [N], {run.label}" if several else "Force [N]", pad=HEADING_PT)
+    axes.set_title(f"Force [N], {run.label}" if several else "Force [N]", pad=_HEADING_PT)
     for name, (column, meaning) in _COMPONENTS.items():
         label = name if several else f"{name} ({meaning})"
         axes.plot(table.t_s, table[column], **style.AXES[name], label=label)
@@ -294,14 +294,14 @@ def _components(axes: Axes, run: Run, events: Sequence[tuple[float, str]], *, se
         axes.annotate(word, (time_s, 0), xytext=(3, 3), color=style.TEXT_SOFT, **at_foot)
 
 
-def _path(axes: Axes, run: Run) -> None:
+def _path(axes: Axes, run: _Run) -> None:
     colour = style.TEXT_SOFT
     x_m, z_m = run.motion.position_m[:, 0], run.motion.position_m[:, 2]
-    axes.set_title("Path from above [m]", pad=HEADING_PT)
+    axes.set_title("Path from above [m]", pad=_HEADING_PT)
     axes.plot(x_m, z_m, color=colour, linewidth=1.1)
     axes.plot(x_m[0], z_m[0], "o", color=style.TEXT, markersize=4)
     axes.annotate("start", (x_m[0], z_m[0]), xytext=(5, 0), textcoords="offset points", va="center", color=colour)
-    at = int(np.searchsorted(run.motion.t_s, ARROW_S))
+    at = int(np.searchsorted(run.motion.t_s, _ARROW_S))
     arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.1, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", (x_m[at + 40], z_m[at + 40]), (x_m[at], z_m[at]), arrowprops=arrow)
     axes.set_aspect("equal", adjustable="datalim")

@@ -13,7 +13,7 @@ from study_app.gui.key_presses import key_presses
 from study_app.gui.theme.icons import logo
 from study_app.gui.theme.theme import LIGHT
 
-SWITCH_INTERVAL_S = 0.0005
+_SWITCH_INTERVAL_S = 0.0005
 """How long another thread keeps Python's lock from the windows' thread, which takes it again after each call of Qt."""
 
 
@@ -32,7 +32,7 @@ def application_here() -> QApplication:
     application.setWindowIcon(logo(32, LIGHT.accent, LIGHT.on_accent))
     application.setQuitOnLastWindowClosed(False)
     key_presses()
-    sys.setswitchinterval(SWITCH_INTERVAL_S)
+    sys.setswitchinterval(_SWITCH_INTERVAL_S)
     return application
 
 

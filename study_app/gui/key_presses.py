@@ -14,14 +14,14 @@ from PySide6.QtWidgets import QWidget
 
 RELEASE_MS: Final = 30  # a release is real unless a press with its time stamp follows within this time
 CLICK_MS: Final = 250  # a page ignores clicks for so long after it appeared
-MOVING: Final = frozenset({
+_MOVING: Final = frozenset({
     Qt.Key.Key_Left, Qt.Key.Key_Right, Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown,
     Qt.Key.Key_Backspace, Qt.Key.Key_Delete,
 })  # fmt: skip
-ONCE: Final = frozenset({Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape, Qt.Key.Key_Tab, Qt.Key.Key_Backtab})
+_ONCE: Final = frozenset({Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape, Qt.Key.Key_Tab, Qt.Key.Key_Backtab})
 """Keys that are pressed once in text fields as well."""
-SHIELD: Final = Qt.WidgetAttribute.WA_TransparentForMouseEvents
-SHIFTING: Final = (
+_SHIELD: Final = Qt.WidgetAttribute.WA_TransparentForMouseEvents
+_SHIFTING: Final = (
     Qt.KeyboardModifier.ShiftModifier
     | Qt.KeyboardModifier.ControlModifier
     | Qt.KeyboardModifier.AltModifier
@@ -59,9 +59,9 @@ class KeyPresses(QObject):
     def begin_page(self, page: QWidget) -> None:
         """Ignore keys held and clicks made before ``page`` appeared; clicks for 250 ms."""
         self._receivers.clear()
-        page.setAttribute(SHIELD)
+        page.setAttribute(_SHIELD)
         unshield = QTimer(page, singleShot=True, interval=CLICK_MS)
-        unshield.timeout.connect(lambda: page.setAttribute(SHIELD, False))
+        unshield.timeout.connect(lambda: page.setAttribute(_SHIELD, False))
         unshield.timeout.connect(unshield.deleteLater)
         QTimer.singleShot(0, unshield, unshield.start)  # once the page is painted
 
@@ -106,7 +106,7 @@ class KeyPresses(QObject):
         receiver = QGuiApplication.focusObject()
         if receiver is None or self._receivers.get(key) is not receiver:
             return
-        if event.key() in MOVING or (event.key() not in ONCE and _takes_text(receiver)):
+        if event.key() in _MOVING or (event.key() not in _ONCE and _takes_text(receiver)):
             self._send_event(window, _marked_repeat(event))
 
     def _hold_back(self, event: QKeyEvent) -> bool:
@@ -151,7 +151,7 @@ def key_presses() -> KeyPresses:
 
 def ignores_clicks(page: QWidget) -> bool:
     """Return whether ``page`` is so new that a click was meant for the previous page."""
-    return page.testAttribute(SHIELD)
+    return page.testAttribute(_SHIELD)
 
 
 def digit_of(event: QKeyEvent) -> int | None:
@@ -160,7 +160,7 @@ def digit_of(event: QKeyEvent) -> int | None:
         return event.key() - Qt.Key.Key_0
     first = 2 if QGuiApplication.platformName() == "windows" else 10  # scan code of the key 1: PC, X11 and Wayland
     place = event.nativeScanCode() - first
-    return (place + 1) % 10 if 0 <= place < 10 and not event.modifiers() & SHIFTING else None
+    return (place + 1) % 10 if 0 <= place < 10 and not event.modifiers() & _SHIFTING else None
 
 
 def _physical_key(event: QKeyEvent) -> int:

@@ -21,7 +21,7 @@ Floats: TypeAlias = NDArray[np.float64]
 
 Side: TypeAlias = Literal["A", "B"]
 
-MOST_STEPS: Final = 500
+_MOST_STEPS: Final = 500
 _SWITCHES_BY_CHANCE: Final = 0.5
 
 
@@ -164,7 +164,7 @@ class Workbench:
         self, side: Side, setting: Setting, *, held: tuple[Side, str] | None = None, goes_on: bool = False
     ) -> Workbench:
         """Return a copy with another setting on a side, as an edit that can be undone."""
-        past = self.past if goes_on else (*self.past, (self.a, self.b))[-MOST_STEPS:]
+        past = self.past if goes_on else (*self.past, (self.a, self.b))[-_MOST_STEPS:]
         a, b = (setting, self.b) if side == "A" else (self.a, setting)
         return replace(self, a=a, b=b, past=past, future=(), held=held)
 

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from study_app.haptics.model.motion import Motion
 
 
-SPAN_NS: Final = 10_000_000_000
-NOW_NS: Final = 150_000_000
+_SPAN_NS: Final = 10_000_000_000
+_NOW_NS: Final = 150_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class LimiterCounts:
             return
         newest_ns = int(samples.time_ns[-1])
         self._batches.append((newest_ns, np.array([np.count_nonzero(samples.limiters & it.bit) for it in LIMITERS])))
-        while self._batches[0][0] <= newest_ns - SPAN_NS:
+        while self._batches[0][0] <= newest_ns - _SPAN_NS:
             self._batches.popleft()
 
     def rows(self, force_limit_n: float, slew_n: float) -> tuple[LimiterCount, ...]:
@@ -62,7 +62,7 @@ class LimiterCounts:
         newest_ns = self._batches[-1][0] if self._batches else 0
         nothing = np.zeros(len(LIMITERS), np.int64)
         counts = sum((batch for _, batch in self._batches), nothing)
-        acting = sum((batch for when, batch in self._batches if when > newest_ns - NOW_NS), nothing)
+        acting = sum((batch for when, batch in self._batches if when > newest_ns - _NOW_NS), nothing)
         limits = {LIMITER_SLEW: f", {slew_n:g} N per tick", LIMITER_NORM: f", {force_limit_n:g} N"}
         return tuple(
             LimiterCount(limiter.label + limits.get(limiter.bit, ""), int(ticks), bool(now))
@@ -70,12 +70,12 @@ class LimiterCounts:
         )
 
 
-Vector = tuple[float, float, float]
+_Vector = tuple[float, float, float]
 
-WORKSPACE_M: Final[Vector] = (0.1, 0.06, 0.06)
-FORCE_LIMIT_N: Final = 8.0
-ELEMENTS: Final = 100_000  # greatest length of a wake
-SPACING_NS: Final = 50_000_000  # duration of a fade: with faster changes by a slider no scene would reach the hand
+WORKSPACE_M: Final[_Vector] = (0.1, 0.06, 0.06)
+_FORCE_LIMIT_N: Final = 8.0
+_ELEMENTS: Final = 100_000  # greatest length of a wake
+_SPACING_NS: Final = 50_000_000  # duration of a fade: with faster changes by a slider no scene would reach the hand
 _LONGEST_GAP_NS: Final = 200_000_000
 
 
@@ -86,9 +86,9 @@ class Reading:
     ``fault`` is why the servo stopped itself, in a sentence; empty while it runs.
     """
 
-    position_m: Vector
-    force_n: Vector
-    wake_mps: Vector
+    position_m: _Vector
+    force_n: _Vector
+    wake_mps: _Vector
     force_on: bool
     fault: str
 
@@ -150,7 +150,7 @@ class Live:
         """Time until `poll` may load a waiting scene; None if none waits."""
         if self._due is None or self._loaded_ns is None:
             return None
-        return max(self._loaded_ns + SPACING_NS - self.servo.now_ns(), 0) * 1e-9
+        return max(self._loaded_ns + _SPACING_NS - self.servo.now_ns(), 0) * 1e-9
 
     def poll(self) -> None:
         """Process new telemetry, load a waiting scene, and restart a path that has ended.
@@ -263,7 +263,7 @@ class Live:
 
     def _load_what_is_due(self) -> None:
         now_ns = self.servo.now_ns()
-        if self._due is None or (self._loaded_ns is not None and now_ns < self._loaded_ns + SPACING_NS):
+        if self._due is None or (self._loaded_ns is not None and now_ns < self._loaded_ns + _SPACING_NS):
             return
         bench, self._due = self._due, None
         self._loaded_ns = now_ns
@@ -298,7 +298,7 @@ class _Ghost:
     """A path without a hand: samples as a servo would produce them, for a separate shadow."""
 
     def __init__(self, motion: Motion, rate_hz: float, limit_n: float, now_ns: int) -> None:
-        self.shadow = Shadow(Scene(rate_hz=rate_hz), ELEMENTS, limit_n, alone=True)
+        self.shadow = Shadow(Scene(rate_hz=rate_hz), _ELEMENTS, limit_n, alone=True)
         self._motion = lead_to_path(motion, motion.position_m[-1])
         self._period_ns = round(1e9 / rate_hz)
         self._started_ns = self._next_ns = now_ns
@@ -346,8 +346,8 @@ def open_live(
     taken = {option.name for option in descriptor_of(name).options}
     settings = RigSettings(
         workspace_m=WORKSPACE_M,
-        force_limit_n=FORCE_LIMIT_N,
-        elements=ELEMENTS,
+        force_limit_n=_FORCE_LIMIT_N,
+        elements=_ELEMENTS,
         random=stream(1, "lab/tremor"),
         options={option: value for option, value in (options or {}).items() if option in taken},
     )
@@ -361,6 +361,6 @@ def open_live(
     return live
 
 
-def _vector(values: Any) -> Vector:
+def _vector(values: Any) -> _Vector:
     x, y, z = values
     return float(x), float(y), float(z)

@@ -27,7 +27,7 @@ from study_app.haptics.model.overrides import override_all
 from study_app.haptics.model.scene import Given, Liquid, Scene
 from study_app.protocol.quantities import QUANTITIES
 
-AXES: Final = ("x", "y", "z")
+_AXES: Final = ("x", "y", "z")
 OFF, ON, AUTO = "off", "on", "auto"
 
 
@@ -108,7 +108,7 @@ def value_of(scene: Scene, name: str) -> Value:
         if not field:
             return AUTO if liquid.effects == "auto" else ON
         return ON if field in resolve(scene).liquids[0].effects else OFF
-    value = read_value(resolve(scene) if place in NAMED and NAMED[place].choose is not None else scene, name)
+    value = _read_value(resolve(scene) if place in NAMED and NAMED[place].choose is not None else scene, name)
     if value is None and place in NAMED and field in NAMED[place].open_values:
         return NAMED[place].open_values[field](scene)
     if value is None and place == "motion":
@@ -116,13 +116,13 @@ def value_of(scene: Scene, name: str) -> Value:
     return value if value is None or isinstance(value, str) else float(value)
 
 
-def read_value(scene: Scene, name: str) -> Any:
+def _read_value(scene: Scene, name: str) -> Any:
     """Return the value of ``table.field`` or of its component in a scene; None if unset."""
     liquid = the_liquid(scene)
     place, field, *axis = name.split(".")
     table = {"liquid": liquid, "scene": scene}.get(place) or getattr(liquid, place, None) or getattr(scene, place, None)
     value = getattr(table, field, None)
-    return value[AXES.index(axis[0])] if axis and value is not None else value
+    return value[_AXES.index(axis[0])] if axis and value is not None else value
 
 
 def the_liquid(scene: Scene) -> Liquid:
@@ -147,7 +147,7 @@ def _names(scene: Scene, place: str) -> tuple[str, ...]:
     for field in type(table).model_fields:
         name = f"{place}.{field}"
         if isinstance(getattr(table, field), tuple):
-            names += [f"{name}.{axis}" for axis in AXES]
+            names += [f"{name}.{axis}" for axis in _AXES]
         elif name in _ROWS:
             follows = place in NAMED and field in NAMED[place].open_values
             if getattr(table, field) is not None or follows or _ROWS[name].default is not None:
@@ -175,7 +175,7 @@ def _parameter(scene: Scene, name: str) -> Parameter:
     if row.choices:
         return dataclasses.replace(row, default=default)
     if axis:
-        default = default[AXES.index(axis[0])] if isinstance(default, tuple) else None
+        default = default[_AXES.index(axis[0])] if isinstance(default, tuple) else None
         row = dataclasses.replace(row, name=name, label=f"{row.label} {axis[0]}")
     value = value_of(scene, name)
     default = value if default is None else default
@@ -237,16 +237,16 @@ def with_parameter(scene: Scene, name: str, value: Value) -> Scene:
         return _with_effect(scene, name.partition(".")[2], on=value == ON)
     place, field, *axis = name.split(".")
     if axis:
-        whole = list(read_value(scene, f"{place}.{field}"))
-        whole[AXES.index(axis[0])] = value
+        whole = list(_read_value(scene, f"{place}.{field}"))
+        whole[_AXES.index(axis[0])] = value
         return override_all(scene, {f"{place}.{field}": tuple(whole)})
     chosen = place in NAMED and NAMED[place].choose is not None
     by_hand = _chosen_by_gate(scene) if chosen else {}  # the gate would choose another law
     if field in _KINDS and (place == "region" or place in NAMED):
-        if value == read_value(scene, name):
+        if value == _read_value(scene, name):
             return scene
         return override_all(scene, by_hand | {f"liquid.{place}": _initial_table(scene, place, str(value))})
-    if read_value(scene, name) is None and value == value_of(scene, name):  # an unset value, unchanged
+    if _read_value(scene, name) is None and value == value_of(scene, name):  # an unset value, unchanged
         return scene
     taken = resolve(scene).liquids[0].effects
     replaced = (it.name for it in EFFECTS if place == "liquid" and field in it.replaces and it.name not in taken)

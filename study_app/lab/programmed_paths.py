@@ -8,7 +8,7 @@ from study_app.errors import StudyError
 from study_app.haptics.model.motion import RADIUS_M, Motion, programmed_motion
 from study_app.haptics.model.scene import Scene
 
-Vector = tuple[float, float, float]
+_Vector = tuple[float, float, float]
 
 TITLES: Final = {
     "circle": "Three circles, then a stop",
@@ -19,15 +19,15 @@ TITLES: Final = {
     "reach": "Back-and-forth reaches",
 }
 REACHED: Final = 0.85  # share of the workspace that a path may fill
-APPROACH_MPS: Final = 0.08
-SHORTEST_APPROACH_S: Final = 0.5
+_APPROACH_MPS: Final = 0.08
+_SHORTEST_APPROACH_S: Final = 0.5
 _REST_S: Final = 2.0
 _LEGS: Final = 5
 _RATE_HZ: Final = 1000.0
 _HALF_TURN: Final = 0.7071  # angle of a leg to either side of the path
 
 
-def programmed_path(name: str, scene: Scene, half_m: Vector) -> Motion:
+def programmed_path(name: str, scene: Scene, half_m: _Vector) -> Motion:
     """Return a path in the hand frame, about the middle of a workspace of these half extents [m].
 
     Its speed is that of the figures in the scene, 1 m/s; its size is theirs, reduced to fit.
@@ -60,7 +60,7 @@ def programmed_path(name: str, scene: Scene, half_m: Vector) -> Motion:
 def lead_to_path(motion: Motion, from_m: Any) -> Motion:
     """Return a motion that begins at the hand, (3,) [m], with a smooth path to its first place."""
     way_m = motion.position_m[0] - np.asarray(from_m, np.float64)
-    lasts_s = max(float(np.linalg.norm(way_m)) / APPROACH_MPS, SHORTEST_APPROACH_S)
+    lasts_s = max(float(np.linalg.norm(way_m)) / _APPROACH_MPS, _SHORTEST_APPROACH_S)
     t_s = np.arange(round(lasts_s * _RATE_HZ)) / _RATE_HZ
     share = (t_s / lasts_s)[:, np.newaxis]
     eased = share**3 * (10 - 15 * share + 6 * share**2)

@@ -24,7 +24,7 @@ from study_app.lab.ab_comparison import Side, other_side
 
 Floats: TypeAlias = NDArray[np.float64]
 
-MOST_POINTS: Final = 400
+_MOST_POINTS: Final = 400
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -44,7 +44,7 @@ class Tail:
     segments: int
 
 
-def tail_of(trail: Any, places: Any, elements: int) -> Tail:
+def _tail_of(trail: Any, places: Any, elements: int) -> Tail:
     """Return the tail of a trail (``haptics.runtime.offline``) of at most ``elements`` elements."""
     left, held = int(trail.left), int(trail.held)
     numbers = np.arange(left - held, left)
@@ -68,16 +68,16 @@ def tail_of(trail: Any, places: Any, elements: int) -> Tail:
 def _rows_to_draw(breaks: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Return the rows to draw: evenly spaced ones, the newest, and starts of segments if they fit."""
     count = len(breaks)
-    if count <= MOST_POINTS:
+    if count <= _MOST_POINTS:
         return np.arange(count)
     begins = np.flatnonzero(breaks)
-    if len(begins) > MOST_POINTS // 2:
-        begins = begins[-(MOST_POINTS // 2) :]
-    even = np.linspace(0, count - 1, MOST_POINTS - len(begins)).round().astype(np.int64)
+    if len(begins) > _MOST_POINTS // 2:
+        begins = begins[-(_MOST_POINTS // 2) :]
+    even = np.linspace(0, count - 1, _MOST_POINTS - len(begins)).round().astype(np.int64)
     return np.unique(np.concatenate([begins, even]))
 
 
-SPAN_S: Final = 2.5
+_SPAN_S: Final = 2.5
 _SIDES: Final[tuple[Side, Side]] = ("A", "B")
 
 _ROW: Final = np.dtype(
@@ -243,7 +243,7 @@ class _Half:
         wake = (
             liquid.wake if "wake" in liquid.effects else liquid.local_wake if "local_wake" in liquid.effects else None
         )
-        return None if wake is None else tail_of(self._trail[0], self._places, scaled_length(wake, scene.rate_hz))
+        return None if wake is None else _tail_of(self._trail[0], self._places, scaled_length(wake, scene.rate_hz))
 
 
 class _Recent:
@@ -260,7 +260,7 @@ class _Recent:
         rows.wake_b_mps = np.linalg.norm(b.wake_mps, axis=1)
         rows.presented_a = presented_a
         joined = np.concatenate([self._rows, rows])
-        self._rows = joined[joined["time_ns"] > time_ns[-1] - round(SPAN_S * 1e9)].view(np.recarray)
+        self._rows = joined[joined["time_ns"] > time_ns[-1] - round(_SPAN_S * 1e9)].view(np.recarray)
 
     def trace(self) -> Trace | None:
         rows = self._rows

@@ -57,7 +57,7 @@ ROOM: Final = 1000
 """Greatest number of waiting markers."""
 HANGS_S: Final = 5.0
 """A sink that takes longer over one marker counts as lost at the next. [choice]"""
-ADVICE: Final = "sending has stopped; check the connection, then end and resume the session"
+_ADVICE: Final = "sending has stopped; check the connection, then end and resume the session"
 PATIENCE_S: Final = 1.0
 HIGH_S: Final = 0.010
 LOW_S: Final = 0.004
@@ -173,9 +173,9 @@ class SinkThread:
             since_s = self._since_s  # read once: the thread clears it at any time
             taken_s = 0.0 if since_s is None else monotonic() - since_s
             if taken_s > HANGS_S:
-                self._give_up(f"a marker was not sent in {taken_s:.1f} s (limit {HANGS_S:g} s): {ADVICE}")
+                self._give_up(f"a marker was not sent in {taken_s:.1f} s (limit {HANGS_S:g} s): {_ADVICE}")
             elif len(self._waiting) >= ROOM:
-                self._give_up(f"{ROOM:,} markers wait to be sent (limit): {ADVICE}")
+                self._give_up(f"{ROOM:,} markers wait to be sent (limit): {_ADVICE}")
             else:
                 self._waiting.append(marker)
                 self._changed.notify_all()

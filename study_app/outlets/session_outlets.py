@@ -43,8 +43,8 @@ class OutletStatus:
     shows_force: bool = False
 
 
-IS_SINK: Final = Returns("a sink", lambda value: callable(value.send) and callable(value.close))
-SINKS: Final = Registry("outlet", {kind.name: kind for kind in OWN}, SinkKind, "name", {"open": IS_SINK})
+_IS_SINK: Final = Returns("a sink", lambda value: callable(value.send) and callable(value.close))
+SINKS: Final = Registry("outlet", {kind.name: kind for kind in OWN}, SinkKind, "name", {"open": _IS_SINK})
 """The kinds of sinks by name."""
 
 

@@ -20,13 +20,13 @@ PPRELEASE: Final = 0x708C
 PPEXCL: Final = 0x708F
 PPWDATA: Final = 0x40017086
 PPWCONTROL: Final = 0x40017084
-STROBE: Final = 0x01  # of linux/parport.h; the connector's line is inverted: low while it is set
-Ioctl = Callable[..., Any]
-BAUD: Final = 115_200
-TIMEOUT_S: Final = 0.5
+_STROBE: Final = 0x01  # of linux/parport.h; the connector's line is inverted: low while it is set
+_Ioctl = Callable[..., Any]
+_BAUD: Final = 115_200
+_TIMEOUT_S: Final = 0.5
 
 
-class MarkerStream:
+class _MarkerStream:
     """An outlet of markers, timed by the servo's clock."""
 
     title = "LSL markers"
@@ -63,7 +63,7 @@ class ParallelPort:
 
     title = "Parallel port"
 
-    def __init__(self, place: str, ioctl: Ioctl | None = None) -> None:
+    def __init__(self, place: str, ioctl: _Ioctl | None = None) -> None:
         self.address = f"parallel:{place}"
         self._ioctl = _system_ioctl() if ioctl is None else ioctl
         try:
@@ -87,7 +87,7 @@ class ParallelPort:
         """
         self._call(PPWDATA, bytes((byte,)))
         if byte:
-            self._call(PPWCONTROL, bytes((STROBE,)))
+            self._call(PPWCONTROL, bytes((_STROBE,)))
             self._call(PPWCONTROL, bytes((0,)))
 
     def close(self) -> None:
@@ -103,7 +103,7 @@ class ParallelPort:
             raise OutletError(f"{self.address} failed: {error.strerror}; is another program using it?") from error
 
 
-def _system_ioctl() -> Ioctl:
+def _system_ioctl() -> _Ioctl:
     try:
         import fcntl  # noqa: PLC0415 - not on Windows
     except ImportError as error:
@@ -111,7 +111,7 @@ def _system_ioctl() -> Ioctl:
     return fcntl.ioctl
 
 
-class SerialPort:
+class _SerialPort:
     """An open serial port."""
 
     title = "Serial port"
@@ -122,12 +122,12 @@ class SerialPort:
         except ImportError as error:
             raise OutletError("triggers need pyserial: pip install 'liquid-study[triggers]'") from error
         name, _, baud = place.partition("@")
-        if not name or not (baud or str(BAUD)).isdecimal():
+        if not name or not (baud or str(_BAUD)).isdecimal():
             raise OutletError(f"serial:{place} is not a serial port: write serial:NAME or serial:NAME@BAUD")
         self.address = f"serial:{place}"
         self._failures: tuple[type[Exception], ...] = (serial.SerialException, OSError)
         try:
-            self._port: Any = serial.Serial(name, int(baud or BAUD), write_timeout=TIMEOUT_S)
+            self._port: Any = serial.Serial(name, int(baud or _BAUD), write_timeout=_TIMEOUT_S)
         except (*self._failures, ValueError, OverflowError) as error:
             raise OutletError(f"{self.address} cannot be opened: {_cause(error)}") from error
 
@@ -160,8 +160,8 @@ def _port(kind: Callable[[str], TriggerPort]) -> Callable[[str, Callable[[], int
 
 
 SINKS: Final = (
-    SinkKind("lsl", MarkerStream.title, example="lsl", open=lambda _place, now_ns: MarkerStream(now_ns)),
+    SinkKind("lsl", _MarkerStream.title, example="lsl", open=lambda _place, now_ns: _MarkerStream(now_ns)),
     SinkKind("parallel", ParallelPort.title, example="parallel:/dev/parport0", open=_port(ParallelPort)),
-    SinkKind("serial", SerialPort.title, example="serial:/dev/ttyUSB0", open=_port(SerialPort)),
+    SinkKind("serial", _SerialPort.title, example="serial:/dev/ttyUSB0", open=_port(_SerialPort)),
 )
 """The kinds of sinks."""

@@ -22,17 +22,17 @@ from study_app.number_text import counted
 
 MARKERS: Final = "liquid-study markers"
 SAMPLES: Final = "liquid-study samples"
-DELIVERY_S: Final = 0.2
+_DELIVERY_S: Final = 0.2
 """Time for which a stream with receivers stays open after its last sample, to deliver it."""
-MEASURE_EVERY_S: Final = 5.0
-READINGS: Final = 8
-SEND_EVERY_S: Final = 0.01
+_MEASURE_EVERY_S: Final = 5.0
+_READINGS: Final = 8
+_SEND_EVERY_S: Final = 0.01
 PATIENCE_S: Final = 1.0
-STREAMED: Final = tuple(sorted((it for it in SAMPLE_FIELDS if it.stream), key=lambda it: it.name == "tick"))
+_STREAMED: Final = tuple(sorted((it for it in SAMPLE_FIELDS if it.stream), key=lambda it: it.name == "tick"))
 """Fields of a sample in the order of their channels: the tick's number comes last, as it came last into the stream."""
 TICKS: Final = 2**24
 """Ticks are numbered modulo this, the first integer beyond which 32-bit floats are not exact: after 4.7 h from 0 on."""
-CHANNELS: Final = tuple(f"{name} {field.unit}".rstrip() for field in STREAMED for name in field.named(field.stream))
+CHANNELS: Final = tuple(f"{name} {field.unit}".rstrip() for field in _STREAMED for name in field.named(field.stream))
 
 
 def library() -> Any:
@@ -73,7 +73,7 @@ def stream_info(lsl: Any, name: str, kind: str, labels: Sequence[str], rate_hz: 
 def close_outlet(outlet: Any) -> None:
     """Wait for delivery of the last samples if a program receives them; the outlet ends with its last reference."""
     if outlet is not None and outlet.have_consumers():
-        time.sleep(DELIVERY_S)
+        time.sleep(_DELIVERY_S)
 
 
 class ClockMapping:
@@ -92,7 +92,7 @@ class ClockMapping:
         self.measure()
 
     def measure(self) -> None:
-        for _ in range(READINGS):
+        for _ in range(_READINGS):
             before_ns = self._now_ns()
             other_s = self._other_s()
             after_ns = self._now_ns()
@@ -101,10 +101,10 @@ class ClockMapping:
                 self._low_s, self._high_s = low_s, high_s
             else:
                 self._low_s, self._high_s = max(low_s, self._low_s), min(high_s, self._high_s)
-        self._due_s = time.monotonic() + MEASURE_EVERY_S
+        self._due_s = time.monotonic() + _MEASURE_EVERY_S
 
     def measure_if_due(self) -> None:
-        """Measure it again if the last measurement is older than `MEASURE_EVERY_S`."""
+        """Measure it again if the last measurement is older than `_MEASURE_EVERY_S`."""
         if time.monotonic() >= self._due_s:
             self.measure()
 
@@ -121,7 +121,7 @@ class ClockMapping:
 
 def channels_of(samples: Any) -> NDArray[np.float32]:
     """Return the channels of the stream for samples (array of ``layout.SAMPLE``)."""
-    columns = [samples[it.name] % TICKS if it.name == "tick" else samples[it.name] for it in STREAMED]
+    columns = [samples[it.name] % TICKS if it.name == "tick" else samples[it.name] for it in _STREAMED]
     return np.column_stack(columns).astype(np.float32)
 
 
@@ -178,7 +178,7 @@ class SampleStream:
 
     def _work(self) -> None:
         try:
-            while not self._ending.wait(SEND_EVERY_S):
+            while not self._ending.wait(_SEND_EVERY_S):
                 self.send_new()
             self.send_new()
             close_outlet(self._outlet)

@@ -16,9 +16,9 @@ Compared: TypeAlias = Literal["liquids", "delays", "views"]
 Kind: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9_]*$", max_length=MAX_ID)]
 
 
-WAYS: Final = ("a stimulus", "conditions", "conditions and no design")
+_WAYS: Final = ("a stimulus", "conditions", "conditions and no design")
 """What a block presents, in words, for each entry of `Block.NOT_WITH`."""
-ROUNDING: Final = 1e-9
+_ROUNDING: Final = 1e-9
 
 
 class Criterion(Table):
@@ -50,11 +50,11 @@ class Catch(Table):
 
     def count(self, trials: int) -> int:
         """Return the number of catch trials among so many others."""
-        return int(trials * self.share + ROUNDING)
+        return int(trials * self.share + _ROUNDING)
 
     def stretch(self, number: int) -> range:
         """Return the slots among which catch trial ``number`` (from 0) is drawn; none is a track's first slot."""
-        begin, end = (number + int(at / self.share + ROUNDING) for at in (number, number + 1))
+        begin, end = (number + int(at / self.share + _ROUNDING) for at in (number, number + 1))
         return range(max(begin, 1), end + 1)
 
 
@@ -152,7 +152,7 @@ class Block(Table):
 
     @model_validator(mode="after")
     def _presents_in_one_way(self) -> Self:
-        ways = zip(WAYS, self.NOT_WITH, strict=True)
+        ways = zip(_WAYS, self.NOT_WITH, strict=True)
         what, refused = next((what, keys) for what, (given, keys) in ways if all(getattr(self, key) for key in given))
         for name in refused:
             if name in self.model_fields_set:

@@ -39,12 +39,12 @@ from study_app.protocol.trials.tasks import Follow
 from study_app.protocol.warnings.expected_precision import precision_rows
 from study_app.protocol.warnings.study_warnings import warnings
 
-LEVELS = {"weber": "Weber fraction", "difference": "difference", "value": "value"}
-BLINDINGS = {
+_LEVELS = {"weber": "Weber fraction", "difference": "difference", "value": "value"}
+_BLINDINGS = {
     "double": "double-blind: the operator does not see the force",
     "single": "single-blind: the operator sees force and wake",
 }
-GROUP_WORDS = {
+_GROUP_WORDS = {
     "randomised": "randomised in permuted blocks",
     "pre-existing": "pre-existing: entered for each participant, not randomised",
 }
@@ -123,10 +123,10 @@ def _head_lines(protocol: Protocol, language: str) -> Iterable[str]:
     rows = [
         ("Languages", ", ".join(study.languages)),
         ("Parts", f"{protocol.parts}"),
-        *([("Groups", GROUP_WORDS[study.group_assignment])] if protocol.groups else ()),
+        *([("Groups", _GROUP_WORDS[study.group_assignment])] if protocol.groups else ()),
         *(("Group", f"{name}, share {group.share}") for name, group in protocol.groups.items()),
         ("Answers", f"{number_range(counts)} per {'session' if sessions_differ(protocol) else 'participant'}"),
-        ("Blinding", BLINDINGS[study.blinding]),
+        ("Blinding", _BLINDINGS[study.blinding]),
         ("Expected duration", f"about {number_range(minutes)} min"),
         ("Force limit", f"{device.force_limit_n:g} N"),
         ("Servo", f"{device.rate_hz:g} Hz"),
@@ -208,7 +208,7 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
     levels = sorted(method.levels_of(stimulus))
     against = f", standard {', '.join(f'{standard:g}' for standard in standards)}" if standards else ""
     yield "Design", f"{kind} of {stimulus.vary}{against}: {intervals}"
-    name = LEVELS[stimulus.level_kind]
+    name = _LEVELS[stimulus.level_kind]
     of_each = " per standard" if standards else ""
     slots = [track.slots for track in tracks_of(protocol, block)]
     guess = design.guess_rate if has_correct_answer(design, stimulus) else 0.0

@@ -18,14 +18,14 @@ CONDITIONS_DIFFER = "conditions differ"
 _HIDDEN = ("conditions", "liquids")
 
 
-Place: TypeAlias = tuple[str | int, ...]
+_Place: TypeAlias = tuple[str | int, ...]
 """Where two protocols differ: keys, ids of entries, and indices from 0."""
 
 
 class Difference(NamedTuple):
     """One place where two protocols differ, and how."""
 
-    place: Place
+    place: _Place
     words: str
 
     @property
@@ -85,7 +85,7 @@ def _pop_hidden(tables: dict[str, Any]) -> dict[str, Any]:
     return hidden
 
 
-def _differences(place: Place, old: Any, new: Any) -> Iterator[Difference]:
+def _differences(place: _Place, old: Any, new: Any) -> Iterator[Difference]:
     """Yield the differences below a place; a key that is None counts as missing."""
     if _has_ids(old) and _has_ids(new):
         yield from _entry_differences(place, old, new)
@@ -116,7 +116,7 @@ def _has_ids(value: Any) -> bool:
 
 
 def _entry_differences(
-    place: Place, old: Sequence[Mapping[str, Any]], new: Sequence[Mapping[str, Any]]
+    place: _Place, old: Sequence[Mapping[str, Any]], new: Sequence[Mapping[str, Any]]
 ) -> Iterator[Difference]:
     """Yield the differences between tables matched by id, then between the orders of those in both."""
     before, after = ({entry["id"]: entry for entry in entries} for entries in (old, new))

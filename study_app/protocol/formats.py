@@ -20,7 +20,7 @@ from study_app.protocol.wording.languages import LANGUAGES, words
 
 LATEST: Final = 2
 TABLES: Final = ("stimuli", "designs", "methods", "groups", "sequences")
-LEVEL_LIMITS: Final = {
+_LEVEL_LIMITS: Final = {
     "level_error_percent": 2,
     "level_error_ms": 2,
     "pace_error_percent": 40,
@@ -35,7 +35,7 @@ def _later_keys(table: type[Table]) -> list[str]:
     return sorted(name for name, field in table.model_fields.items() if field.exclude_if is not None)
 
 
-NEW_KEYS: Final = (
+_NEW_KEYS: Final = (
     "study.codes",
     "study.credits",
     "study.block_order",
@@ -52,22 +52,22 @@ NEW_KEYS: Final = (
     *(f"conditions.*.{key}" for key in OF_LINK),
     *TABLES,
     "simulated_participants",
-    *(f"limits.{key}" for key in LEVEL_LIMITS),
+    *(f"limits.{key}" for key in _LEVEL_LIMITS),
     *(f"blocks.*.{key}" for key in _later_keys(Block)),
     *(f"analysis.{key}" for key in _later_keys(Analysis)),
 )
 """Keys that belong to format 2, as patterns of places in the file."""
-NEW_VALUES: Final = {
+_NEW_VALUES: Final = {
     "liquids.*.drag.law": ("linear",),
     "liquids.*.effects.*": ("unsteady_drag", "non_newtonian"),
     "tasks.*.kind": ("follow",),
 }
 """Values of earlier keys that belong to format 2."""
 
-HINT: Final = 'write format = 2; only effects = "auto" and an omitted scene.velocity change their meaning'
+_HINT: Final = 'write format = 2; only effects = "auto" and an omitted scene.velocity change their meaning'
 ESTIMATOR: Final = "kalman"
-WORKSPACE_MM: Final = (100.0, 60.0, 60.0)
-DENSITY_KG_M3: Final = 1000.0
+_WORKSPACE_MM: Final = (100.0, 60.0, 60.0)
+_DENSITY_KG_M3: Final = 1000.0
 
 
 def is_unknown_format(document: Mapping[str, Any]) -> bool:
@@ -83,27 +83,27 @@ def is_format_2(document: Mapping[str, Any]) -> bool:
 
 def newer_keys(document: Mapping[str, Any]) -> Iterator[Fault]:
     """Yield a fault for every part of a format 1 file that belongs to format 2."""
-    for pattern in NEW_KEYS:
+    for pattern in _NEW_KEYS:
         for path, _ in entries(document, pattern):
-            yield Fault(path, "belongs to format 2", HINT, kind="surplus")
-    for pattern, values in NEW_VALUES.items():
+            yield Fault(path, "belongs to format 2", _HINT, kind="surplus")
+    for pattern, values in _NEW_VALUES.items():
         for path, stated in entries(document, pattern):
             if stated in values:
-                yield Fault(path, f'"{stated}" belongs to format 2', HINT, kind="surplus")
+                yield Fault(path, f'"{stated}" belongs to format 2', _HINT, kind="surplus")
     known = {*names(document, "pages"), *names(document, "blocks")}
     for path, name in entries(document, "sequence.*"):
         if name in names(document, "questionnaires") and name not in known:
-            yield Fault(path, "a questionnaire outside a block requires format 2", HINT, kind="surplus")
+            yield Fault(path, "a questionnaire outside a block requires format 2", _HINT, kind="surplus")
 
 
 def upgrade(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
     """Return a study's document with the defaults of format 2, and faults for newer keys in format 1."""
     if is_format_2(document):
-        return with_omitted_keys(document), []
+        return _with_omitted_keys(document), []
     return dict(document), [] if is_unknown_format(document) else list(newer_keys(document))
 
 
-def with_omitted_keys(document: Mapping[str, Any]) -> dict[str, Any]:
+def _with_omitted_keys(document: Mapping[str, Any]) -> dict[str, Any]:
     """Return a format 2 document with its omitted keys; invalid parts stay as they are."""
     completed = dict(document)
     head = completed.get("study", {})
@@ -111,13 +111,13 @@ def with_omitted_keys(document: Mapping[str, Any]) -> dict[str, Any]:
         completed["study"] = {"version": "1", "languages": ("en",), **head}
         if isinstance(head.get("name"), str):
             completed["study"].setdefault("title", dict.fromkeys(_languages(completed), head["name"]))
-    completed["device"] = _with_defaults(completed.get("device", {}), workspace_mm=WORKSPACE_MM)
+    completed["device"] = _with_defaults(completed.get("device", {}), workspace_mm=_WORKSPACE_MM)
     if any(
         "stimulus" in block or "design" in block
         for _, block in entries(completed, "blocks.*")
         if isinstance(block, Mapping)
     ):
-        completed["limits"] = _with_defaults(completed.get("limits", {}), **LEVEL_LIMITS)
+        completed["limits"] = _with_defaults(completed.get("limits", {}), **_LEVEL_LIMITS)
     completed = with_scene_defaults(completed)
     if isinstance(liquids := completed.get("liquids", {}), dict):
         completed.setdefault("conditions", {name: {"liquid": name} for name in liquids})
@@ -148,7 +148,7 @@ def format_of_scene(scene: Scene) -> int:
     return 2 if newer or scene.fade_s != FADE_S else scene.format
 
 
-OMITTED: Final = {
+_OMITTED: Final = {
     "": ("device", "conditions", "sequence"),
     "study": ("title", "version", "languages"),
     "device": ("workspace_mm",),
@@ -158,17 +158,17 @@ OMITTED: Final = {
 
 
 def relax_schema(schema: dict[str, Any]) -> None:
-    """Require the keys of `OMITTED` in a protocol's JSON Schema for format 1 only."""
+    """Require the keys of `_OMITTED` in a protocol's JSON Schema for format 1 only."""
     tables = {"study": "StudyHead", "device": "DeviceNeeds", "blocks": "Block"}
     asked: dict[str, Any] = {}
-    for section, keys in OMITTED.items():
+    for section, keys in _OMITTED.items():
         node = schema["$defs"][tables[section]] if section else schema
         node["required"] = [key for key in node["required"] if key not in keys]
         if section:
             inner = {"required": list(keys)}
             asked[section] = {"patternProperties": {"": inner}} if section == "blocks" else inner
     schema["if"] = {"properties": {"format": {"const": 1}}}
-    schema["then"] = {"required": list(OMITTED[""]), "properties": asked}
+    schema["then"] = {"required": list(_OMITTED[""]), "properties": asked}
     questions = schema["$defs"]["Questionnaire"]
     questions["if"] = {"not": {"required": ["instrument"]}}
     questions["then"] = {"required": questions.pop("required")}
@@ -190,7 +190,7 @@ def _with_density(liquid: Any) -> Any:
         return liquid
     drag = liquid.get("drag")
     damper = isinstance(drag, Mapping) and drag.get("law") == "linear" and liquid.get("effects", ("drag",)) == ("drag",)
-    return _with_defaults(liquid, density_kg_m3=DENSITY_KG_M3) if damper else liquid
+    return _with_defaults(liquid, density_kg_m3=_DENSITY_KG_M3) if damper else liquid
 
 
 def _with_numbers(blocks: Mapping[str, Any], tasks: tuple[str, ...], languages: tuple[str, ...]) -> dict[str, Any]:

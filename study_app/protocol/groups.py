@@ -14,7 +14,7 @@ from study_app.protocol.table import Id, Table, invalid
 
 GroupAssignment: TypeAlias = Literal["randomised", "pre-existing"]
 ASSIGNMENT: Final = ("study", "group_assignment")
-MOST_SHARE: Final = 20
+_MOST_SHARE: Final = 20
 SEQUENCES: Final = ("sequence", "sequences.*", "groups.*.sequence", "groups.*.sequences.*")
 """Places of lists of steps in a document, as patterns."""
 
@@ -25,7 +25,7 @@ Sequences: TypeAlias = tuple[Annotated[Steps, Field(min_length=1)], ...]
 class Group(Table):
     """A group of participants; a group without a sequence has that of the study."""
 
-    share: Annotated[int, within(1, MOST_SHARE, "shares are small whole numbers")] = Field(
+    share: Annotated[int, within(1, _MOST_SHARE, "shares are small whole numbers")] = Field(
         default=1,
         description=(
             "Number of its participants per randomisation round; for a pre-existing group, its part in the "
@@ -86,7 +86,7 @@ def steps_of(protocol: HasSteps, group: str | None, session: int) -> Steps:
         own = () if group is None else protocol.groups[group].sequence
         return own or protocol.sequence
     if session > len(sequences):
-        raise session_number_error(session, len(sequences))
+        raise _session_number_error(session, len(sequences))
     return sequences[session - 1]
 
 
@@ -95,7 +95,7 @@ def _sequences(protocol: HasSteps, group: str | None) -> Sequences:
     return protocol.sequences if own is None or not (own.sequence or own.sequences) else own.sequences
 
 
-def session_number_error(session: int, last: int) -> StudyError:
+def _session_number_error(session: int, last: int) -> StudyError:
     """Return the error about a session number beyond the last session."""
     permitted = "1, the only session" if last == 1 else f"1 to {last}"
     return StudyError(f"session {session}: a participant of this study has {last} (sequences); permitted: {permitted}")
@@ -106,7 +106,7 @@ def check_session_number(protocol: HasSteps, session: int) -> None:
     counts = [session_count(protocol, group) for group in protocol.groups or (None,)]
     known = [count for count in counts if count is not None]
     if len(known) == len(counts) and session > max(known):
-        raise session_number_error(session, max(known))
+        raise _session_number_error(session, max(known))
 
 
 def every_step(protocol: HasSteps) -> Steps:

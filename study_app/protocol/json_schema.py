@@ -17,11 +17,11 @@ from study_app.documentation import anchor_of
 from study_app.protocol.formats import relax_schema
 from study_app.protocol.model import Protocol
 
-LIQUID_FILE = "Path of a liquid file with one liquid, relative to this file; it replaces the keys of this table."
+_LIQUID_FILE = "Path of a liquid file with one liquid, relative to this file; it replaces the keys of this table."
 
 
-LINEAR_DRAG: Final = {"properties": {"law": {"const": "linear"}}, "required": ["law"]}
-NEED_NO_DENSITY: Final = [{"required": ["file"]}, {"properties": {"drag": LINEAR_DRAG}, "required": ["drag"]}]
+_LINEAR_DRAG: Final = {"properties": {"law": {"const": "linear"}}, "required": ["law"]}
+_NEED_NO_DENSITY: Final = [{"required": ["file"]}, {"properties": {"drag": _LINEAR_DRAG}, "required": ["drag"]}]
 """Liquids without a density: those of a file, and in format 2 dampers."""
 
 
@@ -53,8 +53,8 @@ def schema(of: type[BaseModel] = Protocol) -> dict[str, Any]:
                 part["properties"].pop("id")
                 part["required"].remove("id")
                 if "body" in part["properties"]:  # a liquid of a study may be that of a file instead
-                    part["properties"]["file"] = {"type": "string", "description": LIQUID_FILE}
-                    part["if"], part["then"] = {"not": {"anyOf": NEED_NO_DENSITY}}, {"required": part.pop("required")}
+                    part["properties"]["file"] = {"type": "string", "description": _LIQUID_FILE}
+                    part["if"], part["then"] = {"not": {"anyOf": _NEED_NO_DENSITY}}, {"required": part.pop("required")}
     if of is Protocol:
         relax_schema(described)
         items = described["$defs"]["Questionnaire"]["properties"]["items"]["items"]
@@ -78,7 +78,7 @@ def editor_schema() -> dict[str, Any]:
     return described
 
 
-Node: TypeAlias = Mapping[str, Any]
+_Node: TypeAlias = Mapping[str, Any]
 
 _TYPES: Final = {"integer": "whole number", "number": "number", "string": "text", "boolean": "`true` or `false`"}
 _BOUNDS: Final = {
@@ -107,11 +107,11 @@ def format_markdown() -> str:
     return "\n".join(lines) + "\n"
 
 
-def _model_places(root: Node) -> dict[str, list[str]]:
+def _model_places(root: _Node) -> dict[str, list[str]]:
     """Return the places of each model in the file, in file order, such as ``blocks.NAME.catch``."""
     places: dict[str, list[str]] = {}
 
-    def visit(node: Node, place: str) -> None:
+    def visit(node: _Node, place: str) -> None:
         for key, below in node.get("properties", {}).items():
             for name, inside in _models(below, f"{place}.{key}" if place else key):
                 paths = places.setdefault(name, [])
@@ -124,7 +124,7 @@ def _model_places(root: Node) -> dict[str, list[str]]:
     return places
 
 
-def _models(node: Node, place: str) -> Iterator[tuple[str, str]]:
+def _models(node: _Node, place: str) -> Iterator[tuple[str, str]]:
     if "$ref" in node:
         yield node["$ref"].rsplit("/", 1)[-1], place
     for branch in (*node.get("anyOf", ()), *node.get("oneOf", ())):
@@ -136,7 +136,7 @@ def _models(node: Node, place: str) -> Iterator[tuple[str, str]]:
             yield from _models(below, f"{place}.NAME")
 
 
-def _headings(root: Node, places: Mapping[str, list[str]]) -> dict[str, str]:
+def _headings(root: _Node, places: Mapping[str, list[str]]) -> dict[str, str]:
     """Return the heading of each model: its first place, with a distinguishing value if several share it."""
     firsts = [paths[0] for paths in places.values()]
     return {
@@ -145,7 +145,7 @@ def _headings(root: Node, places: Mapping[str, list[str]]) -> dict[str, str]:
     }
 
 
-def _distinguishing_value(node: Node) -> str:
+def _distinguishing_value(node: _Node) -> str:
     for key in ("kind", "law", "instrument"):
         part = node.get("properties", {}).get(key, {})
         values = [part["const"]] if "const" in part else part.get("enum", [])
@@ -154,7 +154,7 @@ def _distinguishing_value(node: Node) -> str:
     return str(node["title"])
 
 
-def _table_lines(node: Node, root: Node, headings: Mapping[str, str]) -> list[str]:
+def _table_lines(node: _Node, root: _Node, headings: Mapping[str, str]) -> list[str]:
     rows = [
         f"| `{key}` | {_values_text(part, headings)} | {_default_text(key, part, node)} "
         f"| {_cell_text(_meaning(part, root))} |"
@@ -163,12 +163,12 @@ def _table_lines(node: Node, root: Node, headings: Mapping[str, str]) -> list[st
     return ["| key | value | default | meaning |", "| --- | --- | --- | --- |", *rows]
 
 
-def _values_text(node: Node, headings: Mapping[str, str]) -> str:
+def _values_text(node: _Node, headings: Mapping[str, str]) -> str:
     texts = dict.fromkeys(_alternatives(node, headings))
     return " or ".join(text for text in texts if text)
 
 
-def _alternatives(node: Node, headings: Mapping[str, str]) -> Iterator[str]:
+def _alternatives(node: _Node, headings: Mapping[str, str]) -> Iterator[str]:
     if "$ref" in node:
         heading = headings[node["$ref"].rsplit("/", 1)[-1]]
         yield f"table [{heading}](#{anchor_of(heading)})".replace("[]", "\\[\\]", 1)
@@ -189,7 +189,7 @@ def _alternatives(node: Node, headings: Mapping[str, str]) -> Iterator[str]:
         yield ", ".join((_TYPES.get(node.get("type", ""), "any"), *_bound_texts(node)))
 
 
-def _list_text(node: Node, headings: Mapping[str, str]) -> str:
+def _list_text(node: _Node, headings: Mapping[str, str]) -> str:
     inside = node.get("items")
     of = _values_text(inside, headings) if isinstance(inside, Mapping) else ""
     if "prefixItems" in node:
@@ -198,11 +198,11 @@ def _list_text(node: Node, headings: Mapping[str, str]) -> str:
     return ", ".join((f"list of: {of}", *_bound_texts(node)))
 
 
-def _bound_texts(node: Node) -> Iterator[str]:
+def _bound_texts(node: _Node) -> Iterator[str]:
     return (template.format(f"{node[key]:g}") for key, template in _BOUNDS.items() if key in node)
 
 
-def _default_text(key: str, part: Node, node: Node) -> str:
+def _default_text(key: str, part: _Node, node: _Node) -> str:
     if key in node.get("required", ()):
         return "required"
     value = part.get("default")
@@ -211,7 +211,7 @@ def _default_text(key: str, part: Node, node: Node) -> str:
     )
 
 
-def _meaning(part: Node, root: Node) -> str:
+def _meaning(part: _Node, root: _Node) -> str:
     """Return the description of a key, of its only alternative to null, or of the only model that it holds."""
     alternatives = [branch for branch in part.get("anyOf", ()) if branch.get("type") != "null"]
     meant = (part, *alternatives) if len(alternatives) == 1 else (part,)

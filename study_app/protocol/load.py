@@ -51,11 +51,11 @@ __all__ = [
 
 M = TypeVar("M", bound=BaseModel)
 
-SHOWN = 200  # characters of a bad value that a message repeats
-_LONG = re.compile(rf'(?<=")[^"]{{{SHOWN + 1},}}(?=")|\S{{{SHOWN + 1},}}')
+_SHOWN = 200  # characters of a bad value that a message repeats
+_LONG = re.compile(rf'(?<=")[^"]{{{_SHOWN + 1},}}(?=")|\S{{{_SHOWN + 1},}}')
 
 
-class SceneTable(SceneDefaults):
+class _SceneTable(SceneDefaults):
     """The scene of a file that holds no study: rate and force limit stand here, there is no device table."""
 
     rate_hz: RateHz = Field(default=1000, description="Nominal rate of ticks [Hz].")
@@ -66,7 +66,7 @@ class SceneFile(Table):
     """A file of liquids without a study."""
 
     format: Format = 1
-    scene: SceneTable = SceneTable()
+    scene: _SceneTable = _SceneTable()
     liquids: Named[Liquid] = Field(min_length=1)
 
 
@@ -296,7 +296,7 @@ def located_problems(faults: Iterable[Fault], places: Places) -> tuple[Problem, 
     """Return faults as problems with their lines, in the order of the lines."""
 
     def shortened(text: str) -> str:
-        return _LONG.sub(lambda match: f"{match[0][:SHOWN]}…", text)
+        return _LONG.sub(lambda match: f"{match[0][:_SHOWN]}…", text)
 
     problems = (fault.located(places) for fault in faults)
     short = [Problem(shortened(it.place), shortened(it.message), it.line, hint=shortened(it.hint)) for it in problems]

@@ -289,7 +289,7 @@ class Limits(Table):
     )
 
 
-Reported = Annotated[float, within(-1e9, 1e9, "published values are smaller")]
+_Reported = Annotated[float, within(-1e9, 1e9, "published values are smaller")]
 
 
 class Published(Table):
@@ -300,10 +300,10 @@ class Published(Table):
         description="weber: the Weber fraction; threshold: the threshold; exponent: the exponent of a power law; pse: "
         "the point of subjective equality."
     )
-    value: Reported = Field(description="The value; a threshold in the unit of the varied number.")
-    standard: Reported | None = Field(default=None, description="Its standard, in that unit; default: all standards.")
-    low: Reported | None = Field(default=None, description="Lower end of its interval or range.")
-    high: Reported | None = Field(default=None, description="Upper end of its interval or range.")
+    value: _Reported = Field(description="The value; a threshold in the unit of the varied number.")
+    standard: _Reported | None = Field(default=None, description="Its standard, in that unit; default: all standards.")
+    low: _Reported | None = Field(default=None, description="Lower end of its interval or range.")
+    high: _Reported | None = Field(default=None, description="Upper end of its interval or range.")
     percent: Annotated[float, within(0, 100, "a proportion of answers")] | None = Field(
         default=None, description="Percentage of correct answers at this value; default: unknown."
     )
@@ -395,22 +395,22 @@ class Contrast(Table):
 
 
 BELOW_CHANCE_P: Final = 0.001
-Rule: TypeAlias = Literal["below_chance", "threshold_beyond_levels", "constant_answers", "fast_answers"]
-RULES: Final[Mapping[Rule, str]] = {
+_Rule: TypeAlias = Literal["below_chance", "threshold_beyond_levels", "constant_answers", "fast_answers"]
+RULES: Final[Mapping[_Rule, str]] = {
     "below_chance": "fewer answers of a block are correct than by chance (binomial p below 0.001)",
     "threshold_beyond_levels": "a threshold lies beyond the levels of its stimulus",
     "constant_answers": "more than {limit:g} % of the answers to statements are equal",
     "fast_answers": "half of the answers were chosen within {limit:g} s of the question",
 }
 """When each planned rule proposes a session for exclusion."""
-LIMITS: Final[Mapping[Rule, tuple[float, float]]] = {"constant_answers": (1, 100), "fast_answers": (0.05, 600)}
+_LIMITS: Final[Mapping[_Rule, tuple[float, float]]] = {"constant_answers": (1, 100), "fast_answers": (0.05, 600)}
 """The range of the limit of each rule that has one, in percent or seconds."""
 
 
 class ExclusionRule(Table):
     """A rule by which a session is proposed for exclusion; a person decides."""
 
-    rule: Rule = Field(
+    rule: _Rule = Field(
         description="below_chance: fewer correct answers than by chance; threshold_beyond_levels: a threshold beyond "
         "the levels; constant_answers: nearly always the same answer; fast_answers: answers without reading."
     )
@@ -422,7 +422,7 @@ class ExclusionRule(Table):
 
     @model_validator(mode="after")
     def _limit_belongs_to_rule(self) -> Self:
-        bounds = LIMITS.get(self.rule)
+        bounds = _LIMITS.get(self.rule)
         if bounds is None and self.limit is not None:
             raise invalid(f"is not used by the rule {self.rule}", "limit", kind="surplus")
         if bounds is not None and not (self.limit is not None and bounds[0] <= self.limit <= bounds[1]):

@@ -17,7 +17,7 @@ from study_app.protocol.source.problems import Fault, unknown_name
 from study_app.protocol.table import Id, Localised, Table, invalid
 from study_app.protocol.wording.languages import language_name, missing_text
 
-Weight = Annotated[float, within(-1e6, 1e6, "instruments use smaller weights")]
+_Weight = Annotated[float, within(-1e6, 1e6, "instruments use smaller weights")]
 
 
 class Score(Table):
@@ -31,9 +31,9 @@ class Score(Table):
     items: Annotated[tuple[Id, ...], Field(min_length=1)] = Field(description="The items to combine.")
     reverse: tuple[Id, ...] = Field(default=(), description="Which of these items are reversed.")
     combine: Literal["mean", "sum"] = Field(default="mean", description="mean: their mean; sum: their sum.")
-    factor: Weight = Field(default=1, description="Factor by which the result is multiplied.")
-    offset: Weight = Field(default=0, description="Number added to the result.")
-    weights: dict[Id, Weight] = Field(default_factory=dict, description="Weight of an item; default: 1.")
+    factor: _Weight = Field(default=1, description="Factor by which the result is multiplied.")
+    offset: _Weight = Field(default=0, description="Number added to the result.")
+    weights: dict[Id, _Weight] = Field(default_factory=dict, description="Weight of an item; default: 1.")
     weights_from: tuple[Id, ...] = Field(
         default=(), description="Choices between items: each item's weight is how often it was chosen."
     )

@@ -102,13 +102,13 @@ def shown_questions(items: Iterable[Question | ItemView], answers: Mapping[str, 
 Draw: TypeAlias = Callable[[], float]
 ValueType: TypeAlias = Literal["integer", "number", "text"]
 
-MOST_LETTERS: Final = 5000
+_MOST_LETTERS: Final = 5000
 """No answer is longer."""
-MOST: Final = 1e12
+_MOST: Final = 1e12
 """No greater number can be given as an answer."""
-Bound: TypeAlias = Annotated[float, within(-MOST, MOST, "answers cannot be larger")]
+_Bound: TypeAlias = Annotated[float, within(-_MOST, _MOST, "answers cannot be larger")]
 
-OPINION_POINTS = 7
+_OPINION_POINTS = 7
 """Opinions of the simulated observer go from 1 to so many points."""
 
 
@@ -216,8 +216,8 @@ def answer_problem(question: Question, answer: Value, context: Context) -> str |
     if isinstance(answer, bool):
         return f"answer {answer} is neither a number nor a text: give one of these"
     texts = answer if isinstance(answer, tuple) else (answer,) if isinstance(answer, str) else ()
-    if (letters := sum(map(len, texts))) > MOST_LETTERS:
-        return f"an answer to {question.kind_id} {question.id} has {letters:,} characters: at most {MOST_LETTERS:,}"
+    if (letters := sum(map(len, texts))) > _MOST_LETTERS:
+        return f"an answer to {question.kind_id} {question.id} has {letters:,} characters: at most {_MOST_LETTERS:,}"
     return question.problem(answer, context)
 
 
@@ -242,7 +242,7 @@ class RatingView(ItemView):
 
     def simulated(self, opinion: float, draw: Draw) -> Value:
         points = len(self.labels)
-        place = opinion if points == OPINION_POINTS else 1 + (opinion - 1) * (points - 1) / (OPINION_POINTS - 1)
+        place = opinion if points == _OPINION_POINTS else 1 + (opinion - 1) * (points - 1) / (_OPINION_POINTS - 1)
         return min(points, max(1, math.floor(place + 0.5)))
 
     def nearby(self, answer: Value) -> Value:
@@ -394,7 +394,7 @@ class NumberView(ItemView):
         return (
             (self.least is None or number >= self.least)
             and (self.most is None or number <= self.most)
-            and abs(number) <= MOST
+            and abs(number) <= _MOST
             and (not self.whole or number == math.floor(number))
         )
 
@@ -402,7 +402,7 @@ class NumberView(ItemView):
         """Return a number within its bounds, or within 0 to 100 without bounds."""
         least = self.least if self.least is not None else min(0.0, self.most if self.most is not None else 0.0)
         most = self.most if self.most is not None else least + 100.0
-        share = min(1.0, max(0.0, (opinion - 1) / (OPINION_POINTS - 1)))
+        share = min(1.0, max(0.0, (opinion - 1) / (_OPINION_POINTS - 1)))
         number = least + share * (most - least)
         if self.whole:
             return min(math.floor(most), max(math.ceil(least), round(number)))
@@ -420,8 +420,8 @@ class Number(Question):
     value_type: ClassVar[ValueType] = "number"
 
     kind: Literal["number"] = "number"
-    least: Bound | None = Field(default=None, alias="from", description="Smallest number; default: any.")
-    most: Bound | None = Field(default=None, alias="to", description="Largest number; default: any.")
+    least: _Bound | None = Field(default=None, alias="from", description="Smallest number; default: any.")
+    most: _Bound | None = Field(default=None, alias="to", description="Largest number; default: any.")
     whole: bool = Field(default=False, description="Whether only whole numbers are permitted.")
     unit: Localised | None = Field(default=None, description="Unit, shown after the field.")
 
@@ -449,7 +449,7 @@ class Number(Question):
         return None if self.least is None or self.most is None else (self.least, self.most)
 
 
-MOST_STEPS = 10_000
+_MOST_STEPS = 10_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -475,7 +475,7 @@ class SliderView(ItemView):
         return plain_number(self.least + step * self.step)
 
     def simulated(self, opinion: float, draw: Draw) -> Value:
-        share = min(1.0, max(0.0, (opinion - 1) / (OPINION_POINTS - 1)))
+        share = min(1.0, max(0.0, (opinion - 1) / (_OPINION_POINTS - 1)))
         return self.at(round(share * self.steps))
 
 
@@ -492,8 +492,8 @@ class Slider(Question):
     kind: Literal["slider"] = "slider"
     low: Localised = Field(description="Label at the lower end.")
     high: Localised = Field(description="Label at the upper end.")
-    least: Bound = Field(default=0, alias="from", description="The number at the lower end.")
-    most: Bound = Field(default=100, alias="to", description="The number at the upper end.")
+    least: _Bound = Field(default=0, alias="from", description="The number at the lower end.")
+    most: _Bound = Field(default=100, alias="to", description="The number at the upper end.")
     step: float = Field(default=1, gt=0, description="Difference between neighbouring numbers.")
 
     @model_validator(mode="after")
@@ -501,8 +501,8 @@ class Slider(Question):
         if self.most <= self.least:
             raise invalid(f"{self.most:g} must be greater than from = {self.least:g}", "to")
         steps = (self.most - self.least) / self.step
-        if abs(steps - round(steps)) > 1e-6 or not 1 <= round(steps) <= MOST_STEPS:
-            permitted = f"a whole number of 1 to {MOST_STEPS}"
+        if abs(steps - round(steps)) > 1e-6 or not 1 <= round(steps) <= _MOST_STEPS:
+            permitted = f"a whole number of 1 to {_MOST_STEPS}"
             raise invalid(f"is {self.step:g}: {steps:g} steps from end to end; {permitted} are permitted", "step")
         return self
 
@@ -522,7 +522,7 @@ class Slider(Question):
         return self.least, self.most
 
 
-SIMULATED: Final = "Simulated answer."
+_SIMULATED: Final = "Simulated answer."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -536,7 +536,7 @@ class TextView(ItemView):
     longest: int = 500
 
     def simulated(self, opinion: float, draw: Draw) -> Value:
-        return SIMULATED[: self.longest]
+        return _SIMULATED[: self.longest]
 
 
 class Text(Question):
@@ -548,7 +548,7 @@ class Text(Question):
 
     kind: Literal["text"] = "text"
     lines: int = Field(default=1, ge=1, le=10, description="Height of the field, in lines.")
-    longest: int = Field(default=500, ge=1, le=MOST_LETTERS, description="Largest number of characters.")
+    longest: int = Field(default=500, ge=1, le=_MOST_LETTERS, description="Largest number of characters.")
 
     def view(self, number: int, context: Context) -> ItemView:
         return self._shown(TextView, number, context, lines=self.lines, longest=self.longest)

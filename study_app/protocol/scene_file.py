@@ -11,12 +11,12 @@ from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.scene import FADE_S, Ewma, Given, Kalman, Liquid, Scene
 from study_app.protocol.formats import format_of_scene
 
-Place: TypeAlias = tuple[str, ...]
+_Place: TypeAlias = tuple[str, ...]
 
 _COMMENT_LETTERS: Final = 110
 
 
-def scene_text(scene: Scene, *, said: Sequence[str] = (), notes: Mapping[Place, str] | None = None) -> str:
+def scene_text(scene: Scene, *, said: Sequence[str] = (), notes: Mapping[_Place, str] | None = None) -> str:
     """Return a scene as a scene file; the file cannot state that velocities are given.
 
     Paragraphs ``said`` stand above it as comments; ``notes`` are comments of single keys by their place, such as
@@ -49,7 +49,7 @@ def _liquid_table(liquid: Liquid) -> Mapping[str, Any]:
     return liquid.model_dump(exclude_none=True, exclude={"id", *idle})
 
 
-def _table_lines(place: Place, table: Mapping[str, Any], notes: Mapping[Place, str]) -> Iterator[str]:
+def _table_lines(place: _Place, table: Mapping[str, Any], notes: Mapping[_Place, str]) -> Iterator[str]:
     yield ""
     yield f"[{'.'.join(place)}]"
     for key, value in table.items():

@@ -144,7 +144,7 @@ def assigned_row(study: str, block: str, rows: int, participant: str, place: int
 
 T = TypeVar("T")
 
-Proposal: TypeAlias = tuple[tuple[int, ...], Fraction]
+_Proposal: TypeAlias = tuple[tuple[int, ...], Fraction]
 
 PROPOSALS = 32
 _STEEPEST = 6
@@ -166,10 +166,10 @@ def draw_order(codes: Sequence[T], repetitions: int, constraint: Constraint, dra
     return tuple(codes[code] for code in chosen)
 
 
-def propose_order(codes: int, repetitions: int, constraint: Constraint, draw: Draw) -> Proposal | None:
+def propose_order(codes: int, repetitions: int, constraint: Constraint, draw: Draw) -> _Proposal | None:
     """Draw an order from left to right and return it with the inverse of its probability; None in a dead end."""
     apart = max(constraint.min_distance or 1, 2 if constraint.max_repeats == 1 else 1)
-    left = Remaining(codes, repetitions, apart, constraint.max_repeats or codes * repetitions)
+    left = _Remaining(codes, repetitions, apart, constraint.max_repeats or codes * repetitions)
     steepness = _steepness(codes, repetitions, apart)
     masses = chosen_weights = 1
     for _ in range(codes * repetitions):
@@ -201,7 +201,7 @@ def _steepness(codes: int, repetitions: int, apart: int) -> int:
     return min((2 * room + codes * (codes - 1)) // (2 * room), 1 + repetitions // 2, _STEEPEST)
 
 
-class Remaining:
+class _Remaining:
     """What is left to come, and what of it may come next: ``apart`` trials after its like, ``run`` in a row."""
 
     def __init__(self, codes: int, repetitions: int, apart: int, run: int) -> None:

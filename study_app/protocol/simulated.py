@@ -40,9 +40,9 @@ from study_app.protocol.trials.stimuli import DELAYS, FORCE_DELAY, OF_LINK, Stim
 from study_app.psychophysics.families import Floats
 from study_app.psychophysics.people import ASSUMED, UNIFORM, Person, drawn, normal
 
-NO_OPINION: Final = 4.0
-LEAST_SPEED_MPS: Final = 0.01
-MODULUS: Final = 10.0
+_NO_OPINION: Final = 4.0
+_LEAST_SPEED_MPS: Final = 0.01
+_MODULUS: Final = 10.0
 """The number that the first stimulus is given."""
 _Z_75: Final = 0.6745
 
@@ -121,14 +121,14 @@ def rate(items: Iterable[str], trial: TrialFeatures, person: Rater, draw: Draw) 
 def judgements(items: Iterable[str], trial: TrialFeatures, person: Rater, draw: Draw) -> dict[str, float]:
     """Return what a person would answer to each item id, in the order given: from 1 to 7, or a little beyond."""
     asked = tuple(items)
-    thought = zip(asked, opinions(asked, trial, person), strict=True)
+    thought = zip(asked, _opinions(asked, trial, person), strict=True)
     return {item: opinion + person.leaning + person.noise * normal(draw) for item, opinion in thought}
 
 
-def opinions(items: Iterable[str], trial: TrialFeatures, person: Rater) -> list[float]:
+def _opinions(items: Iterable[str], trial: TrialFeatures, person: Rater) -> list[float]:
     """Return what a person thinks of each item, from 1 to 7, before leaning and noise make an answer of it."""
     impression = _impression(trial, person)
-    return [OPINIONS[item](impression) if item in OPINIONS else NO_OPINION for item in items]
+    return [OPINIONS[item](impression) if item in OPINIONS else _NO_OPINION for item in items]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,7 +154,7 @@ def _rise(value: float, middle: float, width: float) -> float:
 
 def _impression(trial: TrialFeatures, person: Rater) -> _Impression:
     force = trial.force_mean_n * person.strength
-    resistance = force / max(trial.speed_rms_mps, LEAST_SPEED_MPS) ** 2  # quadratic drag: the same at any speed
+    resistance = force / max(trial.speed_rms_mps, _LEAST_SPEED_MPS) ** 2  # quadratic drag: the same at any speed
     peak = trial.force_peak_n / max(trial.force_mean_n, 0.05)
     return _Impression(
         present=_rise(force, 0.15, 0.1),
@@ -187,7 +187,7 @@ OPINIONS: Final[dict[str, Callable[[_Impression], float]]] = {
     "unusable": lambda trial: 1.4 + 2.6 * trial.lost,
     "comfortable": lambda trial: 6.0 - 1.4 * trial.lost - 0.4 * trial.bothered,
 }
-"""Item id → the opinion from 1 to 7; statements that people add get `NO_OPINION`."""
+"""Item id → the opinion from 1 to 7; statements that people add get `_NO_OPINION`."""
 
 
 def simulate_ratings(
@@ -215,7 +215,7 @@ def simulate_ratings(
     """
     drawn = random.random((repetitions, len(trials))).tolist()
     thought = [
-        [opinions(items, known[int(len(known) * part)], person) for known, part in zip(trials, parts, strict=True)]
+        [_opinions(items, known[int(len(known) * part)], person) for known, part in zip(trials, parts, strict=True)]
         for parts in drawn
     ]
     noise = random.random((repetitions, len(trials), len(items), UNIFORM)).sum(axis=-1) - UNIFORM / 2
@@ -270,7 +270,7 @@ class Course(NamedTuple):
     last: str | int | float | None = None
 
 
-MIDDLE: Final = Course()
+_MIDDLE: Final = Course()
 
 
 @dataclass(frozen=True, slots=True)
@@ -300,7 +300,7 @@ class Comparison:
             return trial.force_delay_s
         if self.vary in OF_LINK:
             return trial.roughness_n
-        return trial.delay_s if self.delays else trial.force_mean_n / max(trial.speed_rms_mps, LEAST_SPEED_MPS)
+        return trial.delay_s if self.delays else trial.force_mean_n / max(trial.speed_rms_mps, _LEAST_SPEED_MPS)
 
     def noisy(self, sensed: float, draw: Draw) -> float:
         """Return what the observer takes it for."""
@@ -314,7 +314,7 @@ class Comparison:
         observer = self.observer
         return abs(difference) > (observer.delay_jnd_s if self.delays else observer.weber_fraction * abs(about))
 
-    def choose(self, design: Design, sensed: Sequence[float], mean: float, draw: Draw, course: Course = MIDDLE) -> str:
+    def choose(self, design: Design, sensed: Sequence[float], mean: float, draw: Draw, course: Course = _MIDDLE) -> str:
         """Return the answer of a design with choices to what was sensed; ``mean`` is that of the block so far."""
         taken: Sequence[float] = [self.noisy(one, draw) for one in self._apart(sensed, course)]
         if draw() < self.observer.person.lapse:
@@ -350,7 +350,7 @@ class Comparison:
         sensed: Sequence[float],
         before: Sequence[float],
         draw: Draw,
-        course: Course = MIDDLE,
+        course: Course = _MIDDLE,
     ) -> str | int | float:
         """Return the answer to a trial: one of the design's answers, a point of its scale, or a number.
 
@@ -366,9 +366,9 @@ class Comparison:
             return min(points, max(1, math.floor((points + 1) / 2 + (ratio - 1) * (points - 1) + 0.5)))
         if self.observer.estimates is not None and first > 0 and sensed[-1] > 0:
             exponent, spread = self.observer.estimates
-            return MODULUS * math.exp(exponent * math.log(sensed[-1] / first) + spread * normal(draw))
+            return _MODULUS * math.exp(exponent * math.log(sensed[-1] / first) + spread * normal(draw))
         taken = self._taken(sensed, draw)
-        return MODULUS * math.sqrt(max(taken / first if mean > 0 and first > 0 else 1.0, 0.0))
+        return _MODULUS * math.sqrt(max(taken / first if mean > 0 and first > 0 else 1.0, 0.0))
 
     def _taken(self, sensed: Sequence[float], draw: Draw) -> float:
         """Return what the last interval is taken for; noise is drawn for every one."""

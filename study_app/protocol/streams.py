@@ -61,22 +61,22 @@ class Key:
     secret: bytes
 
 
-SECRET_BYTES: Final = 32
+_SECRET_BYTES: Final = 32
 
 
 def draw_secret(draw: Draw) -> bytes:
     """Return a secret drawn with ``draw`` (uniform numbers in [0, 1)); a rehearsal draws it from its seed."""
-    return bytes(int(draw() * 256) for _ in range(SECRET_BYTES))
+    return bytes(int(draw() * 256) for _ in range(_SECRET_BYTES))
 
 
-def sub_key(secret: bytes, name: str) -> bytes:
+def _sub_key(secret: bytes, name: str) -> bytes:
     """Return the sub-key of that name (32 bytes)."""
     return hmac.digest(secret, name.encode(), "sha256")
 
 
 def secret_stream(secret: bytes, name: str) -> random.Random:
     """Return the stream with a name; use only its ``.random()``."""
-    return random.Random(int.from_bytes(sub_key(sub_key(secret, "levels"), name), "big"))  # noqa: S311 - seeded by a MAC
+    return random.Random(int.from_bytes(_sub_key(_sub_key(secret, "levels"), name), "big"))  # noqa: S311 - seeded by a MAC
 
 
 def own_code(codes: Sequence[str], secret: bytes, participant: str, block: str, code: str) -> str:

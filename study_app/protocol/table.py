@@ -34,8 +34,8 @@ from study_app.ids import MAX_ID
 Id: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$", max_length=MAX_ID)]
 Language: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[a-z]{2}$")]
 
-MAX_TEXT: Final = 500
-MAX_BODY: Final = 20_000
+_MAX_TEXT: Final = 500
+_MAX_BODY: Final = 20_000
 UNPRINTABLE: Final = ("Cc", "Cs", "Co", "Cn")  # control, surrogate, private use, unassigned
 VISIBLE: Final = "LNPS"  # letters, numbers, punctuation, symbols
 DIRECTIONS: Final = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
@@ -76,7 +76,7 @@ def characters(text: str) -> list[str]:
 _APART: Final = re.compile(r"\n[ \t]*\n")
 
 
-def tidy(text: str) -> str:
+def _tidy(text: str) -> str:
     """Return ``text`` with single spaces, and one blank line between paragraphs."""
     parts = _APART.split(text) if "\n" in text else (text,)
     return "\n\n".join(" ".join(part.split()) for part in parts if part.strip())
@@ -92,7 +92,7 @@ def _check_each_text(value: Any) -> Any:
 
 @lru_cache(maxsize=16_384)  # saves 17 ms of each edit, after which a study is validated
 def _checked_text(text: str) -> str:
-    return tidy(_check_printable(text))
+    return _tidy(_check_printable(text))
 
 
 def unprintable_character(text: str, permitted: str = "") -> str | None:
@@ -123,21 +123,21 @@ def _at_most_long(most: int) -> AfterValidator:
 
 
 Description: TypeAlias = Annotated[
-    str, AfterValidator(lambda text: _check_printable(text) if text else text), StringConstraints(max_length=MAX_BODY)
+    str, AfterValidator(lambda text: _check_printable(text) if text else text), StringConstraints(max_length=_MAX_BODY)
 ]
 Brief: TypeAlias = Annotated[
-    str, AfterValidator(lambda text: _check_printable(text) if text else text), StringConstraints(max_length=MAX_TEXT)
+    str, AfterValidator(lambda text: _check_printable(text) if text else text), StringConstraints(max_length=_MAX_TEXT)
 ]
 """What may be left empty, and fits in a line or two."""
-Printable: TypeAlias = Annotated[str, AfterValidator(_check_printable), StringConstraints(max_length=MAX_TEXT)]
+Printable: TypeAlias = Annotated[str, AfterValidator(_check_printable), StringConstraints(max_length=_MAX_TEXT)]
 _Text: TypeAlias = Annotated[
     str | dict[str, str],
     BeforeValidator(_check_each_text),
     Field(description="A text: one string, or one string per language of the study."),
 ]
-Localised: TypeAlias = Annotated[_Text, _at_most_long(MAX_TEXT)]
+Localised: TypeAlias = Annotated[_Text, _at_most_long(_MAX_TEXT)]
 """A title, a statement, a label: what fits on a page with others."""
-Body: TypeAlias = Annotated[_Text, _at_most_long(MAX_BODY), Field(json_schema_extra={"lines": "several"})]
+Body: TypeAlias = Annotated[_Text, _at_most_long(_MAX_BODY), Field(json_schema_extra={"lines": "several"})]
 """What fills a page or several; its schema says so to the study designer."""
 
 

@@ -27,11 +27,11 @@ from study_app.psychophysics.grid import Grid, Values, fit, quantile, tables
 from study_app.psychophysics.person_fit import Given, preferred
 
 # The level presented, in the coordinate u, and whether it was a success; in the order of presentation.
-Answer: TypeAlias = tuple[float, bool]
+_Answer: TypeAlias = tuple[float, bool]
 
 RATIOS: Final = {1: 0.2845, 2: 0.5488, 3: 0.7393, 4: 0.8415}
 """Ratio of the step down to the step up, by the number of successes in a row before a step down."""
-DROPPED: Final = 2
+_DROPPED: Final = 2
 """Number of first reversals left out, which depend on the start of the track."""
 
 
@@ -65,14 +65,14 @@ class Staircase:
         """The probability of success at which the expected change is zero."""
         return converges_to(self.down_after, self.ratio)
 
-    def next(self, answers: Sequence[Answer]) -> float:
+    def next(self, answers: Sequence[_Answer]) -> float:
         """Return the next level: a step from the last one presented, or the same again."""
         if not answers:
             return self.begin
         last = answers[-1][0]
         return min(max(last + self._moves(answers)[-1], self.low), self.high)
 
-    def reversals_at(self, answers: Sequence[Answer]) -> list[int]:
+    def reversals_at(self, answers: Sequence[_Answer]) -> list[int]:
         """Return the indices of the trials at which the direction changed."""
         found, before = [], 0.0
         for place, move in enumerate(self._moves(answers)):
@@ -81,20 +81,20 @@ class Staircase:
             before = move or before
         return found
 
-    def reversals(self, answers: Sequence[Answer]) -> list[float]:
+    def reversals(self, answers: Sequence[_Answer]) -> list[float]:
         """Return the levels of the trials at which the direction changed."""
         return [answers[place][0] for place in self.reversals_at(answers)]
 
-    def mean_of_reversals(self, answers: Sequence[Answer], average: int) -> float | None:
+    def mean_of_reversals(self, answers: Sequence[_Answer], average: int) -> float | None:
         """Return the mean of the last even number of reversals, up to ``average``; None if there are too few.
 
         The first two and those at an end of the domain are excluded.
         """
-        kept = [level for level in self.reversals(answers)[DROPPED:] if self.low < level < self.high]
+        kept = [level for level in self.reversals(answers)[_DROPPED:] if self.low < level < self.high]
         count = min(len(kept), average) // 2 * 2
         return sum(kept[-count:]) / count if count else None
 
-    def _moves(self, answers: Sequence[Answer]) -> list[float]:
+    def _moves(self, answers: Sequence[_Answer]) -> list[float]:
         """Return the step that each answer causes; 0 while successes in a row are too few."""
         moves, successes = [], 0
         for _, right in answers:
@@ -114,9 +114,9 @@ def converges_to(down_after: int, ratio: float) -> float:
     return float((1.0 + ratio) ** (-1.0 / down_after))
 
 
-Learn: TypeAlias = Literal["threshold", "all"]
+_Learn: TypeAlias = Literal["threshold", "all"]
 
-TIE_NATS: Final = 1e-9
+_TIE_NATS: Final = 1e-9
 """Expected entropies closer than this are equal: rounding on another processor shifts them by 1e-15."""
 
 
@@ -138,7 +138,7 @@ class Search:
 
     grid: Grid
     levels: Values
-    learn: Learn = "threshold"
+    learn: _Learn = "threshold"
     noise: bool = False
 
     @property
@@ -162,7 +162,7 @@ class Search:
         """Return the index of the next level of each track, (tracks,): the lowest of equal ones."""
         first = int(self.noise)
         entropy = self.expected_entropy(posteriors)[:, first:]
-        return first + np.asarray((entropy <= entropy.min(axis=1, keepdims=True) + TIE_NATS).argmax(axis=1), np.int64)
+        return first + np.asarray((entropy <= entropy.min(axis=1, keepdims=True) + _TIE_NATS).argmax(axis=1), np.int64)
 
     def next(self, successes: ArrayLike, failures: ArrayLike) -> int:
         """Return the index of the next level to present, from counts of answers to each level."""

@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 Times = NDArray[np.float64]
 Vectors = NDArray[np.float64]
 
-HALF_S: Final = 0.02
+_HALF_S: Final = 0.02
 """Half width of the filter [s]."""
 EARLIER: Final = 5
 """Greatest negative lag of the sent force relative to the force model's [rows]."""
-LEAST_SPEED_MPS: Final = 1e-4
+_LEAST_SPEED_MPS: Final = 1e-4
 """Least speed of a moving hand: below it no damping can be computed. [choice]"""
 
 
@@ -55,7 +55,7 @@ class Motion:
         return Motion(self.times_s[later], self.velocity_mps[later], self.acceleration_mps2[later])
 
 
-def motion(times_s: NDArray[np.float64], position_m: Vectors, period_s: float, half_s: float = HALF_S) -> Motion:
+def motion(times_s: NDArray[np.float64], position_m: Vectors, period_s: float, half_s: float = _HALF_S) -> Motion:
     """Return velocity and acceleration of a hand.
 
     Parameters
@@ -107,7 +107,7 @@ def damping(force_n: Vectors, moved: Motion) -> tuple[float, float] | None:
     vv, va, aa = (float(np.einsum("ij,ij->", one, other)) for one, other in ((v, v), (v, a), (a, a)))
     fv, fa = (-float(np.einsum("ij,ij->", force_n, one)) for one in (v, a))
     determinant = vv * aa - va * va
-    if moved.rms_speed_mps < LEAST_SPEED_MPS or determinant <= 1e-9 * vv * aa:
+    if moved.rms_speed_mps < _LEAST_SPEED_MPS or determinant <= 1e-9 * vv * aa:
         return None
     return (fv * aa - fa * va) / determinant, (fa * vv - fv * va) / determinant
 

@@ -23,12 +23,12 @@ from study_app.psychophysics.families import Floats, normal_cdf
 Model: TypeAlias = Literal["differencing", "independent"]
 
 NORMAL: Final = NormalDist()
-NODES: Final = 200
-ENDS: Final = 9.0
+_NODES: Final = 200
+_ENDS: Final = 9.0
 """Range of integrals over the normal density, in standard deviations from its mean."""
-MOST: Final = 20.0
+_MOST: Final = 20.0
 """The largest d′ in searches."""
-TOLERANCE: Final = 1e-10
+_TOLERANCE: Final = 1e-10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +82,7 @@ def d_prime_at(task: str, proportion: float) -> float:
 
 def forced_choice(d_prime: float, intervals: int) -> float:
     """Return P(the comparison is the largest of ``intervals``): ∫ φ(x − d′) Φ(x)^(m−1) dx."""
-    x, weights = _rule(-ENDS, ENDS)
+    x, weights = _rule(-_ENDS, _ENDS)
     return float((weights * normal_cdf(x + d_prime) ** (intervals - 1)).sum())
 
 
@@ -180,10 +180,10 @@ def rating(noise: ArrayLike, signal: ArrayLike) -> Sensitivity | None:
 
 def _inverse(proportion_of: Callable[[float], float], proportion: float) -> float:
     """Return the d′ at which an increasing function reaches ``proportion``; 0 if it is reached at 0."""
-    low, high = 0.0, MOST
+    low, high = 0.0, _MOST
     if proportion <= proportion_of(low):
         return 0.0
-    while high - low > TOLERANCE:
+    while high - low > _TOLERANCE:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if proportion_of(middle) < proportion else (low, middle)
     return 0.5 * (low + high)
@@ -192,7 +192,7 @@ def _inverse(proportion_of: Callable[[float], float], proportion: float) -> floa
 @cache
 def _rule(low: float, high: float) -> tuple[Floats, Floats]:
     """Return the nodes of Gauss–Legendre quadrature, and their weights times the normal density."""
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     x = 0.5 * (low + high) + 0.5 * (high - low) * nodes
     return x, 0.5 * (high - low) * weights * np.exp(-0.5 * x**2) / math.sqrt(2.0 * math.pi)
 
@@ -205,7 +205,7 @@ def _abx(d_prime: float, divisor: float) -> float:
 
 def _oddity(d_prime: float) -> float:
     """Return P(correct) of the triangle test: 2 ∫₀^∞ [Φ(−z√3 + d′√⅔) + Φ(−z√3 − d′√⅔)] φ(z) dz."""
-    z, weights = _rule(0.0, ENDS)
+    z, weights = _rule(0.0, _ENDS)
     away = d_prime * math.sqrt(2.0 / 3.0)
     return float(
         2.0 * (weights * (normal_cdf(-z * math.sqrt(3.0) + away) + normal_cdf(-z * math.sqrt(3.0) - away))).sum()

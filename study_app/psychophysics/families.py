@@ -19,7 +19,7 @@ Floats: TypeAlias = NDArray[np.float64]
 KAPPA: Final = math.log10(math.log(20.0) / math.log(20.0 / 19.0))
 """Width of a Weibull function of slope one: the distance in log10 from F = 0.05 to F = 0.95."""
 Z_95: Final = NormalDist().inv_cdf(0.95)
-LOGIT_95: Final = math.log(19.0)
+_LOGIT_95: Final = math.log(19.0)
 CLIP: Final = 1e-9
 """ψ stays this far from 0 and 1, so that one answer cannot exclude a cell."""
 
@@ -57,7 +57,7 @@ def rise(family: Family, u: ArrayLike, threshold: ArrayLike, width: ArrayLike) -
         case "normal":
             return np.asarray(0.5 * _erfc(-math.sqrt(2.0) * Z_95 * distance), float)
         case "logistic":
-            return np.asarray(1.0 / (1.0 + np.exp(np.minimum(-2.0 * LOGIT_95 * distance, 700.0))), float)
+            return np.asarray(1.0 / (1.0 + np.exp(np.minimum(-2.0 * _LOGIT_95 * distance, 700.0))), float)
     assert_never(family)
 
 
@@ -69,7 +69,7 @@ def position(family: Family, share: float) -> float:
         case "normal":
             return NormalDist().inv_cdf(share) / (2.0 * Z_95)
         case "logistic":
-            return math.log(share / (1.0 - share)) / (2.0 * LOGIT_95)
+            return math.log(share / (1.0 - share)) / (2.0 * _LOGIT_95)
     assert_never(family)
 
 

@@ -26,8 +26,8 @@ FREE_GUESSES: Final[Values] = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3)
 """Guess rates if the answers to noise trials determine it."""
 
 
-OUTER_SHARE: Final = 0.05
-OPEN_MASS: Final = 0.005
+_OUTER_SHARE: Final = 0.05
+_OPEN_MASS: Final = 0.005
 """An end of an interval is open where more of the posterior lies in the outer share of the grid. [choice]"""
 
 
@@ -145,8 +145,8 @@ class Posterior:
     @property
     def open_ends(self) -> tuple[bool, bool]:
         """Whether the lower and the upper end of the interval are unknown: the threshold may lie beyond the grid."""
-        outer = max(1, round(OUTER_SHARE * len(self.marginal)))
-        return bool(self.marginal[:outer].sum() > OPEN_MASS), bool(self.marginal[-outer:].sum() > OPEN_MASS)
+        outer = max(1, round(_OUTER_SHARE * len(self.marginal)))
+        return bool(self.marginal[:outer].sum() > _OPEN_MASS), bool(self.marginal[-outer:].sum() > _OPEN_MASS)
 
     @cached_property
     def session_sd(self) -> float:
@@ -229,7 +229,7 @@ def tables(grid: Grid, levels: Values) -> tuple[NDArray[np.float64], ...]:
 
 ALIKE: Final = 0.6
 """Of the standard deviation of log widths so much is between people of one group; the rest is shared. [choice]"""
-APART: Final = (0.05, 0.1, 0.2)
+_APART: Final = (0.05, 0.1, 0.2)
 """Standard deviations of the thresholds of people of one group [range of thresholds]. [choice]"""
 MEAN_LAPSE: Final = 0.03
 """The mean lapse rates of groups are exponentially distributed with this mean. [choice]"""
@@ -237,10 +237,10 @@ NEAR_MODE: Final = 2
 """Estimates of several people weight what they share by this power of its posterior: a lapse rate is not below zero,
 so that the mean is too high if few answers are lapses, and thresholds would be too low. [choice]"""
 GROUP_LAPSES: Final = (0.002, 0.01, 0.02, 0.03, 0.045, 0.065, 0.09, 0.12)
-"""The mean lapse rates of a group; each person's is about it as `lapse_weights` has it."""
+"""The mean lapse rates of a group; each person's is about it as `_lapse_weights` has it."""
 
 
-def lapse_weights(lapses: Values, mean: float) -> NDArray[np.float64]:
+def _lapse_weights(lapses: Values, mean: float) -> NDArray[np.float64]:
     """Return the prior weight of each lapse rate of a person in a group of this mean: Erlang's distribution of order 2.
 
     ``lapses`` are ascending; each stands for those that are nearer to it than to the others.
@@ -258,7 +258,7 @@ def group_lapse_weights() -> NDArray[np.float64]:
 
 def lapse_prior(lapses: Values) -> Values:
     """Return the prior weight of each lapse rate of a person of whose group nothing is known."""
-    of_means = [lapse_weights(lapses, mean) for mean in GROUP_LAPSES]
+    of_means = [_lapse_weights(lapses, mean) for mean in GROUP_LAPSES]
     return tuple((group_lapse_weights() @ np.array(of_means)).tolist())
 
 
@@ -301,10 +301,10 @@ def group_priors(flat: Sequence[Posterior], width_prior: tuple[float, float]) ->
     median, log_factor = math.log(width_prior[0]), math.log(width_prior[1])
     of_width = np.exp(-0.5 * ((widths - widths[:, None]) / (ALIKE * log_factor)) ** 2)  # (centres, widths)
     of_width /= of_width.sum(axis=1, keepdims=True)
-    of_lapse = np.array([lapse_weights(grid.lapses, mean) for mean in GROUP_LAPSES]) / grid.lapse_prior
+    of_lapse = np.array([_lapse_weights(grid.lapses, mean) for mean in GROUP_LAPSES]) / grid.lapse_prior
     log_centres = -0.5 * ((widths - median) / log_factor) ** 2 / (1.0 - ALIKE**2)
     log_shared = (log_centres[:, None] + np.log(group_lapse_weights())).ravel()  # (centres × means of lapses)
-    apart = np.array(APART)[:, None, None] * np.ptp(thresholds)
+    apart = np.array(_APART)[:, None, None] * np.ptp(thresholds)
     about = np.exp(-0.5 * ((thresholds - thresholds[::2, None]) / apart) ** 2).reshape(-1, len(thresholds))
     about /= about.sum(axis=1, keepdims=True)  # (means and spreads, thresholds)
     joint = np.array([np.einsum("abcd->abc", one.weights) for one in flat])

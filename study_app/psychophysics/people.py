@@ -21,10 +21,10 @@ BETWEEN_PEOPLE: Final = 1.2
 """Factor (one standard deviation of the logarithm) between the thresholds of people. [choice]"""
 ESTIMATE_NOISE: Final = 0.25
 """Standard deviation of the logarithm of a simulated magnitude estimate. [choice]"""
-WIDTHS: Final = (0.5, 2.5)
+_WIDTHS: Final = (0.5, 2.5)
 LAPSES_MOST: Final = 0.05
-PREFERENCE_SD: Final = 0.25
-CHANGE: Final = 1.2
+_PREFERENCE_SD: Final = 0.25
+_CHANGE: Final = 1.2
 """Of people drawn at random: ends of log-uniform widths, the most lapses, standard deviation of a criterion and of a
 preference for the last answer, and factor (one standard deviation) of a change. [choice]"""
 UNIFORM: Final = 12
@@ -91,13 +91,13 @@ def normal(draw: Callable[[], float]) -> float:
 
 def drawn(draw: Callable[[], float]) -> Person:
     """Return a person drawn at random, who may differ in every respect, from uniform numbers in [0, 1)."""
-    low, high = WIDTHS
+    low, high = _WIDTHS
     return Person(
         width=low * (high / low) ** draw(),
         lapse=LAPSES_MOST * draw(),
-        criterion=PREFERENCE_SD * normal(draw),
-        repeats=PREFERENCE_SD * normal(draw),
-        change=CHANGE ** normal(draw),
+        criterion=_PREFERENCE_SD * normal(draw),
+        repeats=_PREFERENCE_SD * normal(draw),
+        change=_CHANGE ** normal(draw),
     )
 
 

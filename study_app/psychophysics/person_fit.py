@@ -25,17 +25,17 @@ CHANGE_PRIOR: Final = 1.5
 """Factor by which a threshold changes from the first trial to the last (one standard deviation). [choice]"""
 BEYOND_CHANCE: Final = 2.0
 """A change that is named is one from so many standard errors on."""
-PREFERENCE_STEP: Final = 0.1
+_PREFERENCE_STEP: Final = 0.1
 """Preferences are rounded to so much [SD of the decision], so that people have tables in common."""
-PASSES: Final = 2
+_PASSES: Final = 2
 """Fits after which preferences are estimated: the first threshold is too high."""
-CHANGES: Final = np.linspace(-2.5, 2.5, 9)
-CHANGE_WEIGHTS: Final = np.exp(-0.5 * CHANGES**2)
+_CHANGES: Final = np.linspace(-2.5, 2.5, 9)
+_CHANGE_WEIGHTS: Final = np.exp(-0.5 * _CHANGES**2)
 """The changes over which a posterior is a mean [SD of the prior], and the prior weight of each."""
 EARLY_TRIALS: Final = 15.0
 """Practice is taken to fade to 1/e in so many trials. [choice]"""
-NEWTON_STEPS: Final = 10
-STEP: Final = 0.01
+_NEWTON_STEPS: Final = 10
+_STEP: Final = 0.01
 """By so many widths a threshold is moved to differentiate the function."""
 
 
@@ -81,7 +81,7 @@ class Given(NamedTuple):
         shifts = np.zeros(len(self.places))
         parts = _likelihoods(self, shifts, grid)
         found = posterior(grid, np.add.reduce([*parts.values()]))
-        for _ in range(PASSES if two_intervals else 0):
+        for _ in range(_PASSES if two_intervals else 0):
             moved = preferences(self, found)
             if np.array_equal(moved, shifts):
                 break
@@ -94,7 +94,7 @@ class Given(NamedTuple):
         constant, share = grid.session_sd
         if named:
             grid = replace(grid, session_sd=(math.hypot(constant, change / math.sqrt(12)), share))
-        return PersonFit(self, shifts, change, named, _posterior(parts, sd * CHANGES, grid, CHANGE_WEIGHTS))
+        return PersonFit(self, shifts, change, named, _posterior(parts, sd * _CHANGES, grid, _CHANGE_WEIGHTS))
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,9 +180,9 @@ def _time_score(given: Given, found: Posterior, shifts: Floats, course: Floats) 
     y, u, others = given.successes.astype(float), given.levels, found.others
     below, above, psi = (
         preferred(success(found.grid.family, u, at, **others._asdict())[given.places], others.lapse, shifts)
-        for at in (found.threshold - STEP * others.width, found.threshold + STEP * others.width, found.threshold)
+        for at in (found.threshold - _STEP * others.width, found.threshold + _STEP * others.width, found.threshold)
     )
-    psi, slope = np.clip(psi, CLIP, 1.0 - CLIP), (above - below) / (2 * STEP * others.width)
+    psi, slope = np.clip(psi, CLIP, 1.0 - CLIP), (above - below) / (2 * _STEP * others.width)
     information = slope**2 / (psi * (1.0 - psi))
     if not information.any():
         return 0.0, 0.0
@@ -230,12 +230,12 @@ def preferences(given: Given, found: Posterior) -> Floats:
     sensed, said = first * np.interp(np.clip(unbiased, 0.5, 0.999), of_z, z), np.where(given.successes, first, -first)
     both = np.abs(first) if np.ptp(first) else np.zeros(len(first))  # one order alone does not show which is preferred
     causes, weights = np.column_stack([both, given.before]), np.zeros(2)
-    for _ in range(NEWTON_STEPS):
+    for _ in range(_NEWTON_STEPS):
         agreed = said * (sensed + causes @ weights)
         hazard = np.exp(-0.5 * agreed**2) / (math.sqrt(2 * math.pi) * np.interp(agreed, z, of_z))
         information = (causes.T * (hazard * (hazard + agreed))) @ causes + np.eye(2) / PREFERENCE_SD**2
         weights += np.linalg.solve(information, causes.T @ (said * hazard) - weights / PREFERENCE_SD**2)
-    return np.asarray(first * np.round(causes @ weights / PREFERENCE_STEP) * PREFERENCE_STEP + 0.0, float)
+    return np.asarray(first * np.round(causes @ weights / _PREFERENCE_STEP) * _PREFERENCE_STEP + 0.0, float)
 
 
 def preferred(psi: ArrayLike, lapse: ArrayLike, shift: ArrayLike) -> Floats:

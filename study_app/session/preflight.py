@@ -32,28 +32,28 @@ from study_app.video.sources import VideosFound
 if TYPE_CHECKING:
     from study_app.haptics.runtime.telemetry import Timing  # loads the compiler, as measuring has done
 
-Means: TypeAlias = Literal["no", "headphones", "noise"]
-MEANS: Final[dict[Means, str]] = {"no": "No", "headphones": "Headphones", "noise": "Noise"}
+_Means: TypeAlias = Literal["no", "headphones", "noise"]
+MEANS: Final[dict[_Means, str]] = {"no": "No", "headphones": "Headphones", "noise": "Noise"}
 """The answers to "Motors masked?", with their labels."""
 QUIETEST_DB, LOUDEST_DB, USUAL_DB = 30, 85, 60
 """Sound pressure levels of masking noise [dB]; above 85 dB hearing is at risk (Directive 2003/10/EC)."""
-Verdict: TypeAlias = Literal["ok", "warning", "failure"]
-LEAST_FRESH = 0.5  # share of ticks in which the device had a new sample
+_Verdict: TypeAlias = Literal["ok", "warning", "failure"]
+_LEAST_FRESH = 0.5  # share of ticks in which the device had a new sample
 RATE_WARNING, RATE_FAILURE = 0.02, 0.5  # relative error of the servo's rate
-LEAST_REFRESH_HZ = 50.0
-SLOW_PROBE_S = 0.1
-TABLES_BYTES = 20_000_000
-MOST_OF_A_TICK = 0.2  # share of a tick that the force model may take
-SAME = 1.1  # greatest ratio of two errors that count as equal
+_LEAST_REFRESH_HZ = 50.0
+_SLOW_PROBE_S = 0.1
+_TABLES_BYTES = 20_000_000
+_MOST_OF_A_TICK = 0.2  # share of a tick that the force model may take
+_SAME = 1.1  # greatest ratio of two errors that count as equal
 _UNKNOWN = {"delay_s": "delay", "count_m": "encoder count", "mass_kg": "mass"}
-SPARE = 3  # required free space as a multiple of a session of the expected length
+_SPARE = 3  # required free space as a multiple of a session of the expected length
 
 
 @dataclass(frozen=True, slots=True)
 class Masking:
     """The operator's answer; ``noise_db`` is the sound pressure level of the masking noise [dB], None without it."""
 
-    means: Means = "no"
+    means: _Means = "no"
     noise_db: int | None = None
 
     @property
@@ -145,7 +145,7 @@ class Check:
     """
 
     name: str
-    verdict: Verdict
+    verdict: _Verdict
     value: str
     _: KW_ONLY
     about: str
@@ -188,7 +188,7 @@ def _servo_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     """Yield the checks of the device's response, its force delay and the servo's rate."""
     share = f"{100 * facts.fresh_share:.0f} %"
     about = f"{facts.device}, a new sample on {share} of ticks"
-    if facts.timing.ticks == 0 or facts.fresh_share < LEAST_FRESH:
+    if facts.timing.ticks == 0 or facts.fresh_share < _LEAST_FRESH:
         advice = f"{facts.device} sends a new sample on only {share} of ticks: check its cable and power"
         yield Check("Device", "failure", "not responding", about=about, advice=advice)
     else:
@@ -226,7 +226,7 @@ def _servo_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     grant = facts.grant  # other processes delay a thread of normal priority
     memory = {None: "", True: ", memory locked", False: ", memory not locked"}[grant.locked]
     advice = "; ".join(f"{it[0].upper()}{it[1:]}" for it in grant.advice)
-    verdict: Verdict = "ok" if grant.level in {"real-time", "none"} else "warning"
+    verdict: _Verdict = "ok" if grant.level in {"real-time", "none"} else "warning"
     yield Check("Priority", verdict, grant.level, about=f"{grant.how}{memory}", advice=f"{advice}." if advice else "")
 
 
@@ -256,7 +256,7 @@ def _screen_and_disk_checks(facts: Measurements, protocol: Protocol) -> Iterator
 
     value, about = f"{screen.refresh_hz:.1f} Hz, {100 * screen.scaling:.0f} %", "refresh rate and scaling of the "
     advice = "Set the participant's screen to 100 % scaling and at least 50 Hz."
-    well = screen.refresh_hz >= LEAST_REFRESH_HZ and screen.scaling == 1
+    well = screen.refresh_hz >= _LEAST_REFRESH_HZ and screen.scaling == 1
     yield _warning_unless("Screen", value, f"{about}participant's screen", advice, well=well)
 
     if facts.probe_s is None:
@@ -264,13 +264,13 @@ def _screen_and_disk_checks(facts: Measurements, protocol: Protocol) -> Iterator
             "Results folder", "failure", "not usable", about="no file could be written", advice=facts.probe_fault
         )
     else:
-        value, well = f"{facts.probe_s * 1e3:.1f} ms", facts.probe_s <= SLOW_PROBE_S
+        value, well = f"{facts.probe_s * 1e3:.1f} ms", facts.probe_s <= _SLOW_PROBE_S
         yield _warning_unless("Results folder", value, "time to write a file", "Use a local disk.", well=well)
 
     rates = SAMPLE_BYTES * protocol.device.rate_hz, FRAMES_BYTES_PER_S  # while measures are sealed
     planned = recordings_of(protocol) if facts.recordings else ()
     recorded = sum(count * sum(sealed_bytes(each_s, rate) for rate in rates) for count, each_s in planned)
-    needed = SPARE * (TABLES_BYTES + recorded)
+    needed = _SPARE * (_TABLES_BYTES + recorded)
     about = f"a session needs about {_megabytes(needed)} MB"
     if facts.free_bytes is None:
         yield Check(
@@ -326,14 +326,14 @@ def _cost_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
             f"{facts.tick_s * 1e9:.0f} ns per tick",
             f"most expensive scene: {100 * share:.2g} % of each tick",
         )
-        advice, well = "Remove an effect from the scene.", share <= MOST_OF_A_TICK
+        advice, well = "Remove an effect from the scene.", share <= _MOST_OF_A_TICK
         yield _warning_unless("Cost of the scenes", value, about, advice, well=well, share=share)
 
     if facts.velocity_errors and facts.dynamics.unknown and descriptor_of(facts.device).kind == "felt":
         now, known = (100 * error for error in facts.velocity_errors)
         missing = [_UNKNOWN[name] for name in facts.dynamics.unknown]
         listed = " and ".join(filter(None, (", ".join(missing[:-1]), missing[-1])))
-        well = now <= SAME * known
+        well = now <= _SAME * known
         why = f"{'although' if well else 'because'} the device's {listed} {'are' if len(missing) > 1 else 'is'} unknown"
         value = f"{now:.2g} %" if well else f"{now:.2g} % instead of {known:.2g} %"
         advice = f"Measure the device: liquid-study devices bench {facts.device}."

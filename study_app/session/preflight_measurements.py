@@ -18,7 +18,7 @@ from study_app.session.preflight import Measurements, Screen
 from study_app.store.atomic import probe_free_bytes
 from study_app.store.blinded.blinding import sealed_hash
 
-LOOK_S = 1 / 60
+_LOOK_S = 1 / 60
 
 
 class MeasuredServo(ServoPort, Protocol):
@@ -47,8 +47,8 @@ def measure_servo_and_disk(
     law_along(Scene(), np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3)))  # compiled here, not at the end of a trial
     reader = servo.telemetry.reader()
     ages_s: list[float] = []
-    for _ in range(max(1, round(lasts_s / LOOK_S))):
-        sleep(LOOK_S)
+    for _ in range(max(1, round(lasts_s / _LOOK_S))):
+        sleep(_LOOK_S)
         newest = servo.telemetry.latest()
         if newest is not None:
             ages_s.append((servo.now_ns() - int(newest["time_ns"])) * 1e-9)

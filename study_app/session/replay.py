@@ -44,10 +44,10 @@ from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
 from study_app.store.progress import attempt_name
 
-TOLERANCE: Final = 1e-9
+_TOLERANCE: Final = 1e-9
 
 
-def scene_presented(
+def _scene_presented(
     protocol: Protocol, key: Key, started: events.TrialStarted, interval: int | None, link_seed: int
 ) -> Scene:
     """Return the presented scene of a condition, or of an interval of a trial whose line was opened.
@@ -68,7 +68,7 @@ class Step:
     scene: Scene
 
 
-def steps_of(
+def _steps_of(
     protocol: Protocol, key: Key, started: events.TrialStarted, interval: int | None, lines: Sequence[events.Event]
 ) -> tuple[Step, ...]:
     """Return the steps of an interval that change a force, in order; empty if no level was set.
@@ -91,7 +91,7 @@ def steps_of(
     return tuple(steps)
 
 
-def as_one_scene(samples: Any, steps: Sequence[Step]) -> Any:
+def _as_one_scene(samples: Any, steps: Sequence[Step]) -> Any:
     """Return samples (n,) in which all scenes of an interval have the number of the last one."""
     if not steps or len(samples) == 0:
         return samples
@@ -100,13 +100,13 @@ def as_one_scene(samples: Any, steps: Sequence[Step]) -> Any:
     return out
 
 
-def step_starts(samples: Any, steps: Sequence[Step]) -> list[tuple[int, Scene]]:
+def _step_starts(samples: Any, steps: Sequence[Step]) -> list[tuple[int, Scene]]:
     """Return the index of the first sample (n,) of each step with its scene, without steps that have no sample."""
     begins = ((np.flatnonzero(samples.scene >= step.serial), step.scene) for step in steps)
     return [(int(at[0]), scene) for at, scene in begins if at.size]
 
 
-def interval_samples(samples: Any, duration_s: float) -> Any:
+def _interval_samples(samples: Any, duration_s: float) -> Any:
     """Return the samples of an interval's task from its recording, which begins earlier and ends later.
 
     ``duration_s`` is the duration of the task in the journal.
@@ -117,7 +117,7 @@ def interval_samples(samples: Any, duration_s: float) -> Any:
     return own[own["time_ns"] <= until_ns]
 
 
-def recompute_delivered(
+def _recompute_delivered(
     protocol: Protocol,
     presented: Stimulated,
     started: events.TrialStarted,
@@ -131,13 +131,13 @@ def recompute_delivered(
     """
     block = protocol.blocks[started.block]
     adjusted = design_of(protocol, block).adjusts and interval == len(started.arrangement or "")
-    own = judged_fields(interval_samples(samples, measured["duration_s"]))
+    own = judged_fields(_interval_samples(samples, measured["duration_s"]))
     return delivered_values(protocol, presented, protocol.tasks[block.task], own, adjusted=adjusted)
 
 
 def recompute_force_error(scene: Scene, rate_hz: float, samples: Any, ended: Mapping[str, Any]) -> float | None:
     """Recompute the force error of a trial or interval from its recording and the opened line on its end."""
-    own = judged_fields(interval_samples(samples, ended["duration_s"]))
+    own = judged_fields(_interval_samples(samples, ended["duration_s"]))
     return delivered_error(own, rate_hz, scene.fade_s, partial(law_along, scene))
 
 
@@ -151,10 +151,10 @@ def differing_columns(recomputed: Mapping[str, float | None], ended: Mapping[str
 def _is_same(value: float | None, other: float | None) -> bool:
     if value is None or other is None:
         return value is other
-    return bool(np.isclose(value, other, rtol=TOLERANCE, atol=TOLERANCE))
+    return bool(np.isclose(value, other, rtol=_TOLERANCE, atol=_TOLERANCE))
 
 
-NAMED_SECONDS = 8
+_NAMED_SECONDS = 8
 _FORCES = ("force_n", "command_n", "device_force_n")
 _ROUNDING = 1e-9
 _FLOAT32 = 2.0**-23  # relative precision of recorded float32 values
@@ -231,13 +231,13 @@ def replay(session_folder: Path) -> Replayed:
             continue
         seed = link_seed(drawn_from, participant, *which)
         interval = which[-1]
-        scene = scene_presented(protocol, key, started, interval, seed)
-        steps = steps_of(protocol, key, started, interval, lines)
+        scene = _scene_presented(protocol, key, started, interval, seed)
+        steps = _steps_of(protocol, key, started, interval, lines)
         recorded, checks = recordings.read_samples(path, key.nonce), recordings.read_checks(path, key.nonce)
         start = time.perf_counter()
-        samples = as_one_scene(recorded, steps)
+        samples = _as_one_scene(recorded, steps)
         try:
-            before = _recompute_forces(samples, scene, devices[resumed], before, step_starts(recorded, steps))
+            before = _recompute_forces(samples, scene, devices[resumed], before, _step_starts(recorded, steps))
         except StudyError as refused:
             before = None
             replayed.uncompared += (f"{name}: not recomputable: {refused}",)
@@ -248,7 +248,7 @@ def replay(session_folder: Path) -> Replayed:
             measured = ended.others
             if interval is not None:
                 presented = recorded_presentation(protocol, key.codes, started.fields()).intervals[interval - 1]
-                again |= recompute_delivered(protocol, presented, started, interval, samples, measured).columns
+                again |= _recompute_delivered(protocol, presented, started, interval, samples, measured).columns
             if measured.get("delivered_error") is not None and ended.outcome != "interrupted":
                 again["delivered_error"] = recompute_force_error(scene, protocol.device.rate_hz, samples, measured)
             replayed.differences += tuple(
@@ -422,8 +422,8 @@ def _samples_before_gap(ticks: NDArray[np.int64]) -> int:
 
 
 def _list_seconds(seconds: list[int]) -> str:
-    shown = ", ".join(map(str, seconds[:NAMED_SECONDS]))
-    more = f" … ({len(seconds)} in all)" if len(seconds) > NAMED_SECONDS else ""
+    shown = ", ".join(map(str, seconds[:_NAMED_SECONDS]))
+    more = f" … ({len(seconds)} in all)" if len(seconds) > _NAMED_SECONDS else ""
     return f"second {shown}{more}"
 
 

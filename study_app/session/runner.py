@@ -37,7 +37,7 @@ from study_app.session.trial import Recording, RunningTrial, is_ball_at_start, r
 from study_app.store.delivered import broken_interval_limits, broken_limits, delivered_values
 from study_app.store.journals.journal_events import TargetReached
 
-STOOD_STILL_S = 3.0  # a longer gap between two trials is noted; in a trial see `trial.FROZEN_S` [choice]
+_STOOD_STILL_S = 3.0  # a longer gap between two trials is noted; in a trial see `trial.FROZEN_S` [choice]
 RETRY_S = 1.0  # interval between attempts to write after a failure [s]
 
 
@@ -155,7 +155,7 @@ class Runner:
                 self.post(event)
             self._follow_samples(samples)
         running = self._running
-        if running is None and still_s > STOOD_STILL_S and self._state.phase not in {Phase.OPENING, *FINAL}:
+        if running is None and still_s > _STOOD_STILL_S and self._state.phase not in {Phase.OPENING, *FINAL}:
             self.post(events.Note(now_s, "note", f"the program stalled for {still_s:.1f} s"))
         if running is not None and running.frozen:
             self.post(events.PauseRequested(self._ports.clock(), "program"))

@@ -43,9 +43,9 @@ if TYPE_CHECKING:
     from study_app.haptics.runtime.servo import Servo
 
 MAX_SEED = 2_147_483_647
-MAX_DRAWN_SEED = 999_999  # greatest seed, short enough to be read aloud
+_MAX_DRAWN_SEED = 999_999  # greatest seed, short enough to be read aloud
 MEASURED_S = 2.0  # duration of the servo's measurement before a session [s]
-PLAYED_MEASURED_S = 0.5  # the same before a session played from the designer [s]
+_PLAYED_MEASURED_S = 0.5  # the same before a session played from the designer [s]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,8 +163,8 @@ def check_row(row_of: str | None, study: Protocol) -> None:
 
 
 def draw_seed() -> int:
-    """Return a random seed, at most `MAX_DRAWN_SEED`."""
-    return secrets.randbelow(MAX_DRAWN_SEED) + 1
+    """Return a random seed, at most `_MAX_DRAWN_SEED`."""
+    return secrets.randbelow(_MAX_DRAWN_SEED) + 1
 
 
 def study_results(results: Path, study: str, device: str, *, pilot: bool = False) -> Path:
@@ -245,7 +245,7 @@ def measure_rig(
         screen=Screen(refresh_hz=0.0, scaling=1.0),
         participant=chosen.row_of or chosen.participant,
         recordings=chosen.recordings,
-        lasts_s=PLAYED_MEASURED_S if chosen.played else MEASURED_S,
+        lasts_s=_PLAYED_MEASURED_S if chosen.played else MEASURED_S,
         sleep=sleep,
     )
     document, _ = read_document(chosen.read_source(), chosen.source)

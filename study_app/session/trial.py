@@ -23,7 +23,7 @@ from study_app.session.transitions.events import StartTrial
 from study_app.store.delivered import JUDGED, delivered_error, judged_fields
 from study_app.video.frames import VideoFrame, VideoSource, VideoStatistics
 
-LEAD_S = 0.6  # time of samples kept for the next recording [s]: longer than the slowest fade
+_LEAD_S = 0.6  # time of samples kept for the next recording [s]: longer than the slowest fade
 _OF_ROW = ("tick", "lateness_ns", "permitted_n", "withheld_n", "delay_ticks")
 _KEPT = np.dtype([(name, SAMPLE[name]) for name in (*(JUDGED.names or ()), *_OF_ROW)])
 """The fields kept of a trial's samples: 128 of 320 bytes."""
@@ -31,9 +31,9 @@ _KEPT = np.dtype([(name, SAMPLE[name]) for name in (*(JUDGED.names or ()), *_OF_
 # delay, including none, and is met exactly; else the newest sample, up to a tick old, would be drawn if there is no
 # delay, and the error of the delay would identify these trials. Two ticks at 1 kHz.
 SETTLED_S = 0.002
-LEAST_SET_S = 1.0
+_LEAST_SET_S = 1.0
 """Least time of a setting after the task's lead [s]: a shorter one could not be judged. [choice]"""
-FROZEN_S = 1.0
+_FROZEN_S = 1.0
 """Longest time without a tick or frame before the attempt ends [s]: no limit of a study permits more. [choice]"""
 
 
@@ -43,7 +43,7 @@ class Recording:
     def __init__(self, recorder: RecorderPort | None, rate_hz: float) -> None:
         self._recorder = recorder
         self._rate_hz = rate_hz
-        self._lead = round(LEAD_S * rate_hz)
+        self._lead = round(_LEAD_S * rate_hz)
         self._before: deque[Any] = deque()
         self._held = 0
         self._running = False
@@ -85,7 +85,7 @@ class Recording:
         self._running = False
 
 
-class FrameStatistics:
+class _FrameStatistics:
     """Statistics of the frames of a trial. Without a window only the first frame needs to be reported."""
 
     def __init__(self, *, late_s: float, due_ns: int, paints: bool = True, videos: bool = False) -> None:
@@ -132,7 +132,7 @@ class FrameStatistics:
         }
 
 
-def sample_columns(samples: Any, rate_hz: float, samples_dropped: int, worst_gap_s: float) -> dict[str, Any]:
+def _sample_columns(samples: Any, rate_hz: float, samples_dropped: int, worst_gap_s: float) -> dict[str, Any]:
     """Return the columns of a trial's row from its samples (array of ``layout.SAMPLE``); None without samples.
 
     ``worst_gap_s`` is the longest time between two ticks, as recorded by the servo.
@@ -199,7 +199,7 @@ class RunningTrial:
         self._serial: int | None = None
         self._dropped_before = 0
         self._tracker = new_tracker(command.task)
-        self._frames = FrameStatistics(late_s=late_s, due_ns=servo.now_ns(), paints=paints, videos=videos)
+        self._frames = _FrameStatistics(late_s=late_s, due_ns=servo.now_ns(), paints=paints, videos=videos)
 
     @property
     def task(self) -> TaskView:
@@ -257,7 +257,7 @@ class RunningTrial:
     def leave(self) -> None:
         """End the task because the participant wants to go on, if it may end so already."""
         if self.command.adjusts:
-            self._tracker.finish(self.command.task.judged_from_s + LEAST_SET_S)
+            self._tracker.finish(self.command.task.judged_from_s + _LEAST_SET_S)
         else:
             self._tracker.leave()
 
@@ -289,7 +289,7 @@ class RunningTrial:
         if self._serial is None:
             return False
         gap_s = max(self._servo.worst_gap_s, self._frames.frame_gap_ns(self._until_ns) * 1e-9)
-        return gap_s > FROZEN_S
+        return gap_s > _FROZEN_S
 
     @property
     def _until_ns(self) -> int:
@@ -299,7 +299,7 @@ class RunningTrial:
         """Return the columns of its row so far (``store.columns``)."""
         dropped = 0 if self._serial is None else self._reader.dropped - self._dropped_before
         measured = {
-            **sample_columns(self._samples, self._servo.rate_hz, dropped, self._servo.worst_gap_s),
+            **_sample_columns(self._samples, self._servo.rate_hz, dropped, self._servo.worst_gap_s),
             **self._frames.columns(self._until_ns),
         }
         measured = {name: round(value, 6) if isinstance(value, float) else value for name, value in measured.items()}

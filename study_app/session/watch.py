@@ -38,7 +38,7 @@ from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
 from study_app.store.progress import progress_of
 
-MOTION_HIDDEN: Final = (
+_MOTION_HIDDEN: Final = (
     "Hidden while the study is blinded: with this device, the recorded motion would reveal the liquid."
 )
 _ASSUMED_FRAME_S: Final = 1 / 60  # frame rate for a session whose frames are unknown
@@ -115,7 +115,7 @@ def reason_motion_is_hidden(start: events.SessionStarted, key: Key | None) -> st
     """Return the reason why a session's motion cannot be shown, or ""; ``key`` is the study's, None while sealed."""
     device = DEVICES.get(start.device or "")
     seen = device is not None and not device.motion_shows_force
-    return "" if seen or key is not None else MOTION_HIDDEN
+    return "" if seen or key is not None else _MOTION_HIDDEN
 
 
 def read_watched(session_folder: Path, trial: int, attempt: int = 1, interval: int = 1) -> Watched:

@@ -12,16 +12,16 @@ from study_app.protocol.questions import KINDS
 from study_app.store.csv_files import Column, optional
 
 STUDY = Column("study", "text", "Short name of the study, from its protocol.")
-PARTICIPANT = Column("participant", "text", "The participant's ID: letters and digits, not a name.")
+_PARTICIPANT = Column("participant", "text", "The participant's ID: letters and digits, not a name.")
 SESSION = Column("session", "integer", "Number of the participant's session.", minimum=1, maximum=99)
-SIMULATED = Column("simulated", "flag", "true if participant and device were simulated (a rehearsal).")
-PILOT = Column("pilot", "flag", "true if the session was a pilot.")
-TRIAL = Column("trial", "integer", "Number of the trial in the session, in the order of presentation.", minimum=1)
-ATTEMPT = Column(
+_SIMULATED = Column("simulated", "flag", "true if participant and device were simulated (a rehearsal).")
+_PILOT = Column("pilot", "flag", "true if the session was a pilot.")
+_TRIAL = Column("trial", "integer", "Number of the trial in the session, in the order of presentation.", minimum=1)
+_ATTEMPT = Column(
     "attempt", "integer", ("1, or higher if the trial was repeated; the last attempt is analysed."), minimum=1
 )
 BLOCK = Column("block", "text", "ID of the block of trials.")
-PHASE = Column(
+_PHASE = Column(
     "phase",
     "text",
     "Purpose of the trial; only main trials are analysed.",
@@ -31,14 +31,14 @@ PHASE = Column(
         ("baseline", "the undisturbed task to which later statements refer"),
     ),
 )
-PART = optional("part", "integer", "Part of the study, as shown to the participant.", minimum=1)
-INDEX = Column("index", "integer", "Position of the trial in its block, from 1.", minimum=1)
+_PART = optional("part", "integer", "Part of the study, as shown to the participant.", minimum=1)
+_INDEX = Column("index", "integer", "Position of the trial in its block, from 1.", minimum=1)
 CODE = Column(
     "code", "text", ("Code of the condition presented (L1, D3 ...); the sealed key assigns it to the condition.")
 )
-SESSION_COLUMNS = (STUDY, PARTICIPANT, SESSION, SIMULATED, PILOT)
+_SESSION_COLUMNS = (STUDY, _PARTICIPANT, SESSION, _SIMULATED, _PILOT)
 """Which session a row is about."""
-TRIAL_COLUMNS = (TRIAL, ATTEMPT, BLOCK, PHASE, PART, INDEX)
+_TRIAL_COLUMNS = (_TRIAL, _ATTEMPT, BLOCK, _PHASE, _PART, _INDEX)
 """Which trial of it."""
 _INVALID = (
     "invalid",
@@ -47,7 +47,7 @@ _INVALID = (
 _NOT_OF_INTERVALS = ("of", "trial_started_at", "trial_started_s", "marked", "notes")
 _LEVEL = "distance of the comparison from its standard, or the value itself, as the protocol asks"
 PARTICIPANTS: tuple[Column, ...] = (
-    *SESSION_COLUMNS,
+    *_SESSION_COLUMNS,
     Column(
         "status",
         "text",
@@ -107,9 +107,9 @@ def with_missing_trials(columns: tuple[Column, ...]) -> tuple[Column, ...]:
 
 
 EXCLUSIONS: tuple[Column, ...] = (
-    PARTICIPANT,
+    _PARTICIPANT,
     SESSION,
-    replace(TRIAL, description="Number of the trial; n/a if the whole session is excluded.", may_miss=True),
+    replace(_TRIAL, description="Number of the trial; n/a if the whole session is excluded.", may_miss=True),
     Column("rule_or_person", "text", "The rule that excludes it, or the initials of the person."),
     Column("reason", "text", "Reason for the exclusion."),
     Column("excluded_at", "time", "Time of the decision."),
@@ -135,8 +135,8 @@ def _delay_error(name: str, which: str, of_trial: Literal["sum", "max", "mean"])
 
 
 RESPONSES: tuple[Column, ...] = (
-    *SESSION_COLUMNS,
-    *TRIAL_COLUMNS,
+    *_SESSION_COLUMNS,
+    *_TRIAL_COLUMNS,
     CODE,
     Column("item", "text", "ID of the statement; its text is in the session's receipt."),
     Column("number", "integer", "Position of the statement on its page, from 1.", minimum=1),
@@ -160,7 +160,7 @@ _RESPONSES_BY_NAME = {column.name: column for column in RESPONSES}
 
 
 RESPONSES_2: tuple[Column, ...] = (
-    *SESSION_COLUMNS,
+    *_SESSION_COLUMNS,
     optional("form", "text", "ID of the questionnaire that was presented on its own; n/a after a trial."),
     optional(
         "after_block",
@@ -168,7 +168,7 @@ RESPONSES_2: tuple[Column, ...] = (
         ("Block after which the form was shown; n/a before the first block and after a trial."),
         later=True,
     ),
-    *(replace(column, may_miss=True) for column in (*TRIAL_COLUMNS, CODE)),
+    *(replace(column, may_miss=True) for column in (*_TRIAL_COLUMNS, CODE)),
     replace(_RESPONSES_BY_NAME["item"], description="ID of the question; its text is in the session's receipt."),
     Column("kind", "text", f"Kind of the question: {', '.join(KINDS.own)}."),
     replace(_RESPONSES_BY_NAME["number"], description="Position of the question on its page as shown, from 1."),
@@ -185,8 +185,8 @@ RESPONSES_2: tuple[Column, ...] = (
 
 
 TRIALS: tuple[Column, ...] = (
-    *SESSION_COLUMNS,
-    *TRIAL_COLUMNS,
+    *_SESSION_COLUMNS,
+    *_TRIAL_COLUMNS,
     Column("of", "integer", "Number of trials in the block.", minimum=1),
     CODE,
     Column("trial_started_at", "time", "Time at which the trial began."),

@@ -147,11 +147,11 @@ def header(columns: tuple[Column, ...]) -> tuple[str, ...]:
 def csv_bytes(columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]) -> bytes:
     """Return a table as CSV in UTF-8; a lone surrogate, which UTF-8 cannot encode, becomes a question mark."""
     names = header(tuple(columns))
-    lines = [",".join(names), *(",".join([cell_text(row[name]) for name in names]) for row in rows), ""]
+    lines = [",".join(names), *(",".join([_cell_text(row[name]) for name in names]) for row in rows), ""]
     return "\n".join(lines).encode("utf-8", "replace")
 
 
-def cell_text(value: Any) -> str:
+def _cell_text(value: Any) -> str:
     """Return a cell as text in a table."""
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return MISSING

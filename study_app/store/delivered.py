@@ -18,14 +18,14 @@ from study_app.protocol.trials.stimuli import DELAY, DELAYS, FORCE_DELAY, OF_CON
 from study_app.protocol.trials.tasks import AnyTask, Follow
 from study_app.psychophysics.delivery import Times, Vectors, at, damping, difference, lag, motion, share
 
-FORCES: Final = ("device_force_n", "force_n")
+_FORCES: Final = ("device_force_n", "force_n")
 """The fields of the force sent to the hand and of the force of the model."""
-DAMPING: Final = "damping_nspm"
-SETTLED_S: Final = 0.2
+_DAMPING: Final = "damping_nspm"
+_SETTLED_S: Final = 0.2
 """Time after the fade-in at which the evaluation of a task without a lead begins [s]."""
-FELT_N: Final = 0.05
+_FELT_N: Final = 0.05
 """RMS of a force below which no error is computed, since people do not feel it [N]."""
-TRUE_HALF_S: Final = 0.018
+_TRUE_HALF_S: Final = 0.018
 """Half width of the filter of the motion on which a force's error is computed [s]. A longer one removes motion that the
 loop adds; a shorter one keeps encoder noise."""
 LONGEST_S: Final = 0.26
@@ -98,10 +98,10 @@ def delivered_values(
     fade_s = protocol.scene.fade_s
     period_s, link = 1 / protocol.device.rate_hz, presented_condition(protocol, presented).link()
     faded_s = fade_s + link.delay_s + link.jitter_s
-    from_s = max(task.lead_s, faded_s) if isinstance(task, Follow) else faded_s + SETTLED_S
+    from_s = max(task.lead_s, faded_s) if isinstance(task, Follow) else faded_s + _SETTLED_S
     moved = motion(times_s, samples["position_m"], period_s).after(from_s)
     first = int(np.searchsorted(times_s, from_s))
-    sent_n, model_n = (np.rint(samples[name] / FORCE_STEP_N) * FORCE_STEP_N for name in FORCES)
+    sent_n, model_n = (np.rint(samples[name] / FORCE_STEP_N) * FORCE_STEP_N for name in _FORCES)
     lag_s = None
     if link.acts or presented.vary == FORCE_DELAY:
         lag_s = _lag_s(times_s, sent_n, model_n, from_s, period_s)
@@ -112,7 +112,7 @@ def delivered_values(
     judges = len(prompt.times_s) and not adjusted
     fitted = damping(at(prompt.times_s, times_s[first:kept], sent_n), prompt) if judges else None
     value = presented.value if presented.vary not in {None, DELAY} and not adjusted else None
-    if varies_damping(presented):
+    if _varies_damping(presented):
         value = None if fitted is None else fitted[0]
     if presented.vary == FORCE_DELAY and not adjusted:
         value = None if lag_s is None else 1000 * lag_s
@@ -140,14 +140,14 @@ def delivered_error(
     rate_hz : float
         Samples per second.
     fade_s : float
-        How long the force fades in: the error counts from `SETTLED_S` later.
+        How long the force fades in: the error counts from `_SETTLED_S` later.
     law_n : callable
         Gives the law's forces (m, 3) [N] at times (m,) [s] of positions and velocities (m, 3) of the hand [m, m/s].
     """
     samples = _plausible_samples(samples)
     times_s = (samples["time_ns"] - samples["time_ns"][:1]) * 1e-9
-    moved = motion(times_s, samples["position_m"], 1 / rate_hz, TRUE_HALF_S)
-    counted = moved.times_s > fade_s + SETTLED_S
+    moved = motion(times_s, samples["position_m"], 1 / rate_hz, _TRUE_HALF_S)
+    counted = moved.times_s > fade_s + _SETTLED_S
     if not counted.any():
         return None
     rounded_n = np.rint(samples["device_force_n"] / FORCE_STEP_N) * FORCE_STEP_N
@@ -155,7 +155,7 @@ def delivered_error(
     right_n = law_n(moved.times_s, position_m, moved.velocity_mps)[counted]
     off_n = sent_n[counted] - right_n
     off_n2, right_n2 = (float(np.mean(np.einsum("ij,ij->i", it, it))) for it in (off_n, right_n))
-    return round(math.sqrt(off_n2 / right_n2), 6) if right_n2 > FELT_N**2 else None
+    return round(math.sqrt(off_n2 / right_n2), 6) if right_n2 > _FELT_N**2 else None
 
 
 def _lag_s(times_s: Times, sent_n: Vectors, model_n: Vectors, from_s: float, period_s: float) -> float | None:
@@ -183,9 +183,9 @@ def delay_error_ms(presented: Stimulated, summary: Mapping[str, Any]) -> float |
     return None if value is None else value - presented.value
 
 
-def varies_damping(presented: Stimulated) -> bool:
+def _varies_damping(presented: Stimulated) -> bool:
     """Return whether the varied quantity is the damping of a linear law, which can be measured at the hand."""
-    return (presented.vary or "").rpartition(".")[2] == DAMPING
+    return (presented.vary or "").rpartition(".")[2] == _DAMPING
 
 
 def broken_interval_limits(
@@ -197,7 +197,7 @@ def broken_interval_limits(
     """
     most = limits.level_error_percent
     if presented.vary is not None and presented.vary not in OF_CONDITION and most is not None:
-        fitted = varies_damping(presented) and not adjusted
+        fitted = _varies_damping(presented) and not adjusted
         measured = delivery.value_delivered if fitted else delivery.force_share
         requested = presented.value if fitted else 1.0
         if abs((measured or 0.0) - requested) > abs(requested) * most / 100:  # a hand at rest receives no force

@@ -18,7 +18,7 @@ from study_app.user_folder import data_folder
 
 REST_S: Final = 0.25
 """Time from the first unsaved edit to the writing of a draft [s]."""
-Selection: TypeAlias = tuple[str | int, ...]
+_Selection: TypeAlias = tuple[str | int, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +39,7 @@ class Draft:
 
     text: str
     base: str
-    selected: Selection = ()
+    selected: _Selection = ()
     kept_at: str = ""
 
 
@@ -62,7 +62,7 @@ class Keeper:
         """Continue from an existing draft."""
         self._own = draft.text
 
-    def note_edit(self, text: str, selected: Selection, now_s: float) -> None:
+    def note_edit(self, text: str, selected: _Selection, now_s: float) -> None:
         """Note an edit at a time of a monotonic clock [s]."""
         if self._pending is None:
             self._due_s = now_s + REST_S

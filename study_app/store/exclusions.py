@@ -23,7 +23,7 @@ from study_app.store.journals import journal
 from study_app.store.progress import progress_of
 from study_app.text_tables import decoded, separator_of, wrong_length
 
-NAMED_IDS = 6
+_NAMED_IDS = 6
 _WHOLE = re.compile("[0-9]{1,9}")
 MISSING_RULE = "missing"
 """The rule that excludes a session in which more trials are missing than the study permits."""
@@ -295,8 +295,8 @@ def _check_recorded(study: StudyFolder, participant: str, session: int, trial: i
     if place not in study.sessions():
         known = [str(session.number) for session in study.sessions() if session.participant == participant]
         ids = study.ids()
-        more = f" … {ids[-1]}" if len(ids) > NAMED_IDS else ""
-        participants = f"participants: {', '.join(ids[:NAMED_IDS]) or 'none'}{more}"
+        more = f" … {ids[-1]}" if len(ids) > _NAMED_IDS else ""
+        participants = f"participants: {', '.join(ids[:_NAMED_IDS]) or 'none'}{more}"
         its = f"sessions of that participant: {', '.join(known)}" if known else participants
         raise StoreError(f"{study.path} does not contain session {session} of participant {participant}; {its}")
     if trial is None:

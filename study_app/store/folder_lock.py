@@ -39,7 +39,7 @@ from study_app.store.checksums import is_system_file
 from study_app.store.journals import journal
 
 _MARKER = re.compile(r"\.open-[0-9a-f]{8}\.json")
-SAME_S = 0.05  # processes with the same ID that began within this time are the same process
+_SAME_S = 0.05  # processes with the same ID that began within this time are the same process
 _BEFORE_THE_FIRST_LINE = ("receipt.json", "journal.jsonl")
 _NO_PROGRAM_TAKES_S = 3600.0  # time in which a program marks a folder that it created, or removes it
 
@@ -226,7 +226,7 @@ def _may_be_running(holder: dict[str, Any]) -> bool:
         return True
     try:
         began = process_start_s(holder["pid"])
-        return began is not None and abs(began - float(holder["began"])) < SAME_S
+        return began is not None and abs(began - float(holder["began"])) < _SAME_S
     except (PermissionError, KeyError, TypeError, ValueError):  # a process with this ID runs, but may be another one
         return True
 

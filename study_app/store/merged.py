@@ -27,7 +27,7 @@ from study_app.store.journals.journal_events import is_valid_value, shorten_valu
 
 MANIFEST: Final = "sites.json"
 FOLDER: Final = "sites"
-FORMAT: Final = 2
+_FORMAT: Final = 2
 DASH: Final = "-"
 
 
@@ -71,7 +71,7 @@ class Merged:
     def content(self) -> bytes:
         """Return the content of ``sites.json``."""
         held = {
-            "format": FORMAT,
+            "format": _FORMAT,
             "study": self.study,
             "protocol_hash": self.protocol_hash,
             "sites": [asdict(site) for site in self.sites],
@@ -90,10 +90,10 @@ def read_merged(folder: Path) -> Merged | None:
     path = folder / MANIFEST
     try:
         held = parse_json(read_regular(path))
-        if held["format"] not in (1, FORMAT):
+        if held["format"] not in (1, _FORMAT):
             shown = shorten_value(held["format"])
             raise StoreError(
-                f"{path} has format {shown}, this version reads 1 and {FORMAT}: use a newer version of liquid-study"
+                f"{path} has format {shown}, this version reads 1 and {_FORMAT}: use a newer version of liquid-study"
             )
         sites = tuple(Site(**site) for site in held["sites"])
         if sites and all(map(_is_site, sites)) and is_valid_value("protocol_hash", held["protocol_hash"]):

@@ -76,10 +76,10 @@ class MissingTrials:
 
     def __str__(self) -> str:
         """Return number and reasons of the missing trials as a sentence without full stop; empty if there are none."""
-        return missing_sentence(self.count, self.asked, self.reasons, self.limits) if self.missing else ""
+        return _missing_sentence(self.count, self.asked, self.reasons, self.limits) if self.missing else ""
 
 
-def missing_sentence(count: int, asked: int, reasons: Mapping[str, int], limits: Mapping[str, float]) -> str:
+def _missing_sentence(count: int, asked: int, reasons: Mapping[str, int], limits: Mapping[str, float]) -> str:
     """Return "26 of 40 trials were not delivered: the safety layer held back too much force (limit 25 %)".
 
     Parameters

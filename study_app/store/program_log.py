@@ -16,14 +16,14 @@ from typing import Any, Final
 from study_app.errors import DeviceError, ServoFault
 from study_app.user_folder import user_folder
 
-MOST_BYTES: Final = 250_000
-KEPT: Final = 2  # files besides the newest
-OMITTED: Final = "…"
+_MOST_BYTES: Final = 250_000
+_KEPT: Final = 2  # files besides the newest
+_OMITTED: Final = "…"
 DEVICE_FAILED: Final = "the device failed: %s"  # support needs it as an error; the session reports it and continues
 _ERROR: Final = re.compile(rf"\S+ \S+ (ERROR|CRITICAL|\S+ \S+ {DEVICE_FAILED.partition('%')[0]})")
 
 
-class PlainFormatter(logging.Formatter):
+class _PlainFormatter(logging.Formatter):
     """Format log records without their arguments."""
 
     def __init__(self) -> None:
@@ -67,8 +67,8 @@ def start_log() -> None:
         return
     with suppress(OSError):
         log_file().parent.mkdir(parents=True, exist_ok=True)
-        handler = _Quiet(log_file(), maxBytes=MOST_BYTES, backupCount=KEPT, encoding="utf-8", delay=True)
-        handler.setFormatter(PlainFormatter())
+        handler = _Quiet(log_file(), maxBytes=_MOST_BYTES, backupCount=_KEPT, encoding="utf-8", delay=True)
+        handler.setFormatter(_PlainFormatter())
         logger.addHandler(handler)
         if logging.lastResort is not None:
             logger.addHandler(logging.lastResort)
@@ -78,7 +78,7 @@ def start_log() -> None:
 def read_log() -> str:
     """Return the log of all readable files, oldest line first."""
     newest = log_file()
-    files = [newest.with_name(f"{newest.name}.{number}") for number in range(KEPT, 0, -1)]
+    files = [newest.with_name(f"{newest.name}.{number}") for number in range(_KEPT, 0, -1)]
     return "".join(map(_read, (*files, newest)))
 
 
@@ -106,8 +106,8 @@ def _read(path: Path) -> str:
 def _plain_argument(given: object) -> str:
     if isinstance(given, DeviceError | ServoFault):
         return str(given)
-    return type(given).__name__ if isinstance(given, BaseException) else OMITTED
+    return type(given).__name__ if isinstance(given, BaseException) else _OMITTED
 
 
 def _message_format(message: object) -> str:
-    return message if isinstance(message, str) else OMITTED
+    return message if isinstance(message, str) else _OMITTED

@@ -29,7 +29,7 @@ GENERATOR = (
     "used, under Fisher-Yates in Durstenfeld's form"
 )
 UNFINISHED = "unfinished"
-CHANGING = ("status", "reason", "ended_at", "resumed", "outlets_lost")
+_CHANGING = ("status", "reason", "ended_at", "resumed", "outlets_lost")
 
 _LIBRARIES = ("numpy", "numba", "pydantic", "PySide6-Essentials", "pyqtgraph", "pyarrow")
 
@@ -122,7 +122,7 @@ def write(path: Path, receipt: Mapping[str, Any]) -> None:
 
 def digest(held: Mapping[str, Any]) -> str:
     """Return the SHA-256 of a receipt, or of one entry of its ``resumed``, without the fields that change later."""
-    lasting = {name: value for name, value in held.items() if name not in CHANGING}
+    lasting = {name: value for name, value in held.items() if name not in _CHANGING}
     return hashlib.sha256(json.dumps(plain_json(lasting), sort_keys=True).encode()).hexdigest()
 
 

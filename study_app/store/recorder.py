@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from study_app.video.frames import VideoFrame
 
 ROOM = 120_000  # capacity of the queue [samples]: two minutes at 1 kHz, 37 MB
-ENOUGH = 5_000  # smallest number of queued samples that wakes the thread
+_ENOUGH = 5_000  # smallest number of queued samples that wakes the thread
 PATIENCE_S = 30.0  # time that the end of a session waits for the disk [s]
 LEAVING_S = 2.0  # the same when the program ends during a session, which must not take long [s]
 
@@ -142,7 +142,7 @@ class Recorder:
                 return
             self._queue.append(samples)
             self._waiting += count
-            if self._waiting >= min(ENOUGH, self._room):
+            if self._waiting >= min(_ENOUGH, self._room):
                 self.changed.notify_all()
 
     def frame(self, painted_ns: int, sample_ns: int, video: VideoFrame | None = None) -> None:

@@ -53,17 +53,17 @@ FRAMES: tuple[Column, ...] = (
         minimum=-1,
     ),
 )
-FORMAT = 4
-RECORDED = tuple(field for field in SAMPLE_FIELDS if field.meaning)
-ROUNDED_TO = {field.name: field.step for field in RECORDED if field.step}
+_FORMAT = 4
+_RECORDED = tuple(field for field in SAMPLE_FIELDS if field.meaning)
+ROUNDED_TO = {field.name: field.step for field in _RECORDED if field.step}
 """Fields of ``layout.SAMPLE`` that are recorded rounded, and the step."""
-FRAME = np.dtype([(column.name, np.int64) for column in FRAMES])
-NO_VIDEO = {"video_frame": -1, "video_ns": 0, "video_age_ns": -1}
+_FRAME = np.dtype([(column.name, np.int64) for column in FRAMES])
+_NO_VIDEO = {"video_frame": -1, "video_ns": 0, "video_age_ns": -1}
 """Values of a frame without a video."""
-FACTS_KEY = b"liquid_study"
+_FACTS_KEY = b"liquid_study"
 _VIDEO_SINCE = 4
 """First format of recordings whose frames have numbers and times of a video."""
-GROUP_SECONDS = 30  # seconds of rows that are compressed together
+_GROUP_SECONDS = 30  # seconds of rows that are compressed together
 _COMPRESSION = ("zstd", 9)
 
 
@@ -77,9 +77,9 @@ def _columns(field: SampleField) -> list[Column]:
     ]
 
 
-SAMPLES = tuple(column for field in RECORDED for column in _columns(field))
+SAMPLES = tuple(column for field in _RECORDED for column in _columns(field))
 _STORED = {
-    **{name: pa.from_numpy_dtype(field.stored) for field in RECORDED for name in field.named()},
+    **{name: pa.from_numpy_dtype(field.stored) for field in _RECORDED for name in field.named()},
     **{column.name: pa.int64() for column in FRAMES},
 }
 
@@ -122,7 +122,7 @@ def read_samples(path: Path, secret: bytes | None = None) -> Any:
     """
     columns, facts = _read_columns(path, "samples", secret)
     samples = records(SAMPLE, len(columns["tick"]))
-    for field in RECORDED:
+    for field in _RECORDED:
         values: Any = field.before
         if field.since <= facts["format"]:
             values = np.column_stack([columns[name] for name in field.named()])
@@ -138,7 +138,7 @@ def read_samples(path: Path, secret: bytes | None = None) -> Any:
 
 
 def read_frames(path: Path, secret: bytes | None = None) -> Any:
-    """Return the frames (n,) as a recarray of `FRAME`: times of painting, of the shown sample and of a video [ns].
+    """Return the frames (n,) as a recarray of `_FRAME`: times of painting, of the shown sample and of a video [ns].
 
     Raises
     ------
@@ -146,9 +146,9 @@ def read_frames(path: Path, secret: bytes | None = None) -> Any:
         It cannot be read, is not a recording of frames, or is sealed.
     """
     columns, _ = _read_columns(path, "frames", secret)
-    frames = records(FRAME, len(columns["painted_ns"]))
-    for name in FRAME.names or ():
-        frames[name] = columns.get(name, NO_VIDEO.get(name, 0))
+    frames = records(_FRAME, len(columns["painted_ns"]))
+    for name in _FRAME.names or ():
+        frames[name] = columns.get(name, _NO_VIDEO.get(name, 0))
     return frames
 
 
@@ -219,9 +219,9 @@ def _read_columns(path: Path, kind: str, secret: bytes | None) -> tuple[dict[str
         table = file.read().combine_chunks()
     held = facts["format"]
     if kind == "frames":
-        columns = [column.name for column in FRAMES if held >= _VIDEO_SINCE or column.name not in NO_VIDEO]
+        columns = [column.name for column in FRAMES if held >= _VIDEO_SINCE or column.name not in _NO_VIDEO]
     else:
-        columns = [name for field in RECORDED if field.since <= held for name in field.named()]
+        columns = [name for field in _RECORDED if field.since <= held for name in field.named()]
     if not _has_columns(table, columns, facts["rows"]):
         raise StoreError(f"{path} is damaged (its columns are not the columns of {kind}): restore it from a copy")
     return {name: _numbers(table.column(name), facts["rows"]) for name in table.column_names}, facts
@@ -251,9 +251,9 @@ def _numbers(column: pa.ChunkedArray, rows: int) -> NDArray[Any]:
 
 def _facts(path: Path, metadata: Any) -> dict[str, Any]:
     try:
-        facts = parse_json(metadata.metadata[FACTS_KEY])
-        if facts["format"] not in range(1, FORMAT + 1):
-            version, readable = facts["format"], f"1 to {FORMAT}"
+        facts = parse_json(metadata.metadata[_FACTS_KEY])
+        if facts["format"] not in range(1, _FORMAT + 1):
+            version, readable = facts["format"], f"1 to {_FORMAT}"
             raise StoreError(
                 f"{path} has format {version!r}, this version reads {readable}: use a newer version of liquid-study"
             )
@@ -286,7 +286,7 @@ class SamplesFile:
         self.taken = 0
         self._secret = secret
         self.check_rows = max(1, round(rate_hz))
-        self.group_rows = self.check_rows * GROUP_SECONDS
+        self.group_rows = self.check_rows * _GROUP_SECONDS
         self.rows = 0
         self._held: list[Any] = []  # samples of the next group
         self._count = 0  # of them
@@ -311,7 +311,7 @@ class SamplesFile:
             self._facts["first_command_n"] = plain_json(samples["command_n"][:1].ravel())
         self._device += crcs(samples["device_force_n"], self.check_rows)
         self._effect += crcs(samples["force_n"], self.check_rows)
-        self._half.write(sample_columns(samples))
+        self._half.write(_sample_columns(samples))
         self.rows += len(samples)
 
     def finish(self, dropped: int = 0) -> Written:
@@ -319,7 +319,7 @@ class SamplesFile:
         if self._count:
             self._write_group(np.concatenate(self._held))
         checks = {"rows": self.check_rows, "device_force": self._device, "effect_force": self._effect}
-        facts = {"format": FORMAT, "kind": "samples", **self._facts, "dropped": dropped, "crc32": checks}
+        facts = {"format": _FORMAT, "kind": "samples", **self._facts, "dropped": dropped, "crc32": checks}
         rate_hz = self._facts["rate_hz"]
         size = sealed_bytes((self.rows + dropped) / rate_hz, SAMPLE_BYTES * rate_hz)
         return self._half.finish(facts, self.rows, size, self._secret)
@@ -335,16 +335,16 @@ def write_frames(
     half = _Half(path, FRAMES)
     painted, shown, *video = frames.T
     columns = {"painted_ns": painted, "sample_ns": shown, "age_ns": painted - shown}
-    half.write({**columns, **dict(zip(NO_VIDEO, video, strict=True))})
+    half.write({**columns, **dict(zip(_NO_VIDEO, video, strict=True))})
     size = sealed_bytes(seconds, FRAMES_BYTES_PER_S)
-    return half.finish({"format": FORMAT, "kind": "frames", **facts}, len(frames), size, secret)
+    return half.finish({"format": _FORMAT, "kind": "frames", **facts}, len(frames), size, secret)
 
 
-def sample_columns(samples: Any) -> dict[str, NDArray[Any]]:
+def _sample_columns(samples: Any) -> dict[str, NDArray[Any]]:
     """Return the columns of ``samples`` as recorded: times and positions exact, other fields rounded."""
     columns: dict[str, NDArray[Any]] = {}
     with np.errstate(invalid="ignore", over="ignore"):  # non-finite values of a fault are stored unchanged
-        for field in RECORDED:
+        for field in _RECORDED:
             values = _round_values(_rows(samples, field.name), field.step)
             if field.beside:
                 values = field.sign * (values - _round_values(_rows(samples, field.beside), field.step))
@@ -392,7 +392,7 @@ class _Half:
 
     def finish(self, facts: Mapping[str, Any], rows: int, size: int, secret: bytes | None) -> Written:
         """Write the file in one step, sealed if there is a ``secret``, so that an opened file is never on the disk."""
-        self._writer.add_key_value_metadata({FACTS_KEY: json.dumps(facts, ensure_ascii=False)})
+        self._writer.add_key_value_metadata({_FACTS_KEY: json.dumps(facts, ensure_ascii=False)})
         self._writer.close()
         content = self._file.getvalue()
         opened_hash = hashlib.sha256(content).hexdigest()

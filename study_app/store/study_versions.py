@@ -21,7 +21,7 @@ from study_app.store.atomic import (
 from study_app.store.folder_lock import lock_folder
 from study_app.user_folder import data_folder
 
-Origin: TypeAlias = Literal["saved", "found", "draft"]
+_Origin: TypeAlias = Literal["saved", "found", "draft"]
 """Saved by this program, found in the file when it was overwritten, or the draft of another program."""
 _ORIGINS: Final = frozenset({"saved", "found", "draft"})
 
@@ -31,7 +31,7 @@ class Kept:
     """A stored content of a study's file, identified by its hash; ``at`` is ISO 8601 with the time zone."""
 
     hash: str
-    origin: Origin
+    origin: _Origin
     at: str
 
 
@@ -88,7 +88,7 @@ def save_study(file: Path, text: str, base: str) -> str:
     return content_hash(source)
 
 
-def keep_version(file: Path, content: bytes, origin: Origin) -> None:
+def keep_version(file: Path, content: bytes, origin: _Origin) -> None:
     """Store a content of a study's file by its hash and list it (`kept_versions`); a listed content is not changed.
 
     Raises

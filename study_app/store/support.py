@@ -18,7 +18,7 @@ from study_app.store.program_log import last_error, read_log, source_place
 from study_app.workspace import workspace
 
 NAME: Final = "liquid-study-support.zip"
-CRASHES: Final = 3
+_CRASHES: Final = 3
 _DRIVERS: Final = ("pyusb", "libusb-package", "hidapi")
 _PRIVATE: Final = frozenset({"operator", "firmware", "workspace", "recent", "camera", "proofs", "stamps", "stamp_root"})
 """Settings with initials, paths that may name a person, or an address that may contain a password."""
@@ -26,7 +26,7 @@ _PLACE: Final = re.compile(r'^ *(File "[^"]*", line \d+ in \S+|<no Python frame>
 _HEADING: Final = re.compile(
     r"^(Fatal Python error: [\w \-]+|(Current thread|Thread) 0x[0-9a-f]+ \(most recent call first\):)$"
 )
-ABOUT: Final = """What liquid-study knows about this machine, for support.
+_ABOUT: Final = """What liquid-study knows about this machine, for support.
 
 versions.json    the program, Python, the system and libraries
 settings.json    the settings of this machine, without initials, folders and camera address
@@ -57,7 +57,7 @@ def write_support(path: Path, diagnosis: str = "") -> None:
 def _parts(diagnosis: str) -> Iterator[tuple[str, str]]:
     settings, trouble = workstation.load_or_default()
     log = read_log()
-    yield "README.txt", ABOUT
+    yield "README.txt", _ABOUT
     yield "versions.json", _json(receipt.versions() | {name: receipt.library_version(name) for name in _DRIVERS})
     yield "settings.json", _json(_settings(settings) | ({"problem": "the file cannot be used"} if trouble else {}))
     yield "log.txt", log
@@ -82,7 +82,7 @@ def _crashes(results: Path) -> Iterator[str]:
             traces.append((path.stat().st_mtime_ns, path.read_text(encoding="utf-8", errors="replace")))
         except OSError:
             continue
-    for _, trace in sorted(traces, reverse=True)[:CRASHES]:
+    for _, trace in sorted(traces, reverse=True)[:_CRASHES]:
         lines = [line for line in trace.splitlines() if _PLACE.match(line) or _HEADING.match(line)]
         yield re.sub(r'(?<=File ")[^"]*', lambda path: source_place(path[0]), "\n".join(lines))
 

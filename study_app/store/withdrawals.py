@@ -42,7 +42,7 @@ from study_app.store.output_files import Output, erase_outputs
 from study_app.store.tables.study_files import described_study, write_participants
 from study_app.workspace import workspace
 
-DATASET: Final = "dataset_description.json"
+_DATASET: Final = "dataset_description.json"
 RESULTS: Final = "results"
 
 
@@ -257,7 +257,7 @@ def _find_copies(study: StudyFolder, also: Iterable[Path]) -> tuple[list[StudyFo
     for folder in also:
         if not folder.is_dir():
             raise StoreError(f"{folder} is not a folder: --also requires a folder with copies of the study")
-        for description in sorted(folder.rglob(DATASET)):
+        for description in sorted(folder.rglob(_DATASET)):
             place = description.parent.resolve()
             if place != study.path.resolve() and StudyFolder(place).data.is_dir():
                 by_path[place] = StudyFolder(description.parent)

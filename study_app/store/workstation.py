@@ -30,15 +30,15 @@ STATEMENT_X_HEIGHT_PX: Final = 16 * 1118 / 2048
 
 DISTANCE_MM: Final = (200.0, 3000.0)
 WIDTH_MM: Final = (80.0, 5000.0)
-MOST_RECENT: Final = 8
+_MOST_RECENT: Final = 8
 REMEMBERED_OPTIONS: Final = ("firmware",)
 """Names of device options stored as settings of this computer; others are asked for before each session."""
 OFFSET_MS: Final = (0.0, 500.0)
 SPREAD_MS: Final = (0.0, 200.0)
 CAMERA_LENGTH: Final = 400
-TRIGGERS_PATTERN: Final = r"^([a-z]+:[^\x00-\x1f]+)?$"
-Place = Annotated[str, Field(pattern=r"^[^\x00]+$")]
-OfAxes = Annotated[tuple[float, float, float], Field(strict=False)]
+_TRIGGERS_PATTERN: Final = r"^([a-z]+:[^\x00-\x1f]+)?$"
+_Place = Annotated[str, Field(pattern=r"^[^\x00]+$")]
+_OfAxes = Annotated[tuple[float, float, float], Field(strict=False)]
 How = Literal["photodiode", "high-speed camera", "data sheet"]
 
 
@@ -71,14 +71,14 @@ class DeviceBench(_Strict):
     name: Annotated[str, Field(pattern=rf"^{NAME_PATTERN}$")]
     serial: str = ""
     measured: str
-    mass_kg: OfAxes
-    damping_nspm: OfAxes
-    friction_n: OfAxes
-    delay_ms: OfAxes
-    stable_nspm: OfAxes
+    mass_kg: _OfAxes
+    damping_nspm: _OfAxes
+    friction_n: _OfAxes
+    delay_ms: _OfAxes
+    stable_nspm: _OfAxes
     gain: float | None = None
     count_m: Annotated[float, Field(gt=0.0)] | None = None
-    report: Place | None = None
+    report: _Place | None = None
 
     @property
     def entry(self) -> dict[str, Any]:
@@ -107,9 +107,9 @@ class MachineSettings(_Strict):
     screen_width_mm: Annotated[float, Field(ge=WIDTH_MM[0], le=WIDTH_MM[1])] | None = None
     display_offset: DisplayOffset | None = None
     device: Annotated[str, Field(pattern=rf"^{NAME_PATTERN}(:.+)?$")] = DEFAULT_DEVICE
-    firmware: Place | None = None
-    workspace: Place | None = None
-    recent: Annotated[tuple[Place, ...], Field(max_length=MOST_RECENT, strict=False)] = ()
+    firmware: _Place | None = None
+    workspace: _Place | None = None
+    recent: Annotated[tuple[_Place, ...], Field(max_length=_MOST_RECENT, strict=False)] = ()
     theme: Annotated[Literal["light", "dark"], Field(title="Theme of the operator's windows")] = "light"
     sound: Annotated[bool, Field(title="Sound when a device needs attention")] = False
     photodiode: bool = False
@@ -118,10 +118,10 @@ class MachineSettings(_Strict):
     benches: Annotated[tuple[DeviceBench, ...], Field(strict=False)] = ()
     lsl_markers: bool = False
     lsl_samples: SampleChoice = "off"
-    proofs: Place | None = None
+    proofs: _Place | None = None
     stamps: Annotated[str, Field(pattern=r"^(https?://\S+)?$")] = ""
-    stamp_root: Place | None = None
-    triggers: Annotated[str, Field(pattern=TRIGGERS_PATTERN)] = ""
+    stamp_root: _Place | None = None
+    triggers: Annotated[str, Field(pattern=_TRIGGERS_PATTERN)] = ""
 
     @property
     def marker_addresses(self) -> tuple[str, ...]:
@@ -140,7 +140,7 @@ class MachineSettings(_Strict):
             return self
         name = str(protocol.absolute())
         others = (other for other in self.recent if other != name)
-        return self.model_copy(update={"recent": (name, *others)[:MOST_RECENT]})
+        return self.model_copy(update={"recent": (name, *others)[:_MOST_RECENT]})
 
     def with_bench(self, bench: DeviceBench) -> MachineSettings:
         """Return the settings with this measurement, replacing an earlier one of the same device."""

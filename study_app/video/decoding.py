@@ -11,13 +11,13 @@ from typing import Any, Final, NamedTuple
 from study_app.errors import VideoError
 
 EXTRA: Final = "needs the optional extra video: pip install 'liquid-study[video]'"
-SIZE: Final = (1280, 720)
+_SIZE: Final = (1280, 720)
 """Size of scaled frames until the tank sets its own [px]."""
-NICE: Final = 5
+_NICE: Final = 5
 """Nice level of a decoding thread above the others, if the system permits one per thread. [choice]"""
 SECOND_NS: Final = 1_000_000_000
-USUAL_RATE_HZ: Final = 30.0
-RATES_HZ: Final = (1.0, 240.0)
+_USUAL_RATE_HZ: Final = 30.0
+_RATES_HZ: Final = (1.0, 240.0)
 OF_FILE: Final = {"format_whitelist": "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpeg,mpegts,ogg"}
 """FFmpeg's names of containers that contain the video: others, such as ffconcat, refer to another file."""
 
@@ -70,9 +70,9 @@ def failure_reason(error: Exception) -> str:
 def period_ns(stream: Any) -> int:
     """Return the frame period that a stream states [ns]."""
     for rate in (stream.average_rate, stream.guessed_rate):
-        if rate is not None and RATES_HZ[0] <= float(rate) <= RATES_HZ[1]:
+        if rate is not None and _RATES_HZ[0] <= float(rate) <= _RATES_HZ[1]:
             return round(SECOND_NS / float(rate))
-    return round(SECOND_NS / USUAL_RATE_HZ)
+    return round(SECOND_NS / _USUAL_RATE_HZ)
 
 
 class Scaler:
@@ -82,7 +82,7 @@ class Scaler:
         from av.video.reformatter import VideoReformatter  # noqa: PLC0415 - an optional extra
 
         self._reformatter = VideoReformatter()
-        self.size = SIZE
+        self.size = _SIZE
 
     def pixels(self, frame: Any) -> Pixels:
         """Return a frame's pixels, scaled to the width or height of the size with the frame's aspect ratio."""
@@ -98,4 +98,4 @@ def make_less_urgent() -> None:
     """Lower the priority of this thread."""
     if sys.platform == "linux":
         with suppress(OSError):
-            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICE)
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)

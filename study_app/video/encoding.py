@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from study_app.errors import VideoError
 from study_app.video.decoding import EXTRA
 
-CODECS = ("libx264", "mpeg4")
+_CODECS = ("libx264", "mpeg4")
 """Codecs in order of preference; the first one in this build of FFmpeg is used."""
 
 
@@ -36,7 +36,7 @@ class VideoWriter:
         self._picture = av.VideoFrame
         self._file = io.BytesIO()
         self._container = av.open(self._file, "w", format="mp4")
-        codec = next(name for name in CODECS if name in av.codecs_available)
+        codec = next(name for name in _CODECS if name in av.codecs_available)
         self._stream = self._container.add_stream(codec, rate=rate_hz)
         self._stream.width, self._stream.height = (side // 2 * 2 for side in size)
         self._stream.pix_fmt = "yuv420p"

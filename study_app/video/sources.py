@@ -38,22 +38,22 @@ from study_app.video.decoding import (
 )
 from study_app.video.frames import VideoFrame, stopped_error
 
-LIVE: Final = {"fflags": "nobuffer", "flags": "low_delay", "probesize": "65536", "analyzeduration": "0"}
-OF_DEVICE: Final = {"video_size": "1280x720", "framerate": "30"}
+_LIVE: Final = {"fflags": "nobuffer", "flags": "low_delay", "probesize": "65536", "analyzeduration": "0"}
+_OF_DEVICE: Final = {"video_size": "1280x720", "framerate": "30"}
 USUAL: Final = {"linux": "v4l2:/dev/video0", "darwin": "avfoundation:0"}.get(sys.platform, "")
 KINDS: Final = ("v4l2", "avfoundation", "dshow")
 OPENS_S, STALLS_S, ENDS_S = 8.0, 1.0, 5.0
-MOST_AGE_S: Final = 10.0
+_MOST_AGE_S: Final = 10.0
 """Greatest difference of a time stamp from a system clock [s]: a larger one means another clock. [choice]"""
-SPARE_NS: Final = SECOND_NS // 2
+_SPARE_NS: Final = SECOND_NS // 2
 HOST: Final = re.compile(r"([\w.-]+|\[[\da-fA-F:.]+\])(:\d{1,5})?")
 NOT_SHOWN: Final = "(address not shown)"
-COUNTED: Final = 30
+_COUNTED: Final = 30
 """Number of intervals between frames whose median is the period."""
-AHEAD: Final = 15
+_AHEAD: Final = 15
 """Capacity for decoded frames: half a second at 30 Hz, 45 MB at 1152 x 648 pixels. [choice]"""
 PATIENCE_S: Final = 5.0
-CAMERA = "camera"
+_CAMERA = "camera"
 
 
 class Camera:
@@ -77,7 +77,7 @@ class Camera:
         if not source:
             raise VideoError("the camera is not set: set it under This machine, such as dshow:video=NAME")
         self._now_ns = now_ns
-        self._holds_ns = round(holds_s * SECOND_NS) + SPARE_NS
+        self._holds_ns = round(holds_s * SECOND_NS) + _SPARE_NS
         self._changed = threading.Condition()
         self._frames: deque[VideoFrame] = deque()
         self._fitted: tuple[int, int] | None = None
@@ -148,7 +148,7 @@ class Camera:
     def _read(self) -> None:
         kind, _, place = self.source.partition(":")
         of_device = kind in KINDS
-        options = {**LIVE, **OF_DEVICE} if of_device else LIVE
+        options = {**_LIVE, **_OF_DEVICE} if of_device else _LIVE
         given = {"kind": kind, **options} if of_device else options
         with open_video(place if of_device else self.source, timeout=(OPENS_S, 2 * STALLS_S), **given) as container:
             stream = container.streams.video[0]
@@ -201,14 +201,14 @@ class _Numbers:
         self.period_ns = period_ns
         self._number = -1
         self._before_s: float | None = None
-        self._gaps_s: deque[float] = deque(maxlen=COUNTED)
+        self._gaps_s: deque[float] = deque(maxlen=_COUNTED)
 
     def of(self, stamp_s: float | None) -> int:
         """Return the number of a frame with this time stamp [s]; without one, the number after the last."""
         missed = 0
         if stamp_s is not None and self._before_s is not None and (gap_s := stamp_s - self._before_s) > 0:
             self._gaps_s.append(gap_s)
-            if len(self._gaps_s) >= COUNTED // 3:
+            if len(self._gaps_s) >= _COUNTED // 3:
                 self.period_ns = round(float(np.median(self._gaps_s)) * SECOND_NS)
             missed = max(0, round(gap_s * SECOND_NS / self.period_ns) - 1)
         self._before_s = stamp_s
@@ -219,7 +219,7 @@ class _Numbers:
 def _age_ns(stamp_s: float | None) -> int | None:
     """Return the age of a frame with this time stamp [ns], by the system clock of the stamps."""
     for clock in (time.monotonic, time.time):
-        if stamp_s is not None and -0.001 <= (age_s := clock() - stamp_s) < MOST_AGE_S:
+        if stamp_s is not None and -0.001 <= (age_s := clock() - stamp_s) < _MOST_AGE_S:
             return max(0, round(age_s * SECOND_NS))
     return None
 
@@ -289,7 +289,7 @@ class Footage:
             self._media_ns = max(0, moment_ns - began_ns)
             while self._frames and self._frames[0].due_ns <= self._media_ns:
                 self._shown = self._frames.popleft()
-            if len(self._frames) <= AHEAD // 2:  # rarely: the decoder competes with painting for the interpreter lock
+            if len(self._frames) <= _AHEAD // 2:  # rarely: the decoder competes with painting for the interpreter lock
                 self._changed.notify_all()
             if self._failure and not self._frames:
                 raise stopped_error(self._failure)
@@ -346,7 +346,7 @@ class Footage:
     def _put(self, frame: VideoFrame, play: int) -> bool:
         """Queue a frame when there is room; return whether it is still needed."""
         with self._changed:
-            while len(self._frames) >= AHEAD and play == self._play and not self._closed:
+            while len(self._frames) >= _AHEAD and play == self._play and not self._closed:
                 self._changed.wait()
             if play != self._play or self._closed:
                 return False
@@ -425,7 +425,7 @@ class Videos:
     def describe(self) -> dict[str, Any]:
         """Return the record for the receipt, which does not reveal the video of a condition."""
         description: dict[str, Any] = {"footage_sha256": sorted(set(self._hashes.values()))} if self._hashes else {}
-        if isinstance(camera := self._open.get(CAMERA), Camera):
+        if isinstance(camera := self._open.get(_CAMERA), Camera):
             age_ns = camera.newest.age_ns
             description["camera"] = {
                 "source": without_login(camera.source),
@@ -453,7 +453,7 @@ class Videos:
             raise VideoError("the videos have been closed")
 
     def _opened(self, view: str) -> Camera | Footage:
-        if view == CAMERA:
+        if view == _CAMERA:
             return Camera(self._camera, self._now_ns, self._holds_s)
         path = self._folder / view
         if file_hash(path) not in (None, self._hashes.get(view)):
@@ -462,7 +462,7 @@ class Videos:
 
     def _words(self) -> Iterable[str]:
         for view, source in self._open.items():
-            if isinstance(source, Camera) and view == CAMERA:
+            if isinstance(source, Camera) and view == _CAMERA:
                 age_ns = source.newest.age_ns
                 age = "age unknown" if age_ns is None else f"{age_ns / 1e6:.0f} ms old"
                 yield f"camera, {source.size[0]} × {source.size[1]}, {1e9 / source.newest.period_ns:.3g} Hz, {age}"
@@ -481,10 +481,10 @@ def missing_on_computer(protocol: Protocol, folder: Path, camera: str, now_ns: C
     views = {condition.view for condition in protocol.conditions.values() if condition.shows_video}
     if views and not is_installed():
         return f"a video {EXTRA}"
-    for view in sorted(views - {CAMERA}):
+    for view in sorted(views - {_CAMERA}):
         Footage(folder / view).close()
     try:
-        if CAMERA in views:
+        if _CAMERA in views:
             Camera(camera or USUAL, now_ns, holds_s=0.0).close()
     except VideoError as error:
         return str(error)

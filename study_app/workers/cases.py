@@ -28,11 +28,11 @@ from study_app.errors import WorkerError
 from study_app.workers.server import CONTEXT, compute_in_one_thread, ignore_interrupts
 
 LIBRARIES: Final = ("numpy", "scipy", "numba", "pandas", "ngsolve")
-ADDRESS: Final = re.compile(r"(?:tcp|tls)://(?:\[(?P<ipv6>[0-9a-fA-F:]+)\]|(?P<host>[^\s:/\[\]]+)):(?P<port>\d{1,5})")
+_ADDRESS: Final = re.compile(r"(?:tcp|tls)://(?:\[(?P<ipv6>[0-9a-fA-F:]+)\]|(?P<host>[^\s:/\[\]]+)):(?P<port>\d{1,5})")
 CONNECT_S: Final = 10.0
-LONGEST_GREETING: Final = 1 << 16
-CLOSE_S: Final = 2.0
-WATCH_S: Final = 0.5
+_LONGEST_GREETING: Final = 1 << 16
+_CLOSE_S: Final = 2.0
+_WATCH_S: Final = 0.5
 P = ParamSpec("P")
 T = TypeVar("T")
 _PACKAGE: Final = Path(study_app.__file__).resolve().parent
@@ -135,7 +135,7 @@ class ClusterExecutor(Executor):
         elif wait:
             wait_for(self._pending.copy())
         self._ended.set()
-        self._client.close(timeout=CLOSE_S)
+        self._client.close(timeout=_CLOSE_S)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -160,7 +160,7 @@ class ClusterExecutor(Executor):
 
     def _watch(self) -> None:
         """Cancel all cases when the scheduler is lost: the client then leaves some without an outcome."""
-        while not self._ended.wait(WATCH_S):
+        while not self._ended.wait(_WATCH_S):
             if self._client.status != "running":
                 self._cancel()
 
@@ -217,7 +217,7 @@ def _version(name: str) -> str:
 
 def _check_that_something_answers(address: str) -> None:
     """Reject an unusable address within seconds; Dask would wait for long or fail at exit."""
-    parts = ADDRESS.fullmatch(address)
+    parts = _ADDRESS.fullmatch(address)
     if parts is None:
         raise WorkerError(
             f"{address!r} is not the address of a Dask scheduler: give tcp://HOST:PORT, such as tcp://lab1:8786"
@@ -242,7 +242,7 @@ def _receive_greeting(connection: socket.socket) -> None:
         more = connection.recv(wanted - len(came))
         came += more
         wanted += int.from_bytes(came, "little") if len(came) == wanted == 8 else 0
-        if not more or wanted > LONGEST_GREETING:
+        if not more or wanted > _LONGEST_GREETING:
             raise ConnectionError("another program answers there")
 
 

@@ -28,7 +28,7 @@ Kind: TypeAlias = Compared
 
 KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
 
-DELAY_PREFIX: Final = "D"
+_DELAY_PREFIX: Final = "D"
 """Codes of delay settings are D1, D2 …: what tells a block of delays in sealed receipts of earlier versions."""
 
 
@@ -175,8 +175,8 @@ def _block(protocol: Mapping[str, Any], block: Mapping[str, Any], language: str,
     questionnaire = protocol["questionnaires"][block["questionnaire"]]
     scale = protocol["scales"][questionnaire["scale"]]
     off_scale = scale["cannot_judge"]
-    settings = settings_in(protocol, block["id"], key)
-    kind: Kind = block.get("compares") or ("delays" if block["code_prefix"] == DELAY_PREFIX else "liquids")
+    settings = _settings_in(protocol, block["id"], key)
+    kind: Kind = block.get("compares") or ("delays" if block["code_prefix"] == _DELAY_PREFIX else "liquids")
     if key is not None:
         kind = _opened(key, block["id"], block["codes"], block.get("compares"))[1]
     return Block(
@@ -193,7 +193,7 @@ def _block(protocol: Mapping[str, Any], block: Mapping[str, Any], language: str,
     )
 
 
-def settings_in(protocol: Mapping[str, Any], block: str, key: Key | None) -> tuple[Setting, ...]:
+def _settings_in(protocol: Mapping[str, Any], block: str, key: Key | None) -> tuple[Setting, ...]:
     """Return the settings of a block: in code order, once known in the order of the conditions."""
     table = protocol["blocks"][block]
     if key is None:
@@ -337,12 +337,12 @@ def _level_block(protocol: Mapping[str, Any], step: str, key: Key | None, whole:
         design = default_design(table["design"])
     title = text_in(table["title"], spoken(protocol))
     return LevelBlock(
-        step, title, table["phase"], design, stimulus, settings_in(protocol, step, key), method, published,
+        step, title, table["phase"], design, stimulus, _settings_in(protocol, step, key), method, published,
         (table.get("catch") or {}).get("wrong_most"),
     )  # fmt: skip
 
 
-Direction: TypeAlias = Literal["increasing", "decreasing"]
+_Direction: TypeAlias = Literal["increasing", "decreasing"]
 Spending: TypeAlias = Literal["obrien-fleming", "pocock"]
 
 
@@ -426,7 +426,7 @@ class Decided:
         """Whether a statement is one that the study is about."""
         return self.binding and (not self.primary or item in self.primary)
 
-    def direction(self, item: str) -> Direction | None:
+    def direction(self, item: str) -> _Direction | None:
         """Return where answers to a statement were expected to go as delay grows; None: nothing was expected."""
         return "increasing" if item in self.rising else "decreasing" if item in self.falling else None
 
@@ -592,7 +592,7 @@ def _questionnaires(protocol: Mapping[str, Any], key: Key | None) -> Iterator[tu
             block = protocol["blocks"][step]
             if block["phase"] == "main" and block["questionnaire"] is not None:
                 title = text_in(block["title"], language)
-                where = QuestionPlace(step, title, False, settings_in(protocol, step, key))
+                where = QuestionPlace(step, title, False, _settings_in(protocol, step, key))
                 yield where, protocol["questionnaires"][block["questionnaire"]]
         elif step in protocol["questionnaires"]:
             table = protocol["questionnaires"][step]

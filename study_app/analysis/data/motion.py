@@ -24,13 +24,13 @@ from study_app.haptics.model.layout import LIMITER_GLITCH
 from study_app.store.merged import session_in
 from study_app.store.recordings import SealedRecording, read_samples
 
-CUTOFF_HZ: Final = 10.0
+_CUTOFF_HZ: Final = 10.0
 """Below this lies what a hand does on purpose; speeds are low-passed here (Butterworth, both ways, order 4 in all)."""
 
-PROMINENCE: Final = 0.1
+_PROMINENCE: Final = 0.1
 """A peak of speed counts as a submovement if it stands out by this share of the reach's highest speed."""
 
-SHORTEST: Final = 32
+_SHORTEST: Final = 32
 """So many samples are needed to be filtered; a shorter reach is one submovement."""
 
 REACH_DEFINITIONS: Final = {
@@ -39,7 +39,7 @@ REACH_DEFINITIONS: Final = {
     "overshoot_mm": "largest distance beyond the far edge of the target, along the line between the targets; "
     "0: no overshoot",
     "submovements": "peaks of the hand's speed until the target was reached "
-    f"(low-pass {CUTOFF_HZ:g} Hz) that stand out by {100 * PROMINENCE:g} % of the highest; 1 is one smooth movement",
+    f"(low-pass {_CUTOFF_HZ:g} Hz) that stand out by {100 * _PROMINENCE:g} % of the highest; 1 is one smooth movement",
 }
 
 
@@ -121,14 +121,14 @@ def path_length_m(positions_m: Array) -> float:
 
 def submovements(seconds: Array, positions_m: Array) -> int:
     """Return how many peaks the speed along a path (n, 3) at ``seconds`` (n,) has; at least 1."""
-    if len(seconds) < SHORTEST:
+    if len(seconds) < _SHORTEST:
         return 1
     rate_hz = (len(seconds) - 1) / (seconds[-1] - seconds[0])
-    if rate_hz <= 2 * CUTOFF_HZ:
+    if rate_hz <= 2 * _CUTOFF_HZ:
         return 1
     speed = np.linalg.norm(np.gradient(positions_m, seconds, axis=0), axis=1)
-    smooth = sosfiltfilt(butter(2, CUTOFF_HZ, fs=rate_hz, output="sos"), speed)
-    peaks, _ = find_peaks(smooth, prominence=PROMINENCE * float(smooth.max()))
+    smooth = sosfiltfilt(butter(2, _CUTOFF_HZ, fs=rate_hz, output="sos"), speed)
+    peaks, _ = find_peaks(smooth, prominence=_PROMINENCE * float(smooth.max()))
     return max(1, len(peaks))
 
 

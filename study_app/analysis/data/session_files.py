@@ -34,7 +34,7 @@ from study_app.store.missing_trials import MissingTrials
 from study_app.store.progress import progress_of
 from study_app.store.tables.study_files import has_intervals
 
-DTYPES: Final[dict[str, Any]] = {
+_DTYPES: Final[dict[str, Any]] = {
     "text": "string",
     "time": "string",
     "integer": "Int64",
@@ -42,10 +42,10 @@ DTYPES: Final[dict[str, Any]] = {
     "flag": "boolean",
 }
 
-Whole: TypeAlias = NDArray[np.int64]
+_Whole: TypeAlias = NDArray[np.int64]
 
 
-def tables(paths: Sequence[Path], columns: tuple[Column, ...]) -> tuple[pd.DataFrame, Whole]:
+def tables(paths: Sequence[Path], columns: tuple[Column, ...]) -> tuple[pd.DataFrame, _Whole]:
     """Read one table of many sessions, typed by the dictionary, ``n/a`` as missing; and how many rows each file has.
 
     Columns that the version which wrote a file did not have yet, or that are sealed, are missing.
@@ -59,7 +59,7 @@ def tables(paths: Sequence[Path], columns: tuple[Column, ...]) -> tuple[pd.DataF
         for column in columns:
             of_file = texts.get(column.name, [MISSING] * rows)
             values[column.name] += _values(column, of_file, known[column.name], path)
-    typed = {column.name: pd.array(values[column.name], dtype=DTYPES[column.kind]) for column in columns}
+    typed = {column.name: pd.array(values[column.name], dtype=_DTYPES[column.kind]) for column in columns}
     return pd.DataFrame(typed), np.array(lengths, dtype=np.int64)
 
 
@@ -269,7 +269,7 @@ def read_tables(sessions: Sequence[Session], name: str) -> pd.DataFrame:
     )
 
 
-def _check_own(sessions: Sequence[Session], paths: Sequence[Path], table: pd.DataFrame, lengths: Whole) -> None:
+def _check_own(sessions: Sequence[Session], paths: Sequence[Path], table: pd.DataFrame, lengths: _Whole) -> None:
     """Refuse rows that are not of the session whose file they stand in."""
     own: dict[str, list[Any]] = {
         "study": [session.study for session in sessions],
@@ -288,7 +288,7 @@ def _check_own(sessions: Sequence[Session], paths: Sequence[Path], table: pd.Dat
             )
 
 
-def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd.DataFrame, lengths: Whole) -> None:
+def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd.DataFrame, lengths: _Whole) -> None:
     """Refuse answers to what was not asked, and answers given twice."""
     blocks = sessions[0].blocks
     asked = {(block.id, code, item.id) for block in blocks for code in block.codes for item in block.items}
@@ -319,7 +319,7 @@ def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd
         )
 
 
-def _place(lengths: Whole, index: int) -> tuple[int, int]:
+def _place(lengths: _Whole, index: int) -> tuple[int, int]:
     """Return the session of the row at ``index``, and the row's number in its file, the header's being 1."""
     ends = np.cumsum(lengths)
     which = int(np.searchsorted(ends, index, side="right"))

@@ -84,7 +84,7 @@ def _all(each: Mapping[str, Iterable[Setting]]) -> tuple[Setting, ...]:
     return tuple(dict.fromkeys(renamed(site, one) for site, settings in each.items() for one in settings))
 
 
-def pooled_blocks(sites: Mapping[str, Sequence[AnyBlock]]) -> tuple[AnyBlock, ...]:
+def _pooled_blocks(sites: Mapping[str, Sequence[AnyBlock]]) -> tuple[AnyBlock, ...]:
     """Return the blocks, which all sites have, with the settings of all sites."""
     first = next(iter(sites.values()))
     return tuple(
@@ -93,7 +93,7 @@ def pooled_blocks(sites: Mapping[str, Sequence[AnyBlock]]) -> tuple[AnyBlock, ..
     )
 
 
-def pooled_questions(sites: Mapping[str, OtherQuestions]) -> OtherQuestions:
+def _pooled_questions(sites: Mapping[str, OtherQuestions]) -> OtherQuestions:
     """Return the other questions, which all sites were asked, with the settings of all sites."""
 
     def where(wheres: Mapping[str, QuestionPlace]) -> QuestionPlace:
@@ -131,7 +131,7 @@ def _of_site(site: str, settings: Settings, table: pd.DataFrame) -> pd.DataFrame
     return table.assign(code=pd.array(codes, dtype="string"))
 
 
-def pooled_dynamics(sites: Iterable[OwnDynamics | None], sessions: int) -> OwnDynamics | None:
+def _pooled_dynamics(sites: Iterable[OwnDynamics | None], sessions: int) -> OwnDynamics | None:
     """Return the mean of what the sessions of all sites know of their devices' own dynamics; None of nothing."""
     known = [one for one in sites if one is not None]
     if not known:
@@ -371,9 +371,9 @@ def pooled(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Study:
         studies[0],
         folder=folder,
         sites=tuple(sites),
-        blocks=pooled_blocks({site: one.blocks for site, one in sites.items()}),
-        levels=pooled_blocks({site: one.levels for site, one in sites.items()}),
-        others=pooled_questions({site: one.others for site, one in sites.items()}),
+        blocks=_pooled_blocks({site: one.blocks for site, one in sites.items()}),
+        levels=_pooled_blocks({site: one.levels for site, one in sites.items()}),
+        others=_pooled_questions({site: one.others for site, one in sites.items()}),
         settings={
             (block, own.code): own
             for site, one in sites.items()
@@ -390,7 +390,7 @@ def pooled(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Study:
         kept=rows("kept"),
         doubts=tuple(doubt for one in studies for doubt in one.doubts),
         decided=replace(studies[0].decided, changed=any(one.decided.changed for one in studies)),
-        own_dynamics=pooled_dynamics(
+        own_dynamics=_pooled_dynamics(
             (one.own_dynamics for one in studies), sum(len(one.participants) for one in studies)
         ),
         estimator=" or ".join(dict.fromkeys(part for parts in estimators for part in parts)) or None,

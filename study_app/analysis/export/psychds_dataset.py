@@ -113,10 +113,10 @@ def _why_missing(path: Path | None) -> str:
 
 
 FOLDER: Final = "psych-ds"
-KEYWORDS: Final = ("haptics", "psychophysics", "liquids", "Likert scale")
-SCRIPT: Final = "report.R"
-CONTEXT: Final = "https://schema.org/"
-VARIABLES: Final = "variableMeasured"
+_KEYWORDS: Final = ("haptics", "psychophysics", "liquids", "Likert scale")
+_SCRIPT: Final = "report.R"
+_CONTEXT: Final = "https://schema.org/"
+_VARIABLES: Final = "variableMeasured"
 
 
 def dataset_files(
@@ -127,12 +127,12 @@ def dataset_files(
     ``tables`` and ``columns`` go by the names of the tables' files; ``report`` has the files of the report, its own
     copies of the tables among them.
     """
-    shown = {name: content for name, content in report.items() if name not in tables and name != SCRIPT}
+    shown = {name: content for name, content in report.items() if name not in tables and name != _SCRIPT}
     description = _description(study, columns)
     own = materials(study)
     files: dict[str, bytes | FileCopy] = {
         "dataset_description.json": _json(description),
-        "data/file_metadata.json": _json({key: description[key] for key in description if key != VARIABLES}),
+        "data/file_metadata.json": _json({key: description[key] for key in description if key != _VARIABLES}),
         **{f"data/{PurePosixPath(name).stem}.json": _sidecar(study, name, columns[name]) for name in tables},
         "README.md": _readme(study, tables, report, own.missing),
         "CHANGES.md": f"# Changes\n\n- {study.version}: exported by liquid-study {__version__}\n".encode(),
@@ -140,7 +140,7 @@ def dataset_files(
         **{f"data/{name}": content for name, content in tables.items()},
         "documentation/codebook.json": codebook_bytes(study, columns),
         "analysis/settings.json": _settings(study),
-        **({f"analysis/{SCRIPT}": report[SCRIPT]} if SCRIPT in report else {}),
+        **({f"analysis/{_SCRIPT}": report[_SCRIPT]} if _SCRIPT in report else {}),
         **{f"results/{name}": content for name, content in shown.items() if name != "codebook.json"},
         "materials/protocol.json": _json(study.protocol),
         **{f"materials/{name}": content for name, content in own.files.items()},
@@ -150,8 +150,8 @@ def dataset_files(
 
 def _sidecar(study: Study, name: str, columns: tuple[Column, ...]) -> bytes:
     """Return what describes the columns of one table alone, with authors and licence."""
-    head = {"@context": CONTEXT, "@type": "Dataset", "name": PurePosixPath(name).stem}
-    return _json({**head, VARIABLES: [column.variable for column in columns], **stated_credits(study)})
+    head = {"@context": _CONTEXT, "@type": "Dataset", "name": PurePosixPath(name).stem}
+    return _json({**head, _VARIABLES: [column.variable for column in columns], **stated_credits(study)})
 
 
 def _settings(study: Study) -> bytes:
@@ -195,7 +195,7 @@ def _description(study: Study, columns: Mapping[str, tuple[Column, ...]]) -> dic
     head = study.protocol.get("study", {})
     description = head.get("description") or study.title
     return {
-        "@context": CONTEXT,
+        "@context": _CONTEXT,
         "@type": "Dataset",
         "name": study.name,
         "alternateName": study.title,
@@ -203,8 +203,8 @@ def _description(study: Study, columns: Mapping[str, tuple[Column, ...]]) -> dic
         if isinstance(description, Mapping)
         else str(description).strip(),
         "version": study.version,
-        "keywords": [*KEYWORDS, *(["simulated"] if study.simulated else [])],
-        VARIABLES: variables(columns),
+        "keywords": [*_KEYWORDS, *(["simulated"] if study.simulated else [])],
+        _VARIABLES: variables(columns),
         **stated_credits(study),
     }
 
@@ -220,7 +220,7 @@ def _readme(study: Study, tables: Mapping[str, bytes], report: Mapping[str, byte
         if study.revealed
         else ("Conditions appear as codes, because the study is blinded.")
     )
-    script = f"; `Rscript analysis/{SCRIPT} data results` recomputes its main numbers" if SCRIPT in report else ""
+    script = f"; `Rscript analysis/{_SCRIPT} data results` recomputes its main numbers" if _SCRIPT in report else ""
     lines = [
         f"# {study.title}",
         "",

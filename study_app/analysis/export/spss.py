@@ -23,14 +23,14 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export.tables import Cells, Delivered, QuestionCells
 from study_app.store.csv_files import Column
 
-EXCLUDED: Final = 97
-CANNOT_JUDGE: Final = 98
-NOT_ANSWERED: Final = 99
-CODES: Final = frozenset((EXCLUDED, CANNOT_JUDGE, NOT_ANSWERED))
-NAME_BYTES: Final = 64
-LABEL_BYTES: Final = 255
-FILE_LABEL_BYTES: Final = 64
-TEXT_BYTES: Final = 32_767
+_EXCLUDED: Final = 97
+_CANNOT_JUDGE: Final = 98
+_NOT_ANSWERED: Final = 99
+_CODES: Final = frozenset((_EXCLUDED, _CANNOT_JUDGE, _NOT_ANSWERED))
+_NAME_BYTES: Final = 64
+_LABEL_BYTES: Final = 255
+_FILE_LABEL_BYTES: Final = 64
+_TEXT_BYTES: Final = 32_767
 _RESERVED: Final = frozenset(("ALL", "AND", "BY", "EQ", "GE", "GT", "LE", "LT", "NE", "NOT", "OR", "TO", "WITH"))
 
 
@@ -39,12 +39,12 @@ def long_sav(study: Study, table: Delivered) -> bytes:
     frame = table.frame
     if study.protocol_format > 1:  # the answers of all kinds in one column are texts, without levels
         return sav(study, table, {})
-    answers = frame["response"].astype("Float64").fillna(NOT_ANSWERED).mask(frame["cannot_judge"], CANNOT_JUDGE)
+    answers = frame["response"].astype("Float64").fillna(_NOT_ANSWERED).mask(frame["cannot_judge"], _CANNOT_JUDGE)
     labels = {block.labels for block in study.blocks}
     levels = dict(zip(LEVELS, next(iter(labels)), strict=True)) if len(labels) == 1 else {}
     words = {block.cannot_judge for block in study.blocks if block.cannot_judge}
     coded = {"response": _levels(levels, " / ".join(sorted(words)))}
-    del coded["response"][EXCLUDED]  # a row keeps its answer; the column `excluded` says so
+    del coded["response"][_EXCLUDED]  # a row keeps its answer; the column `excluded` says so
     return sav(study, Delivered(table.name, table.columns, frame.assign(response=answers)), coded)
 
 
@@ -98,12 +98,12 @@ def _with_codes(values: pd.Series[Any], people: pd.Series[Any], rows: pd.DataFra
     judged = set(counted.loc[counted["cannot_judge"].fillna(False), "participant"])
     excluded = set(rows.loc[rows["excluded"], "participant"]) - set(counted["participant"])
     coded = values.astype("Float64")
-    coded = coded.mask(coded.isna() & people.isin(judged), CANNOT_JUDGE)
-    return coded.mask(coded.isna() & people.isin(excluded), EXCLUDED).fillna(NOT_ANSWERED)
+    coded = coded.mask(coded.isna() & people.isin(judged), _CANNOT_JUDGE)
+    return coded.mask(coded.isna() & people.isin(excluded), _EXCLUDED).fillna(_NOT_ANSWERED)
 
 
 def _levels(levels: Mapping[int, str], cannot_judge: str) -> dict[int, str]:
-    off = {EXCLUDED: "Excluded", CANNOT_JUDGE: cannot_judge or "Cannot judge", NOT_ANSWERED: "No answer"}
+    off = {_EXCLUDED: "Excluded", _CANNOT_JUDGE: cannot_judge or "Cannot judge", _NOT_ANSWERED: "No answer"}
     return {**levels, **off}
 
 
@@ -112,7 +112,7 @@ def sav(study: Study, table: Delivered, coded: Mapping[str, dict[int, str]], opt
 
     ``coded`` has the levels of columns whose missing answers have codes; those of ``options`` have no order.
     """
-    names = names_of([column.name for column in table.columns])
+    names = _names_of([column.name for column in table.columns])
     columns = {names[column.name]: column for column in table.columns}
     levels = {names[name]: found for name, found in coded.items()}
     ordered = {names[name] for name in coded.keys() - set(options)}
@@ -125,13 +125,13 @@ def sav(study: Study, table: Delivered, coded: Mapping[str, dict[int, str]], opt
         pyreadstat.write_sav(
             frame,
             str(path),
-            file_label=_cut(f"{study.title} ({study.name} {study.version})", FILE_LABEL_BYTES),
-            column_labels={name: _cut(_label(name, column), LABEL_BYTES) for name, column in columns.items()},
+            file_label=_cut(f"{study.title} ({study.name} {study.version})", _FILE_LABEL_BYTES),
+            column_labels={name: _cut(_label(name, column), _LABEL_BYTES) for name, column in columns.items()},
             variable_value_labels={
-                name: {value: _cut(label, LABEL_BYTES // 2) for value, label in found.items()}
+                name: {value: _cut(label, _LABEL_BYTES // 2) for value, label in found.items()}
                 for name, found in (levels | flags).items()
             },
-            missing_ranges={name: [*sorted(CODES & found.keys())] for name, found in levels.items()},
+            missing_ranges={name: [*sorted(_CODES & found.keys())] for name, found in levels.items()},
             variable_measure={
                 name: "ordinal" if name in ordered else "nominal" if name in levels else _measure(column)
                 for name, column in columns.items()
@@ -143,7 +143,7 @@ def sav(study: Study, table: Delivered, coded: Mapping[str, dict[int, str]], opt
         return path.read_bytes()
 
 
-def names_of(names: list[str]) -> dict[str, str]:
+def _names_of(names: list[str]) -> dict[str, str]:
     """Return names that SPSS takes: letters first, at most 64 bytes, no reserved word, different in any case."""
     found: dict[str, str] = {}
     taken: set[str] = set()
@@ -151,10 +151,10 @@ def names_of(names: list[str]) -> dict[str, str]:
         plain = re.sub(r"[^A-Za-z0-9_]", "_", name).rstrip("_") or "v"
         if not plain[0].isalpha() or plain.upper() in _RESERVED:
             plain = f"v_{plain}"
-        short, number = plain[:NAME_BYTES], 1
+        short, number = plain[:_NAME_BYTES], 1
         while short.upper() in taken:
             number += 1
-            short = f"{plain[: NAME_BYTES - len(str(number)) - 1]}_{number}"
+            short = f"{plain[: _NAME_BYTES - len(str(number)) - 1]}_{number}"
         taken.add(short.upper())
         found[name] = short
     return found
@@ -163,7 +163,7 @@ def names_of(names: list[str]) -> dict[str, str]:
 def _plain(column: Column, values: pd.Series[Any]) -> pd.Series[Any]:
     """Return values as the library takes them: floats with NaN, or texts, empty where there is none."""
     if column.kind in {"text", "time"}:
-        texts = ["" if value is pd.NA else _cut(str(value), TEXT_BYTES) for value in values.tolist()]
+        texts = ["" if value is pd.NA else _cut(str(value), _TEXT_BYTES) for value in values.tolist()]
         return pd.Series(texts, dtype=object)
     return pd.Series(values.astype("Float64").to_numpy(dtype=np.float64, na_value=np.nan))
 

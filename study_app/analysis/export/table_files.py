@@ -18,7 +18,7 @@ from study_app.store.columns import SEALED
 from study_app.store.csv_files import COMPUTED, MISSING, Column, csv_bytes, header
 from study_app.store.unblinding import reveals_of
 
-CREDITS: Final = {"authors": "author", "license": "license", "citation": "citation", "funder": "funder", "url": "url"}
+_CREDITS: Final = {"authors": "author", "license": "license", "citation": "citation", "funder": "funder", "url": "url"}
 """Keys of ``[study.credits]``, and the properties of schema.org that say the same."""
 
 Extra: TypeAlias = Literal["wide", "parquet", "sav", "psych-ds"]
@@ -40,7 +40,7 @@ def table_files(
     columns = {file_name(study, table, "csv"): table.columns for table in written}
     files["codebook.json"] = codebook_bytes(study, columns)
     if "parquet" in extras:
-        files |= {file_name(study, table, "parquet"): parquet_bytes(table) for table in written}
+        files |= {file_name(study, table, "parquet"): _parquet_bytes(table) for table in written}
     if "sav" in extras:
         opened = {"tracks", *(one.table for one in statistics())}
         files[file_name(study, tables[0], "sav")] = spss.long_sav(study, tables[0])
@@ -126,7 +126,7 @@ def study_head(study: Study) -> dict[str, Any]:
 def stated_credits(study: Study) -> dict[str, Any]:
     """Return what the study states, as properties of schema.org."""
     stated = study.protocol.get("study", {}).get("credits") or {}
-    return {name: stated[key] for key, name in CREDITS.items() if stated.get(key)}
+    return {name: stated[key] for key, name in _CREDITS.items() if stated.get(key)}
 
 
 def _presentations(study: Study, block: Block) -> dict[str, Any]:
@@ -220,7 +220,7 @@ def table_bytes(table: Delivered) -> bytes:
     )
 
 
-def parquet_bytes(table: Delivered) -> bytes:
+def _parquet_bytes(table: Delivered) -> bytes:
     """Return a table as Parquet; every column with its description and unit, points of a scale as Int8."""
     import pyarrow as pa  # type: ignore[import-untyped]  # noqa: PLC0415 - takes long to load
     from pyarrow import parquet  # noqa: PLC0415

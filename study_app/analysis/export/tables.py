@@ -36,7 +36,7 @@ class Delivered:
 SITE: Final = Column("site", "text", "The participant's site: the part of the ID before the dash.")
 
 
-def with_site(study: Study, table: Delivered) -> Delivered:
+def _with_site(study: Study, table: Delivered) -> Delivered:
     """Return a table of a merged study with the column ``site`` after that of participants; any other as it is."""
     if not study.sites or "participant" not in header(table.columns):
         return table
@@ -56,12 +56,12 @@ _OF_BLOCK: Final = ("phase", "part", "index", "code")
 _LEVEL_COLUMNS: Final = {column.name: column for column in (*TRIALS_2, *INTERVALS)}
 
 _OF_PERSON: Final = tuple(_LEVEL_COLUMNS[name] for name in ("study", "participant", "simulated", "pilot", "group"))
-TYPES: Final[dict[Kind, str]] = {"text": "string", "number": "Float64", "integer": "Int64", "flag": "boolean"}
+_TYPES: Final[dict[Kind, str]] = {"text": "string", "number": "Float64", "integer": "Int64", "flag": "boolean"}
 
-TRACKS: Final = (*(_LEVEL_COLUMNS[name] for name in (*_OF_TRIAL, *_OF_BLOCK)), *JUDGED, TRIALS_MISSING, *OF_TRACKS)
+_TRACKS: Final = (*(_LEVEL_COLUMNS[name] for name in (*_OF_TRIAL, *_OF_BLOCK)), *JUDGED, TRIALS_MISSING, *OF_TRACKS)
 
 
-def level_tables(study: Study) -> Iterator[Delivered]:
+def _level_tables(study: Study) -> Iterator[Delivered]:
     """Yield the tables of a study with levels; none of any other."""
     if not study.levels:
         return
@@ -72,7 +72,7 @@ def level_tables(study: Study) -> Iterator[Delivered]:
         return
     frame = _named(study, tracks(study)).rename(columns={"level": "level_asked"})
     # of an interval that no trial reached, the frame has no column
-    of_tracks = (*TRACKS, *_may_miss((*OPENED, ACHIEVED)), *_of_intervals(study))
+    of_tracks = (*_TRACKS, *_may_miss((*OPENED, ACHIEVED)), *_of_intervals(study))
     yield delivered("tracks", of_tracks, frame.reindex(columns=list(header(of_tracks))))
     found = level_results(study, frame.rename(columns={"level_asked": "level"}))
     about = {"study": study.name, "simulated": study.simulated, "pilot": study.pilot}
@@ -82,7 +82,7 @@ def level_tables(study: Study) -> Iterator[Delivered]:
             columns = (*_OF_PERSON, *RESULTS[one.table].columns)
             rows = [{**row, **about, "group": groups[row["participant"]]} for of in found for row in one(of).exported()]
             table = pd.DataFrame(rows, columns=list(header(columns)))
-            yield delivered(one.table, columns, table.astype({column.name: TYPES[column.kind] for column in columns}))
+            yield delivered(one.table, columns, table.astype({column.name: _TYPES[column.kind] for column in columns}))
 
 
 def _of_intervals(study: Study) -> tuple[Column, ...]:
@@ -101,13 +101,13 @@ def names_of_sealed(study: Study) -> set[str]:
     return {column.name for column in INTERVALS if column.sealed} if study.levels else set()
 
 
-OF_A_FORM: Final = Setting(code="")
+_OF_A_FORM: Final = Setting(code="")
 """Stands for the setting of an answer in a form, which has none."""
 
 _BY_NAME: Final = {column.name: column for column in (*TRIALS_2, *RESPONSES)}
 
 _QUARTILE: Final = f"quartiles {QUARTILES}"
-MEASURED: Final = (
+_MEASURED: Final = (
     Column("item", "text", "ID of the statement; its text is in the codebook."),
     Column("short", "text", "Short label of the statement."),
     Column("participants", "integer", "Number of participants with a valid answer.", minimum=0),
@@ -157,16 +157,16 @@ def deliver(study: Study) -> tuple[Delivered, ...]:
             (*trials, *judged, *(_may_miss(achieved) if study.levels else achieved)),
             _named(study, study.trials),
         ),
-        delivered("aggregate", (*_aggregate_head(), *opened, *MEASURED), _aggregate(study)),
-        *level_tables(study),
+        delivered("aggregate", (*_aggregate_head(), *opened, *_MEASURED), _aggregate(study)),
+        *_level_tables(study),
     )
-    return tuple(with_site(study, table) for table in tables)
+    return tuple(_with_site(study, table) for table in tables)
 
 
 def _named(study: Study, table: pd.DataFrame) -> pd.DataFrame:
     """Add what each code stood for: nothing of an answer in a form, and while the key is sealed."""
     pairs = zip(table["block"], table["code"], strict=True)
-    settings = [one.of or one for one in (study.settings.get(pair, OF_A_FORM) for pair in pairs)]
+    settings = [one.of or one for one in (study.settings.get(pair, _OF_A_FORM) for pair in pairs)]
     delay_ms = np.array([np.nan if one.delay_ms is None else one.delay_ms for one in settings], np.float64)
     named = table.assign(
         condition=pd.array([one.condition for one in settings], dtype="string"),
@@ -197,7 +197,7 @@ def _aggregate(study: Study) -> pd.DataFrame:
         shorts = found["item"].map({item.id: item.short for item in block.items})
         frames.append(found.assign(block=block.id, short=shorts))
     if not frames:
-        names = [*header(_aggregate_head()), *header(OPENED), *header(MEASURED)]
+        names = [*header(_aggregate_head()), *header(OPENED), *header(_MEASURED)]
         return pd.DataFrame({name: pd.Series(dtype=object) for name in names})
     found = pd.concat(frames, ignore_index=True)
     return _named(study, found.assign(study=study.name, simulated=study.simulated, pilot=study.pilot))
@@ -238,9 +238,9 @@ def wide(study: Study) -> tuple[Delivered, dict[str, Cells | QuestionCells]]:
     for name, one in cells.items():
         found = _statement(study, one, people) if isinstance(one, Cells) else _question(study, one, people)
         held[name], description, (least, most) = found
-        kind = next(kind for kind, dtype in TYPES.items() if dtype == held[name].dtype.name)
+        kind = next(kind for kind, dtype in _TYPES.items() if dtype == held[name].dtype.name)
         columns.append(optional(name, kind, description, minimum=least, maximum=most))
-    return with_site(study, Delivered("wide", tuple(columns), pd.DataFrame(held))), cells
+    return _with_site(study, Delivered("wide", tuple(columns), pd.DataFrame(held))), cells
 
 
 def _wide_cells(study: Study) -> dict[str, Cells | QuestionCells]:

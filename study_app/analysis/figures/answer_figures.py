@@ -31,21 +31,21 @@ from study_app.errors import AnalysisError
 from study_app.number_text import counted
 from study_app.psychophysics.families import success
 
-PLOTS_A_ROW: Final = 5
-ANSWERS_PT: Final = 112.0
-TITLE_SIZE: Final = 7.5
-TITLE_LINE_PT: Final = 9.0
-ANSWERS_GAP_PT: Final = 11.0
-SCALE_PT: Final = 13.0
-OWN_SCALE_PT: Final = 26.0
-ANSWERS_TOP_PT: Final = 40.0
-ANSWERS_FOOT_PT: Final = 17.0
-BOTTOM: Final = 0.55
-TOP: Final = 7.5
+_PLOTS_A_ROW: Final = 5
+_ANSWERS_PT: Final = 112.0
+_TITLE_SIZE: Final = 7.5
+_TITLE_LINE_PT: Final = 9.0
+_ANSWERS_GAP_PT: Final = 11.0
+_SCALE_PT: Final = 13.0
+_OWN_SCALE_PT: Final = 26.0
+_ANSWERS_TOP_PT: Final = 40.0
+_ANSWERS_FOOT_PT: Final = 17.0
+_BOTTOM: Final = 0.55
+_TOP: Final = 7.5
 MOST_LINES: Final = 60
 """Of more participants so many are drawn: more lines hide the median and the band."""
 
-SPREAD: Final = 0.24
+_SPREAD: Final = 0.24
 """Height over which coinciding lines of participants are drawn apart [levels]."""
 
 
@@ -65,29 +65,29 @@ def draw_answers(
     shows. With ``own_scales`` they are measures, each on a scale of its own.
     """
     ruler = Sheet(style.PAGE_WIDTH_PT, 72, look.fonts)
-    columns = min(len(plots), PLOTS_A_ROW)
-    scale_pt, gap_pt = (OWN_SCALE_PT, OWN_SCALE_PT) if own_scales else (SCALE_PT, ANSWERS_GAP_PT)
+    columns = min(len(plots), _PLOTS_A_ROW)
+    scale_pt, gap_pt = (_OWN_SCALE_PT, _OWN_SCALE_PT) if own_scales else (_SCALE_PT, _ANSWERS_GAP_PT)
     width = (style.PAGE_WIDTH_PT - 2 * MARGIN_PT - scale_pt - 6 - (columns - 1) * gap_pt) / columns
-    titles = [ruler.wrap(title, width, TITLE_SIZE, "bold") for title, _ in plots]
-    title_pt = max(map(len, titles)) * TITLE_LINE_PT
-    rows = -(-len(plots) // PLOTS_A_ROW)
-    row_pt = title_pt + 6 + ANSWERS_PT + 14
-    sheet = look.sheet(ANSWERS_TOP_PT + rows * row_pt + (rows - 1) * 6 + ANSWERS_FOOT_PT)
+    titles = [ruler.wrap(title, width, _TITLE_SIZE, "bold") for title, _ in plots]
+    title_pt = max(map(len, titles)) * _TITLE_LINE_PT
+    rows = -(-len(plots) // _PLOTS_A_ROW)
+    row_pt = title_pt + 6 + _ANSWERS_PT + 14
+    sheet = look.sheet(_ANSWERS_TOP_PT + rows * row_pt + (rows - 1) * 6 + _ANSWERS_FOOT_PT)
     legend(sheet)
     for place, (_, values) in enumerate(plots):
-        row, column = divmod(place, PLOTS_A_ROW)
+        row, column = divmod(place, _PLOTS_A_ROW)
         x = MARGIN_PT + scale_pt + column * (width + gap_pt)
-        top = ANSWERS_TOP_PT + row * (row_pt + 6)
+        top = _ANSWERS_TOP_PT + row * (row_pt + 6)
         for number, line in enumerate(titles[place]):
-            sheet.text(x, top + 6.5 + number * TITLE_LINE_PT, line, size=TITLE_SIZE, weight="bold")
-        axes = sheet.axes(x, top + title_pt + 6, width, ANSWERS_PT)
+            sheet.text(x, top + 6.5 + number * _TITLE_LINE_PT, line, size=_TITLE_SIZE, weight="bold")
+        axes = sheet.axes(x, top + title_pt + 6, width, _ANSWERS_PT)
         axes.set_label(f"item{place + 1}")
         if own_scales:
             _scale_to(sheet, axes, values)
         else:
-            axes.set_ylim(BOTTOM, TOP)
+            axes.set_ylim(_BOTTOM, _TOP)
             sheet.scale(axes, "y", LEVELS, LEVELS if column == 0 else (), lines=True)
-        over_delay(sheet, axes, values, np.asarray(delays_ms, dtype=float), 0.0 if own_scales else SPREAD)
+        over_delay(sheet, axes, values, np.asarray(delays_ms, dtype=float), 0.0 if own_scales else _SPREAD)
         _lowest(sheet, axes, lowest_ms[place], float(np.mean(delays_ms)))
         counts = (~np.isnan(values)).sum(axis=0)
         if (counts < len(values)).any():  # not every participant answered at every setting
@@ -116,7 +116,7 @@ def over_delay(sheet: Sheet, axes: Axes, values: Array, delays_ms: Array, spread
     axes.set_xlim(low - 0.06 * reach, high + 0.06 * reach)
     ticks = MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
     sheet.scale(axes, "x", [float(tick) for tick in ticks if low <= tick <= high])
-    shown = lines_of(len(values))
+    shown = _lines_of(len(values))
     offsets = np.linspace(-spread / 2, spread / 2, len(shown)) if len(shown) > 1 else np.zeros(1)
     thin: Style = {
         "alpha": 0.75 if len(values) <= 15 else 0.45,
@@ -136,7 +136,7 @@ def over_delay(sheet: Sheet, axes: Axes, values: Array, delays_ms: Array, spread
     axes.plot(delays_ms, medians, "o-", color=style.ACCENT, zorder=4, gid=f"{axes.get_label()}-median", **thick)
 
 
-def lines_of(participants: int) -> list[int]:
+def _lines_of(participants: int) -> list[int]:
     """Return the places of the participants who are drawn as lines: all of few, of many an even choice."""
     if participants <= MOST_LINES:
         return list(range(participants))
@@ -158,7 +158,7 @@ def _lowest(sheet: Sheet, axes: Axes, lowest_ms: float | None, middle_ms: float)
     axes.axvline(lowest_ms, color=style.TEXT, **dashed)
     across, side = (-2, "right") if lowest_ms > middle_ms else (2, "left")
     look: Style = {"ha": side, "fontproperties": sheet.font(6, "bold"), "color": style.TEXT}
-    axes.annotate(f"≤ {lowest_ms:g}", (lowest_ms, TOP), xytext=(across, -6), textcoords="offset points", **look)
+    axes.annotate(f"≤ {lowest_ms:g}", (lowest_ms, _TOP), xytext=(across, -6), textcoords="offset points", **look)
 
 
 def legend(sheet: Sheet) -> None:
@@ -175,15 +175,15 @@ def legend(sheet: Sheet) -> None:
         x += sheet.text_width(word, SMALL) + 30
 
 
-PLASTIC: Final = (0.7548776662, 0.5698402910)
+_PLASTIC: Final = (0.7548776662, 0.5698402910)
 """Steps that put many points evenly apart in a plane (Roberts 2018)."""
-PERSON_SPREAD: Final = 0.5
+_PERSON_SPREAD: Final = 0.5
 """How far apart the points of participants at one delay are at most, as a share of the distance of delays."""
-CURVE_LEFT_PT: Final = 30.0
-CURVE_FOOT_PT: Final = 30.0
-HEIGHT_PT: Final = 196.0
-CURVE_TOP_PT: Final = 34.0
-RIGHT_PT: Final = 26.0
+_CURVE_LEFT_PT: Final = 30.0
+_CURVE_FOOT_PT: Final = 30.0
+_HEIGHT_PT: Final = 196.0
+_CURVE_TOP_PT: Final = 34.0
+_RIGHT_PT: Final = 26.0
 
 
 @style.own_settings()
@@ -194,9 +194,9 @@ def draw_threshold(
 
     ``shares_of`` are each participant's shares by delay, drawn as small points.
     """
-    sheet = look.sheet(HEIGHT_PT, WIDTH_PT)
-    room = (sheet.width_pt - CURVE_LEFT_PT - RIGHT_PT, sheet.height_pt - CURVE_TOP_PT - CURVE_FOOT_PT)
-    axes = sheet.axes(MARGIN_PT + CURVE_LEFT_PT, CURVE_TOP_PT, *room)
+    sheet = look.sheet(_HEIGHT_PT, WIDTH_PT)
+    room = (sheet.width_pt - _CURVE_LEFT_PT - _RIGHT_PT, sheet.height_pt - _CURVE_TOP_PT - _CURVE_FOOT_PT)
+    axes = sheet.axes(MARGIN_PT + _CURVE_LEFT_PT, _CURVE_TOP_PT, *room)
     levels, asked = np.array(found.levels), np.array(found.asked)
     span = float(np.ptp(levels)) or 1.0
     axes.set_xlim(levels.min() - 0.04 * span, levels.max() + 0.04 * span)
@@ -205,7 +205,7 @@ def draw_threshold(
     sheet.scale(axes, "x", levels)
     step = float(np.diff(levels).min()) if len(levels) > 1 else 1.0
     for place, (person, own) in enumerate(shares_of.items()):
-        x, y = (PERSON_SPREAD * ((place + 1) * golden % 1 - 0.5) for golden in PLASTIC)
+        x, y = (_PERSON_SPREAD * ((place + 1) * golden % 1 - 0.5) for golden in _PLASTIC)
         points = [(delay + step * x, share + 0.12 * y) for delay, share in own.items()]
         look_of_person: Style = {"color": style.PARTICIPANT, "markersize": 2.2, "markeredgewidth": 0}
         axes.plot(*zip(*points, strict=True), "o", gid=f"person-{person}", **look_of_person)
@@ -240,7 +240,7 @@ def draw_threshold(
     return sheet
 
 
-FILES: Final = 3
+_FILES: Final = 3
 """Of files that are not as recorded so many are named."""
 
 
@@ -276,7 +276,7 @@ def people_a_setting(study: Study, block: Block) -> dict[str, int]:
     return {code: int(rows.loc[rows["code"] == code, "participant"].nunique()) for code in block.codes}
 
 
-def caption(study: Study, block: Block) -> str:
+def _caption(study: Study, block: Block) -> str:
     """Return the caption of a block's figure."""
     return " ".join(_sentences(study, block))
 
@@ -311,9 +311,9 @@ def _sentences(study: Study, block: Block) -> Iterator[str]:
         yield f"{invalid} of {len(trials)} trials exceeded the protocol's timing limits and are included."
     if study.doubts:
         names = sorted({doubt.path.relative_to(study.folder).as_posix() for doubt in study.doubts})
-        more = f" and {len(names) - FILES} more" if len(names) > FILES else ""
+        more = f" and {len(names) - _FILES} more" if len(names) > _FILES else ""
         files = counted(len(names), "file is", "files are")
-        yield f"{files} changed since recording, but used: {', '.join(names[:FILES])}{more}."
+        yield f"{files} changed since recording, but used: {', '.join(names[:_FILES])}{more}."
 
 
 def _marks_of_bars(block: Block) -> Iterator[str]:
@@ -341,19 +341,19 @@ def _noun(block: Block) -> str:
     return block.kind.removesuffix("s") if block.revealed else "setting"
 
 
-PANELS_A_ROW: Final = 3
-ROW_PT: Final = 19.0
-BAR_PT: Final = 12.4
-LABEL_SIZE: Final = 7.5
-WIDEST_ANSWER_PT: Final = 15.0
-PANEL_PADDING_PT: Final = 7.0
-NEUTRAL_GAP_PT: Final = 8.0
-TOP_PT: Final = 52.0
-HEADER_PT: Final = 7.0
-FOOT_PT: Final = 16.0
+_PANELS_A_ROW: Final = 3
+_ROW_PT: Final = 19.0
+_BAR_PT: Final = 12.4
+_LABEL_SIZE: Final = 7.5
+_WIDEST_ANSWER_PT: Final = 15.0
+_PANEL_PADDING_PT: Final = 7.0
+_NEUTRAL_GAP_PT: Final = 8.0
+_TOP_PT: Final = 52.0
+_HEADER_PT: Final = 7.0
+_FOOT_PT: Final = 16.0
 
-DISAGREEMENT: Final = (3, 2, 1)
-AGREEMENT: Final = (5, 6, 7)
+_DISAGREEMENT: Final = (3, 2, 1)
+_AGREEMENT: Final = (5, 6, 7)
 
 
 @style.own_settings()
@@ -362,24 +362,24 @@ def draw_agreement(study: Study, block: Block, look: Look) -> Sheet:
     table = study.aggregate(block)
     panels = [(setting, table[table["code"] == setting.code].reset_index(drop=True)) for setting in block.settings]
     ruler = Sheet(style.PAGE_WIDTH_PT, 72, look.fonts)
-    wrapped = [ruler.wrap(item.short, 118, LABEL_SIZE) for item in block.items]
-    label_pt = max(ruler.text_width(line, LABEL_SIZE) for lines in wrapped for line in lines)
-    columns = min(len(panels), PANELS_A_ROW)
+    wrapped = [ruler.wrap(item.short, 118, _LABEL_SIZE) for item in block.items]
+    label_pt = max(ruler.text_width(line, _LABEL_SIZE) for lines in wrapped for line in lines)
+    columns = min(len(panels), _PANELS_A_ROW)
     panel_pt = (style.PAGE_WIDTH_PT - 2 * MARGIN_PT - label_pt - 6) / columns
-    widths = _widths([counts for _, counts in panels], panel_pt - 2 * PANEL_PADDING_PT)
+    widths = _widths([counts for _, counts in panels], panel_pt - 2 * _PANEL_PADDING_PT)
 
-    rows = -(-len(panels) // PANELS_A_ROW)
-    plot_pt = len(block.items) * ROW_PT
-    row_pt = HEADER_PT + plot_pt + FOOT_PT
-    sheet = look.sheet(TOP_PT + rows * row_pt + (rows - 1) * 12)
+    rows = -(-len(panels) // _PANELS_A_ROW)
+    plot_pt = len(block.items) * _ROW_PT
+    row_pt = _HEADER_PT + plot_pt + _FOOT_PT
+    sheet = look.sheet(_TOP_PT + rows * row_pt + (rows - 1) * 12)
     left_pt = MARGIN_PT + label_pt + 6
     _legend(sheet, block.labels, left_pt)
     for place, (setting, counts) in enumerate(panels):
-        row, column = divmod(place, PANELS_A_ROW)
-        top, x = TOP_PT + row * (row_pt + 12) + HEADER_PT, left_pt + column * panel_pt
+        row, column = divmod(place, _PANELS_A_ROW)
+        top, x = _TOP_PT + row * (row_pt + 12) + _HEADER_PT, left_pt + column * panel_pt
         if column == 0:
             for number, lines in enumerate(wrapped):
-                sheet.lines(MARGIN_PT, top + (number + 0.5) * ROW_PT + 2.7, lines, 8.4, size=LABEL_SIZE)
+                sheet.lines(MARGIN_PT, top + (number + 0.5) * _ROW_PT + 2.7, lines, 8.4, size=_LABEL_SIZE)
             sheet.text(MARGIN_PT, top + plot_pt + 10, "counts of answers", size=SMALL, colour=style.TEXT_SOFT)
         else:
             sheet.line((x, x), (top - 14, top + plot_pt + 10), color=style.BORDER, linewidth=0.5)
@@ -400,19 +400,19 @@ class _Widths:
 
     @property
     def total(self) -> float:
-        return self.left + self.right + NEUTRAL_GAP_PT + self.neutral + self.n
+        return self.left + self.right + _NEUTRAL_GAP_PT + self.neutral + self.n
 
 
 def _widths(tables: Sequence[pd.DataFrame], room: float) -> _Widths:
     """Give one answer the same width everywhere, the widest that fits, and words above and below their room."""
     most = [
         max(int(table[[f"count_{level}" for level in levels]].sum(axis=1).max()) for table in tables)
-        for levels in (DISAGREEMENT, AGREEMENT, (NEUTRAL,))
+        for levels in (_DISAGREEMENT, _AGREEMENT, (NEUTRAL,))
     ]
     n = 17.0 if any(_lacks_answers(table).any() for table in tables) else 0.0
-    answer = WIDEST_ANSWER_PT
+    answer = _WIDEST_ANSWER_PT
     while sum(sides := [max(answer * count, least) for count, least in zip(most, (32.0, 26.0, 27.0), strict=True)]) > (
-        room - (NEUTRAL_GAP_PT + n)
+        room - (_NEUTRAL_GAP_PT + n)
     ):
         answer *= 0.99
     left, right, neutral = sides
@@ -426,11 +426,11 @@ def _lacks_answers(counts: pd.DataFrame) -> pd.Series[bool]:
 
 def _legend(sheet: Sheet, labels: Sequence[str], x: float) -> None:
     """Name the levels in their order; the neutral one, which stands apart in the panels, stands apart here."""
-    short = legend_labels(labels)
-    order = [*DISAGREEMENT[::-1], *AGREEMENT, NEUTRAL]
+    short = _legend_labels(labels)
+    order = [*_DISAGREEMENT[::-1], *_AGREEMENT, NEUTRAL]
     size, swatch, gap = SMALL, 7.0, 9.0
     steps = {level: swatch + 4 + sheet.text_width(short[level - 1], size) + gap for level in order}
-    x = min(x + PANEL_PADDING_PT, max(sheet.width_pt - MARGIN_PT - sum(steps.values()), MARGIN_PT))
+    x = min(x + _PANEL_PADDING_PT, max(sheet.width_pt - MARGIN_PT - sum(steps.values()), MARGIN_PT))
     for level in order:
         if level == NEUTRAL:
             x += gap
@@ -439,7 +439,7 @@ def _legend(sheet: Sheet, labels: Sequence[str], x: float) -> None:
         x += steps[level]
 
 
-def legend_labels(labels: Sequence[str]) -> list[str]:
+def _legend_labels(labels: Sequence[str]) -> list[str]:
     """Shorten the middle levels by the ending they share with the outer level of their side.
 
     "Completely disagree, Mostly disagree" becomes "Completely disagree, Mostly".
@@ -460,9 +460,9 @@ def _agreement_panel(
     sheet: Sheet, name: str, title: str, counts: pd.DataFrame, widths: _Widths, x: float, top: float
 ) -> None:
     """Draw one panel; the axes' unit is one answer, and shapes carry ``name`` in the file."""
-    plot_pt = len(counts) * ROW_PT
+    plot_pt = len(counts) * _ROW_PT
     zero = x + widths.left
-    base = zero + widths.right + NEUTRAL_GAP_PT
+    base = zero + widths.right + _NEUTRAL_GAP_PT
     sheet.text(zero, top - 5, title, size=8, weight="bold", ha="center")
     sheet.text(base + widths.neutral / 2, top - 5, "neutral", size=SMALL, colour=style.TEXT_SOFT, ha="center")
     sheet.text(zero - 3.5, top + plot_pt + 10, "disagree", size=SMALL, colour=style.TEXT_SOFT, ha="right")
@@ -476,16 +476,16 @@ def _agreement_panel(
     lacking = _lacks_answers(counts)
     for y, (_, row) in enumerate(counts.iterrows()):
         of = {level: int(row[column]) for level, column in enumerate(COUNT_COLUMNS, start=1)}
-        edge = -sum(of[level] for level in DISAGREEMENT)
+        edge = -sum(of[level] for level in _DISAGREEMENT)
         lefts: dict[int, float] = {}
-        for level in (*DISAGREEMENT[::-1], *AGREEMENT):
+        for level in (*_DISAGREEMENT[::-1], *_AGREEMENT):
             lefts[level] = edge
             edge += of[level]
         lefts[NEUTRAL] = apart
-        for level in (*DISAGREEMENT, *AGREEMENT, NEUTRAL):
+        for level in (*_DISAGREEMENT, *_AGREEMENT, NEUTRAL):
             _segment(sheet, axes, lefts[level], y, level, of[level], widths.answer)
         if lacking.iloc[y]:
-            place = (x + widths.total, top + (y + 0.5) * ROW_PT + 2)
+            place = (x + widths.total, top + (y + 0.5) * _ROW_PT + 2)
             sheet.text(*place, f"n {row['n']}", size=SMALL, colour=style.TEXT_SOFT, ha="right")
     axes.axvline(0, color=style.TEXT_SOFT, linewidth=0.9, zorder=3)
     axes.axvline(apart, color=style.AXIS, linewidth=0.5, zorder=3)
@@ -500,7 +500,7 @@ def _segment(sheet: Sheet, axes: Axes, left: float, y: int, level: int, count: i
         "edgecolor": "white",
         "linewidth": min(0.5, 0.15 * answer_pt),
     }
-    bar = axes.barh(y, count, left=left, height=BAR_PT / ROW_PT, zorder=2, **look)
+    bar = axes.barh(y, count, left=left, height=_BAR_PT / _ROW_PT, zorder=2, **look)
     bar[0].set_gid(f"{axes.get_label()}-row{y + 1}-level{level}")
     if sheet.text_width(str(count), SMALL) <= count * answer_pt - 0.2:
         ink, font = style.LEVEL_INKS[level - 1], sheet.font(SMALL)
@@ -530,7 +530,7 @@ def answers_picture(
             f"{study.folder}: no completed session with answers in {block.id!r} yet ({states}): figures need "
             "completed sessions; export writes all available data"
         )
-    words = caption(study, block)
+    words = _caption(study, block)
     if lowest:
         words += (
             " Dashed: lowest delay with a trend (step-down test, error rate controlled over all statements), "
@@ -553,12 +553,12 @@ def draw_block(study: Study, block: Block, lowest: Mapping[str, float], look: Lo
     return draw_answers(plots, block.delays_ms, marked, foot, look)
 
 
-CELL_PT: Final = (52.0, 26.0)
-NAMES_PT: Final = 14.0
-MATRIX_TOP_PT: Final = 30.0
-MATRIX_FOOT_PT: Final = 18.0
-GROUND: Final = (0.043, 0.396, 0.639)  # style.ACCENT
-DARKEST: Final = 0.6
+_CELL_PT: Final = (52.0, 26.0)
+_NAMES_PT: Final = 14.0
+_MATRIX_TOP_PT: Final = 30.0
+_MATRIX_FOOT_PT: Final = 18.0
+_GROUND: Final = (0.043, 0.396, 0.639)  # style.ACCENT
+_DARKEST: Final = 0.6
 """Opacity of the ground under all of a row: the counts, always dark, keep a contrast of at least 5."""
 
 
@@ -578,10 +578,10 @@ def draw_recognition(
     kept = [place for place in range(len(names)) if place <= len(labels) or any(row[place] for row in table)]
     ruler = Sheet(style.PAGE_WIDTH_PT, 72, look.fonts)
     first_pt = max(ruler.text_width(name, 7.5) for name in settings) + 10
-    width, height = CELL_PT
+    width, height = _CELL_PT
     names_wrapped = [ruler.wrap(names[place], width - 4, SMALL) for place in kept]
-    top = MATRIX_TOP_PT + NAMES_PT + 8.5 * (max(map(len, names_wrapped)) - 1)
-    sheet = look.sheet(top + height * len(settings) + MATRIX_FOOT_PT)
+    top = _MATRIX_TOP_PT + _NAMES_PT + 8.5 * (max(map(len, names_wrapped)) - 1)
+    sheet = look.sheet(top + height * len(settings) + _MATRIX_FOOT_PT)
     left = MARGIN_PT + first_pt
     for column, place in enumerate(kept):
         x = left + column * width + (8.0 if place >= len(labels) else 0.0)
@@ -604,7 +604,7 @@ def draw_recognition(
 def _cell(sheet: Sheet, axes: Axes, row: int, count: int, total: int, *, right: bool) -> None:
     """Draw how many gave a setting one name."""
     share = count / total if total else 0.0
-    ground = (*GROUND, DARKEST * share) if count else style.GROUND
+    ground = (*_GROUND, _DARKEST * share) if count else style.GROUND
     edge, width = (style.TEXT, 1.6) if right else (style.BORDER, 0.5)
     look: Style = {"facecolor": ground, "edgecolor": edge, "linewidth": width}
     axes.add_patch(Rectangle((0.03, row + 0.05), 0.94, 0.9, gid=f"{axes.get_label()}-setting{row + 1}", **look))

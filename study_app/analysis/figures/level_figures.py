@@ -40,11 +40,11 @@ from study_app.analysis.wording import counted
 from study_app.psychophysics.families import Family, success
 
 COLUMNS: Final = 4
-PANEL_PT: Final = 84.0
-LEFT_PT: Final = 40.0
-GAP_PT: Final = 16.0
-HEAD_PT: Final = 42.0
-ROW_GAP_PT: Final = 36.0
+_PANEL_PT: Final = 84.0
+_LEFT_PT: Final = 40.0
+_GAP_PT: Final = 16.0
+_HEAD_PT: Final = 42.0
+_ROW_GAP_PT: Final = 36.0
 
 
 def panels(
@@ -63,26 +63,26 @@ def panels(
     panel's place, and whether it is the first of its row.
     """
     rows = math.ceil(len(names) / COLUMNS)
-    sheet = look.sheet(HEAD_PT + rows * PANEL_PT + (rows - 1) * ROW_GAP_PT + foot_pt + 14)
+    sheet = look.sheet(_HEAD_PT + rows * _PANEL_PT + (rows - 1) * _ROW_GAP_PT + foot_pt + 14)
     sheet.text(MARGIN_PT, 28, above, size=SMALL, colour=style.TEXT_SOFT)
     x = sheet.width_pt - MARGIN_PT
     for words, colour in reversed(keys):
         x -= sheet.text_width(words, SMALL)
         sheet.text(x, 28, words, size=SMALL, colour=colour)
         x -= 10
-    width = (sheet.width_pt - LEFT_PT - MARGIN_PT - (COLUMNS - 1) * GAP_PT) / COLUMNS
+    width = (sheet.width_pt - _LEFT_PT - MARGIN_PT - (COLUMNS - 1) * _GAP_PT) / COLUMNS
     for place, (name, words) in enumerate(names):
         row, column = divmod(place, COLUMNS)
-        x, y = LEFT_PT + column * (width + GAP_PT), HEAD_PT + row * (PANEL_PT + ROW_GAP_PT)
+        x, y = _LEFT_PT + column * (width + _GAP_PT), _HEAD_PT + row * (_PANEL_PT + _ROW_GAP_PT)
         sheet.text(x, y - 4, name, size=SMALL, weight="bold")
         if words:
             aside = sheet.text_width(name, SMALL, "bold") + 6
             sheet.text(x + aside, y - 4, words, size=SMALL, colour=style.TEXT_SOFT)
-        axes = sheet.axes(x, y, width, PANEL_PT)
+        axes = sheet.axes(x, y, width, _PANEL_PT)
         draw(axes, place, column == 0)
         for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
             label.set_fontproperties(sheet.font(SMALL))
-    sheet.text(LEFT_PT, sheet.height_pt - 10, below, size=SMALL, colour=style.TEXT_SOFT)
+    sheet.text(_LEFT_PT, sheet.height_pt - 10, below, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 
 
@@ -102,7 +102,7 @@ def _ends(
     return low - margin, high + margin
 
 
-def over_trials(axes: Axes, found: LevelsResult, trials: int, ends: tuple[float, float], *, first: bool) -> None:
+def _over_trials(axes: Axes, found: LevelsResult, trials: int, ends: tuple[float, float], *, first: bool) -> None:
     """Give axes ticks for trials from 1 and, between ``ends``, for levels."""
     axes.set_xticks([1, *(place for place in (round(trials / 2), trials) if place > 1)])
     if found.spacing == "log":
@@ -124,27 +124,27 @@ def _level_ticks(found: LevelsResult, ends: tuple[float, float]) -> list[float]:
     return scale_ticks(low, high, log=True)
 
 
-Tracked: TypeAlias = Callable[[], pd.DataFrame]
+_Tracked: TypeAlias = Callable[[], pd.DataFrame]
 """Returns the tracks of a study, made once."""
 
-MOST_PEOPLE: Final = 23
+_MOST_PEOPLE: Final = 23
 """Participants with a panel of their own; the others are in the first panel and in the table."""
-FOOT_PT: Final = 26.0
-MOST_TICKS: Final = 5
-FEWEST_TICKS: Final = 2
-SIZE_PT2: Final = 2.0
+_FOOT_PT: Final = 26.0
+_MOST_TICKS: Final = 5
+_FEWEST_TICKS: Final = 2
+_SIZE_PT2: Final = 2.0
 """Area of a circle for each answer at a level."""
-ASIDE: Final = 0.025
+_ASIDE: Final = 0.025
 """How far the points of one standard are from those of the next, as a share of the axis."""
-BELOW: Final = 0.03
+_BELOW: Final = 0.03
 """How far the interval of one standard's threshold is drawn below that of the one before, as a share correct."""
-COLOURS: Final = (style.ACCENT, "#b35600", style.TEXT, "#6d1007", "#5d8aa8", "#b75a26", "#02256d", style.AXIS)
+_COLOURS: Final = (style.ACCENT, "#b35600", style.TEXT, "#6d1007", "#5d8aa8", "#b75a26", "#02256d", style.AXIS)
 
 
-def level_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str, tracked: Tracked) -> Picture:
+def _level_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str, tracked: _Tracked) -> Picture:
     """Draw the answers over levels of a block."""
     bands = _bands(study, found, tracked)
-    own = len(people(found)) - MOST_PEOPLE
+    own = len(people(found)) - _MOST_PEOPLE
     left_out = f" {counted(own, 'more participant')} only in the table." if own > 0 else ""
     chance = "" if found.guess_rate is None else f" Dashed: chance ({100 * found.guess_rate:.0f} %)."
     caption = (
@@ -154,12 +154,12 @@ def level_picture(study: Study, found: LevelsResult, forms: Sequence[str], name:
     return picture_of(study, found.block, name, found.title, caption, partial(_draw_levels, found, bands), forms)
 
 
-def _bands(study: Study, found: LevelsResult, tracked: Tracked) -> Mapping[str, Array]:
+def _bands(study: Study, found: LevelsResult, tracked: _Tracked) -> Mapping[str, Array]:
     """Return the bands of the participants' functions, where there is one in each panel."""
     if not Thresholds.own(found) or len(_standards(found)) > 1:
         return {}
     block = next(block for block in study.levels if block.id == found.block)
-    return psychometric_bands(block, tracked(), people(found)[:MOST_PEOPLE], _limits(found, _places(found)))
+    return psychometric_bands(block, tracked(), people(found)[:_MOST_PEOPLE], _limits(found, _places(found)))
 
 
 def _panels(found: LevelsResult, banded: bool) -> str:
@@ -180,12 +180,13 @@ def _panels(found: LevelsResult, banded: bool) -> str:
 
 @style.own_settings()
 def _draw_levels(found: LevelsResult, bands: Mapping[str, Array], look: Look) -> Sheet:
-    shown_people = people(found)[:MOST_PEOPLE]
+    shown_people = people(found)[:_MOST_PEOPLE]
     words = summary_words(found)
     above = words[:1].upper() + words[1:]
     standards = _standards(found)
     keys = [
-        (f"standard {with_unit(found, standard)}", colour) for standard, colour in zip(standards, COLOURS, strict=False)
+        (f"standard {with_unit(found, standard)}", colour)
+        for standard, colour in zip(standards, _COLOURS, strict=False)
     ]
 
     def draw(axes: Axes, place: int, first: bool) -> None:
@@ -197,7 +198,7 @@ def _draw_levels(found: LevelsResult, bands: Mapping[str, Array], look: Look) ->
 
     names = [(name, "") for name in ("All", *shown_people)]
     shown = keys if len(standards) > 1 else ()
-    return panels(look, above, names, draw, level_words(found), keys=shown, foot_pt=FOOT_PT)
+    return panels(look, above, names, draw, level_words(found), keys=shown, foot_pt=_FOOT_PT)
 
 
 def _standards(found: LevelsResult) -> list[float]:
@@ -208,7 +209,7 @@ def _levels_panel(axes: Axes, found: LevelsResult, person: str | None, *, first:
     places = _places(found)
     _levels_frame(axes, found, places, first=first)
     groups: Sequence[float | None] = _standards(found) or [None]
-    for number, (standard, colour) in enumerate(zip(groups, COLOURS, strict=False)):
+    for number, (standard, colour) in enumerate(zip(groups, _COLOURS, strict=False)):
         for one in Thresholds.own(found):
             if one.standard == standard and person in {None, one.participant}:
                 grey = person is None and len(groups) == 1
@@ -218,7 +219,7 @@ def _levels_panel(axes: Axes, found: LevelsResult, person: str | None, *, first:
         if person is None and found.adaptive:
             continue
         span = 0.0 if Thresholds.own(found) else max(places.values()) - min(places.values())
-        aside = ASIDE * (number - (len(groups) - 1) / 2) * span
+        aside = _ASIDE * (number - (len(groups) - 1) / 2) * span
         shown = [one for one in Answers.of(found) if one.standard == standard and not one.catch]
         if person is None and len(groups) == 1 and not Thresholds.own(found):
             for somebody in people(found):
@@ -258,7 +259,7 @@ def _threshold_interval(axes: Axes, found: LevelsResult, one: ThresholdEstimate,
     if one.low is None or one.high is None:
         return
     guess = one.guess or 0.0
-    height = guess + (1.0 - guess - (one.lapse or 0.0)) / 2 - BELOW * number
+    height = guess + (1.0 - guess - (one.lapse or 0.0)) / 2 - _BELOW * number
     ends = [_coordinate(found, one.low), _coordinate(found, one.high)]
     axes.plot(ends, [height, height], color=colour, linewidth=1.2, solid_capstyle="butt", zorder=2)
 
@@ -272,7 +273,7 @@ def _answer_points(
 ) -> None:
     xs, ys = [places[_where(one)] for one in points], [_height(found, one.value) for one in points]
     if Thresholds.own(found):
-        sizes = [SIZE_PT2 * one.n for one in points]
+        sizes = [_SIZE_PT2 * one.n for one in points]
         axes.scatter(xs, ys, s=sizes, facecolors="none", edgecolors=colour, linewidths=0.7, zorder=3)
         return
     joined = "none" if found.vary is None else "-"
@@ -328,16 +329,16 @@ def _limits(found: LevelsResult, places: Mapping[Any, float]) -> tuple[float, fl
 def _shown_levels(found: LevelsResult, places: Mapping[Any, float]) -> Mapping[Any, float]:
     """Return the levels that are named below the axis, with their places: of many on log spacing, round ones."""
     named = sorted(places, key=lambda level: places[level])
-    if found.vary is None or len(named) <= MOST_TICKS:
+    if found.vary is None or len(named) <= _MOST_TICKS:
         return {level: places[level] for level in named}
     if found.spacing == "log":
         low, high = places[named[0]], places[named[-1]]
         decades = range(math.floor(low), math.ceil(high) + 1)
         round_levels = [digit * 10.0**decade for decade in decades for digit in (1, 2, 5)]
         inside = {level: math.log10(level) for level in round_levels if low <= math.log10(level) <= high}
-        if len(inside) >= FEWEST_TICKS:
+        if len(inside) >= _FEWEST_TICKS:
             return inside
-    return {level: places[level] for level in named[:: math.ceil(len(named) / MOST_TICKS)]}
+    return {level: places[level] for level in named[:: math.ceil(len(named) / _MOST_TICKS)]}
 
 
 def _ticks(found: LevelsResult) -> list[tuple[float, str]]:
@@ -352,20 +353,20 @@ def _ticks(found: LevelsResult) -> list[tuple[float, str]]:
     least = max((at for at, _ in known if at <= math.log10(min(ends))), default=known[0][0])
     most = min((at for at, _ in known if at >= math.log10(max(ends))), default=known[-1][0])
     inside = [one for one in known if least <= one[0] <= most]
-    return inside if len(inside) <= 2 * MOST_TICKS else [one for one in inside if one[0] == math.floor(one[0])]
+    return inside if len(inside) <= 2 * _MOST_TICKS else [one for one in inside if one[0] == math.floor(one[0])]
 
 
-MOST_PANELS: Final = 24
-MARK_PT2: Final = 7.0
-RING_PT2: Final = 26.0
-CROSS_PT2: Final = 11.0
+_MOST_PANELS: Final = 24
+_MARK_PT2: Final = 7.0
+_RING_PT2: Final = 26.0
+_CROSS_PT2: Final = 11.0
 """Areas of the marks of answers, reversals and catch trials."""
 
 
-def track_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str, tracked: Tracked) -> Picture:
+def _track_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str, tracked: _Tracked) -> Picture:
     """Draw the tracks of a block whose levels answers chose, once the key is open."""
     block = next(block for block in study.levels if block.id == found.block)
-    shown = list(courses(block, tracked(), MOST_PANELS))
+    shown = list(courses(block, tracked(), _MOST_PANELS))
     rest = len(Thresholds.own(found)) - len(shown)
     left_out = f" {counted(rest, 'more panel')} not shown." if rest > 0 else ""
     success = "correct" if found.counts == "correct" else f"“{found.counts}”"
@@ -391,7 +392,7 @@ def _draw_tracks(found: LevelsResult, shown: Sequence[TrackCourse], look: Look) 
     def draw(axes: Axes, place: int, first: bool) -> None:
         n = len(shown[place].levels)
         axes.set_xlim(0.5 - 0.02 * n, n + 0.5 + 0.02 * n)
-        over_trials(axes, found, n, ends, first=first)
+        _over_trials(axes, found, n, ends, first=first)
         _track_panel(axes, shown[place])
 
     below = "Trial at the standard" if standards else "Trial"
@@ -406,23 +407,23 @@ def _track_panel(axes: Axes, course: TrackCourse) -> None:
         trials, np.clip(course.low, low, high), np.clip(course.high, low, high), color=style.BAND, linewidth=0, zorder=1
     )
     levels = np.maximum(course.levels, low)
-    for track, colour in zip(sorted(set(course.tracks.tolist())), COLOURS, strict=False):
+    for track, colour in zip(sorted(set(course.tracks.tolist())), _COLOURS, strict=False):
         of_track = course.tracks == track
         own = of_track & ~course.catches
         chosen = own & ~course.noises
         axes.plot(trials[chosen], levels[chosen], color=colour, linewidth=0.6)
         _marks(axes, trials, levels, own & course.successes, colour, colour)
         _marks(axes, trials, levels, own & ~course.successes, "white", colour)
-        _marks(axes, trials, levels, own & course.reversals, "none", colour, RING_PT2)
+        _marks(axes, trials, levels, own & course.reversals, "none", colour, _RING_PT2)
         for marker, answered in (("x", course.successes), ("+", ~course.successes)):
             which = of_track & course.catches & answered
             axes.scatter(
-                trials[which], levels[which], s=CROSS_PT2, marker=marker, color=colour, linewidths=0.8, clip_on=False
+                trials[which], levels[which], s=_CROSS_PT2, marker=marker, color=colour, linewidths=0.8, clip_on=False
             )
 
 
 def _marks(
-    axes: Axes, trials: Array, levels: Array, which: Flags, face: str, edge: str, size: float = MARK_PT2
+    axes: Axes, trials: Array, levels: Array, which: Flags, face: str, edge: str, size: float = _MARK_PT2
 ) -> None:
     """Draw circles; those at an edge are not cut off."""
     axes.scatter(
@@ -430,9 +431,11 @@ def _marks(
     )
 
 
-def settings_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str, _tracked: Tracked) -> Picture:
+def _settings_picture(
+    study: Study, found: LevelsResult, forms: Sequence[str], name: str, _tracked: _Tracked
+) -> Picture:
     """Draw the settings of a block whose levels participants set, once the key is open."""
-    rest = len(Settings.own(found)) - MOST_PANELS
+    rest = len(Settings.own(found)) - _MOST_PANELS
     left_out = f" {counted(rest, 'more panel')} not shown." if rest > 0 else ""
     compared = any(one.constant_error is not None for one in Settings.own(found))
     standard = " Dashed: standard." if compared else ""
@@ -448,7 +451,7 @@ def settings_picture(study: Study, found: LevelsResult, forms: Sequence[str], na
 
 @style.own_settings()
 def _draw_settings(found: LevelsResult, look: Look) -> Sheet:
-    shown = Settings.own(found)[:MOST_PANELS]
+    shown = Settings.own(found)[:_MOST_PANELS]
     standards = len({one.standard for one in shown}) > 1
     names = [
         (
@@ -462,7 +465,7 @@ def _draw_settings(found: LevelsResult, look: Look) -> Sheet:
 
     def draw(axes: Axes, place: int, first: bool) -> None:
         axes.set_xlim(0.4, shown[place].n + 0.6)
-        over_trials(axes, found, shown[place].n, ends, first=first)
+        _over_trials(axes, found, shown[place].n, ends, first=first)
         _settings_panel(axes, shown[place])
 
     return panels(look, level_words(found), names, draw, "Setting")
@@ -486,17 +489,17 @@ def _settings_panel(axes: Axes, one: SettingEstimate) -> None:
         _marks(axes, places, levels, which, face, style.ACCENT)
 
 
-WEBER_LEFT_PT: Final = 34.0
-RIGHT_PT: Final = 10.0
-TOP_PT: Final = 40.0
-WEBER_FOOT_PT: Final = 32.0
-HEIGHT_PT: Final = 190.0
-FRACTIONS: Final = tuple(digit * 10.0**decade for decade in range(-4, 4) for digit in (1, 2, 5))
+_WEBER_LEFT_PT: Final = 34.0
+_RIGHT_PT: Final = 10.0
+_TOP_PT: Final = 40.0
+_WEBER_FOOT_PT: Final = 32.0
+_HEIGHT_PT: Final = 190.0
+_FRACTIONS: Final = tuple(digit * 10.0**decade for decade in range(-4, 4) for digit in (1, 2, 5))
 Point = tuple[float, float, float | None, float | None]
 """Standard, Weber fraction, and the ends of its interval."""
 
 
-def weber_fractions(found: LevelsResult, participant: str | None) -> list[Point]:
+def _weber_fractions(found: LevelsResult, participant: str | None) -> list[Point]:
     """Return the Weber fractions of a participant or, of None, of the group, by standard.
 
     A threshold that is a difference is divided by its standard; standards of zero and levels that are values have none.
@@ -524,10 +527,10 @@ def _at(found: LevelsResult) -> str:
     return "" if percent is None else f" at {percent:.3g} % {found.counts}"
 
 
-def weber_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str, _tracked: Tracked) -> Picture:
+def _weber_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str, _tracked: _Tracked) -> Picture:
     """Draw the Weber fractions of a block with thresholds at two standards or more."""
     listed = "; ".join(published_words(one) for one in found.published)
-    published = f" Open circles and dotted lines: published values, {listed}." if published_fractions(found) else ""
+    published = f" Open circles and dotted lines: published values, {listed}." if _published_fractions(found) else ""
     caption = (
         f"{found.title}: Weber fraction of {found.quantity}{_at(found)}, against the standard. Thin: "
         f"participants; thick: random-effects mean with its 95 % interval.{published} "
@@ -547,14 +550,14 @@ def weber_picture(study: Study, found: LevelsResult, forms: Sequence[str], name:
 
 @style.own_settings()
 def _draw_fractions(found: LevelsResult, look: Look) -> Sheet:
-    sheet = look.sheet(HEIGHT_PT, style.PAGE_WIDTH_PT / 2)
+    sheet = look.sheet(_HEIGHT_PT, style.PAGE_WIDTH_PT / 2)
     sheet.text(MARGIN_PT, 28, f"Weber fraction{_at(found)}", size=SMALL, colour=style.TEXT_SOFT)
     axes = sheet.axes(
-        WEBER_LEFT_PT, TOP_PT, sheet.width_pt - WEBER_LEFT_PT - RIGHT_PT, sheet.height_pt - TOP_PT - WEBER_FOOT_PT
+        _WEBER_LEFT_PT, _TOP_PT, sheet.width_pt - _WEBER_LEFT_PT - _RIGHT_PT, sheet.height_pt - _TOP_PT - _WEBER_FOOT_PT
     )
-    group = weber_fractions(found, None)
-    own = [weber_fractions(found, person) for person in people(found)]
-    published = published_fractions(found)
+    group = _weber_fractions(found, None)
+    own = [_weber_fractions(found, person) for person in people(found)]
+    published = _published_fractions(found)
     _fractions_frame(axes, group, own, published)
     _published(axes, published, sheet)
     for points in own:
@@ -569,11 +572,11 @@ def _draw_fractions(found: LevelsResult, look: Look) -> Sheet:
     for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
         label.set_fontproperties(sheet.font(SMALL))
     below = f"Standard of {found.quantity}" + (f" [{found.unit}]" if found.unit else "")
-    sheet.text(WEBER_LEFT_PT, sheet.height_pt - 8, below, size=SMALL, colour=style.TEXT_SOFT)
+    sheet.text(_WEBER_LEFT_PT, sheet.height_pt - 8, below, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 
 
-def published_fractions(found: LevelsResult) -> list[tuple[float | None, float]]:
+def _published_fractions(found: LevelsResult) -> list[tuple[float | None, float]]:
     """Return standard and Weber fraction of the published values that are one; a standard of None: of all."""
     points = []
     for one in found.published:
@@ -605,8 +608,8 @@ def _fractions_frame(
     values = [value for points in own for _, value, _, _ in points]
     values += [value for point in group for value in point[1:] if value is not None]
     values += [value for _, value in published]
-    low = max((tick for tick in FRACTIONS if tick <= min(values)), default=min(values))
-    high = min((tick for tick in FRACTIONS if tick >= max(values)), default=max(values))
+    low = max((tick for tick in _FRACTIONS if tick <= min(values)), default=min(values))
+    high = min((tick for tick in _FRACTIONS if tick >= max(values)), default=max(values))
     standards = [one[0] for one in group]
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -615,18 +618,18 @@ def _fractions_frame(
     axes.set_xlim(standards[0] / margin, standards[-1] * margin)
     axes.set_ylim(low, high)
     axes.set_xticks(standards, [f"{standard:g}" for standard in standards])
-    ticks = [tick for tick in FRACTIONS if low <= tick <= high]
+    ticks = [tick for tick in _FRACTIONS if low <= tick <= high]
     axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.hlines(ticks, *axes.get_xlim(), color=style.GRID, linewidth=0.6, zorder=0)
 
 
-Draw: TypeAlias = Callable[[Study, LevelsResult, Sequence[str], str, Tracked], Picture]
+_Draw: TypeAlias = Callable[[Study, LevelsResult, Sequence[str], str, _Tracked], Picture]
 
-FIGURES: Final[tuple[tuple[str, Callable[[LevelsResult], object], Draw], ...]] = (
-    ("levels", Answers.of, level_picture),
-    ("tracks", lambda found: found.adaptive and Thresholds.own(found), track_picture),
-    ("weber", lambda found: len(weber_fractions(found, None)) >= 2, weber_picture),
-    ("settings", Settings.own, settings_picture),
+_FIGURES: Final[tuple[tuple[str, Callable[[LevelsResult], object], _Draw], ...]] = (
+    ("levels", Answers.of, _level_picture),
+    ("tracks", lambda found: found.adaptive and Thresholds.own(found), _track_picture),
+    ("weber", lambda found: len(_weber_fractions(found, None)) >= 2, _weber_picture),
+    ("settings", Settings.own, _settings_picture),
 )
 """What a figure is called, of which blocks there is one, and what draws it."""
 
@@ -642,7 +645,7 @@ def level_pictures(
     yield from attempted(
         (
             (found.block, name := f"{what}-{found.block}", partial(draw, study, found, forms, name, tracked))
-            for what, applies, draw in FIGURES
+            for what, applies, draw in _FIGURES
             for found in levels
             if applies(found)
         ),

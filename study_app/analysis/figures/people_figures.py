@@ -13,36 +13,36 @@ from study_app import figure_style as style
 from study_app.analysis.page_layout import MARGIN_PT, SMALL, Look, Sheet
 from study_app.analysis.statistics.outcome import student_interval
 
-A_ROW: Final = 3
+_A_ROW: Final = 3
 """Panels side by side."""
 WIDTH_PT: Final = 420.0
 """Of a figure that stands beside its answer."""
-PANEL_PT: Final = 128.0
-SMALL_PANEL_PT: Final = 88.0
-LEAST_PANEL_PT: Final = 66.0
+_PANEL_PT: Final = 128.0
+_SMALL_PANEL_PT: Final = 88.0
+_LEAST_PANEL_PT: Final = 66.0
 """Of a panel in one row, in two, and in more."""
-MOST_COLUMN_PT: Final = 120.0
-NARROW_PT: Final = 290.0
+_MOST_COLUMN_PT: Final = 120.0
+_NARROW_PT: Final = 290.0
 """Least width of a figure: its heading must fit."""
-OF_MANY_PT: Final = 300.0
+_OF_MANY_PT: Final = 300.0
 """Most width of a column, and of one in which each participant has an interval."""
-ROW_GAP_PT: Final = 6.0
-LEFT_PT: Final = 34.0
-GAP_PT: Final = 12.0
-TITLE_PT: Final = 10.0
-NAME_PT: Final = 8.6
-HEAD_PT: Final = 38.0
-SPREAD: Final = 0.16
+_ROW_GAP_PT: Final = 6.0
+_LEFT_PT: Final = 34.0
+_GAP_PT: Final = 12.0
+_TITLE_PT: Final = 10.0
+_NAME_PT: Final = 8.6
+_HEAD_PT: Final = 38.0
+_SPREAD: Final = 0.16
 """How far the points of a column are apart at most, as a share of the distance of columns."""
-SPREAD_OF_ENDS: Final = 0.26
+_SPREAD_OF_ENDS: Final = 0.26
 """The same where each participant has an interval: they stand in the order of their numbers."""
-GOLDEN: Final = 0.6180339887
+_GOLDEN: Final = 0.6180339887
 """Steps that put many points evenly apart."""
-ASIDE: Final = 0.27
+_ASIDE: Final = 0.27
 """How far the mean is from the points that it is of."""
-GROUPS: Final = (style.ACCENT, "#b35600", "#5d6a75", "#6d1007", "#5d8aa8", "#02256d")
-MARKERS: Final = "osD^vP"
-LEAST_TICKS: Final = 3
+_GROUPS: Final = (style.ACCENT, "#b35600", "#5d6a75", "#6d1007", "#5d8aa8", "#02256d")
+_MARKERS: Final = "osD^vP"
+_LEAST_TICKS: Final = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,7 +142,7 @@ def draw_people(
     members: Mapping[str, str] | None = None,
     shared: bool = False,
 ) -> Sheet:
-    """Draw panels, `A_ROW` of them side by side.
+    """Draw panels, `_A_ROW` of them side by side.
 
     Parameters
     ----------
@@ -151,14 +151,14 @@ def draw_people(
     shared : whether all panels have one scale
     """
     groups = sorted(set((members or {}).values()))
-    panel_pt = PANEL_PT if len(panels) <= A_ROW else SMALL_PANEL_PT if len(panels) <= 2 * A_ROW else LEAST_PANEL_PT
+    panel_pt = _PANEL_PT if len(panels) <= _A_ROW else _SMALL_PANEL_PT if len(panels) <= 2 * _A_ROW else _LEAST_PANEL_PT
     width_pt = WIDTH_PT
     ruler = Sheet(width_pt, 72, look.fonts)
-    rows = [panels[place : place + A_ROW] for place in range(0, len(panels), A_ROW)]
+    rows = [panels[place : place + _A_ROW] for place in range(0, len(panels), _A_ROW)]
     inside = width_pt - MARGIN_PT
     widths = [_widths(row, inside, shared=shared) for row in rows]
     if len(panels) == 1:
-        width_pt = min(width_pt, max(NARROW_PT, LEFT_PT + widths[0][0] + MARGIN_PT))
+        width_pt = min(width_pt, max(_NARROW_PT, _LEFT_PT + widths[0][0] + MARGIN_PT))
     titles = [
         [ruler.wrap(one.title, width, SMALL, "bold") for one, width in zip(row, wide, strict=True)]
         for row, wide in zip(rows, widths, strict=True)
@@ -167,11 +167,11 @@ def draw_people(
         [_names(ruler, one, width) for one, width in zip(row, wide, strict=True)]
         for row, wide in zip(rows, widths, strict=True)
     ]
-    title_pt = [TITLE_PT * max((len(one) for one in row), default=0) * any(one.title for one in of)
+    title_pt = [_TITLE_PT * max((len(one) for one in row), default=0) * any(one.title for one in of)
                 for row, of in zip(titles, rows, strict=True)]  # fmt: skip
-    name_pt = [NAME_PT * max(len(lines) for panel in row for lines in panel) + 8 for row in names]
-    head = HEAD_PT + (10.0 if groups else 0.0)
-    height = head + sum(title_pt) + sum(name_pt) + len(rows) * (panel_pt + ROW_GAP_PT) + (8.0 if below else 2.0)
+    name_pt = [_NAME_PT * max(len(lines) for panel in row for lines in panel) + 8 for row in names]
+    head = _HEAD_PT + (10.0 if groups else 0.0)
+    height = head + sum(title_pt) + sum(name_pt) + len(rows) * (panel_pt + _ROW_GAP_PT) + (8.0 if below else 2.0)
     sheet = look.sheet(height, width_pt)
     sheet.text(MARGIN_PT, 28, above, size=SMALL, colour=style.TEXT_SOFT)
     _legend(sheet, groups)
@@ -179,25 +179,25 @@ def draw_people(
     for row, wide, of_titles, of_names, title, name in zip(rows, widths, titles, names, title_pt, name_pt, strict=True):
         x = 0.0
         for place, (panel, width) in enumerate(zip(row, wide, strict=True)):
-            x += LEFT_PT if place == 0 or not shared else GAP_PT
+            x += _LEFT_PT if place == 0 or not shared else _GAP_PT
             for number, line in enumerate(of_titles[place]):
-                sheet.text(x, y + TITLE_PT * number + 5, line, size=SMALL, weight="bold")
+                sheet.text(x, y + _TITLE_PT * number + 5, line, size=SMALL, weight="bold")
             axes = sheet.axes(x, y + title, width, panel_pt)
             ends = _scale(sheet, axes, panel, panels if shared else [panel], words=place == 0 or not shared)
             axes.set_ylim(*ends)
             _draw_panel(sheet, axes, panel, members or {}, groups, of_names[place])
             x += width
-        y += title + panel_pt + name + ROW_GAP_PT
+        y += title + panel_pt + name + _ROW_GAP_PT
     if below:
-        sheet.text(LEFT_PT, sheet.height_pt - 4, below, size=SMALL, colour=style.TEXT_SOFT)
+        sheet.text(_LEFT_PT, sheet.height_pt - 4, below, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 
 
 def _widths(row: Sequence[Panel], inside: float, *, shared: bool) -> list[float]:
-    room = inside - (LEFT_PT + (len(row) - 1) * GAP_PT if shared else len(row) * LEFT_PT)
+    room = inside - (_LEFT_PT + (len(row) - 1) * _GAP_PT if shared else len(row) * _LEFT_PT)
     total = sum(one.share for one in row)
     most = [
-        OF_MANY_PT if any(column.ends for column in one.columns) else MOST_COLUMN_PT * len(one.columns) for one in row
+        _OF_MANY_PT if any(column.ends for column in one.columns) else _MOST_COLUMN_PT * len(one.columns) for one in row
     ]
     return [min(room * one.share / total, limit) for one, limit in zip(row, most, strict=True)]
 
@@ -220,10 +220,10 @@ def _legend(sheet: Sheet, groups: Sequence[str]) -> None:
     x = sheet.width_pt - MARGIN_PT
     for number, group in reversed([*enumerate(groups)]):
         x -= sheet.text_width(group, SMALL)
-        sheet.text(x, 38.5, group, size=SMALL, colour=GROUPS[number % len(GROUPS)], weight="bold")
+        sheet.text(x, 38.5, group, size=SMALL, colour=_GROUPS[number % len(_GROUPS)], weight="bold")
         x -= 9
-        sheet.line([x + 4], [36], marker=MARKERS[number % len(MARKERS)], markersize=3.2,
-                   color=GROUPS[number % len(GROUPS)], linestyle="none")  # fmt: skip
+        sheet.line([x + 4], [36], marker=_MARKERS[number % len(_MARKERS)], markersize=3.2,
+                   color=_GROUPS[number % len(_GROUPS)], linestyle="none")  # fmt: skip
         x -= 8
 
 
@@ -257,7 +257,7 @@ def scale_ticks(low: float, high: float, *, log: bool) -> list[float]:
     for digits in ((1,), (1, 3), (1, 2, 5), (1, 2, 3, 5, 7), tuple(range(1, 10)), tuple(np.arange(10, 100) / 10)):
         inside = [tick for tick in (float(f"{digit:g}e{decade}") for decade in decades for digit in digits)
                   if low <= tick <= high]  # fmt: skip
-        if len(inside) >= LEAST_TICKS:
+        if len(inside) >= _LEAST_TICKS:
             break
     return inside
 
@@ -287,17 +287,17 @@ def _draw_panel(
         at = [(x + offsets[person], one.values[person])
               for x, one in zip(xs, panel.columns, strict=True) if person in one.values]  # fmt: skip
         number = groups.index(members[person]) if person in members else None
-        colour = style.PARTICIPANT if number is None else GROUPS[number % len(GROUPS)]
+        colour = style.PARTICIPANT if number is None else _GROUPS[number % len(_GROUPS)]
         if panel.joined and len(at) > 1:
             axes.plot(*zip(*at, strict=True), color=colour, linewidth=0.6, alpha=0.55, zorder=2)
-        marker = "o" if number is None else MARKERS[number % len(MARKERS)]
+        marker = "o" if number is None else _MARKERS[number % len(_MARKERS)]
         axes.plot(*zip(*at, strict=True), marker, color=colour, markersize=2.6, markeredgewidth=0, zorder=3,
                   gid=f"person-{person}")  # fmt: skip
     for x, one in zip(xs, panel.columns, strict=True):
         for person, ends in (one.ends or {}).items():
             axes.plot([x + offsets[person]] * 2, ends, color=style.PARTICIPANT, linewidth=0.5, zorder=2)
         if one.mean is not None:
-            aside = x + (ASIDE * step if one.values else 0.0)
+            aside = x + (_ASIDE * step if one.values else 0.0)
             axes.plot([aside], [one.mean.value], "D", color=style.TEXT, markersize=4, zorder=5, gid="mean")
             if one.mean.low is not None and one.mean.high is not None:
                 axes.plot([aside] * 2, [one.mean.low, one.mean.high], color=style.TEXT, linewidth=1.5, zorder=4)
@@ -309,6 +309,6 @@ def _offsets(panel: Panel, people: Sequence[str], *, apart: bool) -> np.ndarray:
         return np.zeros(len(people))
     order = np.argsort(np.argsort([panel.columns[0].values.get(person, 0.0) for person in people], kind="stable"))
     if panel.columns[0].ends is not None:
-        return np.asarray((order / (len(people) - 1) - 0.75) * 2 * SPREAD_OF_ENDS)
-    spread = SPREAD if apart else 0.5 * SPREAD
-    return np.asarray((np.arange(len(people)) * GOLDEN % 1.0 - 0.5) * 2 * spread)
+        return np.asarray((order / (len(people) - 1) - 0.75) * 2 * _SPREAD_OF_ENDS)
+    spread = _SPREAD if apart else 0.5 * _SPREAD
+    return np.asarray((np.arange(len(people)) * _GOLDEN % 1.0 - 0.5) * 2 * spread)

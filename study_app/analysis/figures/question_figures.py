@@ -26,34 +26,34 @@ from study_app.analysis.page_layout import (
 from study_app.analysis.results import Failures, QuestionResult
 from study_app.discovery import by_name
 
-LEFT_PT: Final = 120.0
-RIGHT_PT: Final = 40.0
-TOP_PT: Final = 30.0
-FOOT_PT: Final = 34.0
-LINE_PT: Final = 8.5
+_LEFT_PT: Final = 120.0
+_RIGHT_PT: Final = 40.0
+_TOP_PT: Final = 30.0
+_FOOT_PT: Final = 34.0
+_LINE_PT: Final = 8.5
 
 
-Draw: TypeAlias = Callable[[PlacedQuestion, QuestionResult, Look], Sheet]
+_Draw: TypeAlias = Callable[[PlacedQuestion, QuestionResult, Look], Sheet]
 
 
 @dataclass(frozen=True, slots=True)
-class QuestionFigure:
+class _QuestionFigure:
     """A figure by its id: what draws it, and the sentence of its caption."""
 
     id: str
-    draw: Draw
+    draw: _Draw
     caption: str
 
 
 def rows(names: Sequence[str], ns: Sequence[int], look: Look, *, row_pt: float) -> tuple[Sheet, Axes]:
     """Return a sheet and its axes, in which row k lies around y = k, the first at the top."""
-    sheet = look.sheet(TOP_PT + row_pt * len(names) + FOOT_PT)
-    axes = sheet.axes(LEFT_PT, TOP_PT, sheet.width_pt - LEFT_PT - RIGHT_PT, row_pt * len(names))
+    sheet = look.sheet(_TOP_PT + row_pt * len(names) + _FOOT_PT)
+    axes = sheet.axes(_LEFT_PT, _TOP_PT, sheet.width_pt - _LEFT_PT - _RIGHT_PT, row_pt * len(names))
     axes.set_ylim(len(names) - 0.5, -0.5)
     for place, (name, n) in enumerate(zip(names, ns, strict=True)):
-        middle = TOP_PT + row_pt * (place + 0.5) + 2.5
+        middle = _TOP_PT + row_pt * (place + 0.5) + 2.5
         sheet.lines(
-            LEFT_PT - 8, middle, sheet.wrap(name, LEFT_PT - MARGIN_PT - 8, SMALL), LINE_PT, size=SMALL, ha="right"
+            _LEFT_PT - 8, middle, sheet.wrap(name, _LEFT_PT - MARGIN_PT - 8, SMALL), _LINE_PT, size=SMALL, ha="right"
         )
         sheet.text(sheet.width_pt - MARGIN_PT, middle, f"n = {n}", size=SMALL, colour=style.TEXT_SOFT, ha="right")
     return sheet, axes
@@ -67,20 +67,20 @@ def _rows_of_groups(found: QuestionResult, look: Look, row_pt: float) -> tuple[S
 
 def _ends(sheet: Sheet, y: float, low: str, high: str) -> None:
     """Write what the ends of the axis mean."""
-    sheet.text(LEFT_PT, y, low, size=SMALL, colour=style.TEXT_SOFT)
-    sheet.text(sheet.width_pt - RIGHT_PT, y, high, size=SMALL, colour=style.TEXT_SOFT, ha="right")
+    sheet.text(_LEFT_PT, y, low, size=SMALL, colour=style.TEXT_SOFT)
+    sheet.text(sheet.width_pt - _RIGHT_PT, y, high, size=SMALL, colour=style.TEXT_SOFT, ha="right")
 
 
-ROW_PT: Final = 30.0
-BAND: Final = 0.22
-PILE: Final = 0.07  # from one of equal answers to the next
+_ROW_PT: Final = 30.0
+_BAND: Final = 0.22
+_PILE: Final = 0.07  # from one of equal answers to the next
 
 
 @style.own_settings()
 def draw_distribution(asked: PlacedQuestion, found: QuestionResult, look: Look) -> Sheet:
     """Draw the answers."""
     groups = found.groups
-    sheet, axes = _rows_of_groups(found, look, ROW_PT)
+    sheet, axes = _rows_of_groups(found, look, _ROW_PT)
     values = [value for group in groups for value in group.numbers["values"]]
     low, high = asked.bounds or (min(values, default=0.0), max(values, default=1.0))
     span = (high - low) or 1.0
@@ -90,23 +90,23 @@ def draw_distribution(asked: PlacedQuestion, found: QuestionResult, look: Look) 
         axes.plot([low, high], [place, place], color=style.GRID, linewidth=0.8, zorder=0)
         if numbers["median"] is None:
             continue
-        axes.fill_between([numbers["q1"], numbers["q3"]], place - BAND, place + BAND, color=style.BAND, linewidth=0)
-        axes.plot([numbers["median"]] * 2, [place - BAND, place + BAND], color=style.ACCENT, linewidth=1.6)
+        axes.fill_between([numbers["q1"], numbers["q3"]], place - _BAND, place + _BAND, color=style.BAND, linewidth=0)
+        axes.plot([numbers["median"]] * 2, [place - _BAND, place + _BAND], color=style.ACCENT, linewidth=1.6)
         for value, many in sorted(Counter(numbers["values"]).items()):
-            ys = [place + PILE * (number - (many - 1) / 2) for number in range(many)]
+            ys = [place + _PILE * (number - (many - 1) / 2) for number in range(many)]
             axes.plot([value] * many, ys, "o", markersize=2.6, color=style.PARTICIPANT, gid=f"{group.code}")
     view = asked.question.view(0, asked.context)
     ends = (f"{low:g} {getattr(view, 'low', '')}".strip(), f"{high:g} {getattr(view, 'high', '')}".strip())
-    _ends(sheet, sheet.height_pt - FOOT_PT + 12, *ends)
+    _ends(sheet, sheet.height_pt - _FOOT_PT + 12, *ends)
     return sheet
 
 
-DISTRIBUTION: Final = QuestionFigure(
+_DISTRIBUTION: Final = _QuestionFigure(
     "distribution", draw_distribution, "Each dot is an answer; line: median; band: interquartile range."
 )
 
 
-OPTION_PT: Final = 20.0
+_OPTION_PT: Final = 20.0
 
 
 @style.own_settings()
@@ -118,7 +118,7 @@ def draw_options(asked: PlacedQuestion, found: QuestionResult, look: Look) -> Sh
         for group in found.groups
         for option, words in asked.levels.items()
     ]
-    sheet, axes = rows([name for name, _, _ in bars], [n for _, _, n in bars], look, row_pt=OPTION_PT)
+    sheet, axes = rows([name for name, _, _ in bars], [n for _, _, n in bars], look, row_pt=_OPTION_PT)
     most = max((n for _, _, n in bars), default=1) or 1
     axes.set_xlim(0, most * 1.06)
     for place, (_, count, n) in enumerate(bars):
@@ -128,15 +128,15 @@ def draw_options(asked: PlacedQuestion, found: QuestionResult, look: Look) -> Sh
     return sheet
 
 
-OPTIONS: Final = QuestionFigure(
+_OPTIONS: Final = _QuestionFigure(
     "counts", draw_options, "Number of participants who chose each option; grey: all who answered."
 )
 
 
-RATING_PT: Final = 26.0
-HALF: Final = 0.32
-SWATCH_PT: Final = 18.0
-NARROW: Final = 0.03  # share of a bar in which the value is not printed
+_RATING_PT: Final = 26.0
+_HALF: Final = 0.32
+_SWATCH_PT: Final = 18.0
+_NARROW: Final = 0.03  # share of a bar in which the value is not printed
 
 
 def colours(points: int) -> list[str]:
@@ -154,7 +154,7 @@ def _ink(colour: str) -> str:
 def draw_ratings(asked: PlacedQuestion, found: QuestionResult, look: Look) -> Sheet:
     """Draw the counts of all points."""
     groups = found.groups
-    sheet, axes = _rows_of_groups(found, look, RATING_PT)
+    sheet, axes = _rows_of_groups(found, look, _RATING_PT)
     axes.set_xlim(0, 1)
     inks = colours(len(asked.levels))
     for place, group in enumerate(groups):
@@ -162,8 +162,8 @@ def draw_ratings(asked: PlacedQuestion, found: QuestionResult, look: Look) -> Sh
         left = 0.0
         for count, colour in zip(group.numbers["counts"].values(), inks, strict=True):
             share = count / total
-            axes.barh(place, share, left=left, height=2 * HALF, color=colour, gid=f"{group.code}")
-            if share > NARROW:
+            axes.barh(place, share, left=left, height=2 * _HALF, color=colour, gid=f"{group.code}")
+            if share > _NARROW:
                 look_of_count: Style = {"ha": "center", "va": "center", "color": _ink(colour)}
                 axes.text(left + share / 2, place, str(count), fontproperties=sheet.font(SMALL), **look_of_count)
             left += share
@@ -175,19 +175,19 @@ def _legend(sheet: Sheet, names: list[str], inks: list[str]) -> None:
     """Write the ends of the scale, and between them the points in their colours."""
     y = sheet.height_pt - 12
     _ends(sheet, y, names[0], names[-1])
-    x = (LEFT_PT + sheet.width_pt - RIGHT_PT - SWATCH_PT * len(inks)) / 2
+    x = (_LEFT_PT + sheet.width_pt - _RIGHT_PT - _SWATCH_PT * len(inks)) / 2
     for point, ink in enumerate(inks, start=1):
-        sheet.box(x, y - 8.5, SWATCH_PT, 11, ink, rounding=0.5)
-        sheet.text(x + SWATCH_PT / 2, y, str(point), size=SMALL, colour=_ink(ink), ha="center")
-        x += SWATCH_PT
+        sheet.box(x, y - 8.5, _SWATCH_PT, 11, ink, rounding=0.5)
+        sheet.text(x + _SWATCH_PT / 2, y, str(point), size=SMALL, colour=_ink(ink), ha="center")
+        x += _SWATCH_PT
 
 
-RATINGS: Final = QuestionFigure(
+_RATINGS: Final = _QuestionFigure(
     "rating", draw_ratings, "Each bar shows the proportions of answers at each point, labelled with counts."
 )
 
 
-FIGURES: Final = {one.id: one for one in (RATINGS, OPTIONS, DISTRIBUTION)}
+_FIGURES: Final = {one.id: one for one in (_RATINGS, _OPTIONS, _DISTRIBUTION)}
 """Every figure by the id that a kind of question names it by."""
 
 
@@ -218,7 +218,7 @@ def question_pictures(
 
 
 def _picture(study: Study, asked: PlacedQuestion, found: QuestionResult, forms: Sequence[str], name: str) -> Picture:
-    figure = by_name(FIGURES, found.figure or "")
+    figure = by_name(_FIGURES, found.figure or "")
     title = found.short if found.short == found.title else f"{found.title}: {found.short}"
     caption = f"{found.title}: “{found.text}” {figure.caption} {sample_words(study, study.n)}"
     return picture_of(study, found.where, name, title, caption, partial(figure.draw, asked, found), forms)

@@ -19,7 +19,7 @@ from study_app.analysis.questions import scored
 from study_app.analysis.results import ContrastResult, Failures, LevelsResult, Results
 from study_app.number_text import capitalised
 
-MEASURES: Final[tuple[tuple[type[LevelStatistic[Any]], str, str], ...]] = (
+_MEASURES: Final[tuple[tuple[type[LevelStatistic[Any]], str, str], ...]] = (
     (Thresholds, "threshold", "threshold"),
     (Settings, "pse", "point of subjective equality"),
     (Exponents, "exponent", "exponent"),
@@ -42,7 +42,7 @@ class Estimates(NamedTuple):
 
 def estimates_of(found: LevelsResult) -> Estimates | None:
     """Return the estimates that answer the question of a block of levels; None without any."""
-    for statistic, attribute, words in MEASURES:
+    for statistic, attribute, words in _MEASURES:
         rows = [one for one in statistic.of(found) if getattr(one, attribute) is not None]
         if own := [one for one in rows if one.participant is not None]:
             return Estimates([one for one in rows if one.participant is None], own, attribute, words)
@@ -200,10 +200,10 @@ def numbers_of(study: Study) -> dict[str, list[Numbers]]:
     """Return the scores and the answers that are numbers, by where they were asked; none of blocks of levels."""
     levels = {block.id for block in study.levels}
     places = dict.fromkeys(one.where.id for one in study.others.questions if one.where.id not in levels)
-    return {where: found for where in places if (found := numbers_at(study, where))}
+    return {where: found for where in places if (found := _numbers_at(study, where))}
 
 
-def numbers_at(study: Study, where: str) -> list[Numbers]:
+def _numbers_at(study: Study, where: str) -> list[Numbers]:
     """Return the scores of a questionnaire or, where it has none, the answers to its questions that are numbers."""
     scores = [one for one in study.others.scores if one.where.id == where]
     tables: list[tuple[str, tuple[float, float] | None, QuestionPlace, pd.DataFrame]]
@@ -233,7 +233,7 @@ def _with_room(low: float, high: float) -> tuple[float, float]:
 
 
 def _answers(study: Study, where: str, forms: Sequence[str], name: str) -> Picture | None:
-    found = numbers_at(study, where)[:MOST_PANELS]
+    found = _numbers_at(study, where)[:MOST_PANELS]
     if not found:
         return None
     panels = [

@@ -82,7 +82,7 @@ def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
         )
 
 
-VERDICTS: Final = ("equivalent", "not equivalent", "inconclusive", "out of reach")
+_VERDICTS: Final = ("equivalent", "not equivalent", "inconclusive", "out of reach")
 
 
 def by_delay(found: BlockResult) -> list[list[str]]:
@@ -91,7 +91,7 @@ def by_delay(found: BlockResult) -> list[list[str]]:
     for delay_ms in dict.fromkeys(one.delay_ms for one in ContrastsWithControl.of(found)):
         here = [one for one in ContrastsWithControl.of(found) if one.delay_ms == delay_ms]
         cells = [
-            ", ".join(short(found, one.item) for one in here if one.verdict == verdict) or "–" for verdict in VERDICTS
+            ", ".join(short(found, one.item) for one in here if one.verdict == verdict) or "–" for verdict in _VERDICTS
         ]
         rows.append([ms(delay_ms), *cells, _said_of(found, delay_ms, here)])
     return rows
@@ -99,14 +99,14 @@ def by_delay(found: BlockResult) -> list[list[str]]:
 
 def _said_of(found: BlockResult, delay_ms: float, here: Sequence[ContrastWithControl]) -> str:
     if all(one.verdict == "equivalent" for one in here):
-        return f"Mean answers to these statements stay within the bound; {not_excluded([one.found for one in here])}."
+        return f"Mean answers to these statements stay within the bound; {_not_excluded([one.found for one in here])}."
     claim = f"“delays up to {ms(delay_ms)} do not matter”"
-    if reasons := evidence_up_to(found, delay_ms):
+    if reasons := _evidence_up_to(found, delay_ms):
         return f"These data speak against {claim}: {'; '.join(reasons)}."
     return f"These data neither support nor refute {claim}."
 
 
-def evidence_up_to(found: BlockResult, delay_ms: float) -> tuple[str, ...]:
+def _evidence_up_to(found: BlockResult, delay_ms: float) -> tuple[str, ...]:
     """Return what shows that delays up to this one change answers.
 
     That is a trend up to this delay or a shorter one, with the error rate held over all statements, or an interval
@@ -207,7 +207,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
             last=1,
         )
         yield paragraph(" ".join(_about_against(self.value)), "soft")
-        head = ("Delay", *(f"{verdict} in" for verdict in VERDICTS), "what can be said")
+        head = ("Delay", *(f"{verdict} in" for verdict in _VERDICTS), "what can be said")
         yield table(head, by_delay(self.found), words=len(head), folded=True)
 
     def limits(self) -> Iterator[str]:
@@ -503,15 +503,15 @@ class UnchangedUpTo(Finding[None]):
         at, within = common_ms(self.found), _within(against[0])
         if at is None:
             return self.answered(
-                "not shown", f"{NO_DELAY.format(within)} {_largest_words(self.found, against)}{_beyond_words(against)}"
+                "not shown", f"{_NO_DELAY.format(within)} {_largest_words(self.found, against)}{_beyond_words(against)}"
             )
         statements = all_of(len(equivalent_up_to(against)), "statement")
-        share = not_excluded([one.found for one in against if one.delay_ms <= at])
+        share = _not_excluded([one.found for one in against if one.delay_ms <= at])
         text = f"Up to {ms(at)} mean answers to {statements} stay {within}; {share}."
         return self.answered("shown", text)
 
 
-NO_DELAY: Final = "We could not show for any delay that the mean answers to all statements stay {}."
+_NO_DELAY: Final = "We could not show for any delay that the mean answers to all statements stay {}."
 
 
 def _largest_words(found: BlockResult, against: Sequence[ContrastWithControl]) -> str:
@@ -538,7 +538,7 @@ def _beyond_words(against: Sequence[ContrastWithControl]) -> str:
     )
 
 
-def not_excluded(tested: Sequence[Equivalence]) -> str:
+def _not_excluded(tested: Sequence[Equivalence]) -> str:
     """Return how many people may differ by more than the bound, by the 95 % interval of their share."""
     most = max((one.beyond.interval.high for one in tested if one.beyond is not None), default=1.0)
     return f"the data do not exclude that up to {100 * most:.0f} % of people differ by more"
@@ -552,7 +552,7 @@ def _within(against: ContrastWithControl) -> str:
     return f"within {_points(against.found.bound)} of those at {ms(against.control_ms)}"
 
 
-MEASURES: Final = ("Movement time, s", "Path, mm", "Overshoot, mm", "Submovements")
+_MEASURES: Final = ("Movement time, s", "Path, mm", "Overshoot, mm", "Submovements")
 """The titles of `OF_REACHES`."""
 
 
@@ -583,7 +583,7 @@ class Movement(Finding[None]):
         medians = measured.medians(block.id).reset_index()
         plots = [
             (title, medians.pivot(index="participant", columns="code", values=measure)[list(block.codes)].to_numpy())
-            for title, measure in zip(MEASURES, OF_REACHES, strict=True)
+            for title, measure in zip(_MEASURES, OF_REACHES, strict=True)
         ]
         people = medians["participant"].nunique()
         n = counted(people, "participant")

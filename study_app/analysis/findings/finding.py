@@ -27,7 +27,7 @@ U = TypeVar("U")
 MANY: Final = DRAWN_UP_TO
 """Above so many participants p of single statements is approximated."""
 
-FEWER_DRAWS: Final = 1999
+_FEWER_DRAWS: Final = 1999
 """So many rearrangements are drawn for the test over all statements above ``MANY``, which has no approximation."""
 
 
@@ -87,7 +87,7 @@ class BlockAnswers:
     @property
     def draws_over_all(self) -> int:
         """How many are drawn for the one test over all statements."""
-        return draws_for(self.decided.alpha, DRAWS if self.n <= MANY else FEWER_DRAWS)
+        return draws_for(self.decided.alpha, DRAWS if self.n <= MANY else _FEWER_DRAWS)
 
 
 def block_answers(study: Study, block: Block, seed: int, failures: Failures) -> BlockAnswers:

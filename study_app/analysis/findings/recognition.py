@@ -28,7 +28,7 @@ from study_app.analysis.statistics.recognition import MOST as MOST_NAMED
 from study_app.analysis.statistics.recognition import Recognition, named, recognition
 from study_app.analysis.wording import counted, interval, listed, number, p_equals, p_value
 
-NONE_RECOGNISED: Final = "No liquid was shown to be recognised above chance."
+_NONE_RECOGNISED: Final = "No liquid was shown to be recognised above chance."
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
             ("Liquid", lambda rate: self.found.names[rate.setting]),
             ("correct", lambda rate: str(rate.hits)),
             ("of", lambda rate: str(rate.n)),
-            ("undecided", lambda rate: str(named.found.table[rate.setting][UNDECIDED_COLUMN])),
+            ("undecided", lambda rate: str(named.found.table[rate.setting][_UNDECIDED_COLUMN])),
             ("share", lambda rate: number(rate.rate)),
             ("95 % interval", lambda rate: interval(rate.interval)),
             ("closest other liquid", lambda rate: "–" if rate.rival is None else self.found.names[rate.rival]),
@@ -155,7 +155,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
             )
 
 
-UNDECIDED_COLUMN: Final = -2
+_UNDECIDED_COLUMN: Final = -2
 """Of the table of names, see `Recognition`."""
 
 
@@ -233,7 +233,7 @@ class Distinguished(Finding[None]):
                 f"Participants named {number(named.found.statistic, 0)} of {sum(one.n for one in named.found.rates)} "
                 f"liquids correctly ({number(named.found.expected, 1)} expected by chance, {p_equals(named.found.p)})."
             )
-            text = f"{f'Recognised above chance: {names}.' if names else NONE_RECOGNISED} {hits} {text}"
+            text = f"{f'Recognised above chance: {names}.' if names else _NONE_RECOGNISED} {hits} {text}"
         if not verdicts:
             return self.answered("not shown", f"{text} {NO_EVIDENCE}")
         return self.answered(verdict, text, claims=True)

@@ -229,7 +229,7 @@ class DelayTrend(StatementTests):
             )
 
 
-class SessionsDiffer(StatementTests):
+class _SessionsDiffer(StatementTests):
     """The comparison of sessions in every statement, by the participants who came to all of them."""
 
     key = "by_session"
@@ -426,7 +426,7 @@ class Pair:
     tested: Tested
 
 
-def smallest_of_pairs(settings: int, participants: int) -> float:
+def _smallest_of_pairs(settings: int, participants: int) -> float:
     """Return the smallest p that a comparison of two of the settings can have, corrected over all pairs by Holm."""
     return min(1.0, math.comb(settings, 2) * 2.0 ** (1 - participants))
 
@@ -439,10 +439,10 @@ def pairs_of(answers: BlockAnswers, omnibus: tuple[Tested, ...]) -> tuple[tuple[
     n, k, alpha, codes = answers.n, answers.k, answers.decided.alpha, answers.block.codes
     if k < 3:
         return (), ()
-    if (corrected := smallest_of_pairs(k, n)) > alpha:
+    if (corrected := _smallest_of_pairs(k, n)) > alpha:
         why = (
             f"{number_text.counted(n, 'participant')} cannot show a difference between two settings: the smallest "
-            f"attainable p is {p_value(smallest_of_pairs(2, n))}, and {p_value(corrected)} after Holm's correction "
+            f"attainable p is {p_value(_smallest_of_pairs(2, n))}, and {p_value(corrected)} after Holm's correction "
             f"over {math.comb(k, 2)} pairs, which is above {significant(alpha)}"
         )
         return (), (NotTested(Pairs.what, why),)

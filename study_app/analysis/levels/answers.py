@@ -37,7 +37,7 @@ from study_app.analysis.wording import listed
 from study_app.protocol.trials.designs import Reply
 from study_app.protocol.trials.stimuli import Stimulus
 
-MOST_NAMED = 6
+_MOST_NAMED = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,7 +153,7 @@ class Settings(LevelStatistic[SettingEstimate]):
         )
         if few := [str(one.participant) for one in own if one.hysteresis is None]:
             words = "all settings started near the same end, so hysteresis is unknown"
-            yield f"{title}: {words} ({listed(few[:MOST_NAMED])})."
+            yield f"{title}: {words} ({listed(few[:_MOST_NAMED])})."
         yield f"{title}: {MOTORS}"
 
     def methods(self, block: LevelBlock) -> Iterator[str]:
@@ -297,7 +297,7 @@ def _summarised(summary: Summary, bounds: tuple[float, float] | None, values: Ar
     return _Mean(value=float(values.mean()), low=low, high=high)
 
 
-def of_group(found: LevelsResult) -> tuple[LevelAnswers, ...]:
+def _of_group(found: LevelsResult) -> tuple[LevelAnswers, ...]:
     """Return the answers of all participants together, in order of standard and level; without catch trials."""
     return tuple(one for one in Answers.of(found) if one.participant is None and not one.catch)
 
@@ -351,7 +351,7 @@ class Answers(LevelStatistic[LevelAnswers]):
         return f"{100 * value:.0f} %" if self.found.summary == "share" else f"{value:.3g}"
 
     def _of_group(self) -> str:
-        found, rows = self.found, of_group(self.found)
+        found, rows = self.found, _of_group(self.found)
         standards = any(one.standard is not None for one in rows)
         alone = found.level_kind == "value" and not standards
         return table_of(
@@ -368,7 +368,7 @@ class Answers(LevelStatistic[LevelAnswers]):
 
     def _of_people(self, standard: float | None) -> str:
         """Return a row per participant, a column per level."""
-        shown = [one for one in of_group(self.found) if one.standard == standard]
+        shown = [one for one in _of_group(self.found) if one.standard == standard]
         own = {
             (one.participant, one.level, one.comparison): one
             for one in self.rows

@@ -87,7 +87,7 @@ OF_TRACKS: Final[tuple[Column, ...]] = (
 )
 
 
-SETTINGS: Final[tuple[Column, ...]] = (
+_SETTINGS: Final[tuple[Column, ...]] = (
     _BLOCK,
     _STANDARD,
     Column("n", "integer", "Settings that count.", minimum=0),
@@ -116,7 +116,7 @@ SETTINGS: Final[tuple[Column, ...]] = (
     ),
 )
 
-EXPONENTS: Final[tuple[Column, ...]] = (
+_EXPONENTS: Final[tuple[Column, ...]] = (
     _BLOCK,
     Column("levels", "integer", "Number of levels with analysed answers.", minimum=2),
     Column(
@@ -126,7 +126,7 @@ EXPONENTS: Final[tuple[Column, ...]] = (
     ),
 )
 
-THRESHOLDS: Final[tuple[Column, ...]] = (
+_THRESHOLDS: Final[tuple[Column, ...]] = (
     _BLOCK,
     _STANDARD,
     optional("condition", "text", "The compared condition; n/a in a block of levels."),
@@ -228,11 +228,11 @@ class Results(NamedTuple):
 
 
 RESULTS: Final = {
-    "thresholds": Results("one row per participant and standard, or condition compared, after unblinding", THRESHOLDS),
+    "thresholds": Results("one row per participant and standard, or condition compared, after unblinding", _THRESHOLDS),
     "settings": Results(
-        "one row per participant and standard of a block whose levels participants set, after unblinding", SETTINGS
+        "one row per participant and standard of a block whose levels participants set, after unblinding", _SETTINGS
     ),
-    "exponents": Results("one row per participant of a block of magnitude estimation, after unblinding", EXPONENTS),
+    "exponents": Results("one row per participant of a block of magnitude estimation, after unblinding", _EXPONENTS),
 }
 """By the names of the tables."""
 

@@ -15,13 +15,13 @@ from study_app.analysis.wording import counted, listed, number
 from study_app.protocol.trials.stimuli import OF_LINK
 from study_app.protocol.warnings.delayed_force import WITHHELD_PERCENT
 
-TRIAL: Final = ["participant", "session", "trial"]
-Row: TypeAlias = dict[str, Any]
-MOST_LEVELS: Final = 8
+_TRIAL: Final = ["participant", "session", "trial"]
+_Row: TypeAlias = dict[str, Any]
+_MOST_LEVELS: Final = 8
 """Rows of times to answer at a standard; of more levels, neighbours share a row."""
 
 
-def _levels(row: Row) -> str:
+def _levels(row: _Row) -> str:
     low, high = row["low"], row["high"]
     return digits(low) if low == high else between(low, high)
 
@@ -36,17 +36,17 @@ class _Range(NamedTuple):
 
 
 def _by_levels(rows: pd.DataFrame) -> Iterator[_Range]:
-    """Yield each level as a range; of many levels `MOST_LEVELS` ranges of neighbours."""
+    """Yield each level as a range; of many levels `_MOST_LEVELS` ranges of neighbours."""
     for standard, at_standard in rows[rows["level"].notna()].groupby("standard", dropna=False, sort=True):
         level = at_standard["level"].astype(float)
         levels = np.unique(level.to_numpy())
-        for some in np.array_split(levels, min(len(levels), MOST_LEVELS)):
+        for some in np.array_split(levels, min(len(levels), _MOST_LEVELS)):
             here = at_standard[level.between(some[0], some[-1])]
             low, high = float(some[0]), float(some[-1])
             yield _Range(number_or_none(standard), low=low, high=high, rows=here)
 
 
-def _withheld(block: LevelBlock, intervals: pd.DataFrame) -> Iterator[Row]:
+def _withheld(block: LevelBlock, intervals: pd.DataFrame) -> Iterator[_Row]:
     """Yield the share of the force [%] that safety withheld in comparisons whose link is varied, by level."""
     if block.stimulus is None or block.stimulus.vary not in OF_LINK:
         return
@@ -57,7 +57,7 @@ def _withheld(block: LevelBlock, intervals: pd.DataFrame) -> Iterator[Row]:
         yield {**row, "mean_percent": float(percent.mean()), "most_percent": float(percent.max())}
 
 
-def level_conduct(block: LevelBlock, opened: pd.DataFrame, intervals: pd.DataFrame) -> Iterator[Row]:
+def _level_conduct(block: LevelBlock, opened: pd.DataFrame, intervals: pd.DataFrame) -> Iterator[_Row]:
     """Yield how the analysed trials at each standard were presented; ``intervals`` are those of all their attempts.
 
     ``reasons`` counts the intervals that broke each limit; errors are delivered less requested levels.
@@ -65,17 +65,17 @@ def level_conduct(block: LevelBlock, opened: pd.DataFrame, intervals: pd.DataFra
     if block.stimulus is None:
         return
     own = opened[(opened["block"] == block.id) & opened["analysed"]]
-    presented = intervals[intervals["block"] == block.id].merge(own[TRIAL], on=TRIAL)
+    presented = intervals[intervals["block"] == block.id].merge(own[_TRIAL], on=_TRIAL)
     for standard, rows in own.groupby("standard", dropna=False, sort=True):
-        here = presented.merge(rows[TRIAL], on=TRIAL)
-        attempts = here.drop_duplicates([*TRIAL, "attempt"])
+        here = presented.merge(rows[_TRIAL], on=_TRIAL)
+        attempts = here.drop_duplicates([*_TRIAL, "attempt"])
         last = here[here["counted"]]
         errors = (rows["level_delivered"] - rows["level"])[rows["level"] != 0].dropna().astype(float)
         reasons = Counter(word for words in here["invalid_reasons"].dropna() for word in set(str(words).split()))
         yield {
             "standard": number_or_none(standard),
             "trials": len(rows),
-            "repeated": len(attempts) - attempts[TRIAL].drop_duplicates().shape[0],
+            "repeated": len(attempts) - attempts[_TRIAL].drop_duplicates().shape[0],
             "reasons": dict(sorted(reasons.items())),
             "measured": len(errors),
             "error_mean": number_or_none(errors.mean()),
@@ -85,7 +85,7 @@ def level_conduct(block: LevelBlock, opened: pd.DataFrame, intervals: pd.DataFra
         }
 
 
-def catch_answers(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Row]:
+def _catch_answers(block: LevelBlock, opened: pd.DataFrame) -> Iterator[_Row]:
     """Yield how many catch trials of each session were answered incorrectly; a share above ``most`` excludes it."""
     if block.wrong_most is None:
         return
@@ -96,14 +96,14 @@ def catch_answers(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Row]:
         yield {"participant": person, "session": session, "n": len(rows), "wrong": wrong, "most": block.wrong_most}
 
 
-class Delivery(LevelStatistic[Row]):
+class Delivery(LevelStatistic[_Row]):
     """How the trials at each standard were delivered."""
 
     key = "conduct"
     place = 6
     title = "Delivery of levels"
 
-    compute = staticmethod(lambda block, opened, study, _found: level_conduct(block, opened, study.intervals))
+    compute = staticmethod(lambda block, opened, study, _found: _level_conduct(block, opened, study.intervals))
 
     def standard(self) -> Shown:
         if all(one["standard"] is None for one in self.rows):
@@ -141,19 +141,19 @@ class Delivery(LevelStatistic[Row]):
         )
 
 
-def _rule(row: Row) -> str:
+def _rule(row: _Row) -> str:
     excludes = row["wrong"] / row["n"] > row["most"]
     return f"{'excluded: above' if excludes else 'kept: at most'} {100 * row['most']:g} %"
 
 
-class CatchTrials(LevelStatistic[Row]):
+class _CatchTrials(LevelStatistic[_Row]):
     """The answers to catch trials of each session, also where they exclude it."""
 
     key = "catches"
     place = 7
     title = "Catch trials"
 
-    compute = staticmethod(lambda block, opened, _study, _found: catch_answers(block, opened))
+    compute = staticmethod(lambda block, opened, _study, _found: _catch_answers(block, opened))
 
     def shown(self) -> Sequence[Shown]:
         return (
@@ -169,7 +169,7 @@ class CatchTrials(LevelStatistic[Row]):
         return "Catch trials present the largest level; the fit of the threshold includes them."
 
 
-class Withheld(LevelStatistic[Row]):
+class _Withheld(LevelStatistic[_Row]):
     """What safety withheld of the force in comparisons whose link is varied, by level."""
 
     key = "withheld"

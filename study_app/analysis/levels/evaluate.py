@@ -25,7 +25,7 @@ READ: Final = (
 )
 """The columns of tracks that statistics read."""
 
-SEALED: Final = "Standards, levels, contents of each interval and correct answers appear here after unblinding."
+_SEALED: Final = "Standards, levels, contents of each interval and correct answers appear here after unblinding."
 
 
 def level_results(study: Study, rows: pd.DataFrame | None = None) -> tuple[LevelsResult, ...]:
@@ -100,7 +100,7 @@ def level_section(found: LevelsResult, pictures: Sequence[Picture], estimator: s
     if not Settings.of(found):
         yield heading(3, "Answers against levels" if found.adaptive else at_each)
     if not found.revealed:
-        yield paragraph(SEALED)
+        yield paragraph(_SEALED)
         return
     if not Settings.of(found) and not Answers.of(found):
         yield paragraph("There are no answers to analyse yet.")

@@ -31,19 +31,19 @@ from study_app.protocol.trials.designs import Design
 from study_app.psychophysics.detection import Model, Sensitivity, d_prime_at, rating
 from study_app.psychophysics.grid import Z_95
 
-MODELS: Final = {
+_MODELS: Final = {
     "differencing": " d′ uses the differencing model, because standards vary from trial to trial.",
     "independent": " d′ uses the model of independent observations; the exported table thresholds gives the "
     "differencing model in the column d_prime_other.",
 }
-FROM_SHARE_CORRECT: Final = ("abx", "oddity", "3ifc", "4ifc")
+_FROM_SHARE_CORRECT: Final = ("abx", "oddity", "3ifc", "4ifc")
 """Designs whose d′ follows from the share of correct answers alone."""
-BIASES: Final = {
+_BIASES: Final = {
     "2ifc": " c is above 0 if the second interval is preferred.",
     "yesno": " c is above 0 if “no” is preferred.",
     "samedifferent": " k is the difference above which the answer is “different”.",
     **dict.fromkeys(
-        FROM_SHARE_CORRECT,
+        _FROM_SHARE_CORRECT,
         " d′ is computed from the proportion correct and assumes that participants do not prefer an answer; a "
         "preference, visible in unequal proportions of the answers, makes d′ too small. Participants' "
         "intervals are d′ at the ends of the Clopper–Pearson interval for the proportion correct; there is "
@@ -76,14 +76,14 @@ class SensitivityEstimate:
     other: float | None = None
 
 
-BIASED: Final = 0.2
+_BIASED: Final = 0.2
 """A criterion of two intervals beyond which a preference is named."""
 
 
 def preferences(of_people: Iterable[SensitivityEstimate]) -> dict[str, float]:
     """Return the mean criterion over all standards of each participant who prefers one of two intervals.
 
-    It is further from 0 than `BIASED` and than twice its standard error.
+    It is further from 0 than `_BIASED` and than twice its standard error.
     """
     found = dict[str, list[tuple[float, float]]]()
     for one in of_people:
@@ -93,7 +93,7 @@ def preferences(of_people: Iterable[SensitivityEstimate]) -> dict[str, float]:
         found.setdefault(one.participant, []).append((one.criterion, error))
     means = {person: np.mean([criterion for criterion, _ in rows]) for person, rows in found.items()}
     errors = {person: math.hypot(*(error for _, error in rows)) / len(rows) for person, rows in found.items()}
-    return {person: float(mean) for person, mean in means.items() if abs(mean) > max(BIASED, 2 * errors[person])}
+    return {person: float(mean) for person, mean in means.items() if abs(mean) > max(_BIASED, 2 * errors[person])}
 
 
 def sensitivities(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SensitivityEstimate]:
@@ -144,7 +144,7 @@ def _of_choices(
     if found is None:
         return one
     measured = _measured(one, found)
-    return _with_ends(measured, design, counts, found.model) if design.kind in FROM_SHARE_CORRECT else measured
+    return _with_ends(measured, design, counts, found.model) if design.kind in _FROM_SHARE_CORRECT else measured
 
 
 def _with_ends(
@@ -237,7 +237,7 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
         if biased := preferences(self.own(self.found)):
             people = listed([f"{person} ({number(criterion)})" for person, criterion in biased.items()])
             yield (
-                f"{self.found.title}: {people} preferred one interval (the criterion c is beyond ±{BIASED:g} and "
+                f"{self.found.title}: {people} preferred one interval (the criterion c is beyond ±{_BIASED:g} and "
                 f"twice its standard error). The fits of their thresholds allow for this."
             )
 
@@ -248,7 +248,7 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
         over = "over all levels presented" if self.found.vary is not None else "for each comparison"
         if self.found.summary == "mean":
             over = "of each level against the lowest, as d_a from the area under the ROC curve"
-        bias, model = BIASES.get(self.found.design, ""), MODELS.get(self.rows[0].model or "", "")
+        bias, model = _BIASES.get(self.found.design, ""), _MODELS.get(self.rows[0].model or "", "")
         return (
             f"d′ {over}, from rates with the log-linear correction (Hautus 1995; Macmillan & Creelman 2005); "
             f"the group value is the mean over participants with Student’s interval.{model}{bias} {shares}"

@@ -192,14 +192,14 @@ INTERVAL_2: Final[Shown] = ("95 % interval", lambda one: between(one.low, one.hi
 """With two decimals."""
 
 KINDS: Final = {"weber": "Weber fractions", "difference": "differences", "value": "values"}
-LEVELS: Final[Mapping[str | None, str]] = {"weber": "Weber fraction of ", "difference": "difference of ", "value": ""}
+_LEVELS: Final[Mapping[str | None, str]] = {"weber": "Weber fraction of ", "difference": "difference of ", "value": ""}
 
 
 def level_words(found: LevelsResult) -> str:
     """Return what a level is, with its unit: "Weber fraction of viscosity", "Viscosity [Pa·s]", "Condition"."""
     if found.quantity is None:
         return "Condition"
-    words = f"{LEVELS[found.level_kind]}{found.quantity}"
+    words = f"{_LEVELS[found.level_kind]}{found.quantity}"
     return words[:1].upper() + words[1:] + ("" if found.level_kind == "weber" else unit(found))
 
 

@@ -53,14 +53,14 @@ from study_app.psychophysics.person_fit import (
 )
 
 FAMILIES: Final = {"weibull": "Weibull", "normal": "cumulative normal", "logistic": "logistic"}
-WIDTH_UNITS: Final = {"log": "decades", "linear": "level"}
+_WIDTH_UNITS: Final = {"log": "decades", "linear": "level"}
 BEYOND: Final = {None: "", "above": "above ", "below": "below "}
-OPEN_ENDS: Final = {(False, False): None, (True, False): "low", (False, True): "high", (True, True): "both"}
-SHIFT: Final = 0.1
+_OPEN_ENDS: Final = {(False, False): None, (True, False): "low", (False, True): "high", (True, True): "both"}
+_SHIFT: Final = 0.1
 """A prior that shifts a threshold by a larger share of it is named."""
-FEW_ANSWERS: Final = 40
+_FEW_ANSWERS: Final = 40
 """The fewest answers for which the coverage of the intervals was tested."""
-MOST_NAMED: Final = 6
+_MOST_NAMED: Final = 6
 REMOVED: Final = (
     "A preference for an interval or for the previous answer, estimated by probit regression (standard deviation "
     f"between people: {PREFERENCE_SD:g} times the standard deviation of a decision), {{}} removed."
@@ -290,7 +290,7 @@ def _own(
         flat_width=level_of(fit.flat.threshold),
         beyond="above" if threshold > highest else "below" if threshold < lowest else None,
         variance=found.variance,
-        open_end=OPEN_ENDS[found.open_ends],
+        open_end=_OPEN_ENDS[found.open_ends],
         fit_p=p_of_fit(np.bincount(cells, given.successes), np.bincount(cells), psi[first]),
         drift=drift(given.successes, psi),
         change=10.0**decades - 1.0 if fit.named else 0.0,
@@ -424,7 +424,7 @@ def percent_compared(found: LevelsResult) -> float | None:
     return compared_percent(found.published) if any(one.compared is not None for one in Thresholds.of(found)) else None
 
 
-def with_device(found: LevelsResult, one: ThresholdEstimate) -> float | None:
+def _with_device(found: LevelsResult, one: ThresholdEstimate) -> float | None:
     """Return a Weber fraction of damping with the device's own in the standard, ΔB/(B + b); None where unknown."""
     if found.device is None or one.standard is None or (found.vary, found.level_kind) != ("damping_nspm", "weber"):
         return None
@@ -432,8 +432,8 @@ def with_device(found: LevelsResult, one: ThresholdEstimate) -> float | None:
 
 
 def _named_people(own: Sequence[ThresholdEstimate], some: Sequence[ThresholdEstimate]) -> str:
-    """Return whose thresholds they are: at each standard where there are several, at most `MOST_NAMED` by name."""
-    if len(some) > MOST_NAMED:
+    """Return whose thresholds they are: at each standard where there are several, at most `_MOST_NAMED` by name."""
+    if len(some) > _MOST_NAMED:
         return f"{len(some)} of {len(own)} thresholds"
     several = len({one.standard for one in own}) > 1
     return listed([f"{one.participant} at {one.standard:g}" if several else str(one.participant) for one in some])
@@ -475,10 +475,10 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             ),
             ("95 % interval", interval),
             None if compared is None else (f"at {compared:g} %", lambda one: digits(one.compared)),
-            ("with device damping", lambda one: digits(with_device(found, one)))
-            if any(with_device(found, one) is not None for one in self.rows)
+            ("with device damping", lambda one: digits(_with_device(found, one)))
+            if any(_with_device(found, one) is not None for one in self.rows)
             else None,
-            (f"width [{WIDTH_UNITS[found.spacing]}]", lambda one: digits(one.width, 2)),
+            (f"width [{_WIDTH_UNITS[found.spacing]}]", lambda one: digits(one.width, 2)),
             ("flat width prior", lambda one: digits(one.flat_width)),
             None
             if percent is None
@@ -543,10 +543,10 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             return
 
         def shifted(one: ThresholdEstimate) -> bool:
-            return one.flat_width is not None and abs(one.flat_width - one.threshold) > SHIFT * abs(one.threshold)
+            return one.flat_width is not None and abs(one.flat_width - one.threshold) > _SHIFT * abs(one.threshold)
 
         kinds: tuple[tuple[Callable[[ThresholdEstimate], bool], str], ...] = (
-            (shifted, f"the prior of the width shifts a threshold by more than {100 * SHIFT:.0f} %: too few answers"),
+            (shifted, f"the prior of the width shifts a threshold by more than {100 * _SHIFT:.0f} %: too few answers"),
             (
                 lambda one: one.beyond == "above",
                 "a threshold lies above the highest level of the stimulus; the distance is unknown",
@@ -556,7 +556,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 "a threshold lies below the lowest level of the stimulus; the distance is unknown",
             ),
             (lambda one: not one.fits, "the function does not fit the answers, so a threshold may be biased"),
-            (lambda one: one.n < FEW_ANSWERS, f"fewer than {FEW_ANSWERS} answers, so intervals are wide"),
+            (lambda one: one.n < _FEW_ANSWERS, f"fewer than {_FEW_ANSWERS} answers, so intervals are wide"),
         )
         for applies, words in kinds:
             if some := [one for one in own if applies(one)]:
@@ -575,7 +575,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                     f"{abs(one.early_change or 0.0):.1f} standard errors, so that the group's threshold may be biased."
                 )
         if some := [one for one in own if one.drifts]:
-            sizes = listed([f"{100 * (one.change or 0.0):+.0f} %".replace("-", "−") for one in some[:MOST_NAMED]])
+            sizes = listed([f"{100 * (one.change or 0.0):+.0f} %".replace("-", "−") for one in some[:_MOST_NAMED]])
             yield (
                 f"{title}: the threshold changed over the trials, which the interval includes "
                 f"({_named_people(own, some)}: {sizes} from the first trial to the last)."
@@ -607,7 +607,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         shares = [
             f"{share:.3g} instead of {one.threshold:.3g} at {one.standard:g} {found.unit}"
             for one in self.rows
-            if one.participant is None and (share := with_device(found, one)) is not None
+            if one.participant is None and (share := _with_device(found, one)) is not None
         ]
         if not shares:
             return f"{words}."

@@ -18,7 +18,7 @@ from study_app.protocol.trials.stimuli import DELAY, FORCE_DELAY, Stimulus
 
 TRACK: Final = ["participant", "session", "block", "code"]
 """What one track is in the rows of `tracks`."""
-PRESENTATION: Final = ["participant", "session", "trial", "attempt"]
+_PRESENTATION: Final = ["participant", "session", "trial", "attempt"]
 OF_INTERVALS: Final = ("force_mean_n", "mean_speed_mps")
 """What a trial's row repeats of each of its intervals."""
 _DELIVERED: Final = tuple(f"{what}_{letter}" for what in ("value", "delay_error_ms") for letter in "CS")
@@ -54,10 +54,10 @@ def tracks(study: Study) -> pd.DataFrame:
     """
     by_id = {block.id: block for block in study.levels}
     rows = study.trials[study.trials["block"].isin(list(by_id))]
-    rows = rows.sort_values("attempt").drop_duplicates(PRESENTATION[:-1], keep="last").sort_index()
-    answers = answers_timed(study)[[*PRESENTATION, "response", "value", "response_s"]]
-    found = rows.merge(_presented(study.intervals), on=PRESENTATION, how="left")
-    found = found.merge(answers, on=PRESENTATION, how="left")
+    rows = rows.sort_values("attempt").drop_duplicates(_PRESENTATION[:-1], keep="last").sort_index()
+    answers = answers_timed(study)[[*_PRESENTATION, "response", "value", "response_s"]]
+    found = rows.merge(_presented(study.intervals), on=_PRESENTATION, how="left")
+    found = found.merge(answers, on=_PRESENTATION, how="left")
     found["slot"] = found.groupby(TRACK).cumcount() + 1
     track_rows = [_track_row(by_id[row["block"]], row) for row in found[list(_READ)].to_dict("records")]
     found = found.drop(columns=list(_DELIVERED))
@@ -177,18 +177,18 @@ def _level_delivered(stimulus: Stimulus, standard: float | None, comparison: flo
 
 def _presented(intervals: pd.DataFrame) -> pd.DataFrame:
     """Return a row per presentation: standard, level, arrangement, and of each interval force and speed."""
-    ordered = intervals.sort_values([*PRESENTATION, "interval"])
+    ordered = intervals.sort_values([*_PRESENTATION, "interval"])
     letters = ordered["presented"].map({"comparison": "C", "standard": "S"}).fillna("?")
-    found = ordered.groupby(PRESENTATION, sort=False)[["standard", "level", "catch", "setting"]].first()
+    found = ordered.groupby(_PRESENTATION, sort=False)[["standard", "level", "catch", "setting"]].first()
     presented: dict[Any, str] = {}
-    for which, letter in zip(zip(*(ordered[name] for name in PRESENTATION), strict=True), letters, strict=True):
+    for which, letter in zip(zip(*(ordered[name] for name in _PRESENTATION), strict=True), letters, strict=True):
         presented[which] = presented.get(which, "") + letter
     found["arrangement"] = pd.Series(presented, dtype="string").reindex(found.index)
     for name, what in (("value_delivered", "value"), ("delay_error_mean_ms", "delay_error_ms")):
-        means = ordered.assign(letter=letters).groupby([*PRESENTATION, "letter"])[name].mean().unstack("letter")
+        means = ordered.assign(letter=letters).groupby([*_PRESENTATION, "letter"])[name].mean().unstack("letter")
         for letter in "CS":
             found[f"{what}_{letter}"] = means.get(letter, pd.NA)
     for name in OF_INTERVALS:
-        wide = ordered.pivot(index=PRESENTATION, columns="interval", values=name)
+        wide = ordered.pivot(index=_PRESENTATION, columns="interval", values=name)
         found = found.join(wide.rename(columns={number: f"{name}_{number}" for number in wide.columns}))
     return found.reset_index()

@@ -45,15 +45,15 @@ from study_app.store.output_files import write_files
 
 Question: TypeAlias = Literal["settings differ", "trend", "lowest delay", "equivalence", "contrast"]
 
-MANY: Final = 200
+_MANY: Final = 200
 """So many simulated participants tell how far people differ."""
 
 WANTED: Final = 0.8
 """The power that "smallest detectable effect" and "participants needed" are about."""
 
-SPREADS: Final = 1000
+_SPREADS: Final = 1000
 
-OVER_ALL: Final = "all statements at once"
+_OVER_ALL: Final = "all statements at once"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,7 +143,7 @@ def interval(share: float, studies: int) -> tuple[float, float]:
 def _curves(block: Planned, counts: Counts, studies: int) -> Iterator[Curve]:
     question: Question = "trend" if block.kind == "delays" else "settings differ"
     means = counts[block.id, "means"] / studies
-    for what, over in (("any", "at least one statement"), ("all", OVER_ALL)):
+    for what, over in (("any", "at least one statement"), ("all", _OVER_ALL)):
         if (block.id, what) in counts:
             power, alarms = _shares(counts[block.id, what] / studies)
             yield Curve(
@@ -400,7 +400,7 @@ def _preface(found: Powers) -> list[str]:
         f"Numbers are for {_people(next(iter(found.kinds)))}, with the lowest and the highest over all kinds of "
         "people in parentheses: "
         + "; ".join(f"**{kind}**: {people.described()}" for kind, people in found.plan.kinds.items())
-        + f". {SOURCES}",
+        + f". {_SOURCES}",
     ]
     if not found.complete:
         lines += ["", f"**Ended early: {found.studies} of {found.asked} studies.**"]
@@ -420,7 +420,7 @@ def _preface(found: Powers) -> list[str]:
     return lines
 
 
-SOURCES: Final = (
+_SOURCES: Final = (
     "Consistent, typical and noisy people have values from published ratings, in points of a seven-point "
     "scale: a trained panel (data TVbo, R package lmerTest, Kuznetsova, Brockhoff and Christensen 2017; "
     "medians over 15 attributes); panelists who rated chocolates (data sensochoc, R package SensoMineR, Lê and "
@@ -463,7 +463,7 @@ def _summary(found: Powers) -> Iterator[str]:
 def _between(found: Powers) -> Iterator[str]:
     """Yield a table for each contrast of a statement between groups; the model knows no difference between groups."""
     plan = found.plan
-    given = people(plan, MANY, found.seed, 0) if plan.between else ()
+    given = people(plan, _MANY, found.seed, 0) if plan.between else ()
     for one, shares in plan.between:
         place = [block.id for block in plan.blocks].index(one.blocks[0])
         item = [it.id for it in plan.blocks[place].items].index(one.measure)
@@ -559,7 +559,7 @@ def shown_equal(bound: float, n: int, second: int | None = None, *, alpha: float
     Of ``n`` pairs, or of two groups of ``n`` and ``second`` people; the mean over quantiles of the estimated SD.
     """
     root, freedom = _precision(n, second)
-    spreads = np.sqrt(chi2.ppf((np.arange(SPREADS) + 0.5) / SPREADS, freedom) / freedom)
+    spreads = np.sqrt(chi2.ppf((np.arange(_SPREADS) + 0.5) / _SPREADS, freedom) / freedom)
     inside = bound * root - float(student.isf(alpha, min(n, second or n) - 1)) * spreads
     return float(np.maximum(2 * norm.cdf(inside) - 1, 0.0).mean())
 
@@ -659,8 +659,8 @@ def _name(curve: Curve, found: Powers) -> str:
     return short if curve.setting is None else f"{short}, {curve.setting}"
 
 
-PLOTS_A_ROW: Final = 5
-TITLE_LETTERS: Final = 21
+_PLOTS_A_ROW: Final = 5
+_TITLE_LETTERS: Final = 21
 HEADS: Final[dict[Question, str]] = {
     "settings differ": "settings differ",
     "trend": "trend over delay",
@@ -672,23 +672,23 @@ HEADS: Final[dict[Question, str]] = {
 DELAYS: Final = LinearSegmentedColormap.from_list("delays", ("#9dc3de", "#02256d"))
 """Colours of delays, from the shortest to the longest."""
 
-Plot: TypeAlias = tuple[str, Question, tuple[Curve, ...]]
+_Plot: TypeAlias = tuple[str, Question, tuple[Curve, ...]]
 """Title, question and curves of a plot."""
 
 
-def _plots(found: Powers, block: Planned) -> Iterator[list[Plot]]:
+def _plots(found: Powers, block: Planned) -> Iterator[list[_Plot]]:
     """Yield the rows of plots of a block: a plot for each statement and for the test over all."""
     for question in HEADS:
         curves = [
             one for one in found.curves if (one.block, one.question) == (block.id, question) and one.setting != IF_EQUAL
         ]
-        plots: list[Plot] = [
+        plots: list[_Plot] = [
             (item.short, question, mine)
             for item in block.items
             if (mine := tuple(one for one in curves if one.item == item.id))
         ]
-        plots += [(one.over.capitalize(), question, (one,)) for one in curves if one.over == OVER_ALL]
-        yield from (plots[first : first + PLOTS_A_ROW] for first in range(0, len(plots), PLOTS_A_ROW))
+        plots += [(one.over.capitalize(), question, (one,)) for one in curves if one.over == _OVER_ALL]
+        yield from (plots[first : first + _PLOTS_A_ROW] for first in range(0, len(plots), _PLOTS_A_ROW))
 
 
 @style.own_settings(style.PLOT_SETTINGS)
@@ -704,8 +704,8 @@ def draw_power(found: Powers, block: Planned) -> Figure:
     )
     for row, plots in enumerate(rows):
         for column, (title, question, curves) in enumerate(plots):
-            axes = figure.add_subplot(len(rows), PLOTS_A_ROW, row * PLOTS_A_ROW + column + 1)
-            axes.set_title(textwrap.fill(title, TITLE_LETTERS))
+            axes = figure.add_subplot(len(rows), _PLOTS_A_ROW, row * _PLOTS_A_ROW + column + 1)
+            axes.set_title(textwrap.fill(title, _TITLE_LETTERS))
             axes.set_ylim(-0.02, 1.04)
             axes.yaxis.set_major_formatter(PercentFormatter(1.0))
             axes.set_yticks((0.0, 0.5, WANTED, 1.0))

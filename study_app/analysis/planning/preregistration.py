@@ -429,7 +429,7 @@ def _exclusions(protocol: Protocol) -> Iterator[str]:
     yield "Any other exclusion is a deviation from this preregistration; the report lists it with its reason and date."
 
 
-SHOWN = 20
+_SHOWN = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -470,20 +470,20 @@ def _differences(study: Study, sites: Mapping[str, Commitment | None], committed
     other = rows[rows["counted"] & (rows["protocol_hash"] != committed.protocol_hash)]
     if len(other):
         versions = listed(sorted(set(map(str, other["protocol_version"]))))
-        who = listed([f"{row.participant}/{row.session}" for row in other.head(SHOWN).itertuples()])
-        more = "" if len(other) <= SHOWN else f" and {len(other) - SHOWN} more"
+        who = listed([f"{row.participant}/{row.session}" for row in other.head(_SHOWN).itertuples()])
+        more = "" if len(other) <= _SHOWN else f" and {len(other) - _SHOWN} more"
         yield (
             f"{counted(len(other), 'session')} ran under another protocol (version {versions}) than the preregistered "
             f"one (version {committed.version}, SHA-256 {committed.protocol_hash[:12]}…): {who}{more}"
         )
     yield from _other_participants(study, committed.participants)
     by_person = [one for one in study.exclusions if one.rule_or_person not in committed.rules]
-    for one in by_person[:SHOWN]:
+    for one in by_person[:_SHOWN]:
         yield (
             f"an exclusion without a preregistered rule ({describe_exclusion(one)}; {one.reason}; {one.rule_or_person})"
         )
-    if len(by_person) > SHOWN:
-        yield f"{len(by_person) - SHOWN} more exclusions without a preregistered rule are in report.json"
+    if len(by_person) > _SHOWN:
+        yield f"{len(by_person) - _SHOWN} more exclusions without a preregistered rule are in report.json"
     if study.decided.changed:
         yield "the decisions about the analysis differ between sessions: all results are exploratory"
 

@@ -35,7 +35,7 @@ from study_app.protocol.simulated import OPINIONS, TrialFeatures, rater, simulat
 from study_app.protocol.table import text_in
 
 LOWEST, HIGHEST = 1, POINTS
-ConditionFeatures: TypeAlias = Mapping[tuple[str, str], Sequence[TrialFeatures]]
+_ConditionFeatures: TypeAlias = Mapping[tuple[str, str], Sequence[TrialFeatures]]
 """(Block, condition) → features of rehearsed trials."""
 
 
@@ -91,7 +91,7 @@ class Plan:
         return tuple(dict.fromkeys(it.id for block in self.blocks for it in block.items if it.id not in OPINIONS))
 
 
-def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
+def plan(protocol: Protocol, features: _ConditionFeatures) -> Plan:
     """Return what can be planned of a protocol; AnalysisError says that no block compares settings and asks of them."""
     language = spoken({"study": {"languages": protocol.study.languages}})
     asked = _compared(protocol)
@@ -138,7 +138,7 @@ def _compared(protocol: Protocol) -> list[Block]:
     return [block for block in protocol.main_blocks if _statements(protocol, block) and len(block.conditions) > 1]
 
 
-def _planned(protocol: Protocol, block: Block, features: ConditionFeatures, language: str) -> Planned:
+def _planned(protocol: Protocol, block: Block, features: _ConditionFeatures, language: str) -> Planned:
     conditions = {name: protocol.conditions[name] for name in block.conditions}
     kind = protocol.compared_in(block.id)
     assert kind is not None  # noqa: S101 - a main block
@@ -204,19 +204,19 @@ class Opinions:
         return np.asarray(given[:, 0] if given.shape[1] == 1 else np.median(given, axis=1))
 
 
-STANDARD: Final = SimulatedParticipants(noise_sd=1, bias_sd=1)
-OF_SLOPES: Final = 1
+_STANDARD: Final = SimulatedParticipants(noise_sd=1, bias_sd=1)
+_OF_SLOPES: Final = 1
 """The stream of random numbers of slopes, which are drawn apart from everything else."""
 
 
 def people(plan: Plan, participants: int, seed: int, study: int) -> tuple[Opinions, ...]:
     """Return what the participants of simulated study number ``study`` think in each block of the plan."""
     rng = np.random.default_rng([seed, study])
-    slopes = np.random.default_rng([seed, study, OF_SLOPES]).standard_normal(participants)
+    slopes = np.random.default_rng([seed, study, _OF_SLOPES]).standard_normal(participants)
     found: list[list[tuple[Array, Array, Array]]] = [[] for _ in plan.blocks]
     bias = []
     for _ in range(participants):
-        person = rater(rng.random, STANDARD)
+        person = rater(rng.random, _STANDARD)
         bias.append(person.leaning)
         for place, block in enumerate(plan.blocks):
             items = [item.id for item in block.items]
@@ -238,10 +238,10 @@ def together(
 PLANNED_DRAWS: Final = 1999
 """Rearrangements; the report goes through all of them, or draws more."""
 
-Single = NDArray[np.float32]
+_Single = NDArray[np.float32]
 
 
-def ranks(answers: Array) -> Single:
+def ranks(answers: Array) -> _Single:
     """Return (doubled) ranks among the settings of ``answers`` (…, settings, items): (…, settings, items)."""
     found: Any = np.ones(answers.shape, dtype=np.float32)
     for other in range(answers.shape[-2]):
@@ -250,7 +250,7 @@ def ranks(answers: Array) -> Single:
     return np.asarray(found)
 
 
-def friedman(ranked: Single, rng: np.random.Generator) -> tuple[Array, Array]:
+def friedman(ranked: _Single, rng: np.random.Generator) -> tuple[Array, Array]:
     """Return Friedman's p of every item (studies, items), and of the sum of their statistics (studies,): a global test.
 
     The ranks are of (studies, participants, settings, items).
@@ -277,7 +277,7 @@ def friedman(ranked: Single, rng: np.random.Generator) -> tuple[Array, Array]:
     return p_of_draws(squares, seen), p_of_draws(of_all, seen_of_all * np.float32(1 - 1e-5))
 
 
-def trend(ranked: Single, both_ways: NDArray[np.bool_], rng: np.random.Generator) -> Array:
+def trend(ranked: _Single, both_ways: NDArray[np.bool_], rng: np.random.Generator) -> Array:
     """Return the p (studies, items) that answers rise; ``ranked``: (studies, people, settings, items).
 
     Two-sided for the items (items,) that may go ``both_ways``.
@@ -286,7 +286,7 @@ def trend(ranked: Single, both_ways: NDArray[np.bool_], rng: np.random.Generator
     scores = np.einsum("snki,k->sin", ranked, np.arange(1, k + 1, dtype=np.float32)).reshape(-1, n)
     away = scores - np.float32(k * (k + 1) ** 2 / 2)
     up = (rng.random((PLANNED_DRAWS, n)) < 0.5).astype(np.float32)
-    rising, falling = (p_above(np.abs(away), side * away > 0, up).reshape(studies, items) for side in (1, -1))
+    rising, falling = (_p_above(np.abs(away), side * away > 0, up).reshape(studies, items) for side in (1, -1))
     return np.where(both_ways, np.minimum(1.0, 2 * np.minimum(rising, falling)), rising)
 
 
@@ -322,7 +322,7 @@ def sizes(differences: Array) -> Array:
     return np.where(differences == 0, 0, ranked)
 
 
-def p_above(values: Array, positive: NDArray[np.bool_], up: NDArray[np.float32]) -> Array:
+def _p_above(values: Array, positive: NDArray[np.bool_], up: NDArray[np.float32]) -> Array:
     """Return the one-sided p (rows,) that the ``positive`` of ``values`` (rows, n) outweigh the others.
 
     ``up`` (draws, n) are the signs that are drawn, 1 for positive.

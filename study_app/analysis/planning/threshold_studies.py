@@ -38,10 +38,10 @@ from study_app.store.csv_files import Column, csv_bytes, optional
 
 BATCH: Final = 10
 """Studies of one case; which studies these are does not depend on how many are asked for."""
-TRACKS_AT_ONCE: Final = 200
+_TRACKS_AT_ONCE: Final = 200
 
-Plan: TypeAlias = ThresholdPlan | MeanPlan
-PrecisionPlans: TypeAlias = Mapping[str, Mapping[int, Plan]]
+_Plan: TypeAlias = ThresholdPlan | MeanPlan
+PrecisionPlans: TypeAlias = Mapping[str, Mapping[int, _Plan]]
 """Block → trials of each standard → what is simulated."""
 
 
@@ -50,7 +50,7 @@ class Case:
     """A batch of studies of one block with so many trials for each standard."""
 
     block: str
-    plan: Plan
+    plan: _Plan
     seed: tuple[int, ...]
 
 
@@ -95,7 +95,7 @@ def plans(protocol: Protocol, trials: Sequence[int]) -> PrecisionPlans:
         plan = precision_plan(protocol, block)
         if plan is None:
             continue
-        changed: list[Plan] = [plan.with_trials(one) for one in trials] or [plan]
+        changed: list[_Plan] = [plan.with_trials(one) for one in trials] or [plan]
         for asked, one in zip(trials, changed, strict=False):
             if abs(one.trials - asked) > max(1, asked / 2):
                 raise AnalysisError(
@@ -174,7 +174,7 @@ def _estimates(
     first of them are the people of the smaller studies, who have their own widths.
     """
     studies, people, standards = truth.shape
-    own, at_once = truth.transpose(0, 2, 1).reshape(-1), max(1, TRACKS_AT_ONCE // people) * people
+    own, at_once = truth.transpose(0, 2, 1).reshape(-1), max(1, _TRACKS_AT_ONCE // people) * people
     who = [kind for kind in kinds for _ in range(people * standards)]
     found: list[list[Estimates]] = [[] for _ in sizes]
     for first in range(0, len(own), at_once):
@@ -345,7 +345,7 @@ def _of_kinds(precisions: Precisions, block: str) -> Iterator[str]:
         )
 
 
-MEASURED: Final = {ThresholdPlan: "threshold", SensitivityPlan: "d_prime", EstimationPlan: "exponent"}
+_MEASURED: Final = {ThresholdPlan: "threshold", SensitivityPlan: "d_prime", EstimationPlan: "exponent"}
 
 
 def _contrasts(precisions: Precisions) -> Iterator[str]:
@@ -355,7 +355,7 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
     planned = plans(precisions.protocol, ())
     for one in decided.contrasts:
         firsts = [next(iter(planned[block].values())) for block in one.blocks if block in planned]
-        if len(firsts) < len(one.blocks) or any(MEASURED.get(type(it)) != one.measure for it in firsts):
+        if len(firsts) < len(one.blocks) or any(_MEASURED.get(type(it)) != one.measure for it in firsts):
             continue
         first, ratio = firsts[0], one.measure == "threshold"
         mean = 1.0 if isinstance(first, ThresholdPlan) else first.value
@@ -398,7 +398,7 @@ def _spreads(precisions: Precisions, one: Contrast) -> Iterator[tuple[str, str, 
             yield str(trials), f"{spread:.0%}", spread
 
 
-def _assumed(plans_of_block: Mapping[int, Plan]) -> str:
+def _assumed(plans_of_block: Mapping[int, _Plan]) -> str:
     """Return what the simulated people of a block are like, and what the group's interval is."""
     plan = next(iter(plans_of_block.values()))
     if isinstance(plan, ThresholdPlan):

@@ -19,11 +19,11 @@ from study_app.analysis.results import LevelsResult, QuestionResult, Results
 from study_app.analysis.statistics.outcome import clopper_pearson
 from study_app.analysis.wording import interval, listed, number, significant
 
-LIMITS_SHOWN: Final = 6
+_LIMITS_SHOWN: Final = 6
 """So many limits are listed on the first page; the others are folded."""
 
 
-NO_NUMBERS: Final[Mapping[str, Sequence[Numbers]]] = MappingProxyType({})
+_NO_NUMBERS: Final[Mapping[str, Sequence[Numbers]]] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +50,7 @@ class Card:
         return None
 
 
-def cards(results: Results, numbers: Mapping[str, Sequence[Numbers]] = NO_NUMBERS) -> tuple[Card, ...]:
+def cards(results: Results, numbers: Mapping[str, Sequence[Numbers]] = _NO_NUMBERS) -> tuple[Card, ...]:
     """Return the answers of a study, those to its hypotheses first; ``numbers`` are those of `numbers_of`."""
     return (*_hypotheses(results), *_statements(results), *_levels(results), *_questions(results, numbers))
 
@@ -201,7 +201,7 @@ def _choice_words(found: QuestionResult) -> str:
 def first_page(
     results: Results,
     limits: Sequence[str],
-    numbers: Mapping[str, Sequence[Numbers]] = NO_NUMBERS,
+    numbers: Mapping[str, Sequence[Numbers]] = _NO_NUMBERS,
     drawn: Sequence[Picture] = (),
 ) -> Markup:
     """Return the answers beside their figures, what the study cannot show, and how often the page is wrong."""
@@ -225,7 +225,7 @@ def first_page(
         ],
         sentences=[*filter(None, [look]), *(() if given else (none_found(results),))],
         limits=_limits_once(limits),
-        shown=LIMITS_SHOWN,
+        shown=_LIMITS_SHOWN,
         empty=empty_studies(max(found.n for found in results.blocks)) if claimed and not results.decided.looks else "",
     )
 

@@ -17,17 +17,17 @@ from study_app.analysis.results import BlockResult, Results, lead, said_of_prese
 from study_app.analysis.wording import counted, listed, ms, number, significant
 from study_app.store.unblinding import RULES
 
-WITHOUT_FORCE: Final = {"mouse", "spacemouse"}
+_WITHOUT_FORCE: Final = {"mouse", "spacemouse"}
 """The devices without force: reading results must not load their descriptors."""
 
-ORDERS: Final = {
+_ORDERS: Final = {
     "fixed": "in one order for all participants",
     "shuffled": "in an order drawn for each participant",
     "constrained": "in a constrained order drawn for each participant",
     "williams": "in the orders of a Williams design",
     "latin": "in the orders of a Latin square",
 }
-BLOCK_ORDERS: Final = {
+_BLOCK_ORDERS: Final = {
     "fixed": "in the same order for all participants",
     "balanced": "in orders balanced over participants (Williams design)",
     "random": "in an order drawn for each participant",
@@ -162,7 +162,7 @@ def _apparatus(study: Study) -> str:
         f"a haptic device ({listed(names)}); forces were computed at {device['rate_hz']:g} Hz and limited to "
     )
     device_words += f"{device['force_limit_n']:g} N"
-    if WITHOUT_FORCE.issuperset(names):
+    if _WITHOUT_FORCE.issuperset(names):
         device_words = f"a device without force ({listed(names)})"
     velocity = {None: "", "device": "; its velocity was measured by the device"}.get(
         study.estimator, f"; its velocity was estimated by {study.estimator}"
@@ -213,7 +213,7 @@ def _design(study: Study, results: Results) -> Iterator[str]:
 
 
 def _presented(study: Study, block: Block, found: BlockResult) -> str:
-    order = ORDERS.get(study.protocol.get("blocks", {}).get(found.id, {}).get("order", ""), "")
+    order = _ORDERS.get(study.protocol.get("blocks", {}).get(found.id, {}).get("order", ""), "")
     noun = {"delays": "visual delay"}.get(found.kind, found.kind.removesuffix("s")) if found.revealed else "setting"
     names = [f"{delay:g}" for delay in found.delays_ms] or [name.lower() for name in found.names]
     unit = " ms" if found.delays_ms else ""
@@ -241,7 +241,7 @@ def _block_order(study: Study) -> str:
     if order == "fixed" and len({tuple(one) for one in orders.values()}) > 1:
         by_group = [f"{listed([f'“{title}”' for title in one])} in the group {group}" for group, one in orders.items()]
         return f"The order of the blocks was {'; '.join(by_group)}."
-    return f"The blocks were presented {BLOCK_ORDERS[order]}."
+    return f"The blocks were presented {_BLOCK_ORDERS[order]}."
 
 
 def _delays(study: Study, results: Results) -> Iterator[str]:

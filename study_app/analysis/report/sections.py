@@ -375,8 +375,8 @@ def _scores(scores: Sequence[ScoreResult]) -> Iterator[str]:
     yield from (paragraph(source, "soft") for source in dict.fromkeys(one.source for one in scores) if source)
 
 
-UNITS: Final = {"s": "s", "m": "m", "mm": "mm", "n": "N", "percent": "%"}
-SHOWN: Final = 20
+_UNITS: Final = {"s": "s", "m": "m", "mm": "mm", "n": "N", "percent": "%"}
+_SHOWN: Final = 20
 """So many exclusions and doubts are listed; all of them stand in report.json."""
 
 
@@ -480,7 +480,7 @@ def _missing(study: Study) -> Iterator[str]:
     ]
     if rows:
         yield table_of(
-            rows[:SHOWN],
+            rows[:_SHOWN],
             ("Session", lambda one: one.session),
             ("missing", lambda one: f"{one.missing.count} of {one.missing.asked}"),
             ("of which", lambda one: listed([f"{_track(study, *of)}: {n}" for of, n in one.missing.tracks.items()])),
@@ -490,8 +490,8 @@ def _missing(study: Study) -> Iterator[str]:
         )
     else:
         yield paragraph("All trials were delivered.")
-    if len(rows) > SHOWN:
-        yield paragraph(f"And {counted(len(rows) - SHOWN, 'more session')}, in report.json.")
+    if len(rows) > _SHOWN:
+        yield paragraph(f"And {counted(len(rows) - _SHOWN, 'more session')}, in report.json.")
     permitted = study.protocol.get("limits", {}).get(MISSING_PERCENT)
     if permitted is not None:
         yield paragraph(
@@ -509,8 +509,8 @@ def _track(study: Study, block: str, code: str) -> str:
 
 
 def _first(lines: list[str]) -> list[str]:
-    more = len(lines) - SHOWN
-    return [*lines[:SHOWN], *([f"and {more} more, in report.json"] if more > 0 else [])]
+    more = len(lines) - _SHOWN
+    return [*lines[:_SHOWN], *([f"and {more} more, in report.json"] if more > 0 else [])]
 
 
 def _delivered(study: Study, results: Results) -> Iterator[str]:
@@ -666,9 +666,9 @@ def _quartiles(one: Moved) -> str:
 
 def _label(measure: str) -> str:
     words, _, unit = measure.rpartition("_")
-    if unit not in UNITS:
+    if unit not in _UNITS:
         return measure.replace("_", " ")
-    return f"{words.replace('_', ' ')}, {UNITS[unit]}"
+    return f"{words.replace('_', ' ')}, {_UNITS[unit]}"
 
 
 def _recordings(measured: Performance) -> str:

@@ -50,7 +50,7 @@ from study_app.store.output_files import write_output
 from study_app.store.receipt import recorded_plug_ins
 from study_app.store.unblinding import reveals_of
 
-OF_FORMAT_2: Final = {
+_OF_FORMAT_2: Final = {
     Results: frozenset({"questions", "scores", "levels", "contrasts"}),
     Setting: frozenset({"link", "view"}),
 }
@@ -66,7 +66,7 @@ def plain(value: Any) -> Any:
         return plain(entries | level_entries(value))
     if is_dataclass(value) and not isinstance(value, type):
         held = {field.name: getattr(value, field.name) for field in fields(value)}
-        omitted = OF_FORMAT_2.get(type(value), frozenset())
+        omitted = _OF_FORMAT_2.get(type(value), frozenset())
         return {name: plain(entry) for name, entry in held.items() if entry or name not in omitted}
     if isinstance(value, Contrast):
         return value.model_dump()
@@ -95,10 +95,10 @@ def _entries(found: BlockResult) -> Iterator[tuple[str, Any]]:
                 yield from finding.entries(found).items()
 
 
-FORMAT: Final = 1
+_FORMAT: Final = 1
 LIBRARIES: Final = ("numpy", "scipy", "pandas", "matplotlib", "pyarrow")
 
-MOTION: Final = (
+_MOTION: Final = (
     Column("block", "text", "Id of the block."),
     Column("code", "text", "Code of the setting."),
     Column("setting", "text", "What the setting is."),
@@ -131,7 +131,7 @@ def motion_csv(results: Results) -> bytes:
     blocks = {found.id: found for found in results.blocks}
     kept = {(one.block, one.code): one for one in results.delivered}
     return csv_bytes(
-        MOTION,
+        _MOTION,
         [
             {
                 **plain(one),
@@ -164,7 +164,7 @@ def document(study: Study, results: Results, texts: Mapping[str, Any], failures:
         parts["preregistration"] = lambda: plain(deviations(study))
     held = {name: failures.attempt(f"report.json, {name}", make) for name, make in parts.items()}
     content = {
-        "format": FORMAT,
+        "format": _FORMAT,
         "program": f"liquid-study {__version__}",
         "failures": [{**asdict(one), "why": one.why} for one in failures.found],
         **{name: None if isinstance(part, Failure) else part for name, part in held.items()},
@@ -224,7 +224,7 @@ def r_script(study: Study) -> str:
     return "".join(f"# {line}\n" for line in credit_lines(study)) + f"sealed <- {sealed}  # the key\n{script}"
 
 
-HASHES_SHOWN = 12
+_HASHES_SHOWN = 12
 """Of so few files the page shows the hashes one by one; of more, one over all of them."""
 
 
@@ -429,7 +429,7 @@ def _again(study: Study, results: Results) -> Iterator[str]:
     yield table(("Setting", "Value"), rows, words=2)
     hashes = files(study)
     together = hashlib.sha256("".join(f"{digest}  {name}\n" for name, digest in sorted(hashes.items())).encode())
-    if len(hashes) <= HASHES_SHOWN:
+    if len(hashes) <= _HASHES_SHOWN:
         yield table(("File", "SHA-256"), list(hashes.items()), words=2)
     yield paragraph(
         f"The numbers come from {counted(len(hashes), 'file')}; SHA-256 over their hashes and names: "

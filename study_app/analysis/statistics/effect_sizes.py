@@ -20,10 +20,10 @@ from study_app.analysis.statistics.outcome import Array
 
 PRIOR_SCALE: Final = math.sqrt(2) / 2
 """Scale of the Cauchy prior of the standardised difference ("medium")."""
-LEVEL: Final = 0.95
+_LEVEL: Final = 0.95
 LARGEST_LOG: Final = 700.0
 """Logarithm of the largest Bayes factor, which a float can hold."""
-SAME: Final = 1e-9
+_SAME: Final = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +43,7 @@ class EffectSize:
 def d_z(differences: Array) -> EffectSize | None:
     """Return the mean of paired differences in units of their standard deviation; None if they do not vary."""
     n = len(differences)
-    if n < 2 or (sd := float(np.std(differences, ddof=1))) < SAME:
+    if n < 2 or (sd := float(np.std(differences, ddof=1))) < _SAME:
         return None
     value = float(differences.mean()) / sd
     t = value * math.sqrt(n)
@@ -57,7 +57,7 @@ def hedges_g(first: Array, second: Array) -> EffectSize | None:
     The correction is the exact one (Hedges 1981). None if a group has fewer than two numbers, or none of them varies.
     """
     n, m = len(first), len(second)
-    if min(n, m) < 2 or (sd := _pooled_sd(first, second)) < SAME:
+    if min(n, m) < 2 or (sd := _pooled_sd(first, second)) < _SAME:
         return None
     d, freedom, root = float(first.mean() - second.mean()) / sd, n + m - 2, math.sqrt(n * m / (n + m))
     bias = math.exp(gammaln(freedom / 2) - gammaln((freedom - 1) / 2)) / math.sqrt(freedom / 2)
@@ -72,7 +72,7 @@ def _pooled_sd(first: Array, second: Array) -> float:
 
 def _noncentrality(t: float, freedom: int) -> tuple[float, float]:
     """Return the noncentralities for which t is at the ends of the central 95 %."""
-    tail, reach = (1 - LEVEL) / 2, 10.0 + 3 * abs(t)
+    tail, reach = (1 - _LEVEL) / 2, 10.0 + 3 * abs(t)
 
     def away(shift: float, p: float) -> float:
         below = float(nct.cdf(t, freedom, shift))
@@ -108,7 +108,7 @@ def paired_delta(differences: Array) -> EffectSize | None:
     None if there are fewer than two, or all are zero.
     """
     n = len(differences)
-    signs = np.where(np.abs(differences) < SAME, 0.0, np.sign(differences))
+    signs = np.where(np.abs(differences) < _SAME, 0.0, np.sign(differences))
     if n < 2 or not signs.any():
         return None
     return _of_signs(float(signs.mean()), float(signs.var(ddof=1)) / n, n - 1, n)
@@ -119,11 +119,11 @@ def _of_signs(delta: float, variance: float, freedom: int, cases: int) -> Effect
 
     At ±1, where the variance is zero, it ends at the bound of Clopper and Pearson (1934) for ``cases`` of ``cases``.
     """
-    if 1 - abs(delta) < SAME:
-        end = 2 * ((1 - LEVEL) / 2) ** (1 / cases) - 1
+    if 1 - abs(delta) < _SAME:
+        end = 2 * ((1 - _LEVEL) / 2) ** (1 / cases) - 1
         ends = (end, 1.0) if delta > 0 else (-1.0, -end)
         return EffectSize(name="Cliff's delta", value=delta, low=ends[0], high=ends[1])
-    t = float(student.ppf((1 + LEVEL) / 2, freedom))
+    t = float(student.ppf((1 + _LEVEL) / 2, freedom))
     reach = t * math.sqrt(variance) * math.sqrt((1 - delta**2) ** 2 + t**2 * variance)
     middle, below = delta - delta**3, 1 - delta**2 + t**2 * variance
     low, high = (middle - reach) / below, (middle + reach) / below

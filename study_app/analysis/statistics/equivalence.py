@@ -25,7 +25,7 @@ from study_app.number_text import counted
 
 Verdict: TypeAlias = Literal["equivalent", "not equivalent", "inconclusive", "out of reach"]
 
-UNSEEN: Final = 1 / 5
+_UNSEEN: Final = 1 / 5
 """A group of this share of all people, who differ strongly, must not be missed by chance, however wide the bound."""
 
 STEPS: Final = 6.0
@@ -112,11 +112,11 @@ def p_equivalent(means: Means, bound: float, n: int, largest: float | None) -> A
 
 
 def minority(bound: float, largest: float | None) -> float:
-    """Return the share of people that shifts the mean by the bound if they differ by ``largest``; at most `UNSEEN`.
+    """Return the share of people that shifts the mean by the bound if they differ by ``largest``; at most `_UNSEEN`.
 
     None: differences have no limit, so that no number of participants excludes the smallest minorities.
     """
-    return UNSEEN if largest is None else min(UNSEEN, bound / largest)
+    return _UNSEEN if largest is None else min(_UNSEEN, bound / largest)
 
 
 def p_unseen(n: int, bound: float, largest: float | None = STEPS) -> float:
@@ -217,7 +217,7 @@ def people_beyond(differences: Array, bound: float) -> Beyond:
     return Beyond(count=count, n=n, share=count / n, interval=clopper_pearson(count, n))
 
 
-AT_ONCE: Final = 500
+_AT_ONCE: Final = 500
 """Studies that are resampled together: more take more memory."""
 
 
@@ -233,7 +233,7 @@ def equivalent(
     if n < 2 or p_unseen(n, bound, largest) > alpha:
         return shown
     near = np.flatnonzero(np.abs(differences.mean(axis=1)) < bound)
-    for part in np.array_split(near, max(1, math.ceil(len(near) / AT_ONCE))):
+    for part in np.array_split(near, max(1, math.ceil(len(near) / _AT_ONCE))):
         means = means_of(differences[part], seed=seed, resamples=resamples)
         shown[part] = p_equivalent(means, bound, n, largest) <= alpha
     return shown

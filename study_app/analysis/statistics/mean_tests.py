@@ -21,8 +21,8 @@ from scipy.special import stdtr, stdtrit
 
 from study_app.analysis.statistics.outcome import Array
 
-RESAMPLES: Final = 1999
-MOST_RESAMPLES: Final = 100_000
+_RESAMPLES: Final = 1999
+_MOST_RESAMPLES: Final = 100_000
 SAME: Final = 1e-9
 """Differences that spread less than this are equal."""
 
@@ -89,11 +89,11 @@ class Means:
 
 def resamples_for(alpha: float) -> int:
     """Return how many resamples are drawn: so many that their number does not decide whether p reaches ``alpha``."""
-    return min(MOST_RESAMPLES, max(RESAMPLES, math.ceil(20 / alpha)))
+    return min(_MOST_RESAMPLES, max(_RESAMPLES, math.ceil(20 / alpha)))
 
 
 def means_of(
-    values: Array, weights: Array | None = None, *, seed: int = 1, group: int = 0, resamples: int = RESAMPLES
+    values: Array, weights: Array | None = None, *, seed: int = 1, group: int = 0, resamples: int = _RESAMPLES
 ) -> Means:
     """Return estimates of the means of studies.
 

@@ -25,8 +25,8 @@ Whole: TypeAlias = NDArray[np.int64]
 DRAWS: Final = 9999
 """Random rearrangements where not all can be gone through; (1 + those as extreme) / (1 + DRAWS) is then p."""
 
-MOST_DRAWS: Final = 199_999
-FLOOR: Final = 0.05
+_MOST_DRAWS: Final = 199_999
+_FLOOR: Final = 0.05
 """The smallest p that draws can give, corrected for its family, is this share of alpha at most."""
 
 SAMPLES: Final = 1999
@@ -35,7 +35,7 @@ SAMPLES: Final = 1999
 FEW: Final = 10
 """Below so many participants there is no percentile bootstrap interval and no test of slopes."""
 
-TOO_FEW: Final = f"no interval below {FEW} participants: resampling so few has far too low coverage"
+_TOO_FEW: Final = f"no interval below {FEW} participants: resampling so few has far too low coverage"
 NO_VARIATION: Final = "no variation: every participant gave the same answer in all conditions"
 
 
@@ -96,13 +96,13 @@ def complete(values: ArrayLike, *, at_least: int, why: str) -> tuple[Array, int]
 
 def draws_for(alpha: float, usual: int, members: int = 1) -> int:
     """Return how many rearrangements are drawn for each of ``members`` tests: their number decides no verdict."""
-    return min(MOST_DRAWS, max(usual, math.ceil(members / (FLOOR * alpha))))
+    return min(_MOST_DRAWS, max(usual, math.ceil(members / (_FLOOR * alpha))))
 
 
 SIDES: Final = {"higher": "greater", "lower": "less", None: "two-sided"}
 """The alternative of a test, by what is expected of the first of two."""
 
-NODES: Final = 200
+_NODES: Final = 200
 """Of the quadrature over the statistic of a look."""
 
 
@@ -128,7 +128,7 @@ def alpha_of_looks(looks: tuple[int, ...], alpha: float, spending: str) -> tuple
     spent = alpha * np.log1p((math.e - 1) * shares)
     if spending == "obrien-fleming":
         spent = 4 * norm.sf(norm.isf(alpha / 4) / np.sqrt(shares))
-    nodes, of_nodes = np.polynomial.legendre.leggauss(NODES)
+    nodes, of_nodes = np.polynomial.legendre.leggauss(_NODES)
     found, places, weights, before = [], np.zeros(1), np.ones(1), 0.0
     for share, due in zip(shares, np.diff(spent, prepend=0.0), strict=True):
         end = float(brentq(_excess, 0.0, 40.0, (places, weights, math.sqrt(share - before), due)))
@@ -139,7 +139,7 @@ def alpha_of_looks(looks: tuple[int, ...], alpha: float, spending: str) -> tuple
     return tuple(found)
 
 
-MOST_REPORTS: Final = 200
+_MOST_REPORTS: Final = 200
 """So many reports between the first look and the last are integrated over."""
 
 
@@ -150,9 +150,9 @@ def error_of_every_report(looks: tuple[int, ...], alpha: float, spending: str) -
     Each test has the alpha of the last look that is reached; for the parameters see `alpha_of_looks`.
     """
     levels = np.array(alpha_of_looks(looks, alpha, spending))
-    every = np.unique([*np.linspace(looks[0], looks[-1], MOST_REPORTS).round().astype(int), *looks])
+    every = np.unique([*np.linspace(looks[0], looks[-1], _MOST_REPORTS).round().astype(int), *looks])
     reached = np.searchsorted(looks, every, side="right") - 1
-    nodes, of_nodes = np.polynomial.legendre.leggauss(NODES)
+    nodes, of_nodes = np.polynomial.legendre.leggauss(_NODES)
     error, places, weights, before = 0.0, np.zeros(1), np.ones(1), 0.0
     for share, level in zip(every / looks[-1], levels[reached], strict=True):
         end, step = float(norm.isf(level / 2)) * math.sqrt(share), math.sqrt(share - before)
@@ -184,7 +184,7 @@ def bootstrap(n: int, seed: int | None, sampled: Callable[[Whole], Array], alike
     if seed is None:
         return None, "an interval was not requested"
     if n < FEW:
-        return None, TOO_FEW
+        return None, _TOO_FEW
     rng = np.random.default_rng(seed)
     rows = max(1, 1_000_000 // n)
     tables = (rng.integers(0, n, (min(rows, SAMPLES - done), n)) for done in range(0, SAMPLES, rows))
@@ -267,14 +267,14 @@ def doubled_ranks(values: Array) -> Whole:
     return ranks
 
 
-ROUNDING: Final = 1e-12
+_ROUNDING: Final = 1e-12
 """Values that differ by less than this share of them are equal."""
 
 
 def student_interval(values: Array) -> tuple[float | None, float | None]:
     """Return the 95 % interval of a mean (Student 1908); None for a single value and for equal ones."""
     n = len(values)
-    if n < 2 or (spread := float(np.std(values, ddof=1))) <= ROUNDING * float(np.abs(values).max()):
+    if n < 2 or (spread := float(np.std(values, ddof=1))) <= _ROUNDING * float(np.abs(values).max()):
         return None, None
     half = float(student.ppf(0.975, n - 1)) * spread / math.sqrt(n)
     return float(values.mean()) - half, float(values.mean()) + half

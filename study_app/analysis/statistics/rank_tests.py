@@ -38,10 +38,10 @@ from study_app.errors import AnalysisError
 
 Alternative: TypeAlias = Literal["two-sided", "greater", "less"]
 
-EXACT_UP_TO: Final = 200
+_EXACT_UP_TO: Final = 200
 """Up to so many pairs p is exact; beyond that normal, corrected for ties."""
 
-INTERVAL_FROM: Final = 6
+_INTERVAL_FROM: Final = 6
 """Below so many pairs with a difference no test can be significant, and no interval is shown."""
 
 
@@ -113,7 +113,7 @@ def signed_p(ranks: Whole, v: int, alternative: Alternative = "two-sided") -> tu
         return None, None, "none"
     below = int(ranks.sum()) - v
     tail = v if alternative == "greater" else below if alternative == "less" else max(v, below)
-    if n > EXACT_UP_TO:
+    if n > _EXACT_UP_TO:
         deviation = (tail - ranks.sum() / 2) / math.sqrt(float((ranks.astype(float) ** 2).sum()) / 4)
         return min(1.0, both * float(norm.sf(deviation))), None, "normal approximation, corrected for ties"
     sums = _sums(tuple(sorted(ranks.tolist())))
@@ -135,8 +135,8 @@ def _fisher(effect: float | None, n: int) -> tuple[Interval | None, str]:
     """Return the 95 % Fisher-z interval of a rank-biserial correlation of ``n`` pairs, or why there is none."""
     if effect is None:
         return None, "no interval: no pair differs"
-    if n < INTERVAL_FROM:
-        return None, f"no interval below {INTERVAL_FROM} pairs that differ: it would cover far less than it claims"
+    if n < _INTERVAL_FROM:
+        return None, f"no interval below {_INTERVAL_FROM} pairs that differ: it would cover far less than it claims"
     if abs(effect) == 1.0:
         return None, f"no interval: all {n} pairs that differ went one way"
     deviation = math.sqrt((2 * n**3 + 3 * n**2 + n) / 6) / (n * (n + 1) / 2)
@@ -167,12 +167,12 @@ DRAWN_UP_TO: Final = 200
 """Beyond so many participants the chi-square p is used: nearer to the exact one, far from 0.5, than a drawn p, which
 cannot fall below 1 / (1 + draws)."""
 
-APPROXIMATE: Final = f"chi-square approximation, corrected for ties, as always above {DRAWN_UP_TO} participants"
+_APPROXIMATE: Final = f"chi-square approximation, corrected for ties, as always above {DRAWN_UP_TO} participants"
 
-TABLED: Final = 7
+_TABLED: Final = 7
 """Up to so many settings all their orders fit into a table."""
 
-NO_INTERVAL: Final = "no interval for W: W cannot be negative, so such intervals have less than their nominal coverage"
+_NO_INTERVAL: Final = "no interval for W: W cannot be negative, so such intervals have less than their nominal coverage"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -201,7 +201,7 @@ def friedman(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> Friedma
     rows, dropped = complete(values, at_least=3, why=" for Friedman's test; compare two by the signed ranks of pairs")
     n, k = rows.shape
     ranks = doubled_ranks(rows)
-    spread = tied_spread(ranks)
+    spread = _tied_spread(ranks)
     sums = ranks.sum(axis=0)
     if spread == 0:
         note, middle = NO_VARIATION if n else "no participant answered in all conditions", (k + 1) / 2
@@ -221,7 +221,7 @@ def friedman(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> Friedma
         smallest_p=smallest,
         method=method,
         effect=float(w),
-        no_interval=NO_INTERVAL,
+        no_interval=_NO_INTERVAL,
         df=k - 1,
         p_chi2=approximate,
         f=f,
@@ -230,7 +230,7 @@ def friedman(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> Friedma
     )
 
 
-def tied_spread(ranks: Whole) -> int:
+def _tied_spread(ranks: Whole) -> int:
     """Return the sum over all (doubled) ranks (n, k) of their squared distance from the middle, 0 if all are tied."""
     return int(((ranks - (ranks.shape[1] + 1)) ** 2).sum())
 
@@ -258,9 +258,9 @@ def _p(ranks: Whole, squares: int, draws: int, seed: int) -> tuple[float | None,
         support, tails = exact
         return float(tails[np.searchsorted(support, squares)]), float(tails[-1]), "exact permutation"
     if n > DRAWN_UP_TO:
-        return None, None, APPROXIMATE
+        return None, None, _APPROXIMATE
     least = math.exp((1 - n) * math.lgamma(k + 1))
-    (sums,) = shuffled_sums(ranks[None], draws, seed)
+    (sums,) = _shuffled_sums(ranks[None], draws, seed)
     return drawn_p(_squares(sums, n) >= squares, seed, least)
 
 
@@ -272,7 +272,7 @@ def distribution(patterns: tuple[tuple[int, ...], ...]) -> tuple[Whole, Array] |
     """
     n, k = len(patterns), len(patterns[0])
     base = 2 * n * k + 1
-    if k > TABLED or base**k >= 2**62:
+    if k > _TABLED or base**k >= 2**62:
         return None
     powers = base ** np.arange(k, dtype=np.int64)
     states = np.zeros((1, k), dtype=np.int64)
@@ -299,15 +299,15 @@ def _orders(pattern: tuple[int, ...]) -> Whole:
     return np.unique(np.array(list(permutations(pattern)), dtype=np.int64), axis=0)
 
 
-def shuffles(rng: np.random.Generator, draws: int, k: int) -> Whole:
+def _shuffles(rng: np.random.Generator, draws: int, k: int) -> Whole:
     """Return ``draws`` random orders (draws, k) of k settings."""
-    if k > TABLED:
+    if k > _TABLED:
         return np.argsort(rng.random((draws, k)), axis=1)
     table = _orders(tuple(range(k)))
     return table[(rng.random(draws) * len(table)).astype(np.int64)]
 
 
-def shuffled_sums(scores: NDArray[Any], draws: int, seed: int) -> NDArray[Any]:
+def _shuffled_sums(scores: NDArray[Any], draws: int, seed: int) -> NDArray[Any]:
     """Return the sums over participants (items, draws, settings) after shuffling each one's scores at random.
 
     ``scores`` (items, participants, settings) move together.
@@ -316,14 +316,14 @@ def shuffled_sums(scores: NDArray[Any], draws: int, seed: int) -> NDArray[Any]:
     rng = np.random.default_rng(seed)
     sums = np.zeros((items, draws, k), dtype=scores.dtype)
     for own in scores.transpose(1, 0, 2):
-        sums += own[:, shuffles(rng, draws, k)]
+        sums += own[:, _shuffles(rng, draws, k)]
     return sums
 
 
-EXACT_OVER_ALL: Final = 50_000
+_EXACT_OVER_ALL: Final = 50_000
 """So many rearrangements are gone through (three settings: seven participants); beyond that p is drawn."""
 
-ROUNDING: Final = 1e-9
+_ROUNDING: Final = 1e-9
 """Sums of the same numbers in another order differ by less than this, relatively."""
 
 
@@ -370,7 +370,7 @@ def global_permutation(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) 
         method=method,
         effect_name="mean Kendall's W",
         effect=mean_w,
-        no_interval=NO_INTERVAL,
+        no_interval=_NO_INTERVAL,
         note="" if found is not None else "no participant completed a statement" if n == 0 else NO_VARIATION,
         items=int(varying.sum()),
         incomplete=int((~whole).sum()),
@@ -383,7 +383,7 @@ def _scores_over_all(array: Array, whole: NDArray[np.bool_]) -> Array:
     scores = np.zeros(array.shape)
     for item, (values, kept) in enumerate(zip(array, whole, strict=True)):
         ranks = doubled_ranks(values[kept])
-        spread = tied_spread(ranks)
+        spread = _tied_spread(ranks)
         if spread:
             scores[item, kept] = (ranks - (k + 1)) * math.sqrt((k - 1) / spread)
     return scores
@@ -393,14 +393,14 @@ def _p_over_all(scores: Array, found: float, draws: int, seed: int) -> tuple[flo
     """Return p, the smallest it could have been, and how it was found."""
     _, n, k = scores.shape
     orders = math.factorial(k)
-    if (n - 1) * math.log(orders) <= math.log(EXACT_OVER_ALL):
+    if (n - 1) * math.log(orders) <= math.log(_EXACT_OVER_ALL):
         people = scores.transpose(1, 0, 2)
         sums = people[:1]  # the first participant may stay as he or she is
         every = np.array(list(permutations(range(k))))
         for person in people[1:]:
             sums = (sums[:, None] + person[:, every].transpose(1, 0, 2)[None]).reshape(-1, *person.shape)
         reached = (sums**2).sum(axis=(1, 2))
-        p = float((reached >= found * (1 - ROUNDING)).mean())
-        return p, float((reached >= reached.max() * (1 - ROUNDING)).mean()), "exact permutation"
-    drawn = (shuffled_sums(scores, draws, seed) ** 2).sum(axis=(0, 2))
-    return drawn_p(drawn >= found * (1 - ROUNDING), seed, math.exp((1 - n) * math.log(orders)))
+        p = float((reached >= found * (1 - _ROUNDING)).mean())
+        return p, float((reached >= reached.max() * (1 - _ROUNDING)).mean()), "exact permutation"
+    drawn = (_shuffled_sums(scores, draws, seed) ** 2).sum(axis=(0, 2))
+    return drawn_p(drawn >= found * (1 - _ROUNDING), seed, math.exp((1 - n) * math.log(orders)))

@@ -49,7 +49,7 @@ def kappa(tables: ArrayLike) -> Array:
     return np.where(exists, (agreed - expected) / np.where(exists, 1 - expected, 1.0), np.nan)
 
 
-Flags: TypeAlias = NDArray[np.bool_]
+_Flags: TypeAlias = NDArray[np.bool_]
 
 UNDECIDED: Final = -1
 UNANSWERED: Final = -2
@@ -233,7 +233,7 @@ def _rate(given: Whole, setting: int, label: int, truth: Sequence[int | None]) -
     return HitRate(setting=setting, hits=hits, n=n, rate=hits / n, interval=clopper_pearson(hits, n), rival=rival, p=p)
 
 
-def _p_more_often(named: Flags, named_other: Flags, answered: Flags) -> float:
+def _p_more_often(named: _Flags, named_other: _Flags, answered: _Flags) -> float:
     """Return the exact one-sided p that a name is used more often for a setting than for another one.
 
     ``named`` and ``named_other`` say for each participant (n,) whether the name was used for the one and the other;

@@ -20,7 +20,7 @@ from study_app.analysis.statistics.outcome import FEW, NO_VARIATION, Array, Inte
 from study_app.analysis.statistics.trend import Direction
 from study_app.errors import AnalysisError
 
-SURE: Final = 0.95
+_SURE: Final = 0.95
 T_TEST: Final = "t test of slopes"
 HOTELLING: Final = "Hotelling's T²"
 
@@ -69,7 +69,7 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
     fewest = max(FEW, several + 1)
     if n < fewest or np.linalg.matrix_rank(covariance, tol=1e-12) < several:
         few = f"no test of means below {fewest} participants: slopes of so few would have to be normal"
-        note = few if n < fewest else NO_SPREAD
+        note = few if n < fewest else _NO_SPREAD
         note = NO_VARIATION if n and not np.ptp(rows, axis=1).any() else note
         return replace(found, no_interval=note, note=note)
     means, errors = own.mean(axis=0), np.sqrt(np.diag(covariance) / n)
@@ -80,9 +80,9 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
     else:
         statistic = float(means @ np.linalg.solve(covariance, means)) * n * (n - several) / (several * (n - 1))
         p = float(variance_ratio.sf(statistic, several, n - several))
-    reach = float(student.ppf((1 + SURE) / 2, n - 1)) * errors
+    reach = float(student.ppf((1 + _SURE) / 2, n - 1)) * errors
     ends = zip((means - reach).tolist(), (means + reach).tolist(), strict=True)
-    intervals = tuple(Interval(low=low, high=high, level=SURE, method="Student's t") for low, high in ends)
+    intervals = tuple(Interval(low=low, high=high, level=_SURE, method="Student's t") for low, high in ends)
     sides = f"one-sided ({direction})" if direction else "two-sided"
     freedom = f"t({n - 1}), {sides}" if several == 1 else f"F({several}, {n - several})"
     return replace(
@@ -100,7 +100,7 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
     )
 
 
-NO_SPREAD: Final = "no spread: some differences between settings are the same for every participant"
+_NO_SPREAD: Final = "no spread: some differences between settings are the same for every participant"
 
 
 def _design(settings: int, columns: ArrayLike | None) -> Array:

@@ -23,20 +23,20 @@ from scipy.stats import t as student
 from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked
 from study_app.psychophysics.grid import Z_95, Grid, Posterior, Values, evenly, fit, geometric, tables
 
-NOTICED_FROM: Final = 5.0
+_NOTICED_FROM: Final = 5.0
 """Agreement from "somewhat agree" on counts as having noticed."""
 
-SURE: Final = 0.95
-RATES: Final[Values] = (0.0, 0.02, 0.06, 0.12, 0.2, 0.3, 0.4, 0.5)
+_SURE: Final = 0.95
+_RATES: Final[Values] = (0.0, 0.02, 0.06, 0.12, 0.2, 0.3, 0.4, 0.5)
 """Rates of guesses and of lapses. People who never agree are lapses of the pooled answers, and may be many of them."""
 
 PLACES: Final = 121
 """Thresholds of the grid, from one span below the lowest level to one span above the highest."""
 
-WIDTHS: Final = (1 / 40, 3.0, 12)
+_WIDTHS: Final = (1 / 40, 3.0, 12)
 """The smallest and the largest width of the grid [spans], and their number."""
 
-WIDTH_PRIOR: Final = (0.3, 2.5)
+_WIDTH_PRIOR: Final = (0.3, 2.5)
 """Median [spans] and factor."""
 
 
@@ -70,7 +70,7 @@ class Threshold(Outcome):
 
 
 def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
-    """Return the threshold of raw answers: `NOTICED_FROM` or more means noticed, NaN is missing.
+    """Return the threshold of raw answers: `_NOTICED_FROM` or more means noticed, NaN is missing.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
     used = there.any(axis=(1, 2))
     order = np.unique(presented[there.any(axis=(0, 2))])
     same = np.asarray(presented[:, None] == order, float)
-    yes, asked = (one[used].sum(axis=2, dtype=float) @ same for one in (there & (array >= NOTICED_FROM), there))
+    yes, asked = (one[used].sum(axis=2, dtype=float) @ same for one in (there & (array >= _NOTICED_FROM), there))
     of_yes, of_asked = yes.sum(axis=0), asked.sum(axis=0)
     found: dict[str, Any] = {}
     note = _impossible(order, of_yes, of_asked)
@@ -104,7 +104,7 @@ def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
             interval = Interval(
                 low=lower,
                 high=upper,
-                level=SURE,
+                level=_SURE,
                 method="posterior density, scaled for differences between participants",
             )
         note = "; ".join(_remarks(order, lower, upper, len(yes), dispersion))
@@ -152,24 +152,24 @@ def _pooled(levels: Array, yes: Array, asked: Array) -> tuple[Posterior, float, 
     to clusters: Chandler & Bate 2007, Biometrika 94, 167–183).
     """
     low, span, people = float(levels[0]), float(np.ptp(levels)), len(yes)
-    least, most, count = WIDTHS
-    equal = (1 / len(RATES),) * len(RATES)
-    median, factor = WIDTH_PRIOR
+    least, most, count = _WIDTHS
+    equal = (1 / len(_RATES),) * len(_RATES)
+    median, factor = _WIDTH_PRIOR
     widths = geometric(least * span, most * span, count)
     grid = Grid(
         family="logistic",
         thresholds=evenly(low - span, low + 2 * span, PLACES),
         widths=widths,
         width_prior=(median * span, factor),
-        lapses=RATES,
+        lapses=_RATES,
         lapse_prior=equal,
-        guesses=RATES,
+        guesses=_RATES,
     )
     found = fit(levels, yes.sum(axis=0), (asked - yes).sum(axis=0), grid)
     if people < 2:
         return found, 1.0, _ends(found, 1.0)
     dispersion = _dispersion(found, levels, yes, asked)
-    return found, dispersion, _ends(found, dispersion * float(student.ppf((1 + SURE) / 2, people - 1) / Z_95) ** 2)
+    return found, dispersion, _ends(found, dispersion * float(student.ppf((1 + _SURE) / 2, people - 1) / Z_95) ** 2)
 
 
 def _dispersion(found: Posterior, levels: Array, yes: Array, asked: Array) -> float:

@@ -40,7 +40,7 @@ Direction: TypeAlias = Literal["increasing", "decreasing"]
 EXACT_UP_TO: Final = 200
 """Up to so many participants Page's p is exact; beyond that normal, corrected for ties."""
 
-MOST: Final = 12
+_MOST: Final = 12
 """Exact distributions over more settings take too long."""
 
 
@@ -164,7 +164,7 @@ def _note(first: Step, lowest: float | None) -> str:
 def _page(ranks: Whole, found: int) -> float:
     """Return P(L ≥ found) for (doubled) ranks (n, k), every order of every participant being equally likely."""
     n, k = ranks.shape
-    if n > EXACT_UP_TO or k > MOST:
+    if n > EXACT_UP_TO or k > _MOST:
         mean = n * k * (k + 1) ** 2 / 2
         spread = ((ranks - (k + 1.0)) ** 2).sum() / (k - 1) * k * (k * k - 1) / 12
         return float(norm.sf((found - mean) / math.sqrt(spread)))

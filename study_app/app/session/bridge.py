@@ -76,11 +76,11 @@ if TYPE_CHECKING:
     from study_app.store.sessions.open_session import SessionStore
     from study_app.video.sources import Videos
 
-TRACES_S = 0.030  # every second frame of 60 a second, every fifth of 144
-TILES_S = 0.5
-END_SHOWN_MS = 5000
+_TRACES_S = 0.030  # every second frame of 60 a second, every fifth of 144
+_TILES_S = 0.5
+_END_SHOWN_MS = 5000
 SCREEN_SETTLES_MS = 500  # a window manager may briefly put a window on another screen
-SCREEN_REMOVED = (
+_SCREEN_REMOVED = (
     "Both windows are on one screen",
     "The session is paused, and cannot be resumed: the participant's window would cover the force stop. Connect the "
     "second screen again; the participant's window returns to it.",
@@ -207,7 +207,7 @@ class SessionBridge(QObject):
         self.frames.due.connect(self.draw_frame)
         self._thread_priority = ThreadPriority()
         self.budget = FrameBudget(
-            ((self.show_tiles, TILES_S), (self.show_traces, TRACES_S), (self.show_forces, TRACES_S))
+            ((self.show_tiles, _TILES_S), (self.show_traces, _TRACES_S), (self.show_forces, _TRACES_S))
         )
         self.runner.on_change(lambda _state: self._show_changes())
         self._connect()
@@ -284,7 +284,7 @@ class SessionBridge(QObject):
         if self._covers_operator:
             self._post_event(PauseRequested(self._now(), "program"))
             self.operator.bring_forward()
-            self.operator.show_message(*SCREEN_REMOVED)
+            self.operator.show_message(*_SCREEN_REMOVED)
 
     @guarded_session_slot
     def _return_to_screen(self, screen: QScreen) -> None:
@@ -298,7 +298,7 @@ class SessionBridge(QObject):
         """Return whether the session cannot be resumed because one window covers the other, and say so."""
         if refused := self._covers_operator:
             self.operator.bring_forward()
-            self.operator.show_message(*SCREEN_REMOVED)
+            self.operator.show_message(*_SCREEN_REMOVED)
         return refused
 
     @guarded_session_slot
@@ -417,7 +417,7 @@ class SessionBridge(QObject):
         elif self.runner.finished and self.participant.isFullScreen():
             ended = self.parts.journal.progress.reached_end
             said = ended and isinstance(self.parts.session.schedule.steps[-1], PageStep)  # a study's last page
-            QTimer.singleShot(0 if said else END_SHOWN_MS, self.operator, self.operator.bring_forward)
+            QTimer.singleShot(0 if said else _END_SHOWN_MS, self.operator, self.operator.bring_forward)
 
     def _show_view(self) -> None:
         view = self.view()

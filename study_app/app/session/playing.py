@@ -40,9 +40,9 @@ from study_app.store.folders import kept_pilot_folder
 from study_app.store.sessions.begin import SessionStart
 from study_app.store.study_versions import keep_content
 
-END_SHOWN_MS: Final = 2500
+_END_SHOWN_MS: Final = 2500
 log = logging.getLogger(__name__)
-STOPPED: Final = "stopped while playing in the study designer"
+_STOPPED: Final = "stopped while playing in the study designer"
 
 
 class PlayedSession(LiveSession):
@@ -84,7 +84,7 @@ class PlayedSession(LiveSession):
         bridge.parts.servo.stop_force()
         try:
             if not bridge.runner.finished:
-                bridge.runner.post(EndRequested(bridge.parts.clock(), "aborted", STOPPED))
+                bridge.runner.post(EndRequested(bridge.parts.clock(), "aborted", _STOPPED))
         except StudyError as error:  # it stays unfinished
             log.warning("the played session does not have an end: %s", error)
         finally:
@@ -103,7 +103,7 @@ class PlayedSession(LiveSession):
         if state.phase is Phase.TROUBLE:
             self._stop_later()
         elif state.over:
-            QTimer.singleShot(END_SHOWN_MS, self, self._leave_session)
+            QTimer.singleShot(_END_SHOWN_MS, self, self._leave_session)
 
     def _stop_later(self) -> None:
         """Stop after the current event, which may be the window's own."""
@@ -114,10 +114,10 @@ class PlayedSession(LiveSession):
             self.bridge.leave_without_asking()
 
 
-SIMULATED: Final = "scripted"
-LOOK_S: Final = 0.01
+_SIMULATED: Final = "scripted"
+_LOOK_S: Final = 0.01
 FOLDER: Final = "liquid-study-play-"
-OUTCOMES: Final = {
+_OUTCOMES: Final = {
     "completed": "to the end",
     "incomplete": "to the end; some trials were not delivered",
     "aborted": "stopped",
@@ -155,7 +155,7 @@ class Playing(QObject):
         self.editing, self.place = editing, place
         self.where: Callable[[], StepPosition | None] = lambda: designer.preview.position
         self.kept.connect(designer.runs.read_in_background)
-        self.device = SIMULATED
+        self.device = _SIMULATED
         self.pilot: _Pilot | None = None
         self._asked: Playable | None = None
         self._left: list[PlayedSession] = []
@@ -194,7 +194,7 @@ class Playing(QObject):
             self._show_notice(shown.refusal_notice(tuple(map(str, named))))
             return
         self._asked = playable_part
-        if self.device == SIMULATED:
+        if self.device == _SIMULATED:
             self._prepare_pilot()
         else:
             has_force = descriptor_of(self.device).kind == "felt"
@@ -270,7 +270,7 @@ class Playing(QObject):
         elif session.code == BUG:
             self.place.message.emit("A bug in the program stopped the pilot", "The terminal shows the details.")
         if session.has_begun:
-            self._show_notice(shown.ended_notice(pilot.what.words, OUTCOMES.get(session.status or "", "stopped")))
+            self._show_notice(shown.ended_notice(pilot.what.words, _OUTCOMES.get(session.status or "", "stopped")))
         else:
             self._delete_data()
             self._show_notice(None)
@@ -300,7 +300,7 @@ class Playing(QObject):
         self.stop()
         while self._preparing.busy and patience.left_s > 0:
             QApplication.processEvents()
-            time.sleep(LOOK_S)
+            time.sleep(_LOOK_S)
         for session in self._left:
             session.wait(patience.left_s)
         self._delete_data()

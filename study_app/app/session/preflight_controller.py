@@ -39,7 +39,7 @@ from study_app.store.folders import StudyFolder, locate_session
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import start_of
 
-LOOK_MS = 100
+_LOOK_MS = 100
 PATIENCE_S = 10.0
 
 
@@ -153,7 +153,7 @@ class Preflight(QObject):
         self._outlets_shown = ready.outlet_statuses
         self._timer = QTimer(self)
         self._timer.timeout.connect(self._watch_servo_and_screen)
-        self._timer.start(LOOK_MS)
+        self._timer.start(_LOOK_MS)
 
     def open(self) -> None:
         self._show_checks()

@@ -150,12 +150,12 @@ def _edits_to_renumber(study: Study, place: Path, moves: Sequence[Edit]) -> tupl
     return tuple(edits)
 
 
-LONGEST: Final = 40
+_LONGEST: Final = 40
 
 
-def initial_short_text(text: str) -> str:
+def _initial_short_text(text: str) -> str:
     """Return the initial short text of a question: the beginning of its text."""
-    return " ".join(text.split())[:LONGEST].rstrip(" ?.!:")
+    return " ".join(text.split())[:_LONGEST].rstrip(" ?.!:")
 
 
 def short_text_edits(study: Study, path: Path, language: str, text: str) -> tuple[Edit, ...]:
@@ -165,9 +165,9 @@ def short_text_edits(study: Study, path: Path, language: str, text: str) -> tupl
     if path[-1] != "text" or isinstance(before, Mapping) != isinstance(short, Mapping):
         return ()
     old, own = _text_in(before, language), _text_in(short, language)
-    if old is None or own is None or own != initial_short_text(old):
+    if old is None or own is None or own != _initial_short_text(old):
         return ()
-    return (Set((*place, language) if isinstance(short, Mapping) else place, initial_short_text(text)),)
+    return (Set((*place, language) if isinstance(short, Mapping) else place, _initial_short_text(text)),)
 
 
 def _text_in(value: Any, language: str) -> str | None:
@@ -189,10 +189,10 @@ class Repair:
 def repairs(study: Study, fault: Fault) -> tuple[Repair, ...]:
     """Return the repairs of a fault, by its kind: after each of them it is gone."""
     offered = (*_level_repairs(study, fault), *_stated_repairs(study, fault), *_repairs_by_kind(study, fault))
-    return tuple(repair for repair in offered if removes_fault(study, fault, repair))
+    return tuple(repair for repair in offered if _removes_fault(study, fault, repair))
 
 
-def removes_fault(study: Study, fault: Fault, repair: Repair) -> bool:
+def _removes_fault(study: Study, fault: Fault, repair: Repair) -> bool:
     """Return whether a repair removes a fault and adds none."""
     try:
         after, _ = study.with_edits(*repair.edits)
@@ -250,7 +250,7 @@ def _level_repairs(study: Study, fault: Fault) -> Iterator[Repair]:
     if fault.path[:1] != ("stimuli",) or fault.path[-1:] != ("levels",) or not isinstance(levels, tuple):
         return
     if len(levels) == 2 and all(isinstance(level, int | float) for level in levels):
-        highest = highest_level(study, fault, *levels)
+        highest = _highest_level(study, fault, *levels)
         if highest is not None:
             lowered = _lowered_levels(study, str(fault.path[1]), highest)
             edits = (Set(("methods", name, "levels"), list(own)) for name, own in lowered.items())
@@ -272,7 +272,7 @@ def _lowered_levels(study: Study, stimulus: str, highest: float) -> dict[str, tu
     return lowered_levels
 
 
-def highest_level(study: Study, fault: Fault, low: float, high: float) -> float | None:
+def _highest_level(study: Study, fault: Fault, low: float, high: float) -> float | None:
     """Return the highest level, in three digits, without this kind of fault; None if even ``low`` has it."""
     formed = study.formed
     if formed is None:
@@ -369,7 +369,7 @@ def additions_for(study: Study, fault: Fault) -> tuple[Repair, ...]:
             repairs.append(
                 Repair(f'Add {element_noun(section)} "{name}"', edits_to_add(study, (section,), name=name)[0])
             )
-    return tuple(repair for repair in repairs if removes_fault(study, fault, repair))
+    return tuple(repair for repair in repairs if _removes_fault(study, fault, repair))
 
 
 def edits_to_duplicate(study: Study, path: Path, wanted: str = "") -> tuple[tuple[Edit, ...], Path]:
@@ -393,10 +393,10 @@ def edits_to_duplicate(study: Study, path: Path, wanted: str = "") -> tuple[tupl
     else:
         copy = (*path[:-1], wanted or free_id(names(study.document, str(path[0])), str(name)))
         edits = [Duplicate(path, str(copy[-1]))]
-    return (*edits, *edits_to_fit(study, study.with_edits(*edits)[0], copy)), copy
+    return (*edits, *_edits_to_fit(study, study.with_edits(*edits)[0], copy)), copy
 
 
-def edits_to_fit(before: Study, after: Study, path: Path) -> tuple[Edit, ...]:
+def _edits_to_fit(before: Study, after: Study, path: Path) -> tuple[Edit, ...]:
     """Return the additional edits that a copy needs: a free code letter and a place in the session."""
     edits: list[Edit] = []
     for row in rows(after.document, path):
@@ -422,9 +422,9 @@ def _set_nested(value: dict[str, Any], path: Path, inner: Any) -> None:
     value[str(path[-1])] = inner
 
 
-MOST: Final = 24
+_MOST: Final = 24
 """Greatest number of values of a series; code letters end at Z."""
-NUMBERS: Final = frozenset({"number", "whole number"})
+_NUMBERS: Final = frozenset({"number", "whole number"})
 """Kinds of rows with one number."""
 _DEEPEST: Final = 2
 
@@ -446,7 +446,7 @@ def _number_rows(document: Mapping[str, Any], path: Path, deepest: int) -> Itera
     for row in rows(document, path):
         if row.kind == "table" and isinstance(row.value, Mapping) and deepest > 1:
             below.append(row.path)
-        elif row.kind in NUMBERS and (row.value is not None or row.path[-1] not in refused):
+        elif row.kind in _NUMBERS and (row.value is not None or row.path[-1] not in refused):
             known = isinstance(row.value, int | float) and not isinstance(row.value, bool)
             yield row if known else replace(row, value=None)
     for inner in below:
@@ -470,8 +470,8 @@ def check_values(document: Mapping[str, Any], row: Row, values: Sequence[float])
         if value in known:
             raise Refused(f"{exact_text(value)} is listed twice, or is the value of the original")
         known.append(value)
-    if not 0 < len(values) <= MOST:
-        raise Refused(f"a series has 1 to {MOST} copies")
+    if not 0 < len(values) <= _MOST:
+        raise Refused(f"a series has 1 to {_MOST} copies")
 
 
 def edits_to_copy_with(study: Study, path: Path, row: Row, value: float) -> tuple[tuple[Edit, ...], Path]:
@@ -480,11 +480,11 @@ def edits_to_copy_with(study: Study, path: Path, row: Row, value: float) -> tupl
     stem = str(path[1]).removesuffix("" if row.value is None else f"_{_number_in_id(row.value)}")
     name = f"{stem[: MAX_ID - len(word) - 1]}_{word}"
     edits, copy = edits_to_duplicate(study, path, free_id(names(study.document, str(path[0])), name))
-    titles = (Set((*copy, *place), text) for place, text in titles_of_copy(study.document, path, row, value))
+    titles = (Set((*copy, *place), text) for place, text in _titles_of_copy(study.document, path, row, value))
     return (*edits, Set((*copy, *row.path[2:]), value), *titles), copy
 
 
-def titles_of_copy(document: Mapping[str, Any], path: Path, row: Row, value: float) -> Iterator[tuple[Path, str]]:
+def _titles_of_copy(document: Mapping[str, Any], path: Path, row: Row, value: float) -> Iterator[tuple[Path, str]]:
     """Yield the titles of a copy: the number at their end is replaced, or the new number is added."""
     number = re.compile(rf"(?:(?<!\w)[-{MINUS}])?\d+(?:[.,]\d+)?(?=\s*(?:{re.escape(row.unit)})?\s*$)")
     title = value_at(document, (*path, "title"))

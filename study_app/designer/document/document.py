@@ -57,7 +57,7 @@ class Answers:
 
 
 NO_ANSWERS: Final = Answers()
-FIRST_VERSION: Final = "0.1"
+_FIRST_VERSION: Final = "0.1"
 _NAME: Final = re.compile(rf"[a-z][a-z0-9]{{0,{MAX_SHORT_NAME - 1}}}")
 _SELF: Final = "liquid-study check NAME"
 
@@ -79,7 +79,7 @@ def copy_of(study: Study, name: str) -> Study:
     """
     _check_name(name)
     named = Study(study.text.replace(_SELF, f"liquid-study check {name}"), study.folder)
-    return named.with_edits(Set(("study", "name"), name), Set(("study", "version"), FIRST_VERSION))[0]
+    return named.with_edits(Set(("study", "name"), name), Set(("study", "version"), _FIRST_VERSION))[0]
 
 
 def with_answers(study: Study, answers: Answers) -> Study:
@@ -150,9 +150,9 @@ def _refusal(why: str, name: str) -> Refused:
     return Refused(f'{why}; "{free}" is free')
 
 
-MOST_STEPS: Final = 500
-JOIN_S: Final = 1.0  # typing in one field is one step until the keyboard rests for so long
-DEFAULT_VERSION: Final = "1"
+_MOST_STEPS: Final = 500
+_JOIN_S: Final = 1.0  # typing in one field is one step until the keyboard rests for so long
+_DEFAULT_VERSION: Final = "1"
 _VERSION: Final = re.compile(r"[0-9A-Za-z.+-]+")
 
 
@@ -194,7 +194,7 @@ class Document:
     ) -> None:
         """Replace the text, apply edits in their order, or both, as one step; if nothing changes, there is no step.
 
-        A step with the ``key`` of the last step, made within `JOIN_S`, is joined to it. Refused edits change nothing.
+        A step with the ``key`` of the last step, made within `_JOIN_S`, is joined to it. Refused edits change nothing.
         """
         study, splices = (self.study, ()) if text is None else self.study.with_text(text)
         if edits or text is None:
@@ -205,11 +205,11 @@ class Document:
         if not splices:
             return
         last, then = self.last
-        if key is not None and key == last and time.monotonic() - then < JOIN_S and self.done:
+        if key is not None and key == last and time.monotonic() - then < _JOIN_S and self.done:
             joined = self.done.pop()
             splices, before = (*joined.splices, *splices), joined.before
         self.study, self.undone, self.last = study, [], (key, time.monotonic())
-        self.done = [*self.done, DoneStep(name, splices, before, selected)][-MOST_STEPS:]
+        self.done = [*self.done, DoneStep(name, splices, before, selected)][-_MOST_STEPS:]
 
     def end_step(self) -> None:
         """Close the current undo step: the next edit begins a new one."""
@@ -245,7 +245,7 @@ class Document:
     def version(self) -> str:
         """The version that the study states, or the default version."""
         stated = value_at(self.study.document, ("study", "version"))
-        return str(stated) if stated is not None else DEFAULT_VERSION
+        return str(stated) if stated is not None else _DEFAULT_VERSION
 
     # file and draft
 

@@ -26,9 +26,9 @@ from study_app.protocol.groups import sequences_in
 from study_app.protocol.source.document import Path, entries, has, value_at
 from study_app.protocol.wording.languages import languages_of
 
-TITLES: Final = ("title", "short", "text")
+_TITLES: Final = ("title", "short", "text")
 """Keys of texts that an element is called by, the first that it has."""
-NAMED: Final = 3
+_NAMED: Final = 3
 """By so many of its texts an entry without a title is called."""
 FIRST: Final = ("study",)
 """What is selected where nothing else is."""
@@ -92,7 +92,7 @@ def title_of(document: Mapping[str, Any], path: Path) -> str:
         return called
     if isinstance(path[-1], int) and "id" not in value:
         texts = [text for held in value.values() for text in (held if isinstance(held, tuple | list) else (held,))]
-        return ", ".join([text for text in texts if isinstance(text, str)][:NAMED]) or str(path[-1] + 1)
+        return ", ".join([text for text in texts if isinstance(text, str)][:_NAMED]) or str(path[-1] + 1)
     return name_label(str(value.get("id", path[-1])))
 
 
@@ -103,7 +103,7 @@ def study_title(document: Mapping[str, Any]) -> str:
 
 
 def _title_text(document: Mapping[str, Any], value: Mapping[str, Any]) -> str:
-    text = next((value[key] for key in TITLES if key in value), None)
+    text = next((value[key] for key in _TITLES if key in value), None)
     if isinstance(text, Mapping):
         text = text.get(languages_of(document)[0]) or next(iter(text.values()), None)
     return text if isinstance(text, str) and text.strip() else ""
@@ -195,7 +195,9 @@ def first_element(document: Mapping[str, Any]) -> Path:
     return next((named for step in steps if (named := named_at(document, step)) is not None), FIRST)
 
 
-USED: Final = frozenset({"liquids", "conditions", "tasks", "questionnaires", "scales", "stimuli", "designs", "methods"})
+_USED: Final = frozenset(
+    {"liquids", "conditions", "tasks", "questionnaires", "scales", "stimuli", "designs", "methods"}
+)
 """Sections whose elements other elements use; pages and blocks are steps of the session."""
 
 
@@ -239,7 +241,7 @@ def usage_text(document: Mapping[str, Any], path: Path) -> str:
 
     It is "" of steps and settings.
     """
-    if len(path) != 2 or path[0] not in USED:
+    if len(path) != 2 or path[0] not in _USED:
         return ""
     users = {(place[:4] if place[2:3] == (ITEMS,) else place[:2]) for place, used in uses(document) if used == path} - {
         path
@@ -252,7 +254,7 @@ def usage_text(document: Mapping[str, Any], path: Path) -> str:
     return f"used by {', '.join(using)}" if counts else "not used"
 
 
-SHORTEST: Final = 3
+_SHORTEST: Final = 3
 """So many letters are typed before fields are looked for."""
 LABEL, CHOSEN, OTHER, SENTENCE = range(4)
 _DEEPEST: Final = 3
@@ -271,7 +273,7 @@ class FoundField:
 
 def search_words(text: str) -> list[str]:
     """Return the search words, each without the "s" of a plural."""
-    return [part.removesuffix("s") if len(part) > SHORTEST else part for part in text.casefold().split()]
+    return [part.removesuffix("s") if len(part) > _SHORTEST else part for part in text.casefold().split()]
 
 
 def found_fields(study: Study, text: str) -> tuple[FoundField, ...]:
@@ -280,7 +282,7 @@ def found_fields(study: Study, text: str) -> tuple[FoundField, ...]:
     Choices that are not chosen count where no label and nothing that is chosen has the words; sentences count last.
     """
     parts = search_words(text)
-    if not parts or len(text.strip()) < SHORTEST:
+    if not parts or len(text.strip()) < _SHORTEST:
         return ()
     fields = [match for field in _searchable_fields(study) for match in _matches_in_field(field, parts)]
     best = min((match.rank for match in fields), default=0)

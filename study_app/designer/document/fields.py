@@ -110,7 +110,7 @@ def edits_to_rename(
     Where the name is refused, a free one is proposed that is not one of those with ``recorded`` answers.
     """
     item = _item_id(document, thing)
-    taken = sibling_names(document, thing)
+    taken = _sibling_names(document, thing)
     title = value_at(document, (*thing, "text" if item is not None else "title"))
     text = next(iter(title.values()), "") if isinstance(title, Mapping) else title
     own = str(item or thing[-1])
@@ -137,11 +137,11 @@ def suggested_id(document: Document, thing: Path, recorded: frozenset[str] = fro
         text = text.get(languages_of(document)[0])
     wanted = id_of(text, MAX_FROM_TEXT) if isinstance(text, str) else ""
     own = id_at(document, thing)
-    free = free_id(sibling_names(document, thing) | (recorded - {own}), wanted) if wanted else ""
+    free = free_id(_sibling_names(document, thing) | (recorded - {own}), wanted) if wanted else ""
     return "" if free == own else free
 
 
-def sibling_names(document: Document, thing: Path) -> set[str]:
+def _sibling_names(document: Document, thing: Path) -> set[str]:
     """Return the names that other tables or items already have."""
     if _item_id(document, thing) is None:
         node = value_at(document, thing[:-1])
@@ -283,14 +283,14 @@ def _matches_pattern(place: Path, pattern: str) -> bool:
     return len(steps) == len(place) and all(step in {"*", str(key)} for step, key in zip(steps, place, strict=True))
 
 
-Node: TypeAlias = Mapping[str, Any]
+_Node: TypeAlias = Mapping[str, Any]
 OWN = "own description"
 """Where a node keeps what its own model says of it, if the place it is at has a description, too."""
 
 
-def node_at(document: Any, path: Path) -> tuple[Node, ...]:
+def node_at(document: Any, path: Path) -> tuple[_Node, ...]:
     """Return the schema's alternatives for the value at ``path``, present or not; none if no value is permitted."""
-    nodes: list[Node] = [schema()]
+    nodes: list[_Node] = [schema()]
     for step in path:
         nodes = [child for node in (table_of(tuple(nodes), document),) if node for child in _children(node, step)]
         nodes = [alternative for node in nodes for alternative in alternatives(node)]
@@ -298,7 +298,7 @@ def node_at(document: Any, path: Path) -> tuple[Node, ...]:
     return tuple(nodes)
 
 
-def table_of(nodes: tuple[Node, ...], value: Any) -> Node | None:
+def table_of(nodes: tuple[_Node, ...], value: Any) -> _Node | None:
     """Return the alternative of a table or array whose fixed key, such as ``kind``, matches the value."""
     if isinstance(value, Mapping):
         tables = [node for node in nodes if node.get("type") == "object"]
@@ -308,7 +308,7 @@ def table_of(nodes: tuple[Node, ...], value: Any) -> Node | None:
     return next(iter(arrays if isinstance(value, tuple) and arrays else several), None)
 
 
-def tags(nodes: tuple[Node, ...]) -> tuple[str, dict[str | None, Node]]:
+def tags(nodes: tuple[_Node, ...]) -> tuple[str, dict[str | None, _Node]]:
     """Return the key that distinguishes the tables, and the table of each of its values; None: the key is omitted."""
     tables = [node for node in nodes if node.get("type") == "object" and "properties" in node]
     if len(tables) < 2:
@@ -318,7 +318,7 @@ def tags(nodes: tuple[Node, ...]) -> tuple[str, dict[str | None, Node]]:
     return key, {value: node for node in tables for value in _fixed_values(node, key) or (None,)} if key else {}
 
 
-def alternatives(node: Node) -> Iterator[Node]:
+def alternatives(node: _Node) -> Iterator[_Node]:
     """Yield the alternatives of a node except null, with references resolved and the node's common keys added."""
     around = {key: value for key, value in node.items() if key not in {"$ref", "anyOf", "oneOf", "discriminator"}}
     if "$ref" in node:
@@ -331,13 +331,13 @@ def alternatives(node: Node) -> Iterator[Node]:
         yield node
 
 
-def _with_union_keys(around: Node, node: Node) -> Node:
+def _with_union_keys(around: _Node, node: _Node) -> _Node:
     """Return a node with the keys of the union around it; `OWN` keeps the node's own description."""
     own = {OWN: node["description"]} if "description" in node and OWN not in node else {}
     return {**node, **own, **around}
 
 
-def _is_of(node: Node, tables: list[Node], value: Mapping[str, Any]) -> bool:
+def _is_of(node: _Node, tables: list[_Node], value: Mapping[str, Any]) -> bool:
     key, named = tags(tuple(tables))
     if not key:
         return True
@@ -348,19 +348,19 @@ def _is_of(node: Node, tables: list[Node], value: Mapping[str, Any]) -> bool:
     return (chosen is None or isinstance(chosen, str)) and named.get(chosen) is node
 
 
-def _distinguishes(key: str, tables: list[Node]) -> bool:
+def _distinguishes(key: str, tables: list[_Node]) -> bool:
     """Return whether the key has another fixed value in each table; one table may lack it."""
     values = [_fixed_values(node, key) for node in tables]
     every = [value for some in values for value in some]
     return sum(map(bool, values)) >= len(tables) - 1 and len(every) == len(set(every))
 
 
-def _fixed_values(node: Node, key: str) -> tuple[str, ...]:
+def _fixed_values(node: _Node, key: str) -> tuple[str, ...]:
     part = node["properties"].get(key, {})
     return (part["const"],) if "const" in part else tuple(part.get("enum", ()))
 
 
-def _children(node: Node, step: str | int) -> Iterator[Node]:
+def _children(node: _Node, step: str | int) -> Iterator[_Node]:
     if isinstance(step, int):
         fixed = node.get("prefixItems", ())
         if step < len(fixed):
@@ -383,7 +383,7 @@ Kind: TypeAlias = Literal[
 "kind" a choice that decides the other rows, "vector" numbers of one point, "list" tables in an array, "tables" tables
 by name, "either" one of several other kinds; an "unknown" key does not belong to the table."""
 
-UNITS: Final = {
+_UNITS: Final = {
     "mm": "mm", "m": "m", "s": "s", "ms": "ms", "n": "N", "hz": "Hz", "deg": "°", "percent": "%", "mps": "m/s",
     "mps2": "m/s²", "m2ps": "m²/s", "nspm": "N·s/m", "pa": "Pa", "pa_s": "Pa·s", "pa_sn": "Pa·sⁿ", "kg_m3": "kg/m³",
     "per_s": "1/s",
@@ -409,7 +409,7 @@ _OF_LENGTHS: Final = {
 _SENTENCES: Final = re.compile(r"((?:[a-z_0-9-]+, )*[a-z_0-9-]+): ([^;]+?)(?:; |\.?\Z)")
 
 
-KIND_LABELS: Final = {
+_KIND_LABELS: Final = {
     "2ifc": "2IFC",
     "3ifc": "3IFC",
     "4ifc": "4IFC",
@@ -421,8 +421,8 @@ KIND_LABELS: Final = {
     "yesno": "Yes/no",
 }
 """Labels of designs and methods, also of elements named after them."""
-LABELS: Final = {
-    **KIND_LABELS,
+_LABELS: Final = {
+    **_KIND_LABELS,
     "1down1up": "1-down 1-up",
     "2down1up": "2-down 1-up",
     "3down1up": "3-down 1-up",
@@ -592,7 +592,7 @@ def row_at(document: Mapping[str, Any], path: Path) -> Row | None:
     return replace(row, instead=instead, model=around.get("title", ""))
 
 
-def _make_row(document: Mapping[str, Any], path: Path, nodes: tuple[Node, ...], value: Any, *, required: bool) -> Row:
+def _make_row(document: Mapping[str, Any], path: Path, nodes: tuple[_Node, ...], value: Any, *, required: bool) -> Row:
     first = nodes[0]
     common: dict[str, Any] = {
         "label": label_of(path[-1]),
@@ -626,7 +626,7 @@ def _make_row(document: Mapping[str, Any], path: Path, nodes: tuple[Node, ...], 
     )
 
 
-def _kind(node: Node, references: bool) -> Kind:
+def _kind(node: _Node, references: bool) -> Kind:
     kind = node.get("type")
     if kind == "array":
         if references:
@@ -648,24 +648,24 @@ def _kind(node: Node, references: bool) -> Kind:
     return "switch" if kind == "boolean" else "whole number" if kind == "integer" else "number"
 
 
-def _permitted_values(node: Node) -> tuple[Any, ...]:
+def _permitted_values(node: _Node) -> tuple[Any, ...]:
     return (node["const"],) if "const" in node else tuple(node.get("enum", ()))
 
 
-def is_localised(nodes: tuple[Node, ...]) -> bool:
+def is_localised(nodes: tuple[_Node, ...]) -> bool:
     """Return whether the value of such nodes is a text, or one for each language."""
     if len(nodes) != 2 or nodes[0].get("type") != "string":
         return False
     return nodes[1].get("additionalProperties") == {"type": "string"}
 
 
-def _numbers_in(node: Node) -> Node:
+def _numbers_in(node: _Node) -> _Node:
     while node.get("type") == "array":
         node = node["prefixItems"][0] if "prefixItems" in node else next(alternatives(node["items"]))
     return node
 
 
-def _bound_texts(node: Node, numbers: Node) -> tuple[str, ...]:
+def _bound_texts(node: _Node, numbers: _Node) -> tuple[str, ...]:
     stated = {key: numbers[key] for key in _OF_NUMBERS if key in numbers and abs(numbers[key]) < _NO_BOUND}
     phrases = [_OF_NUMBERS[key].format(shown_value(number)) for key, number in stated.items()]
     if "prefixItems" not in node:
@@ -686,8 +686,8 @@ def label_of(step: str | int) -> str:
     """Return a key in words without its unit: "Force limit" for ``force_limit_n``; for an entry its number."""
     if isinstance(step, int):
         return str(step + 1)
-    if step in LABELS:
-        return LABELS[step]
+    if step in _LABELS:
+        return _LABELS[step]
     unit = _unit_suffix(step)
     plain = step.removesuffix(f"_{unit}") if unit else step
     return plain.replace("_", " ").strip().capitalize()
@@ -695,16 +695,16 @@ def label_of(step: str | int) -> str:
 
 def name_label(name: str) -> str:
     """Return an ID in words: "Thick honey" for ``thick_honey``."""
-    return KIND_LABELS.get(name, name.replace("_", " ").strip().capitalize())
+    return _KIND_LABELS.get(name, name.replace("_", " ").strip().capitalize())
 
 
 def unit_of(key: str) -> str:
     """Return the unit at the end of a key, "" if it has none."""
-    return UNITS.get(_unit_suffix(key), "")
+    return _UNITS.get(_unit_suffix(key), "")
 
 
 def _unit_suffix(key: str) -> str:
-    return max((suffix for suffix in UNITS if key.endswith(f"_{suffix}")), key=len, default="")
+    return max((suffix for suffix in _UNITS if key.endswith(f"_{suffix}")), key=len, default="")
 
 
 def _value_sentences(description: str) -> dict[str, str]:
@@ -712,7 +712,7 @@ def _value_sentences(description: str) -> dict[str, str]:
     return {value: match[2].strip() for match in _SENTENCES.finditer(description) for value in match[1].split(", ")}
 
 
-SINGULAR: Final = {"items": "question", "stimuli": "stimulus", "analysis": "analysis", "contrasts": "hypothesis"}
+_SINGULAR: Final = {"items": "question", "stimuli": "stimulus", "analysis": "analysis", "contrasts": "hypothesis"}
 """Singular names of sections' elements that are not the section's name without its last letter."""
 _PLURAL: Final = {"items": "questions"}
 """Plural names of sections' elements that are not the section's name."""
@@ -721,7 +721,7 @@ LETTER: Final = "^[A-Z]$"
 
 def element_noun(section: str | int) -> str:
     """Return the name of an element of a section: "liquid" of ``liquids``."""
-    return SINGULAR.get(str(section), str(section).removesuffix("s"))
+    return _SINGULAR.get(str(section), str(section).removesuffix("s"))
 
 
 def counted_elements(number: int, section: str | int) -> str:
@@ -729,7 +729,7 @@ def counted_elements(number: int, section: str | int) -> str:
     return counted(number, element_noun(section), _PLURAL.get(str(section), str(section)))
 
 
-def new_text(section: str | int) -> str:
+def _new_text(section: str | int) -> str:
     """Return the initial text of an element of a list: "New question" of ``items``."""
     return f"New {element_noun(section)}"
 
@@ -746,7 +746,7 @@ def initial_value(document: Mapping[str, Any], path: Path) -> Any:
     return _initial_of_kind(document, row.either[0] if row.kind == "either" else row, node)
 
 
-def _initial_of_kind(document: Mapping[str, Any], row: Row, node: Node) -> Any:
+def _initial_of_kind(document: Mapping[str, Any], row: Row, node: _Node) -> Any:
     path, kind = row.path, row.kind
     if kind in {"localised", "paragraphs", "text"}:
         return _initial_text(document, path, node, localised=kind != "text")
@@ -774,7 +774,7 @@ def _initial_of_kind(document: Mapping[str, Any], row: Row, node: Node) -> Any:
     return _initial_tables(document, path, node) if kind == "list" else {}
 
 
-def _initial_tables(document: Mapping[str, Any], path: Path, node: Node) -> list[Any]:
+def _initial_tables(document: Mapping[str, Any], path: Path, node: _Node) -> list[Any]:
     """Return the minimum number of tables of a list, each with its required keys, or of lists for sequences."""
     tables: list[Any] = []
     for number in range(max(1, node.get("minItems", 1))):
@@ -791,7 +791,7 @@ def _initial_tables(document: Mapping[str, Any], path: Path, node: Node) -> list
     return tables
 
 
-def _initial_text(document: Mapping[str, Any], path: Path, node: Node, *, localised: bool) -> Any:
+def _initial_text(document: Mapping[str, Any], path: Path, node: _Node, *, localised: bool) -> Any:
     around = value_at(document, path[:-1])
     if path[-1] == "id":
         taken = (str(name) for _, name in entries(document, ".".join((*map(str, path[:2]), "*", "*", "id"))))
@@ -800,7 +800,7 @@ def _initial_text(document: Mapping[str, Any], path: Path, node: Node, *, locali
         used = {letter for _, letter in entries(document, f"{path[0]}.*.{path[-1]}")}
         return next((letter for letter in string.ascii_uppercase if letter not in used), "Z")
     name = around.get("id", path[-2]) if isinstance(around, Mapping) else path[-2]
-    text = new_text(path[-3]) if isinstance(name, int) else f"New {name_label(str(name)).lower()}"
+    text = _new_text(path[-3]) if isinstance(name, int) else f"New {name_label(str(name)).lower()}"
     return _in_languages(document, text) if localised else text
 
 
@@ -809,7 +809,7 @@ def _in_languages(document: Mapping[str, Any], text: str) -> Any:
     return dict.fromkeys(languages, text) if len(languages) > 1 else text
 
 
-def _initial_number(node: Node, otherwise: float) -> float:
+def _initial_number(node: _Node, otherwise: float) -> float:
     wanted = next(iter(node.get("examples", ())), otherwise)
     least, most = node.get("minimum", node.get("exclusiveMinimum", wanted)), node.get("maximum", wanted)
     number = min(max(wanted, least), most)

@@ -32,7 +32,7 @@ _COMMA: Final = re.compile(r"[ \t]*,[ \t]*")
 _BLANK_LINE: Final = re.compile(r"[ \t]*(?:\r?\n|\Z)")
 
 
-def replace_value(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
+def _replace_value(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
     """Replace the value at ``path``; a comment behind it keeps its column if possible."""
     node = spans.node(path)
     if node is None or node.kind in {"table", "array table"}:
@@ -56,12 +56,12 @@ def replace_value(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
         edit.replace(*padding.span(1), padding.group(1) if kept == wide else " " * kept)
 
 
-def add_key(spans: Spans, edit: Editor, path: Path, value: Any, after: str | None = None) -> None:
+def _add_key(spans: Spans, edit: Editor, path: Path, value: Any, after: str | None = None) -> None:
     """Add a missing key to an existing table; ``after`` names the key or table before it."""
     parent, pieces = path[:-1], spans.pieces(path[:-1])
     owner = spans.node(parent)
     if parent and not pieces:
-        add_key(spans, edit, parent, {path[-1]: value})
+        _add_key(spans, edit, parent, {path[-1]: value})
     elif owner is not None and owner.kind in {"key", "pair", "entry"}:
         _add_pair(spans, edit, owner, path, value)
     elif parent and owner is None and (dotted := [piece for piece in pieces if piece.node.kind in {"key", "pair"}]):
@@ -94,14 +94,14 @@ def _add_table(spans: Spans, edit: Editor, path: Path, value: Any, after: str | 
     body = spans.newline.join(table_text(path, row, spans.newline, entry=entry) for row in rows)
     pieces = _header_pieces(spans, (*path[:-1], after)) if after is not None else []
     pieces = pieces or (_header_pieces(spans, path[:-1]) if len(path) > 1 else [])
-    insert_block(spans, edit, pieces[-1].end if pieces else len(spans.text), body)
+    _insert_block(spans, edit, pieces[-1].end if pieces else len(spans.text), body)
 
 
 def _header_pieces(spans: Spans, path: Path) -> list[Piece]:
     return [piece for piece in spans.pieces(path) if piece.node.kind in {"table", "array table"}]
 
 
-def insert_block(spans: Spans, edit: Editor, at: int, body: str) -> None:
+def _insert_block(spans: Spans, edit: Editor, at: int, body: str) -> None:
     """Insert whole lines after the piece that ends at ``at``, with a blank line before them, and after where needed."""
     text, newline = spans.text, spans.newline
     before = text[:at]
@@ -114,7 +114,7 @@ def insert_block(spans: Spans, edit: Editor, at: int, body: str) -> None:
     edit.insert(at, opening + body + closing)
 
 
-def insert_lines(spans: Spans, edit: Editor, at: int, lines: str) -> None:
+def _insert_lines(spans: Spans, edit: Editor, at: int, lines: str) -> None:
     """Insert whole lines; at the end of a text without a last line break, the text stays without."""
     if at and not spans.text[:at].endswith("\n"):
         lines = spans.newline + lines.removesuffix(spans.newline)
@@ -131,12 +131,12 @@ def _add_line(spans: Spans, edit: Editor, owner: Node | None, path: Path, value:
         first = next(spans.headers(), None)
         at = len(spans.text) if first is None else spans.owned_start(first)
         line = f"{key}{toml_value(value, newline=spans.newline, column=len(key))}{spans.newline}"
-        insert_lines(spans, edit, at, line if first is None else line + spans.newline)
+        _insert_lines(spans, edit, at, line if first is None else line + spans.newline)
         return
     line_start = spans.text.rfind("\n", 0, last.start) + 1
     indent = spans.text[line_start : last.start]
     line = f"{indent}{key}{toml_value(value, '', spans.newline, indent, len(indent + key))}{spans.newline}"
-    insert_lines(spans, edit, spans.line_end(last), line)
+    _insert_lines(spans, edit, spans.line_end(last), line)
 
 
 def _add_pair(spans: Spans, edit: Editor, owner: Node, path: Path, value: Any) -> None:
@@ -163,19 +163,19 @@ def _add_dotted(spans: Spans, edit: Editor, piece: Piece, path: Path, value: Any
     indent = text[text.rfind("\n", 0, node.start) + 1 : node.start]
     like = text[node.value : node.end]
     value_text = toml_value(value, like, spans.newline, indent, len(indent + key))
-    insert_lines(spans, edit, piece.end, f"{indent}{key}{value_text}{spans.newline}")
+    _insert_lines(spans, edit, piece.end, f"{indent}{key}{value_text}{spans.newline}")
 
 
-def remove_key(spans: Spans, edit: Editor, path: Path) -> None:
+def _remove_key(spans: Spans, edit: Editor, path: Path) -> None:
     """Remove a key or table with its comments, and the blank line before it where two would be left."""
     for piece in spans.pieces(path):
         if piece.node.kind == "pair":
             _remove_pair(spans, edit, piece)
         else:
-            edit.delete(blank_start(spans.text, piece), piece.end)
+            edit.delete(_blank_start(spans.text, piece), piece.end)
 
 
-def blank_start(text: str, piece: Piece) -> int:
+def _blank_start(text: str, piece: Piece) -> int:
     """Return the start of a deletion: before the blank lines above, if a blank line or the end follows."""
     start = piece.start
     if not _BLANK_LINE.match(text, piece.end):
@@ -194,7 +194,7 @@ def _remove_pair(spans: Spans, edit: Editor, piece: Piece) -> None:
     edit.delete(len(before[:-1].rstrip(" \t")) if before.endswith(",") else piece.start, piece.end)
 
 
-def copy_table(spans: Spans, edit: Editor, path: Path, name: str) -> None:
+def _copy_table(spans: Spans, edit: Editor, path: Path, name: str) -> None:
     """Copy a key or table with its comments under another name, right after it."""
     pieces = spans.pieces(path)
     copies = [_renamed_text(spans, piece, len(path) - 1, name) for piece in pieces]
@@ -202,9 +202,9 @@ def copy_table(spans: Spans, edit: Editor, path: Path, name: str) -> None:
     if last.node.kind == "pair":
         edit.insert(last.end, "".join(f", {text}" for text in copies))
     elif all(piece.node.kind == "key" for piece in pieces):
-        insert_lines(spans, edit, last.end, "".join(copies))
+        _insert_lines(spans, edit, last.end, "".join(copies))
     else:
-        insert_block(spans, edit, last.end, spans.newline.join(copies))
+        _insert_block(spans, edit, last.end, spans.newline.join(copies))
 
 
 def _renamed_text(spans: Spans, piece: Piece, depth: int, name: str) -> str:
@@ -244,7 +244,7 @@ def _array_and_index(path: Path) -> tuple[Path, int]:
     return path[:-1], index
 
 
-def insert_entry(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
+def _insert_entry(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
     """Insert an entry at the index that ends ``path``, into an array that is in the text."""
     array, index = _array_and_index(path)
     node = spans.node(array)
@@ -309,15 +309,15 @@ def _insert_table(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
     if following := spans.pieces((*array, index)):
         edit.insert(following[0].start, body + spans.newline)
     else:
-        insert_block(spans, edit, spans.pieces(array)[-1].end, body)
+        _insert_block(spans, edit, spans.pieces(array)[-1].end, body)
 
 
-def remove_entry(spans: Spans, edit: Editor, path: Path) -> None:
+def _remove_entry(spans: Spans, edit: Editor, path: Path) -> None:
     """Remove an entry with its comments."""
     array, index = _array_and_index(path)
     if spans.node(array) is None:
         for piece in spans.pieces(path):
-            edit.delete(blank_start(spans.text, piece), piece.end)
+            edit.delete(_blank_start(spans.text, piece), piece.end)
         return
     text, slots = spans.text, spans.slots(array)
     slot, last = slots[index], index == len(slots) - 1
@@ -336,14 +336,14 @@ def remove_entry(spans: Spans, edit: Editor, path: Path) -> None:
     edit.delete(start, slot.tail_end + len(space))
 
 
-def copy_entry(spans: Spans, edit: Editor, path: Path) -> None:
+def _copy_entry(spans: Spans, edit: Editor, path: Path) -> None:
     """Copy an entry with its comments, right after it."""
     array, index = _array_and_index(path)
     text, newline = spans.text, spans.newline
     if spans.node(array) is None:
         pieces = spans.pieces(path)
         copies = (_lines(text, piece, newline) for piece in pieces)
-        insert_block(spans, edit, pieces[-1].end, newline.join(copies))
+        _insert_block(spans, edit, pieces[-1].end, newline.join(copies))
         return
     slots = spans.slots(array)
     slot = slots[index]
@@ -361,7 +361,7 @@ def _lines(text: str, piece: Piece, newline: str) -> str:
     return lines if lines.endswith("\n") else lines + newline
 
 
-def move_entry(spans: Spans, edit: Editor, path: Path, to: int) -> None:
+def _move_entry(spans: Spans, edit: Editor, path: Path, to: int) -> None:
     """Move an entry with its comments to another index; the others close up."""
     array, index = _array_and_index(path)
     order = list(range(max(index, to) + 1))
@@ -398,7 +398,7 @@ def _move_table(spans: Spans, edit: Editor, array: Path, order: list[int]) -> No
             body = body.removesuffix(spans.newline)
         edit.replace(first.start, first.end, body)
         for piece in others:
-            edit.delete(blank_start(text, piece), piece.end)
+            edit.delete(_blank_start(text, piece), piece.end)
 
 
 Document: TypeAlias = dict[str, Any]
@@ -660,9 +660,9 @@ def _edits_between_lists(path: Path, old: list[Any], new: list[Any]) -> Iterator
 def _write_edit(spans: Spans, editor: Editor, edit: Edit) -> None:
     path = edit.path
     if isinstance(edit, Insert):
-        insert_entry(spans, editor, path, edit.value)
+        _insert_entry(spans, editor, path, edit.value)
     elif isinstance(edit, Move):
-        move_entry(spans, editor, path, edit.to)
+        _move_entry(spans, editor, path, edit.to)
     elif isinstance(edit, Rename):
         for start, end in _key_parts(spans, path):
             editor.replace(start, end, key_text(edit.name))
@@ -671,15 +671,15 @@ def _write_edit(spans: Spans, editor: Editor, edit: Edit) -> None:
                 editor.replace(node.value, node.end, toml_value(edit.name, spans.text[node.value : node.end]))
     elif isinstance(edit, Duplicate):
         if isinstance(path[-1], int):
-            copy_entry(spans, editor, path)
+            _copy_entry(spans, editor, path)
         else:
-            copy_table(spans, editor, path, edit.name)
+            _copy_table(spans, editor, path, edit.name)
     elif isinstance(edit, Unset):
-        (remove_entry if isinstance(path[-1], int) else remove_key)(spans, editor, path)
+        (_remove_entry if isinstance(path[-1], int) else _remove_key)(spans, editor, path)
     elif spans.node(path) is None:
-        add_key(spans, editor, path, edit.value, edit.after)
+        _add_key(spans, editor, path, edit.value, edit.after)
     else:
-        replace_value(spans, editor, path, edit.value)
+        _replace_value(spans, editor, path, edit.value)
 
 
 def _is_written_apart(spans: Spans, path: Path) -> bool:

@@ -67,7 +67,7 @@ KINDS = {
 """What the kinds of a value that may be of several are called."""
 
 
-class EitherField(Field):
+class _EitherField(Field):
     """A value of one of several kinds: the kind, then its editor."""
 
     def __init__(self, row: FormRow) -> None:
@@ -76,7 +76,7 @@ class EitherField(Field):
         self.kinds = Segments(f"{row.label}, kind")
         self.kinds.chosen.connect(self._switch_kind)
         self.box.addWidget(self.kinds, 0, Qt.AlignmentFlag.AlignLeft)
-        self.inner = field_for(self._chosen_row(row))
+        self.inner = _field_for(self._chosen_row(row))
         self.inner.asked.connect(self.asked)
         self.inner.came.connect(self.came)
         self.box.addWidget(self.inner)
@@ -112,7 +112,7 @@ class EitherField(Field):
             self.set_value(str(first))
 
 
-def field_for(row: FormRow) -> Field:
+def _field_for(row: FormRow) -> Field:
     """Return the editor of a row."""
     kind = row.kind
     if kind in {"localised", "paragraphs"}:
@@ -130,12 +130,12 @@ def field_for(row: FormRow) -> Field:
     if kind in {"references", "list", "tables"}:
         return EntriesField(row)
     if kind == "either":
-        return EitherField(row)
+        return _EitherField(row)
     return LineField(row) if kind not in {"unknown", "table"} else UnknownField(row)
 
 
-LABEL_PX = 116
-MOST_REPAIRS = 3
+_LABEL_PX = 116
+_MOST_REPAIRS = 3
 EDITORS: Final[Mapping[tuple[str, str], SpecialEditor]] = {
     key: editor
     for editor in (
@@ -147,14 +147,14 @@ EDITORS: Final[Mapping[tuple[str, str], SpecialEditor]] = {
 """The special editor of each (model, key) that has one."""
 
 
-class FaultLine(QWidget):
+class _FaultLine(QWidget):
     """A sentence that says what is wrong, below an editor."""
 
     def __init__(self) -> None:
         super().__init__()
         icon = (Icon("warning", "bad", 16), 0, Qt.AlignmentFlag.AlignTop)
         self.sentence = label("", "label", "bad", wraps=True)
-        hbox(icon, (self.sentence, 1), spacing=8, margins=(LABEL_PX + 8, 0, 0, 0), parent=self)
+        hbox(icon, (self.sentence, 1), spacing=8, margins=(_LABEL_PX + 8, 0, 0, 0), parent=self)
 
 
 class RowWidget(Themed, QWidget):
@@ -169,15 +169,15 @@ class RowWidget(Themed, QWidget):
         super().__init__()
         self.row = row
         self.refusal = ""
-        special, wide = special_editor_of(row), is_wide(row)
+        special, wide = _special_editor_of(row), _is_wide(row)
         bare = special is not None and not special.labelled
-        self.field = field_for(row) if special is None or special.make is None else special.make(row)
+        self.field = _field_for(row) if special is None or special.make is None else special.make(row)
         if special is not None and special.adds is not None:
             self.field.add_extra(special.adds(self.field))
         self.keys = Segments("Which of the two to use") if row.keys else None
         self.words = label(row.label, "label", wraps=True)
         if not wide:
-            self.words.setFixedWidth(LABEL_PX)
+            self.words.setFixedWidth(_LABEL_PX)
         self.words.setMinimumHeight(FIELD_PX)
         self.words.setAlignment(Qt.AlignmentFlag.AlignVCenter)
         self.words.setBuddy(self.field)
@@ -199,7 +199,7 @@ class RowWidget(Themed, QWidget):
             across.addWidget(self.remove, 0, top)
         self.repairs: list[RepairButton] = []
         self._offered: dict[ProblemRow, tuple[str, ...]] = {}
-        self._buttons = vbox(spacing=6, margins=(LABEL_PX + 32, 0, 0, 0))
+        self._buttons = vbox(spacing=6, margins=(_LABEL_PX + 32, 0, 0, 0))
         column = vbox(spacing=4, margins=0, parent=self)
         heads = wide and len(row.languages) > 1 and not is_stacked(row)
         labelled = not bare and not (heads and row.required)
@@ -211,20 +211,20 @@ class RowWidget(Themed, QWidget):
         if self.keys is not None:
             self.keys.show_values(row.keys, row.path[-1])
             self.keys.chosen.connect(self._switch_key)
-            above = hbox((self.keys, 0, Qt.AlignmentFlag.AlignLeft), margins=(0 if wide else LABEL_PX + 8, 0, 0, 0))
+            above = hbox((self.keys, 0, Qt.AlignmentFlag.AlignLeft), margins=(0 if wide else _LABEL_PX + 8, 0, 0, 0))
             insert_layout(column, 0, above)
         if heads:
             of = "" if labelled else f"{row.label}, "
-            column.addWidget(LanguageHeads(f"{of}{language}" for _, language in row.languages))
+            column.addWidget(_LanguageHeads(f"{of}{language}" for _, language in row.languages))
         if wide and not bare:
             column.addWidget(self.field)
         add_layout(column, self._buttons)
         self.show_row(row)
 
     @cached_property
-    def wrong(self) -> FaultLine:
+    def wrong(self) -> _FaultLine:
         """The faults below the editor; made on first use."""
-        made = FaultLine()
+        made = _FaultLine()
         column = self.layout()
         assert isinstance(column, QVBoxLayout)  # noqa: S101 - made so
         made.hide()
@@ -308,7 +308,7 @@ class RowWidget(Themed, QWidget):
         several = len(offered) > 1
         asked = [(problem, word) for problem, sentences in offered.items() for word in sentences[: 1 if several else 2]]
         times = Counter(word for _problem, word in asked)
-        for problem, word in [(problem, word) for problem, word in asked if times[word] == 1][:MOST_REPAIRS]:
+        for problem, word in [(problem, word) for problem, word in asked if times[word] == 1][:_MOST_REPAIRS]:
             made = RepairButton(problem, word)
             made.clicked.connect(lambda _on=False, row=problem, word=word: self.repair_asked.emit(row, word))
             made.typed.connect(self._type_letter)
@@ -343,27 +343,27 @@ class RowWidget(Themed, QWidget):
         return capitalised(text)
 
 
-def special_editor_of(row: FormRow) -> SpecialEditor | None:
+def _special_editor_of(row: FormRow) -> SpecialEditor | None:
     """Return the special editor of a row, None if the editor of its kind is used."""
     return EDITORS.get((row.model, str(row.path[-1])))
 
 
-def is_wide(row: FormRow) -> bool:
+def _is_wide(row: FormRow) -> bool:
     """Return whether the editor of a row takes the width of the form."""
-    special = special_editor_of(row)
+    special = _special_editor_of(row)
     return row.kind == "paragraphs" if special is None else special.wide
 
 
-def editor_structure(row: FormRow) -> object:
+def _editor_structure(row: FormRow) -> object:
     """Return the part of a row's state that, when it changes, requires a new editor."""
-    special, own = special_editor_of(row), row
+    special, own = _special_editor_of(row), row
     inner = own.either[row.number or 0].kind if own.either else ""
     choices = tuple(choice.value for choice in own.choices) if own.kind in {"choice", "choices", "kind"} else ()
     extra = None if special is None else special.structure(row)
     return own.model, own.kind, inner, choices, row.languages, own.required, row.keys, extra
 
 
-class LanguageHeads(QWidget):
+class _LanguageHeads(QWidget):
     """Names of languages above the columns of their texts; ``inset`` is the room left and right [px]."""
 
     def __init__(self, languages: Iterable[str], inset: tuple[int, int] = (0, 0)) -> None:
@@ -372,16 +372,16 @@ class LanguageHeads(QWidget):
         hbox(*heads, spacing=8, margins=(inset[0], 0, inset[1], 0), parent=self)
 
 
-TILE = 40
+_TILE = 40
 
 
-class Tile(Themed, QWidget):
+class _Tile(Themed, QWidget):
     """An icon on a tinted square."""
 
     def __init__(self) -> None:
         super().__init__()
         self.icon = "ring"
-        self.setFixedSize(TILE, TILE)
+        self.setFixedSize(_TILE, _TILE)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = smooth_painter(self)
@@ -391,7 +391,7 @@ class Tile(Themed, QWidget):
         draw_icon(painter, self.icon, QRectF(self.rect()).adjusted(10, 10, -10, -10), self.theme.accent, 2.0)
 
 
-class FormHead(QWidget):
+class _FormHead(QWidget):
     """Signals: ``asked`` (a request), ``feel_asked`` (path), ``id_typed`` (path, text so far).
 
     ``unlock_asked`` is emitted where a locked id is to be changed.
@@ -406,7 +406,7 @@ class FormHead(QWidget):
         super().__init__()
         self.form: Form | None = None
         self._faulty = False
-        self.tile = Tile()
+        self.tile = _Tile()
         self.title = Elided("card")
         self.kind = Elided("small", "text2")
         self.used = Elided("small", "text2")
@@ -441,7 +441,7 @@ class FormHead(QWidget):
         )
         self.id_line = QWidget()
         words_of_id = label("ID", "label")
-        words_of_id.setFixedWidth(LABEL_PX)
+        words_of_id.setFixedWidth(_LABEL_PX)
         parts = (words_of_id, (self.id, 8), self.unlock, (self.used, 1))
         hbox(*parts, spacing=8, margins=(0, 4, 0, 0), parent=self.id_line)
         grid.addWidget(self.id_line, 1, 0, 1, 3)
@@ -533,12 +533,12 @@ class FormHead(QWidget):
                 self.asked.emit(RenameElement(self.form.path, name))
 
 
-ACROSS = 2
-FOOT_FROM = 460
+_ACROSS = 2
+_FOOT_FROM = 460
 """The height of the form from which it has a foot [px]."""
 
 
-class FormFoot(Themed, QWidget):
+class _FormFoot(Themed, QWidget):
     """Label and place of a field, and its description."""
 
     def __init__(self) -> None:
@@ -561,7 +561,7 @@ class FormFoot(Themed, QWidget):
         fill_rounded(painter, QRectF(self.rect()), RADIUS_CONTROL, self.theme.sunk)
 
 
-class AddKeys(QWidget):
+class _AddKeys(QWidget):
     """Buttons that add keys to a section; ``keys`` are paths within the element, labels and descriptions."""
 
     def __init__(self, keys: Iterable[tuple[Path, str, str]], add: Callable[[Path], None]) -> None:
@@ -572,7 +572,7 @@ class AddKeys(QWidget):
             made = self.buttons[inner] = add_button(f"Add {name}", name)
             made.setToolTip(help_)
             made.clicked.connect(lambda _checked=False, inner=inner: add(inner))
-            grid.addWidget(made, at // ACROSS, at % ACROSS, Qt.AlignmentFlag.AlignLeft)
+            grid.addWidget(made, at // _ACROSS, at % _ACROSS, Qt.AlignmentFlag.AlignLeft)
 
 
 class FormCard(Card):
@@ -595,7 +595,7 @@ class FormCard(Card):
         self._known: Mapping[ProblemRow, tuple[str, ...]] = {}
         self._focused: RowWidget | None = None
         self._renames = False
-        self.head = FormHead()
+        self.head = _FormHead()
         self.head.asked.connect(self._request)
         self.own = label("", "label", "bad", wraps=True)
         self.above, self.panel, self.below = QuestionRows(), Panel(), QuestionRows()
@@ -605,12 +605,12 @@ class FormCard(Card):
         self.inside = QWidget()
         vbox(self.above, self.panel, self.below, STRETCH, spacing=7, margins=(0, 2, 8, 2), parent=self.inside)
         self.area = scrolled(self.inside)
-        self.foot = FormFoot()
+        self.foot = _FormFoot()
         add_parts(self.column, self.head, Rule(), self.own, (self.area, 1), self.foot)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self.foot.setVisible(self.height() >= FOOT_FROM)
+        self.foot.setVisible(self.height() >= _FOOT_FROM)
 
     def _request(self, asked: object) -> None:
         """Request a step; after a rename the form stays at its element."""
@@ -664,7 +664,7 @@ class FormCard(Card):
                 else:
                     part.show_row(row)
                 self.rows.append(part)
-            elif isinstance(part, AddKeys):
+            elif isinstance(part, _AddKeys):
                 self.adds |= {(*form.path, *inner): made for inner, made in part.buttons.items()}
         gone = next((part for part in old.values() if inside_form and part.isAncestorOf(keyboard)), None)
         if gone is not None and keyboard is not None:
@@ -708,20 +708,20 @@ class FormCard(Card):
                 yield ("faults", at, sentences), partial(label, sentences, "label", "bad", wraps=True), None
             heads: tuple[tuple[str, str], ...] = ()
             for row in section.rows:
-                beside = () if is_stacked(row) or is_wide(row) else row.languages
+                beside = () if is_stacked(row) or _is_wide(row) else row.languages
                 if len(beside) > 1 and beside != heads:
                     names = tuple(language for _, language in beside)
                     yield (
                         ("heads", at, row.path[-1], names),
-                        partial(LanguageHeads, names, (LABEL_PX + 8, FIELD_PX + 8)),
+                        partial(_LanguageHeads, names, (_LABEL_PX + 8, FIELD_PX + 8)),
                         None,
                     )
                 heads = beside
                 inner = row.path[len(form.path) :] if row.path[: len(form.path)] == form.path else row.path
-                yield (at, inner, editor_structure(row)), partial(self._make_row, row), row
+                yield (at, inner, _editor_structure(row)), partial(self._make_row, row), row
             if section.absent and not self.read_only:
                 added = tuple((row.path[len(form.path) :], row.label, row.help) for row in section.absent)
-                yield ("adds", at, added), partial(AddKeys, added, self._add_key), None
+                yield ("adds", at, added), partial(_AddKeys, added, self._add_key), None
 
     def _add_key(self, inner: Path) -> None:
         self.asked.emit(AddKey(self._path_in_form(inner)))

@@ -40,14 +40,14 @@ from study_app.protocol.trials.methods import Adjustment
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.protocol.trials.tasks import AnyTask
 
-FARTHEST: Final = 3.0
+_FARTHEST: Final = 3.0
 """A limit is drawn up to so many times the highest level, or spans above it."""
 ROOM: Final = 1.3
-MOST_TICKS: Final = 6
+_MOST_TICKS: Final = 6
 
 
 @dataclass(frozen=True, slots=True)
-class AxisLimit:
+class _AxisLimit:
     """A limit: its name with its value, and the level that reaches it."""
 
     words: str
@@ -55,7 +55,7 @@ class AxisLimit:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LevelAxis:
+class _LevelAxis:
     """An axis of levels."""
 
     # the ends of the levels
@@ -71,12 +71,12 @@ class LevelAxis:
     caption: str  # what a level is, and how the levels are spaced
     standard: str  # the highest standard in words, "" without one
     # the levels of the force limit ("norm") and the slope limit, if near
-    limits: Mapping[Limit, AxisLimit]
+    limits: Mapping[Limit, _AxisLimit]
     ticks: Ticks  # levels at which the axis is written at
     sentence: str  # the axis in a sentence
 
 
-def level_axis(study: Study, row: Row) -> LevelAxis | None:
+def _level_axis(study: Study, row: Row) -> _LevelAxis | None:
     """Return the axis of a stimulus' levels; None if they are invalid."""
     try:
         stimulus = Stimulus.model_validate(value_at(study.document, row.path[:-1]))
@@ -89,18 +89,18 @@ def level_axis(study: Study, row: Row) -> LevelAxis | None:
     near = [
         limit.level
         for limit in limits.values()
-        if limit.level <= (FARTHEST * high if log else high + FARTHEST * (high - low))
+        if limit.level <= (_FARTHEST * high if log else high + _FARTHEST * (high - low))
     ]
     top = max(high, *near) if near else high
     least, most = (low / ROOM**2, top * ROOM) if log else (low - 0.1 * (top - low), top + 0.15 * (top - low))
     if not log and stimulus.level_kind != "value":
         least = max(0.0, least)
     factor = scale.factor
-    ticks = (log_ticks if log else even_ticks)(least * factor, most * factor, MOST_TICKS)
+    ticks = (log_ticks if log else even_ticks)(least * factor, most * factor, _MOST_TICKS)
     shown = {name: limit for name, limit in limits.items() if limit.level <= most}
     spacing = "in ratio" if log else "even"
     beyond = "".join(f" {capitalised(limit.words)}." for limit in shown.values())
-    return LevelAxis(
+    return _LevelAxis(
         low=low,
         high=high,
         least=least,
@@ -117,7 +117,7 @@ def level_axis(study: Study, row: Row) -> LevelAxis | None:
     )
 
 
-def _limits(study: Study, row: Row, scale: LevelWords) -> tuple[str, dict[Limit, AxisLimit]]:
+def _limits(study: Study, row: Row, scale: LevelWords) -> tuple[str, dict[Limit, _AxisLimit]]:
     """Return the highest standard in words, and the limits of the block that presents the levels."""
     protocol = study.formed
     focus = focus_of(protocol, row.path[:-1])
@@ -125,26 +125,28 @@ def _limits(study: Study, row: Row, scale: LevelWords) -> tuple[str, dict[Limit,
     if of is None:
         return "", {}
     standard = "" if of.standard is None else f"standard {rounded(of.standard)} {scale.value_unit}".rstrip()
-    limits: dict[Limit, AxisLimit] = {}
+    limits: dict[Limit, _AxisLimit] = {}
     if of.limits is not None:
         values: dict[Limit, float | None] = {"norm": of.limits.force, "slope": of.limits.loop}
         for name, value in values.items():
             if value is not None:
                 level = scale.stimulus.level_between(of.standard, value)
                 if math.isfinite(level) and level > 0:
-                    limits[name] = AxisLimit(f"{LIMIT_NAMES[name]} {rounded(value)} {scale.value_unit}".rstrip(), level)
+                    limits[name] = _AxisLimit(
+                        f"{LIMIT_NAMES[name]} {rounded(value)} {scale.value_unit}".rstrip(), level
+                    )
     return standard, limits
 
 
 HEIGHT, TRACK_Y, TRACK_PX, MARGIN = 104, 46.0, 12.0, 14
 
 
-class AxisView(Extra, Themed, QWidget):
+class _AxisView(Extra, Themed, QWidget):
     """The axis: the levels with their ends, and the limits."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.axis: LevelAxis | None = None
+        self.axis: _LevelAxis | None = None
         self.setFixedHeight(HEIGHT)
         self.setAccessibleName("Axis of the levels")
 
@@ -197,7 +199,7 @@ class AxisView(Extra, Themed, QWidget):
         painter.drawText(below, Qt.AlignmentFlag.AlignLeft, axis.standard)
         painter.drawText(below, Qt.AlignmentFlag.AlignRight, axis.caption)
 
-    def _paint_limits(self, painter: QPainter, axis: LevelAxis, track: QRectF) -> None:
+    def _paint_limits(self, painter: QPainter, axis: _LevelAxis, track: QRectF) -> None:
         """Paint where the limits begin, the name of the higher one above that of the lower one."""
         limits = [(limit, limit_colour(self.theme, name)) for name, limit in axis.limits.items()]
         for row, (limit, ink) in enumerate(sorted(limits, key=lambda pair: pair[0].level)):
@@ -209,17 +211,17 @@ class AxisView(Extra, Themed, QWidget):
             painter.drawText(room, Qt.AlignmentFlag.AlignRight, limit.words)
 
 
-LEVELS: Final = SpecialEditor((("Stimulus", "levels"),), adds=lambda _field: AxisView(), wide=True, facts=level_axis)
+LEVELS: Final = SpecialEditor((("Stimulus", "levels"),), adds=lambda _field: _AxisView(), wide=True, facts=_level_axis)
 
 
-PhaseKind: TypeAlias = Literal["interval", "pause", "question", "feedback"]
+_PhaseKind: TypeAlias = Literal["interval", "pause", "question", "feedback"]
 
 
 @dataclass(frozen=True, slots=True)
-class Phase:
+class _Phase:
     """A phase of a trial."""
 
-    kind: PhaseKind  # what it is
+    kind: _PhaseKind  # what it is
     # its name, and what is written in its picture
     name: str
     words: str
@@ -240,10 +242,10 @@ class Phase:
 
 
 @dataclass(frozen=True, slots=True)
-class TrialStrip:
+class _TrialStrip:
     """A trial: its phases, and how long it takes with the pause after it [s]."""
 
-    phases: tuple[Phase, ...]
+    phases: tuple[_Phase, ...]
     duration_s: float
 
     @property
@@ -256,14 +258,14 @@ class TrialStrip:
         return duration(self.duration_s, tenths=True)
 
 
-def trial_strip(study: Study, row: Row) -> TrialStrip | None:
+def _trial_strip(study: Study, row: Row) -> _TrialStrip | None:
     """Return a trial of a block with a design; None where the study has faults."""
     protocol = study.formed
     block = None if protocol is None else protocol.blocks.get(str(row.path[1]))
     if protocol is None or block is None or block.design is None:
         return None
     design, task = design_of(protocol, block), protocol.tasks[block.task]
-    phases: list[Phase] = []
+    phases: list[_Phase] = []
     free = task.expected_s != task.limit_s
 
     def of_design(key: str) -> Path:
@@ -271,22 +273,22 @@ def trial_strip(study: Study, row: Row) -> TrialStrip | None:
 
     for number in range(design.intervals):
         if number:
-            phases.append(Phase("pause", label_of("pause_s"), "", design.pause_s, of_design("pause_s")))
+            phases.append(_Phase("pause", label_of("pause_s"), "", design.pause_s, of_design("pause_s")))
         ordinal = ORDINALS[number] if design.intervals > 1 else ""
         phases.append(
-            Phase("interval", "Interval", ordinal, task.expected_s, ("tasks", block.task, _duration_key(task)), free)
+            _Phase("interval", "Interval", ordinal, task.expected_s, ("tasks", block.task, _duration_key(task)), free)
         )
     method = method_of(protocol, block) if block.stimulus is not None else None
     if isinstance(method, Adjustment):
         field = ("methods", str(block.method), "most_s") if block.method in protocol.methods else ()
-        phases.append(Phase("question", "Setting", "", method.most_s / 2, field, about=True))
+        phases.append(_Phase("question", "Setting", "", method.most_s / 2, field, about=True))
     else:
         reply_s = CHOICE_S if design.reply == "choice" else ANSWER_S
-        phases.append(Phase("question", "Question", design.reply, reply_s, of_design("question"), about=True))
+        phases.append(_Phase("question", "Question", design.reply, reply_s, of_design("question"), about=True))
     if design.shows_feedback(block.phase == "practice"):
-        phases.append(Phase("feedback", "Feedback", "", design.feedback_s, of_design("feedback_s")))
-    phases.append(Phase("pause", label_of("between_s"), "", design.between_s, of_design("between_s")))
-    return TrialStrip(tuple(phases), sum(phase.duration_s for phase in phases))
+        phases.append(_Phase("feedback", "Feedback", "", design.feedback_s, of_design("feedback_s")))
+    phases.append(_Phase("pause", label_of("between_s"), "", design.between_s, of_design("between_s")))
+    return _TrialStrip(tuple(phases), sum(phase.duration_s for phase in phases))
 
 
 def _duration_key(task: AnyTask) -> str:
@@ -297,14 +299,14 @@ def _duration_key(task: AnyTask) -> str:
 PICTURE_PX, GAP = 52, 6
 
 
-class PhaseButton(Themed, QAbstractButton):
+class _PhaseButton(Themed, QAbstractButton):
     """A phase of a trial; a press asks for its field."""
 
     def __init__(self, strip: QWidget) -> None:
         super().__init__(strip)
-        self.phase: Phase | None = None
+        self.phase: _Phase | None = None
 
-    def show_phase(self, phase: Phase) -> None:
+    def show_phase(self, phase: _Phase) -> None:
         self.phase = phase
         opens = f"Opens “{phase.opens}”" if phase.opens else ""
         self.setAccessibleName(f"{phase.name}, {phase.duration}")
@@ -337,7 +339,7 @@ class PhaseButton(Themed, QAbstractButton):
             shown = metrics.elidedText(text, Qt.TextElideMode.ElideRight, self.width())
             painter.drawText(QPointF(0, picture.bottom() + below), shown)
 
-    def _paint_interval(self, painter: QPainter, phase: Phase, picture: QRectF) -> None:
+    def _paint_interval(self, painter: QPainter, phase: _Phase, picture: QRectF) -> None:
         t, way = self.theme, QPainterPath()
         middle = picture.center().y() - 5
         step = picture.width() / 4
@@ -358,7 +360,7 @@ class PhaseButton(Themed, QAbstractButton):
                          phase.words)  # fmt: skip
 
 
-class StripView(Extra, Themed, QWidget):
+class _StripView(Extra, Themed, QWidget):
     """One trial, as wide as its phases are long, but each wide enough for its words.
 
     ``opened`` carries the path of the field of the phase that is pressed.
@@ -368,17 +370,17 @@ class StripView(Extra, Themed, QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.strip: TrialStrip | None = None
-        self.phases: list[PhaseButton] = []
+        self.strip: _TrialStrip | None = None
+        self.phases: list[_PhaseButton] = []
         self.setFixedHeight(HEIGHT)
 
     def show_facts(self, facts: Any) -> None:
-        strip: TrialStrip = facts
+        strip: _TrialStrip = facts
         self.strip = strip
         self.setAccessibleName("One trial")
         self.setAccessibleDescription(strip.sentence)
         while len(self.phases) < len(strip.phases):
-            made = PhaseButton(self)
+            made = _PhaseButton(self)
             made.clicked.connect(lambda _checked=False, made=made: self._open_phase(made))
             self.phases.append(made)
         for at, button in enumerate(self.phases):
@@ -388,7 +390,7 @@ class StripView(Extra, Themed, QWidget):
         self._place_phases()
         self.update()
 
-    def _open_phase(self, pressed: PhaseButton) -> None:
+    def _open_phase(self, pressed: _PhaseButton) -> None:
         if pressed.phase is not None and pressed.phase.field:
             self.opened.emit(pressed.phase.field)
 
@@ -420,7 +422,7 @@ class StripView(Extra, Themed, QWidget):
         painter.drawText(head, Qt.AlignmentFlag.AlignRight, self.strip.duration)
 
 
-def _phase_widths(phases: tuple[Phase, ...], whole: float) -> list[float]:
+def _phase_widths(phases: tuple[_Phase, ...], whole: float) -> list[float]:
     """Return the widths of the phases: wide enough for their texts, and longer phases are wider."""
     metrics = QFontMetrics(font("small"))
     least_widths = [max(map(metrics.horizontalAdvance, (phase.name, phase.duration))) + GAP for phase in phases]
@@ -429,10 +431,10 @@ def _phase_widths(phases: tuple[Phase, ...], whole: float) -> list[float]:
     return [share * least + rest * phase.duration_s / total for least, phase in zip(least_widths, phases, strict=True)]
 
 
-def _trial_strip_below(field: Field) -> StripView:
-    made = StripView()
+def _trial_strip_below(field: Field) -> _StripView:
+    made = _StripView()
     made.opened.connect(lambda path: field.asked.emit(GoTo(path[:2], path)))
     return made
 
 
-TRIAL: Final = SpecialEditor((("Block", "design"),), adds=_trial_strip_below, wide=True, facts=trial_strip)
+TRIAL: Final = SpecialEditor((("Block", "design"),), adds=_trial_strip_below, wide=True, facts=_trial_strip)

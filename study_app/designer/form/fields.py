@@ -37,7 +37,7 @@ CLICK_MS = 10
 """How often it is looked whether the click is done that the keyboard left a field by [ms]."""
 MOST_LINES, SENTENCE_EDGE_PX = 6, 16
 """How many lines a sentence has at most, and what its field needs above and below them [px]."""
-LINE_BREAK = re.compile(r"\s*[\r\n\u2028\u2029]+\s*")
+_LINE_BREAK = re.compile(r"\s*[\r\n\u2028\u2029]+\s*")
 KEYS_OF_PLACE = (QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo, QKeySequence.StandardKey.Save)
 
 
@@ -287,7 +287,7 @@ class TypedSentence(TypedText):
             super().keyPressEvent(event)
 
     def insertFromMimeData(self, source: QMimeData) -> None:
-        self.insertPlainText(LINE_BREAK.sub(" ", source.text()))
+        self.insertPlainText(_LINE_BREAK.sub(" ", source.text()))
 
 
 MOST_SEGMENTS, SEGMENT_LETTERS = 4, 34

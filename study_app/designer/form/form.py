@@ -49,12 +49,12 @@ from study_app.protocol.source.document import Path, Places, names, places_of, v
 from study_app.protocol.warnings.untranslated import untranslated_at
 from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
 
-ENTRIES: Final = "In this order"
-DEEPEST: Final = 3
+_ENTRIES: Final = "In this order"
+_DEEPEST: Final = 3
 """So many tables within each other are shown in one form."""
 KINDS: Final[Mapping[Path, str]] = {SEQUENCE: "Pages, blocks and questionnaires"}
-UNREADABLE: Final = "Correct the text in the tab File"
-WITH_LIQUIDS = ("liquids", "conditions", "blocks")
+_UNREADABLE: Final = "Correct the text in the tab File"
+_WITH_LIQUIDS = ("liquids", "conditions", "blocks")
 """Sections whose elements the lab opens."""
 
 
@@ -65,12 +65,17 @@ def form_of(study: Study, path: Path) -> Form:
         said = [_sentence(problem.message, problem.hint) for problem in study.problems]
         why = tuple(map("".join, zip(lines, said, strict=True)))
         return Form(
-            path=FIRST, title=title_of({}, FIRST), icon=icon_of(FIRST, {}), kind=UNREADABLE, faults=why, unreadable=True
+            path=FIRST,
+            title=title_of({}, FIRST),
+            icon=icon_of(FIRST, {}),
+            kind=_UNREADABLE,
+            faults=why,
+            unreadable=True,
         )
     document, places = study.document, places_of(study.text)
     own_row = row_at(document, path) if len(path) == 1 else None
     if own_row is not None and own_row.kind == "tables":
-        own_row = replace(own_row, label=ENTRIES)
+        own_row = replace(own_row, label=_ENTRIES)
         sections: tuple[Section, ...] = (Section(path, "", (_form_row(study, own_row, places),)),)
     else:
         sections = tuple(_sections(study, path, places, 0))
@@ -105,14 +110,14 @@ def form_of(study: Study, path: Path) -> Form:
         position=position_of(document, path),
         questions=question_lines(study, path[:-1]) if path[2:3] == ("items",) else NO_QUESTIONS,
         around=tuple((path[:length], title_of(document, path[:length])) for length in (1, 2, 4) if length <= len(path)),
-        feel=f"Feel {title}" if len(path) == 2 and path[0] in WITH_LIQUIDS else "",
+        feel=f"Feel {title}" if len(path) == 2 and path[0] in _WITH_LIQUIDS else "",
         series=bool(number_rows(document, path)),
         used=usage_text(document, path),
-        asks=tuple(session_requests(document, path)),
+        asks=tuple(_session_requests(document, path)),
     )
 
 
-def session_requests(document: Mapping[str, Any], path: Path) -> Iterator[tuple[str, Request]]:
+def _session_requests(document: Mapping[str, Any], path: Path) -> Iterator[tuple[str, Request]]:
     """Yield the ways to add a questionnaire to the session, each with its request."""
     if len(path) != 2 or path[0] != "questionnaires":
         return
@@ -164,12 +169,12 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
     other = {row.path[-1]: row for row in of_table}
     for row in of_table:
         faulty = any(fault.path[: len(row.path)] == row.path for fault in study.faults)
-        if row.kind == "table" and row.value is not None and depth < DEEPEST and isinstance(row.value, Mapping):
+        if row.kind == "table" and row.value is not None and depth < _DEEPEST and isinstance(row.value, Mapping):
             below.append(row.path)
         elif (
             row.kind == "tables"
             and _facts_of(row) is None
-            and depth < DEEPEST
+            and depth < _DEEPEST
             and len(row.path) > 1
             and isinstance(row.value, Mapping)
             and not any(isinstance(value, Mapping) for value in row.value.values())

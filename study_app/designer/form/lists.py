@@ -37,11 +37,11 @@ from study_app.haptics.model.slope_limits import HAND_MPS, steady_force
 from study_app.number_text import typed_numbers
 from study_app.protocol.source.document import Path
 
-CAPTION: Final = f"force at {HAND_MPS:g} m/s of the hand"
+_CAPTION: Final = f"force at {HAND_MPS:g} m/s of the hand"
 
 
 @dataclass(frozen=True, slots=True)
-class ConditionLine:
+class _ConditionLine:
     """One condition of a block."""
 
     liquid: Path | None  # the place of its liquid, None if it has several or is not in the study
@@ -50,12 +50,12 @@ class ConditionLine:
     clipped: bool = False  # whether a limit clips the force
 
 
-def _condition_line(study: Study, name: Any) -> ConditionLine:
+def _condition_line(study: Study, name: Any) -> _ConditionLine:
     document = study.document
     conditions, liquids = document.get("conditions", {}), document.get("liquids", {})
     table = conditions.get(name) if isinstance(conditions, Mapping) and isinstance(name, str) else None
     if not isinstance(table, Mapping):
-        return ConditionLine(None, "not in the study", UNKNOWN)
+        return _ConditionLine(None, "not in the study", UNKNOWN)
     named = table.get("liquid")
     known = isinstance(named, str) and isinstance(liquids, Mapping) and named in liquids
     liquid: Path | None = ("liquids", str(named)) if known else None
@@ -69,15 +69,15 @@ def _condition_line(study: Study, name: Any) -> ConditionLine:
     valid = valid_part(study)
     protocol = valid.protocol if valid.forces else None
     if protocol is None or liquid is None or name not in protocol.conditions:
-        return ConditionLine(liquid, ", ".join(details), UNKNOWN)
+        return _ConditionLine(liquid, ", ".join(details), UNKNOWN)
     force = steady_force(protocol.scene_for(str(name)))
-    return ConditionLine(liquid, ", ".join(details), f"{force.force_n:.2f} N", force.limit is not None)
+    return _ConditionLine(liquid, ", ".join(details), f"{force.force_n:.2f} N", force.limit is not None)
 
 
 RIGHT: Final = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 
 
-class Rows(QListWidget):
+class _Rows(QListWidget):
     """Qt's list, as high as its entries; ``keys`` are its own, and ``dropped`` says where a drag ended."""
 
     dropped = Signal(int)
@@ -154,7 +154,7 @@ class EntryList(Field):
         self.rows: list[EntryRow] = []
         self._after: int | None = None
         self._filled: object = None
-        self.list = Rows()
+        self.list = _Rows()
         self.list.setAccessibleName(row.label)
         self.list.dropped.connect(lambda to: self.move_entry(self.chosen, to))
         self.list.itemDoubleClicked.connect(lambda item: self.open_entry(self.list.row(item)))
@@ -247,7 +247,7 @@ class EntryList(Field):
             self._request_step(DuplicateElement(self.entry_path(self.chosen), stays=True), self.chosen + 1)
 
 
-class NamesList(Choice):
+class _NamesList(Choice):
     """A list of what can be added, which shows no choice of its own; ``chosen`` carries what an entry stands for."""
 
     chosen = Signal(object)
@@ -276,7 +276,7 @@ class EntriesField(EntryList):
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
         name = f"Add to {row.label}"
-        self.names = NamesList(name, "Add …") if row.kind == "references" else None
+        self.names = _NamesList(name, "Add …") if row.kind == "references" else None
         if self.names is not None:
             self.names.chosen.connect(self.asked)
             self.add: QWidget = self.names
@@ -321,10 +321,10 @@ class EntriesField(EntryList):
             shown.line.addWidget(note)
 
 
-class ConditionsField(EntriesField):
+class _ConditionsField(EntriesField):
     """The conditions of a block, each with its liquid, its delay and its force."""
 
-    caption = CAPTION
+    caption = _CAPTION
 
     def row_content(self) -> object:
         return self.row.entries, self.row.facts
@@ -395,7 +395,7 @@ class LanguageListField(EntryList):
         super().__init__(row)
         self.make_read_only()
         self.copies: dict[str, ActionButton] = {}
-        self.names = NamesList("Add a language to every text", "Language …")
+        self.names = _NamesList("Add a language to every text", "Language …")
         self.names.chosen.connect(lambda code: self.asked.emit(ChangeLanguage("add", code)))
         self.box.addWidget(self.names, 0, Qt.AlignmentFlag.AlignLeft)
         self.setFocusProxy(self.names)
@@ -423,7 +423,7 @@ class LanguageListField(EntryList):
 
 
 CONDITIONS: Final = SpecialEditor(
-    (("Block", "conditions"),), ConditionsField, wide=True,
+    (("Block", "conditions"),), _ConditionsField, wide=True,
     facts=lambda study, row: tuple(
         _condition_line(study, name) for name in (row.value if isinstance(row.value, tuple) else ())
     ),

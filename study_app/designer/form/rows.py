@@ -11,7 +11,7 @@ from study_app.protocol.source.document import Path, value_at
 from study_app.protocol.warnings.untranslated import UntranslatedText
 from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
 
-ICONS: Final = {"rating": "scale", "slider": "slider", "number": "number", "choice": "list", "text": "letter"}
+_ICONS: Final = {"rating": "scale", "slider": "slider", "number": "number", "choice": "list", "text": "letter"}
 STATEMENT: Final = "statement"
 
 
@@ -63,7 +63,7 @@ def _question_line(
         path=path,
         number=number,
         kind=kind,
-        icon=ICONS.get(kind, "scale"),
+        icon=_ICONS.get(kind, "scale"),
         texts=shown,
         note=_show_if_note(item, numbers),
         faults=faults,

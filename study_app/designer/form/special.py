@@ -47,11 +47,11 @@ from study_app.protocol.source.document import entries, names, value_at
 from study_app.protocol.trials import designs, tasks
 from study_app.protocol.wording.languages import language_name, languages_of
 
-ROUNDS: Final = 3
-SQUARES: Final[Mapping[Any, Literal["williams", "latin"]]] = {"williams": "williams", "latin": "latin"}
+_ROUNDS: Final = 3
+_SQUARES: Final[Mapping[Any, Literal["williams", "latin"]]] = {"williams": "williams", "latin": "latin"}
 
 
-def order_balance(study: Study, row: Row) -> tuple[Verdict, str] | None:
+def _order_balance(study: Study, row: Row) -> tuple[Verdict, str] | None:
     """Return how balanced the order of a block is, and the explanation.
 
     None where it has one condition, or another method orders it.
@@ -63,12 +63,12 @@ def order_balance(study: Study, row: Row) -> tuple[Verdict, str] | None:
     order, codes = row.default if row.value is None else row.value, len(conditions)
     if order == "fixed":
         return ("neutral", "ring", "same for all"), "Effects of condition and position cannot be separated."
-    if not isinstance(order, str) or order not in SQUARES:
+    if not isinstance(order, str) or order not in _SQUARES:
         drawn = "Drawn again in every session, so positions are balanced only on average."
         return ("neutral", "ring", "balanced on average"), drawn
-    square, repetitions = SQUARES[order], block.get("repetitions", 1)
+    square, repetitions = _SQUARES[order], block.get("repetitions", 1)
     rows = row_count(square, codes)
-    numbers = ", ".join(str(rows * number) for number in range(1, ROUNDS + 1))
+    numbers = ", ".join(str(rows * number) for number in range(1, _ROUNDS + 1))
     carries = square == "williams" and isinstance(repetitions, int) and has_even_borders(codes, max(1, repetitions))
     at = f"at every multiple of {rows} participants{' in a group' if study.document.get('groups') else ''}."
     if carries or codes == 2:
@@ -77,25 +77,25 @@ def order_balance(study: Study, row: Row) -> tuple[Verdict, str] | None:
 
 
 @dataclass(frozen=True, slots=True)
-class ScalePoints:
+class _ScalePoints:
     """Code and name of each language, and the words of each point in each of them, "" where it is missing."""
 
     languages: tuple[tuple[str, str], ...]
     points: tuple[tuple[str, ...], ...]
 
 
-def scale_points(study: Study, row: Row) -> ScalePoints:
+def _scale_points(study: Study, row: Row) -> _ScalePoints:
     """Return the points of a scale in the study's languages and any others that it has."""
     labels = row.value if isinstance(row.value, Mapping) else {}
     codes = list(dict.fromkeys([*languages_of(study.document), *labels]))
     columns = [labels[code] if isinstance(labels.get(code), tuple) else () for code in codes]
     count = max(map(len, columns), default=0)
     points = tuple(tuple(str(column[at]) if at < len(column) else "" for column in columns) for at in range(count))
-    return ScalePoints(tuple((code, language_name(code)) for code in codes), points)
+    return _ScalePoints(tuple((code, language_name(code)) for code in codes), points)
 
 
 NUMBER_PX, ICON_PX, OPEN_PX = 18, 18, 32
-INSET_PX = NUMBER_PX + ICON_PX + 2 * 8
+_INSET_PX = NUMBER_PX + ICON_PX + 2 * 8
 
 
 class QuestionRow(Themed, QWidget):
@@ -180,7 +180,7 @@ class QuestionRows(Themed, QWidget):
         if len(languages) > 1:
             heads = QWidget()
             columns = ((_column_text(language, "small", "text2"), 1) for language in languages)
-            hbox(*columns, spacing=8, margins=(INSET_PX, 0, OPEN_PX + 8, 0), parent=heads)
+            hbox(*columns, spacing=8, margins=(_INSET_PX, 0, OPEN_PX + 8, 0), parent=heads)
             self.column.addWidget(heads)
         for line in lines:
             made = QuestionRow(line)
@@ -206,25 +206,25 @@ DESCRIPTION: Final = SpecialEditor(
 )
 
 
-QUESTIONS: Final = (*(kind.__name__ for kind in questions.KINDS.own.values()), *questions.KINDS.others)
-TASKS: Final = (*(kind.__name__ for kind in tasks.KINDS.own.values()), *tasks.KINDS.others)
-DESIGNS: Final = tuple({kind.__name__ for kind in designs.KINDS.values()})
+_QUESTIONS: Final = (*(kind.__name__ for kind in questions.KINDS.own.values()), *questions.KINDS.others)
+_TASKS: Final = (*(kind.__name__ for kind in tasks.KINDS.own.values()), *tasks.KINDS.others)
+_DESIGNS: Final = tuple({kind.__name__ for kind in designs.KINDS.values()})
 """The titles of their tables."""
 
 
 SENTENCES: Final = SpecialEditor(
     (
         ("Questionnaire", "intro"),
-        *((kind, "text") for kind in QUESTIONS),
-        *((kind, "instruction") for kind in TASKS),
-        *((kind, "question") for kind in DESIGNS),
+        *((kind, "text") for kind in _QUESTIONS),
+        *((kind, "instruction") for kind in _TASKS),
+        *((kind, "question") for kind in _DESIGNS),
     ),
     partial(LanguagesField, typed_in=TypedSentence),
     wide=True,
 )
 
 
-class BalanceChip(Extra, Chip):
+class _BalanceChip(Extra, Chip):
     """Says how even an order is."""
 
     beside_px = 124
@@ -236,10 +236,10 @@ class BalanceChip(Extra, Chip):
         self.setAccessibleDescription(sentence)
 
 
-ORDER: Final = SpecialEditor((("Block", "order"),), adds=lambda _field: BalanceChip(small=True), facts=order_balance)
+ORDER: Final = SpecialEditor((("Block", "order"),), adds=lambda _field: _BalanceChip(small=True), facts=_order_balance)
 
 
-class PointsField(Field):
+class _PointsField(Field):
     """A line for each point, a column for each language, and a button that adds a point."""
 
     def __init__(self, row: FormRow) -> None:
@@ -298,17 +298,17 @@ class PointsField(Field):
 
 POINTS: Final = SpecialEditor(
     (("Scale", "labels"),),
-    PointsField,
+    _PointsField,
     wide=True,
     structure=lambda row: (row.facts.languages, len(row.facts.points)),
-    facts=scale_points,
+    facts=_scale_points,
 )
 
 
-QUESTION_KIND: Final = SpecialEditor(tuple((kind, "kind") for kind in QUESTIONS), wide=True, labelled=False)
+QUESTION_KIND: Final = SpecialEditor(tuple((kind, "kind") for kind in _QUESTIONS), wide=True, labelled=False)
 
 
-class QuestionsField(Field):
+class _QuestionsField(Field):
     """The questions, in their order; each is moved, copied and deleted in its own form."""
 
     def __init__(self, row: FormRow) -> None:
@@ -329,11 +329,11 @@ class QuestionsField(Field):
 
 
 QUESTION_LIST: Final = SpecialEditor(
-    (("Questionnaire", "items"),), QuestionsField, wide=True, facts=lambda study, row: question_lines(study, row.path)
+    (("Questionnaire", "items"),), _QuestionsField, wide=True, facts=lambda study, row: question_lines(study, row.path)
 )
 
 
-def order_of_blocks(study: Study, _row: Row) -> str:
+def _order_of_blocks(study: Study, _row: Row) -> str:
     """Return a sentence on the blocks' order for the planned participants; "" while it is unknown."""
     protocol = valid_part(study).protocol
     if protocol is None or len(protocol.main_blocks) < 2:
@@ -344,13 +344,13 @@ def order_of_blocks(study: Study, _row: Row) -> str:
     )
 
 
-def choice_sentences(_study: Study, row: Row) -> str:
+def _choice_sentences(_study: Study, row: Row) -> str:
     """Return the sentence about each choice, one per line."""
     described = [choice for choice in row.choices if choice.value is not None and choice.sentence]
     return "\n".join(f"{label_of(choice.value or '')}: {choice.sentence}." for choice in described)
 
 
-class Said(Extra, QLabel):
+class _Said(Extra, QLabel):
     """A sentence below a choice that says what it means."""
 
     def __init__(self) -> None:
@@ -362,17 +362,17 @@ class Said(Extra, QLabel):
         self.setText(facts)
 
 
-BLOCK_ORDER: Final = SpecialEditor((("StudyHead", "block_order"),), adds=lambda _field: Said(), facts=order_of_blocks)
+BLOCK_ORDER: Final = SpecialEditor((("StudyHead", "block_order"),), adds=lambda _field: _Said(), facts=_order_of_blocks)
 GROUP_ASSIGNMENT: Final = SpecialEditor(
-    (("StudyHead", "group_assignment"),), adds=lambda _field: Said(), facts=choice_sentences
+    (("StudyHead", "group_assignment"),), adds=lambda _field: _Said(), facts=_choice_sentences
 )
 
-MEASURES: Final = tuple(zip(OF_LEVELS, ("Threshold", "Exponent", "Sensitivity d′", "Setting (PSE)"), strict=True))
-RELATIONS: Final = (
+_MEASURES: Final = tuple(zip(OF_LEVELS, ("Threshold", "Exponent", "Sensitivity d′", "Setting (PSE)"), strict=True))
+_RELATIONS: Final = (
     ("higher", "is higher than"), ("lower", "is lower than"), (None, "is different from"), ("equal", "is equal to"),
 )  # fmt: skip
 BOUND, RATIO = 0.5, 1.25
-NOTHING_TO_COMPARE: Final = (
+_NOTHING_TO_COMPARE: Final = (
     "A hypothesis compares two main blocks, two conditions of a block, or two groups: add a second one."
 )
 
@@ -413,7 +413,7 @@ def _comparable_items(document: Mapping[str, Any]) -> Iterator[Compared]:
     for place, block in entries(document, "blocks.*"):
         if not isinstance(block, Mapping) or block.get("phase", "main") != "main":
             continue
-        name, title, measures = str(place[1]), title_of(document, place), MEASURES
+        name, title, measures = str(place[1]), title_of(document, place), _MEASURES
         if "design" not in block:
             asked = entries(document, f"questionnaires.{block.get('questionnaire')}.items.*")
             items = ((item, path) for path, item in asked if isinstance(item, Mapping) and "kind" not in item)
@@ -436,7 +436,7 @@ class Hypothesis(QWidget):
 
     def __init__(self, name: str) -> None:
         super().__init__()
-        self.measures = MEASURES
+        self.measures = _MEASURES
         self.known: tuple[Compared, ...] = ()
         self.others: tuple[Compared, ...] = ()
         self.value: Mapping[str, Any] = {}
@@ -466,14 +466,14 @@ class Hypothesis(QWidget):
         first, second = (*items, None, None)[:2]
         self.others = () if first is None else first.comparable_with(known)
         self.measures = (
-            MEASURES if first is None else first.measures if second is None else first.shared_measures(second)
+            _MEASURES if first is None else first.measures if second is None else first.shared_measures(second)
         )
         measure, relation = value.get("measure", "threshold"), _relation(value)
         first_name, two = (*named, "", "")[:2]
         for box, word in ((self.measure, measure), (self.first, first_name), (self.second, two)):
             box.setPlaceholderText(str(word))  # shown where it is not among the choices
         self._fill_choice(self.measure, self.measures, measure)
-        self._fill_choice(self.relation, RELATIONS, relation)
+        self._fill_choice(self.relation, _RELATIONS, relation)
         self._fill_choice(self.first, tuple((item, item.words) for item in known), first)
         self._fill_choice(self.second, tuple((item, item.words) for item in self.others), second)
         self.bound.show_text("" if (bound := value.get("bound")) is None else typed_value(bound))
@@ -490,7 +490,7 @@ class Hypothesis(QWidget):
 
     def _take_choice(self) -> None:
         """Emit the chosen hypothesis; replace choices that no longer fit the first item."""
-        relation = RELATIONS[max(0, self.relation.currentIndex())][0]
+        relation = _RELATIONS[max(0, self.relation.currentIndex())][0]
         if not self.known or self.first.currentIndex() < 0:  # what it compares is not among the choices
             keys = ("measure", "blocks", "conditions", "groups")
             table = {key: self.value[key] for key in keys if key in self.value}
@@ -540,13 +540,13 @@ def _relation(value: Mapping[str, Any]) -> Any:
     return value.get("expected", None if value.get("bound") is None else "equal")
 
 
-class HypothesesField(Field):
+class _HypothesesField(Field):
     """A sentence with choices for each hypothesis."""
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
         self.box.setDirection(QBoxLayout.Direction.TopToBottom)
-        self.lines = [Hypothesis(f"Hypothesis {at + 1}") for at in range(hypothesis_count(row))]
+        self.lines = [Hypothesis(f"Hypothesis {at + 1}") for at in range(_hypothesis_count(row))]
         for at, line in enumerate(self.lines):
             line.changed.connect(lambda value, at=at: self._change_hypothesis(at, value))
             line.refused.connect(self._refuse)
@@ -562,13 +562,13 @@ class HypothesesField(Field):
         for line, value in zip(self.lines, self.row.value if self.lines else (), strict=False):
             line.show_value(value if isinstance(value, Mapping) else {}, self.row.facts)
         self.add.setEnabled(bool(self.row.facts))
-        self.why.setText("" if self.row.facts else NOTHING_TO_COMPARE)
+        self.why.setText("" if self.row.facts else _NOTHING_TO_COMPARE)
 
     def _add_hypothesis(self) -> None:
         first: Compared = self.row.facts[0]
         second = first.comparable_with(self.row.facts)[0]
         value = _comparison_keys(first, second, first.shared_measures(second)[0][0]) | _relation_keys(
-            RELATIONS[0][0], None
+            _RELATIONS[0][0], None
         )
         self.asked.emit(AddEntry(self.row.path, value))
 
@@ -596,11 +596,11 @@ class HypothesesField(Field):
             self.asked.emit(Several("Change hypothesis", tuple(asked)))
 
 
-def hypothesis_count(row: FormRow) -> int:
+def _hypothesis_count(row: FormRow) -> int:
     """Return the number of a row's hypotheses; 0 if the file has another value there."""
     return len(row.value) if isinstance(row.value, tuple) else 0
 
 
 HYPOTHESES: Final = SpecialEditor(
-    (("Analysis", "contrasts"),), HypothesesField, wide=True, structure=hypothesis_count, facts=comparable_items
+    (("Analysis", "contrasts"),), _HypothesesField, wide=True, structure=_hypothesis_count, facts=comparable_items
 )

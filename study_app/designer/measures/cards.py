@@ -23,8 +23,8 @@ UNKNOWN: Final = "–"
 Verdict: TypeAlias = tuple[Tone, str, str]
 """Tone, icon and words."""
 INKS: dict[Tone, Ink] = {"ok": "ok", "warn": "warn", "bad": "bad", "accent": "accent", "neutral": "text2"}
-NAME_PX = 132
-MOST_LINES = 7
+_NAME_PX = 132
+_MOST_LINES = 7
 NARROW_CODES = 3
 NUMBERS, ONE_ROW_FROM = 4, 600
 
@@ -109,7 +109,7 @@ class MeasureCard:
     wide: bool = False
 
 
-class NumberPart(Card):
+class _NumberPart(Card):
     """One number; grey while another one is computed."""
 
     def __init__(self) -> None:
@@ -161,7 +161,7 @@ class NumbersRow(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.grid = grid_of(8, 8, margins=0, parent=self)
-        self.parts = [NumberPart() for _ in range(NUMBERS)]
+        self.parts = [_NumberPart() for _ in range(NUMBERS)]
         self._columns = 0
         self._lay_out(NUMBERS)
 
@@ -183,7 +183,7 @@ class NumbersRow(QWidget):
                 self.grid.setColumnStretch(at, int(at < columns))
 
 
-class Strip(Themed, QWidget):
+class _Strip(Themed, QWidget):
     """The steps of a session side by side, as wide as they are long; a click opens one."""
 
     def __init__(self, segments: tuple[Segment, ...], opens: Callable[[Path], None]) -> None:
@@ -264,18 +264,18 @@ class CardWidget(Card):
                 if at:
                     note.setAlignment(Qt.AlignmentFlag.AlignRight)
                 notes.addWidget(note)
-            vbox(Strip(part.segments, self.opens), notes, spacing=8, margins=0, parent=made)
+            vbox(_Strip(part.segments, self.opens), notes, spacing=8, margins=0, parent=made)
         elif isinstance(part[0], Table):
             tables = (
                 (_table_widget(table), 0, Qt.AlignmentFlag.AlignTop) for table in part if isinstance(table, Table)
             )
             hbox(*tables, STRETCH, spacing=18, margins=0, parent=made)
         else:
-            return verdict_line(part)
+            return _verdict_line(part)
         return made
 
 
-def verdict_line(verdict: Verdict) -> QWidget:
+def _verdict_line(verdict: Verdict) -> QWidget:
     """Return a line with a verdict's icon and its wrapped text."""
     tone, icon, text = verdict
     made = QWidget()
@@ -323,9 +323,9 @@ def _lines_widget(shown: Lines) -> QWidget:
     grid.setContentsMargins(0, 0, 0, 0)
     grid.setVerticalSpacing(4)
     grid.setColumnStretch(1, 1)
-    for at, line in enumerate(shown.lines[:MOST_LINES]):
+    for at, line in enumerate(shown.lines[:_MOST_LINES]):
         name, bar = Elided("label", ink), Bar(6)
-        name.setFixedWidth(NAME_PX)
+        name.setFixedWidth(_NAME_PX)
         name.show_text(line.title)
         bar.show_share(line.share)
         number = figures(line.number, ink=ink)
@@ -339,8 +339,8 @@ def _lines_widget(shown: Lines) -> QWidget:
             mark.setToolTip(plain_tip(text))
             mark.setAccessibleName(f"{line.title}: {text}")
             grid.addWidget(mark, at, 3)
-    if len(shown.lines) > MOST_LINES:
-        grid.addWidget(label(f"and {len(shown.lines) - MOST_LINES} more", "small", "text2"), MOST_LINES, 0, 1, 2)
+    if len(shown.lines) > _MOST_LINES:
+        grid.addWidget(label(f"and {len(shown.lines) - _MOST_LINES} more", "small", "text2"), _MOST_LINES, 0, 1, 2)
     return made
 
 

@@ -16,8 +16,8 @@ from study_app.protocol.trials.stimuli import Stimulus
 Limit: TypeAlias = Literal["norm", "slope"]
 Ticks: TypeAlias = tuple[tuple[float, str], ...]
 LIMIT_NAMES: Final[dict[Limit, str]] = {"norm": "force limit", "slope": "slope limit"}
-AS_ASKED: Final = "The simulation uses the requested levels"
-MOST_TICKS: Final = 7
+_AS_ASKED: Final = "The simulation uses the requested levels"
+_MOST_TICKS: Final = 7
 _BY_DECADE: Final = ((1.0,), (1.0, 3.0), (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 5.0, 7.0), tuple(range(1, 10)))
 _STEPS: Final = (1, 2, 2.5, 5, 10)
 
@@ -69,7 +69,7 @@ class LevelWords:
         low, _ = self.stimulus.domain
         return max(self.stimulus.coordinate(level), low - 1.0)
 
-    def ticks(self, most: int = MOST_TICKS) -> Ticks:
+    def ticks(self, most: int = _MOST_TICKS) -> Ticks:
         """Return round levels between the ends with their axis positions."""
         low, high = (self.factor * level for level in self.stimulus.levels)
         values = log_ticks(low, high, most) if self.stimulus.spacing == "log" else even_ticks(low, high, most)
@@ -115,7 +115,7 @@ class LevelBlock:
     def as_asked(self) -> str:
         """A sentence that clipped levels are simulated as requested; "" if none is clipped or as presented."""
         simulated = self.clipping is not None and self.clipping.paced
-        return "" if simulated or all(level.clipped_by is None for level in self.shown) else AS_ASKED
+        return "" if simulated or all(level.clipped_by is None for level in self.shown) else _AS_ASKED
 
     @property
     def clipped_words(self) -> str:
@@ -129,7 +129,7 @@ class LevelBlock:
             which = f"The standard{named} is"
         if self.clipping.paced:
             return f"{which} clipped: the simulation uses the clipped levels"
-        return f"{which} clipped in fast motions; such trials are repeated. {AS_ASKED}"
+        return f"{which} clipped in fast motions; such trials are repeated. {_AS_ASKED}"
 
 
 def level_block(protocol: Protocol, block: Block, *, forces: bool = True) -> LevelBlock | None:
@@ -158,7 +158,7 @@ def rounded(value: float, digits: int = 3) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def log_ticks(low: float, high: float, most: int = MOST_TICKS) -> tuple[float, ...]:
+def log_ticks(low: float, high: float, most: int = _MOST_TICKS) -> tuple[float, ...]:
     """Return round numbers in an interval above 0, by decades, at most so many."""
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     best: tuple[float, ...] = ()
@@ -170,7 +170,7 @@ def log_ticks(low: float, high: float, most: int = MOST_TICKS) -> tuple[float, .
     return best if len(best) > 1 else (low, high)
 
 
-def even_ticks(low: float, high: float, most: int = MOST_TICKS) -> tuple[float, ...]:
+def even_ticks(low: float, high: float, most: int = _MOST_TICKS) -> tuple[float, ...]:
     """Return round numbers in an interval, evenly spaced, at most so many."""
     if high <= low:
         return (low,)

@@ -27,13 +27,13 @@ from study_app.protocol.checks.force_limits import check_clipping, unpaced_clipp
 if TYPE_CHECKING:
     from study_app.designer.measures.plots import ForcesView, FunctionView, TrackView
 
-EARLIER = "These numbers describe the last valid state: correct the problems to update them."
-FIELD_PX = 48
+_EARLIER = "These numbers describe the last valid state: correct the problems to update them."
+_FIELD_PX = 48
 PLOT_PX, HIGHEST_PX, FORCES_PX = 300, 470, 216
-FUNCTION_LEGEND = (
+_FUNCTION_LEGEND = (
     "Line: simulated observers. Bands: 50 and 90 % of the estimates. Bars: how often each level is presented."
 )
-TRACK_LEGEND = "Bands: 50 and 90 % of the estimates. Marks: the trials of one observer, filled if correct."
+_TRACK_LEGEND = "Bands: 50 and 90 % of the estimates. Marks: the trials of one observer, filled if correct."
 FACTS_MOST, FACTS_LEAST = 366, 190
 FACTS_SHARE, HIGH_FROM = 0.3, 940
 """The share of a window's height that the cards take at most; in windows as high as this two rows are shown whole."""
@@ -49,7 +49,7 @@ class Control(QWidget):
         self._value, self._step = 0.0, step
         self.words, self.unit = label(text, "small", "text2"), label(unit, "small", "text2")
         self.field = NumberField()
-        self.field.setFixedWidth(FIELD_PX)
+        self.field.setFixedWidth(_FIELD_PX)
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Preferred)
         hbox(self.words, self.field, self.unit, spacing=6, margins=0, parent=self)
         self.show_words(text, unit)
@@ -80,7 +80,7 @@ class Control(QWidget):
         self.field.show_text(text)
 
 
-class MeasureControls(QWidget):
+class _MeasureControls(QWidget):
     """Simulated threshold, lapse rate and participants."""
 
     def __init__(self) -> None:
@@ -124,7 +124,7 @@ class PlotCard(Card):
         self.plot.show_observed(of, observed, grey=shown.earlier or bool(waiting))
 
 
-class WarningBar(Themed, QWidget):
+class _WarningBar(Themed, QWidget):
     """A field in the colour of warnings."""
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -143,7 +143,7 @@ class ForcesCard(Card):
         self.unit = Elided("small", "text2")
         self.chips = [Chip(small=True), Chip(small=True)]
         head = hbox(label("Force at each level", "card"), (self.unit, 1), *self.chips, spacing=8)
-        self.bar = WarningBar()
+        self.bar = _WarningBar()
         self.words = label("", "small", wraps=True)
         self.repair = small_button("", "Repair", height=34)
         self.repair.clicked.connect(lambda: self.repair_asked.emit(*self.offered))
@@ -191,7 +191,7 @@ def clipped_sentence(of: LevelBlock) -> str:
     return said or unpaced_clipping_warning(of.protocol, [of.block]) or ""
 
 
-class MeasureCards(QScrollArea):
+class _MeasureCards(QScrollArea):
     """Draws numbers and cards of a `MeasuresView`; ``open_asked`` carries an element's path.
 
     While they are hidden, the last ones are kept; ``appeared`` comes when they are shown.
@@ -208,7 +208,7 @@ class MeasureCards(QScrollArea):
         self.shown: MeasuresView | None = None
         self.numbers, self.grid = NumbersRow(), CardGrid(self.open_asked.emit)
         self.numbers.hide()
-        self.earlier = label(EARLIER, "small", "warn", wraps=True)
+        self.earlier = label(_EARLIER, "small", "warn", wraps=True)
         self.earlier.hide()
         inside = QWidget()
         inside.setObjectName("earlier")
@@ -233,7 +233,7 @@ class MeasureCards(QScrollArea):
         self.numbers.show_numbers(shown.numbers, shown.simulated.waiting)
 
 
-class MeasuresPage(MeasureCards):
+class MeasuresPage(_MeasureCards):
     """The tab; plots are made when a block with a method is first shown."""
 
     repair_asked = Signal(object, str)
@@ -241,7 +241,7 @@ class MeasuresPage(MeasureCards):
     def __init__(self) -> None:
         super().__init__("Measures")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.controls = MeasureControls()
+        self.controls = _MeasureControls()
         self.function: PlotCard | None = None
         self.track: PlotCard | None = None
         self.forces: ForcesCard | None = None
@@ -278,8 +278,8 @@ class MeasuresPage(MeasureCards):
     def _make_plots(self) -> None:
         from study_app.designer.measures.plots import ForcesView, FunctionView, TrackView  # noqa: PLC0415 - pyqtgraph, once there is a plot
 
-        self.function = PlotCard("Psychometric function", FUNCTION_LEGEND, FunctionView())
-        self.track = PlotCard("Expected track", TRACK_LEGEND, TrackView())
+        self.function = PlotCard("Psychometric function", _FUNCTION_LEGEND, FunctionView())
+        self.track = PlotCard("Expected track", _TRACK_LEGEND, TrackView())
         self.forces = ForcesCard(ForcesView())
         self.forces.repair_asked.connect(self.repair_asked)
         for card in (self.function, self.track):
@@ -290,7 +290,7 @@ class MeasuresPage(MeasureCards):
         self.column.insertWidget(4, self.forces, 2)
 
 
-class FactsRow(MeasureCards):
+class FactsRow(_MeasureCards):
     """The cards that stay below other tabs."""
 
     def __init__(self) -> None:

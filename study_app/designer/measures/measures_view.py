@@ -40,18 +40,18 @@ from study_app.protocol.orders.block_orders import BlockOrder, order_of
 from study_app.protocol.source.document import Path
 from study_app.protocol.wording.languages import language_name, languages_of
 
-BELOW: Final = 4
+_BELOW: Final = 4
 """So many cards stay below the other tabs."""
-SQUARE_NAMES: Final = {"williams": "Williams design", "latin": "Latin square"}
-MOST_CODES: Final = 8
+_SQUARE_NAMES: Final = {"williams": "Williams design", "latin": "Latin square"}
+_MOST_CODES: Final = 8
 """Of more codes only how even they are is said."""
-MOST_ROWS: Final = 6
+_MOST_ROWS: Final = 6
 """Positions that are shown of a long block."""
 NO_FORCES: Final = "Unknown until you correct the problems of device and scene."
-ON_AVERAGE: Final = "The warning of check refers to the average precision with the planned participants"
+_ON_AVERAGE: Final = "The warning of check refers to the average precision with the planned participants"
 FAILED: Final[Verdict] = ("bad", "warning", "simulation failed")
-CLIPPED: Final[Verdict] = ("bad", "warning", "levels are clipped")
-TOO_SMALL: Final = "All levels are below twice the level error of a valid trial"
+_CLIPPED: Final[Verdict] = ("bad", "warning", "levels are clipped")
+_TOO_SMALL: Final = "All levels are below twice the level error of a valid trial"
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ class MeasuresView:
     @property
     def below(self) -> tuple[MeasureCard, ...]:
         """The cards that stay below other tabs; the measures tab shows them if it has no numbers."""
-        return self.cards[:BELOW]
+        return self.cards[:_BELOW]
 
 
 def measures_view(
@@ -100,15 +100,15 @@ def measures_view(
         cards = _cards(study, facts, path, focus, controls, simulated)
         return MeasuresView(controls, simulated=simulated, cards=tuple(cards), earlier=earlier)
     block, plan = focus.block, focus.plan
-    asked = hypotheses_card(protocol, path, controls, simulated)
+    asked = _hypotheses_card(protocol, path, controls, simulated)
     levels = None if block is None else level_block(protocol, block, forces=valid.forces)
     wording = None if plan is None else LevelWords(plan.stimulus, plan.design)
     of = None if block is None else ("stimuli", str(block.stimulus), "levels")
     own = tuple((row, repairs) for row, repairs in problems.items() if row.fault.path == of)
     if block is not None and levels is not None and plan is not None:
         lasts = facts.steps_s.get(block.id, 0.0)
-        numbers = number_cards(levels, simulated, controls, lasts, order_of(protocol, block))
-        cards = [session_card(study, facts, path)]
+        numbers = _number_cards(levels, simulated, controls, lasts, order_of(protocol, block))
+        cards = [_session_card(study, facts, path)]
     else:
         numbers, cards = (), _cards(study, facts, path, focus, controls, simulated)
     return MeasuresView(controls, wording, numbers, levels, simulated, own, tuple(cards), asked, earlier)
@@ -120,18 +120,18 @@ def _cards(
     """Return the cards of an element without simulated tracks, the most relevant first."""
     valid, block = valid_part(study), focus.block
     protocol = valid.protocol
-    cards: list[MeasureCard] = [session_card(study, facts, path)]
+    cards: list[MeasureCard] = [_session_card(study, facts, path)]
     if protocol is None:
         return cards
     if block is not None:
-        cards += balance_card(study, protocol, block, controls)
+        cards += _balance_card(study, protocol, block, controls)
     if block is not None and focus.compares:
         known = simulated.detectable
-        who = people_text(controls.participants if known is None else known.participants, controls.planned)
-        cards.append(detectable_card(study, block, who, simulated))
-    cards.append(force_card(study, facts, protocol, _liquids(protocol, path, block)))
+        who = _people_text(controls.participants if known is None else known.participants, controls.planned)
+        cards.append(_detectable_card(study, block, who, simulated))
+    cards.append(_force_card(study, facts, protocol, _liquids(protocol, path, block)))
     if block is not None and path[0] == "blocks":
-        cards.append(block_card(study, facts, protocol, block))
+        cards.append(_block_card(study, facts, protocol, block))
     return cards
 
 
@@ -146,12 +146,12 @@ def _liquids(protocol: Protocol, path: Path, block: Block | None) -> list[str]:
     return list(liquids) or list(protocol.liquids)
 
 
-def people_text(participants: int, planned: int | None) -> str:
+def _people_text(participants: int, planned: int | None) -> str:
     """Return the number of simulated participants, and whether the file plans as many."""
     return f"{participants} {'planned' if participants == planned else 'simulated'}"
 
 
-def number_cards(
+def _number_cards(
     of: LevelBlock, simulated: Simulated, controls: Controls, duration_s: float, order: BlockOrder
 ) -> tuple[NumberCard, ...]:
     """Return the four number cards of a block with simulated tracks."""
@@ -183,8 +183,8 @@ def _range_card(of: LevelBlock, simulated: Simulated, controls: Controls) -> Num
         if measurable.planted:
             return NumberCard(title, "none", unit="", note=("bad", "warning", "estimates are biased"), more=clipped)
         if of.clipping is None:
-            return NumberCard(title, "none", unit="", note=("bad", "warning", "levels are too small"), more=TOO_SMALL)
-        why = "the standard is clipped" if of.clipping.clips_standard else CLIPPED[2]
+            return NumberCard(title, "none", unit="", note=("bad", "warning", "levels are too small"), more=_TOO_SMALL)
+        why = "the standard is clipped" if of.clipping.clips_standard else _CLIPPED[2]
         return NumberCard(title, "none", unit="", note=("bad", "warning", why), more=clipped)
     low, high = measurable.ends
     note: Verdict = ("neutral", "info", f"of {wording.number(of.words.stimulus.levels[1])} {wording.unit} at most")
@@ -203,7 +203,7 @@ def _one_person_card(of: LevelBlock, simulated: Simulated) -> NumberCard:
     if observed is None:
         return _unknown_card("One person", "%", simulated)
     if not of.can_measure(observed.threshold):
-        return NumberCard("One person", UNKNOWN, unit="%", note=CLIPPED, more=of.clipped_words)
+        return NumberCard("One person", UNKNOWN, unit="%", note=_CLIPPED, more=of.clipped_words)
     note: Verdict = ("neutral", "people", f"at a {of.words.name} of {of.words.words(observed.threshold)}")
     return NumberCard("One person", f"± {100 * observed.error:.0f}", unit="%", note=note, more=of.as_asked)
 
@@ -211,23 +211,23 @@ def _one_person_card(of: LevelBlock, simulated: Simulated) -> NumberCard:
 def _group_card(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberCard:
     precision = simulated.group
     if precision is None:
-        title = f"{people_text(controls.participants, controls.planned)} in ± {100 * controls.precision:g} %"
+        title = f"{_people_text(controls.participants, controls.planned)} in ± {100 * controls.precision:g} %"
         return _unknown_card(title, "% of studies", simulated)
-    title = f"{people_text(precision.participants, controls.planned)} in ± {100 * precision.precision:g} %"
+    title = f"{_people_text(precision.participants, controls.planned)} in ± {100 * precision.precision:g} %"
     if not of.can_measure(controls.threshold):
-        return NumberCard(title, UNKNOWN, unit="% of studies", note=CLIPPED, more=of.clipped_words)
+        return NumberCard(title, UNKNOWN, unit="% of studies", note=_CLIPPED, more=of.clipped_words)
     enough = precision.share >= ENOUGH
     note: Verdict = ("ok", "check", "Enough") if enough else ("warn", "warning", "Not enough")
     many = f"more than {precision.most}" if precision.enough is None else f"about {precision.enough}"
     needed = f"{100 * ENOUGH:g} % are enough" if enough else f"Needed: {many} participants for {100 * ENOUGH:g} %"
     more = f"{needed}; with {precision.more_trials} trials: {100 * precision.more_share:.0f} %"
-    more = ". ".join(filter(None, (more, ON_AVERAGE if simulated.warnings else "", of.as_asked)))
+    more = ". ".join(filter(None, (more, _ON_AVERAGE if simulated.warnings else "", of.as_asked)))
     return NumberCard(title, f"{100 * precision.share:.0f}", unit="% of studies", note=note, more=more)
 
 
-def session_card(study: Study, facts: Facts, path: Path) -> MeasureCard:
+def _session_card(study: Study, facts: Facts, path: Path) -> MeasureCard:
     """Return the session in numbers, with the duration of the selected step."""
-    verdicts = text_verdicts(study, facts)
+    verdicts = _text_verdicts(study, facts)
     if facts.expected_s is None or facts.range_s is None:
         unknown = tuple((UNKNOWN, word) for word in ("min", "answers", "trials"))
         return MeasureCard("Session", "", (Figures(unknown), *_below_rule(verdicts)))
@@ -256,7 +256,7 @@ def _below_rule(verdicts: Iterable[Verdict]) -> tuple[Part, ...]:
     return (None, *states) if (states := tuple(verdicts)) else ()
 
 
-def hypotheses_card(protocol: Protocol, path: Path, controls: Controls, simulated: Simulated) -> MeasureCard | None:
+def _hypotheses_card(protocol: Protocol, path: Path, controls: Controls, simulated: Simulated) -> MeasureCard | None:
     """Return the hypotheses about a block, at the session's order all of them, with the simulated results."""
     block = str(path[1]) if path[:1] == ("blocks",) and len(path) > 1 else ""
     contrasts = hypotheses_of(protocol, block) if block or path == SEQUENCE else ()
@@ -264,7 +264,7 @@ def hypotheses_card(protocol: Protocol, path: Path, controls: Controls, simulate
     said = [
         f"{capitalised(contrast.described())}: {known.get(contrast.described(), waiting)}" for contrast in contrasts
     ]
-    who = people_text(controls.participants, controls.planned)
+    who = _people_text(controls.participants, controls.planned)
     return (
         MeasureCard("Hypotheses", who, tuple(("neutral", "flag", sentence) for sentence in said), wide=True)
         if said
@@ -276,7 +276,7 @@ def _noun(count: int | None, word: str) -> str:
     return word if count == 1 else f"{word}s"
 
 
-def block_card(study: Study, facts: Facts, protocol: Protocol, block: Block) -> MeasureCard:
+def _block_card(study: Study, facts: Facts, protocol: Protocol, block: Block) -> MeasureCard:
     """Return a block in numbers."""
     order, questionnaire = order_of(protocol, block), protocol.questionnaire_of(block.id)
     answers = 0 if questionnaire is None else len(questionnaire.items)
@@ -290,7 +290,7 @@ def block_card(study: Study, facts: Facts, protocol: Protocol, block: Block) -> 
     return MeasureCard(_title(study, block.id), aside, (Figures(figures),))
 
 
-def text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
+def _text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
     """Return verdicts on missing texts and on texts that reveal a condition."""
     if study.is_unreadable:
         return ()
@@ -312,7 +312,7 @@ def text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
     return verdicts
 
 
-def balance_card(study: Study, protocol: Protocol, block: Block, controls: Controls) -> list[MeasureCard]:
+def _balance_card(study: Study, protocol: Protocol, block: Block, controls: Controls) -> list[MeasureCard]:
     """Return how balanced the orders of a block are for the participants; none if it has one code."""
     participants = controls.participants
     judged = balance_of(protocol, block, participants)
@@ -327,20 +327,20 @@ def balance_card(study: Study, protocol: Protocol, block: Block, controls: Contr
     elif rows is not None and participants % rows:
         last = participants - participants % rows
         even = f"{last} or {last + rows}" if last else f"{rows}"
-        verdict = ("warn", "warning", f"balanced with {even} participants, for a {SQUARE_NAMES[order]}")
+        verdict = ("warn", "warning", f"balanced with {even} participants, for a {_SQUARE_NAMES[order]}")
     elif rows is not None:
         verdict = ("warn", "warning", "positions balanced, carry-over not")
     elif order == "fixed":
         verdict = ("warn", "warning", "all participants have the same order, which reveals the codes")
     else:
         verdict = ("neutral", "info", "balanced only on average: drawn for each session")
-    aside = f"{_title(study, block.id)}, {people_text(participants, controls.planned)}"
-    if len(evenness.codes) > MOST_CODES:
+    aside = f"{_title(study, block.id)}, {_people_text(participants, controls.planned)}"
+    if len(evenness.codes) > _MOST_CODES:
         cells = [count for line in evenness.positions for count in line]
         after = evenness.after_another
         summary = f"positions {min(cells)} to {max(cells)} times, carry-over {min(after)} to {max(after)} times"
         return [MeasureCard("Balance", aside, ((*verdict[:2], f"{verdict[2]}; {summary}"),))]
-    shown, codes = evenness.positions[:MOST_ROWS], evenness.codes
+    shown, codes = evenness.positions[:_MOST_ROWS], evenness.codes
     places = tuple(str(number + 1) for number in range(len(shown)))
     tables = Table("position", codes, places, shown), Table("comes after", codes, codes, evenness.follows)
     hidden = len(evenness.positions) - len(shown)
@@ -348,7 +348,7 @@ def balance_card(study: Study, protocol: Protocol, block: Block, controls: Contr
     return [MeasureCard("Balance", aside, (tables, *more, verdict), wide=len(codes) > NARROW_CODES)]
 
 
-def lines_card(
+def _lines_card(
     title: str, aside: str, lines: Iterable[Line], sentences: Iterable[Verdict] = (), waiting: str = ""
 ) -> MeasureCard:
     """Return lines with bars, and sentences below them; grey lines where others are simulated (``waiting``)."""
@@ -357,11 +357,11 @@ def lines_card(
     return MeasureCard(title, waiting or aside, parts)
 
 
-def force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[str]) -> MeasureCard:
+def _force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[str]) -> MeasureCard:
     """Return the force of some liquids against a hand at 0.1 m/s."""
     if not valid_part(study).forces:
         unknown = tuple(Line(_title(study, name, "liquids"), UNKNOWN, 0.0) for name in names)
-        return lines_card("Force of each liquid", "", unknown, (("neutral", "minus", NO_FORCES),))
+        return _lines_card("Force of each liquid", "", unknown, (("neutral", "minus", NO_FORCES),))
     limit_n = protocol.device.force_limit_n
     lines = []
     for name in names:
@@ -380,18 +380,18 @@ def force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[s
     sentences: tuple[Verdict, ...] = tuple(("warn", "warning", f"{capitalised(warning)}.") for warning in alike)
     if not sentences and len(names) > 1:
         sentences = (("ok", "check", "All pairs are distinguishable"),)
-    return lines_card("Force of each liquid", f"0.1 m/s, {LIMIT_NAMES['norm']} {limit_n:g} N", tuple(lines), sentences)
+    return _lines_card("Force of each liquid", f"0.1 m/s, {LIMIT_NAMES['norm']} {limit_n:g} N", tuple(lines), sentences)
 
 
-def detectable_card(study: Study, block: Block, who: str, simulated: Simulated) -> MeasureCard:
+def _detectable_card(study: Study, block: Block, who: str, simulated: Simulated) -> MeasureCard:
     """Return the smallest difference of each statement that studies of so many participants (``who``) detect."""
     title, detectable = "Smallest differences", simulated.detectable
     if not valid_part(study).forces:  # the answers depend on them
-        return lines_card(title, who, (), (("neutral", "minus", NO_FORCES),))
+        return _lines_card(title, who, (), (("neutral", "minus", NO_FORCES),))
     if detectable is None and simulated.failed:
-        return lines_card(title, who, (), (FAILED, ("neutral", "info", simulated.failed)))
+        return _lines_card(title, who, (), (FAILED, ("neutral", "info", simulated.failed)))
     if detectable is None:
-        return lines_card(title, who, (), (("neutral", "clock", "Studies are simulated."),), simulated.waiting)
+        return _lines_card(title, who, (), (("neutral", "clock", "Studies are simulated."),), simulated.waiting)
     items = study.document.get("questionnaires", {}).get(block.questionnaire, {}).get("items", ())
     places = {item.get("id"): at for at, item in enumerate(items)}
     lines = []
@@ -407,7 +407,7 @@ def detectable_card(study: Study, block: Block, who: str, simulated: Simulated) 
     note: Verdict = ("neutral", "info", model)
     if not lines:
         note = ("neutral", "info", "The answer model does not know these statements.")
-    return lines_card(title, who, tuple(lines), (note,), simulated.waiting)
+    return _lines_card(title, who, tuple(lines), (note,), simulated.waiting)
 
 
 def _title(study: Study, name: str, section: str = "") -> str:

@@ -25,14 +25,14 @@ from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.live_plots import Floats, Plot, pen
 from study_app.protocol.presented.presented_levels import Level, standard_level
 
-BARS = 0.14  # of the height, for how often each level is asked
-SYMBOLS = ("o", "t1", "s", "d")
-DASHED = (4.0, 3.0)
-LIMITS_PX = 128.0  # of the names of the limits
-MOST_LABELS = 9
+_BARS = 0.14  # of the height, for how often each level is asked
+_SYMBOLS = ("o", "t1", "s", "d")
+_DASHED = (4.0, 3.0)
+_LIMITS_PX = 128.0  # of the names of the limits
+_MOST_LABELS = 9
 
 
-class MeasurePlot(Plot):
+class _MeasurePlot(Plot):
     """A plot that is drawn anew from its value; ``sentence`` says what observers answered."""
 
     sentence: Callable[[LevelWords, Observed], str]
@@ -94,7 +94,7 @@ class MeasurePlot(Plot):
 
     def draw_curve(self, x: object, y: object, colour: str, width: float = 2.0, *, dashed: bool = False) -> None:
         made = pg.PlotCurveItem(np.asarray(x, float), np.asarray(y, float), antialias=True)
-        made.setPen(self.stroke(colour, width, DASHED if dashed else None))
+        made.setPen(self.stroke(colour, width, _DASHED if dashed else None))
         self.add_item(made, 2)
 
     def draw_zone(self, limit: Limit, first: float, last: float, *, upright: bool) -> None:
@@ -103,7 +103,7 @@ class MeasurePlot(Plot):
         colour.setAlphaF(0.16)
         made = pg.LinearRegionItem(
             (first, last), orientation="vertical" if upright else "horizontal", movable=False, brush=QBrush(colour),
-            pen=pen(edge, 1, DASHED),
+            pen=pen(edge, 1, _DASHED),
         )  # fmt: skip
         self.add_item(made, -8)
 
@@ -117,7 +117,7 @@ class MeasurePlot(Plot):
         self.add_item(made, 5)
 
 
-class FunctionView(MeasurePlot):
+class FunctionView(_MeasurePlot):
     """The psychometric function, the functions that were found, and how often each level is asked."""
 
     def __init__(self) -> None:
@@ -165,7 +165,7 @@ class FunctionView(MeasurePlot):
         if not len(places) or shares.max() <= 0:
             return
         apart = float(np.min(np.diff(places))) if len(places) > 1 else 0.04 * span
-        heights = BARS * (ends[1] - ends[0]) * shares / shares.max()
+        heights = _BARS * (ends[1] - ends[0]) * shares / shares.max()
         first, limit = clipped_from or (math.inf, "norm")
         clipped = places >= first
         for some, ink in ((~clipped, self.theme.accent), (clipped, limit_colour(self.theme, limit))):
@@ -179,7 +179,7 @@ class FunctionView(MeasurePlot):
                 self.add_item(bars, -2)
 
 
-class TrackView(MeasurePlot):
+class TrackView(_MeasurePlot):
     """The estimates after so many trials, and the trials of one observer."""
 
     def __init__(self) -> None:
@@ -203,7 +203,7 @@ class TrackView(MeasurePlot):
                 some = [asked for asked in observed.one if asked.track == track and asked.success == success]
                 points = pg.ScatterPlotItem(
                     [asked.trial for asked in some], [wording.at(asked.level) for asked in some], size=7,
-                    symbol=SYMBOLS[(track - 1) % len(SYMBOLS)], pen=pen(ink.name(), 1.2),
+                    symbol=_SYMBOLS[(track - 1) % len(_SYMBOLS)], pen=pen(ink.name(), 1.2),
                     brush=QBrush(ink) if success else QBrush(QColor(theme.surface)),
                 )  # fmt: skip
                 self.add_item(points, 3)
@@ -216,7 +216,7 @@ class TrackView(MeasurePlot):
         self.box.setYRange(bottom - beyond, top + beyond, padding=0)
 
 
-class ForcesView(MeasurePlot):
+class ForcesView(_MeasurePlot):
     """The force of each level: as sent, and dashed what the limits take away."""
 
     def __init__(self) -> None:
@@ -244,7 +244,7 @@ class ForcesView(MeasurePlot):
         theme, count = self.theme, len(bars)
         forces = [(bar.asked_n or 0.0, bar.sent_n or 0.0) for bar in bars]
         top = max(limits["norm"], *(asked for asked, _ in forces))
-        step = max(1, math.ceil(count / MOST_LABELS))
+        step = max(1, math.ceil(count / _MOST_LABELS))
         self.show_ticks("left", [(force_n, f"{force_n:g}") for force_n in even_ticks(0.0, 1.02 * top, 5)])
         self.show_ticks("bottom", [(float(at), rounded(values[at])) for at in range(0, count, step)])
         for at, (bar, (asked, sent)) in enumerate(zip(bars, forces, strict=True)):
@@ -263,7 +263,7 @@ class ForcesView(MeasurePlot):
                 brush=QBrush(QColor(ink)), pen=QPen(Qt.PenStyle.NoPen),
             )  # fmt: skip
             self.add_item(bars, 0)
-        room = count * LIMITS_PX / max(LIMITS_PX + 1.0, self.box.width() - LIMITS_PX)
+        room = count * _LIMITS_PX / max(_LIMITS_PX + 1.0, self.box.width() - _LIMITS_PX)
         for name, force_n in limits.items():
             ink, text = limit_colour(theme, name), f"{LIMIT_NAMES[name]} {force_n:.3g} N"
             above = 0.5 if len(limits) == 1 else 1.0 if name == "norm" else 0.0  # the limits may be nearly equal

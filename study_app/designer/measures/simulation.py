@@ -33,27 +33,27 @@ if TYPE_CHECKING:
 
 OBSERVERS: Final = 400
 SEED: Final = 1
-AT_ONCE: Final = 100
+_AT_ONCE: Final = 100
 """Observers that are simulated together."""
-SHARES: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
+_SHARES: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
 """The quantiles of every band: the middle, the 50 % and the 90 % in between."""
-POINTS: Final = 61
-MOST_BARS: Final = 60
-COURSE: Final = 12
+_POINTS: Final = 61
+_MOST_BARS: Final = 60
+_COURSE: Final = 12
 """Numbers of trials after which the estimate is computed."""
-PLANTED: Final = 12
+_PLANTED: Final = 12
 ENOUGH: Final = 0.8
 """Participants are enough where so many simulated studies are as precise as planned."""
-BIAS: Final = 0.1
-COVERAGE: Final = 0.93
+_BIAS: Final = 0.1
+_COVERAGE: Final = 0.93
 """A threshold can be measured if the mean estimate is within the bias and so many 95 % intervals hold it. [choice]"""
 
 Check: TypeAlias = Callable[[], None]
 """Called between batches of simulations; raises to end them."""
-Values: TypeAlias = tuple[float, ...]
+_Values: TypeAlias = tuple[float, ...]
 
 
-def never_stop() -> None:
+def _never_stop() -> None:
     """Let simulations run to their end."""
 
 
@@ -72,7 +72,7 @@ class Observed:
     """What observers with one threshold showed; levels are those of the stimulus, not comparisons.
 
     Planted were ``threshold``, a level, and ``lapses``; ``at_threshold`` is the share of successes there. At each of
-    ``levels`` the planted function has the share ``planted``, and those through the quantiles (`SHARES`) of the
+    ``levels`` the planted function has the share ``planted``, and those through the quantiles (`_SHARES`) of the
     thresholds that were found have ``found``. ``asked`` are levels with the share of trials that presented them,
     ``course`` quantiles of the estimates after so many trials of the standard, ``one`` the trials of the first
     observer. ``error`` is the standard deviation of the estimates as a share of the threshold, infinite where limits
@@ -83,11 +83,11 @@ class Observed:
     lapses: float
     observers: int
     at_threshold: float
-    levels: Values
-    planted: Values
-    found: tuple[Values, ...]
+    levels: _Values
+    planted: _Values
+    found: tuple[_Values, ...]
     asked: tuple[tuple[float, float], ...]
-    course: tuple[tuple[int, Values], ...]
+    course: tuple[tuple[int, _Values], ...]
     one: tuple[Asked, ...]
     error: float
     trials: int
@@ -103,7 +103,7 @@ class Planted:
 
     @property
     def measurable(self) -> bool:
-        return abs(self.bias) <= BIAS and self.coverage >= COVERAGE
+        return abs(self.bias) <= _BIAS and self.coverage >= _COVERAGE
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,15 +179,15 @@ class Simulated:
     failed: str = ""
 
 
-def simulate_observers(plan: ThresholdPlan, threshold: float, lapses: float, check: Check = never_stop) -> Observed:
+def simulate_observers(plan: ThresholdPlan, threshold: float, lapses: float, check: Check = _never_stop) -> Observed:
     """Simulate observers with a threshold (a level) and return their answers and estimates."""
     stimulus, random = plan.stimulus, np.random.default_rng(SEED)
     u = stimulus.coordinate(threshold)
     medians, course, presented = [], None, []
     first: ObserverAnswers | None = None
-    for _ in range(0, OBSERVERS, AT_ONCE):
+    for _ in range(0, OBSERVERS, _AT_ONCE):
         check()
-        answered = plan.answers(np.full(AT_ONCE, u), random, (_lapsing_person(plan, lapses),))
+        answered = plan.answers(np.full(_AT_ONCE, u), random, (_lapsing_person(plan, lapses),))
         medians.append(plan.estimates(answered).medians)
         presented += [track.levels[~np.isnan(track.levels)] for track in answered.tracks]
         if first is None:
@@ -195,8 +195,8 @@ def simulate_observers(plan: ThresholdPlan, threshold: float, lapses: float, che
     assert first is not None  # noqa: S101 - there is a first one
     estimates, planted = np.concatenate(medians), replace(first.observers, thresholds=np.array(u), moves=0.0)
     errors = (estimates - u) * math.log(10) if stimulus.spacing == "log" else (estimates - u) / u
-    at = np.linspace(*stimulus.domain, POINTS)
-    quantiles = np.quantile(estimates, SHARES)
+    at = np.linspace(*stimulus.domain, _POINTS)
+    quantiles = np.quantile(estimates, _SHARES)
     return Observed(
         threshold=threshold,
         lapses=lapses,
@@ -219,7 +219,7 @@ def _lapsing_person(plan: ThresholdPlan, lapses: float) -> Person:
 
 
 def measurable_thresholds(
-    plan: ThresholdPlan, lapses: float, least: float, check: Check = never_stop, most: float = math.inf
+    plan: ThresholdPlan, lapses: float, least: float, check: Check = _never_stop, most: float = math.inf
 ) -> Measurable:
     """Return the range of thresholds that a block can measure.
 
@@ -229,13 +229,13 @@ def measurable_thresholds(
     """
     stimulus, random = plan.stimulus, np.random.default_rng(SEED)
     measured: list[Planted] = []
-    planted = [(u, stimulus.level_of(u)) for u in np.linspace(*stimulus.domain, PLANTED).tolist()]
+    planted = [(u, stimulus.level_of(u)) for u in np.linspace(*stimulus.domain, _PLANTED).tolist()]
     planted = [(u, threshold) for u, threshold in planted if least <= threshold <= most and threshold > 0]
     for u, threshold in planted:
         levels, held = [], []
-        for _ in range(0, OBSERVERS, AT_ONCE):
+        for _ in range(0, OBSERVERS, _AT_ONCE):
             check()
-            answered = plan.answers(np.full(AT_ONCE, u), random, (_lapsing_person(plan, lapses),))
+            answered = plan.answers(np.full(_AT_ONCE, u), random, (_lapsing_person(plan, lapses),))
             estimates = plan.estimates(answered)
             levels += [stimulus.level_of(median) for median in estimates.medians.tolist()]
             held.append((estimates.lows <= u) & (u <= estimates.highs))
@@ -264,21 +264,21 @@ def _psychometric_function(answered: ObserverAnswers, u: float, at: Floats) -> l
 def _presented_shares(plan: ThresholdPlan, presented: Floats) -> tuple[tuple[float, float], ...]:
     """Return levels with their shares of the trials, on a grid if there are many."""
     places = np.unique(presented)
-    if len(places) > MOST_BARS:
+    if len(places) > _MOST_BARS:
         places = np.array([plan.stimulus.coordinate(level) for level in plan.stimulus.spaced(plan.stimulus.steps)])
     nearest = np.searchsorted((places[1:] + places[:-1]) / 2, presented)
     counts = np.bincount(nearest, minlength=len(places)) / len(presented)
     return tuple((plan.stimulus.level_of(u), share) for u, share in zip(places.tolist(), counts.tolist(), strict=True))
 
 
-def _estimate_course(plan: ThresholdPlan, answered: ObserverAnswers, check: Check) -> tuple[tuple[int, Values], ...]:
+def _estimate_course(plan: ThresholdPlan, answered: ObserverAnswers, check: Check) -> tuple[tuple[int, _Values], ...]:
     """Return quantiles of the estimates after increasing numbers of trials."""
     trials, tracks = answered.tracks[0].levels.shape[1], len(answered.tracks)
-    course: list[tuple[int, Values]] = []
-    for number in sorted({round(trial) for trial in np.geomspace(1, trials, min(COURSE, trials))}):
+    course: list[tuple[int, _Values]] = []
+    for number in sorted({round(trial) for trial in np.geomspace(1, trials, min(_COURSE, trials))}):
         check()
         medians = plan.estimates(answered, most=number).medians
-        quantiles = (plan.stimulus.level_of(median) for median in np.quantile(medians, SHARES).tolist())
+        quantiles = (plan.stimulus.level_of(median) for median in np.quantile(medians, _SHARES).tolist())
         course.append((number * tracks, tuple(quantiles)))
     return tuple(course)
 
@@ -314,20 +314,20 @@ def balance_of(protocol: Protocol, block: Block, participants: int) -> tuple[str
 
 
 STUDIES: Final = 200
-SPREAD_OF: Final = 30
+_SPREAD_OF: Final = 30
 """Fewest simulated participants from which the error of one participant's threshold is estimated."""
 THRESHOLD_STUDIES: Final = 60
 MORE: Final = 4 / 3
-MOST_PEOPLE: Final = 60
+_MOST_PEOPLE: Final = 60
 """Up to so many participants it is looked for how many are enough."""
-PLANNED: Final = ("analysis", "participants")
+_PLANNED: Final = ("analysis", "participants")
 PARTICIPANTS: Final = 12
 """Simulated participants of a study without `analysis.participants`."""
-PRECISION: Final = 0.15
-JND: Final = 0.19
+_PRECISION: Final = 0.15
+_JND: Final = 0.19
 """People tell viscosities that differ by so much (Jones, Hunter & Lafontaine 1997)."""
 LAPSES: Final = 0.02
-ERRORS: Final = 2.0
+_ERRORS: Final = 2.0
 """A threshold below so many times the largest error of a valid trial is not measured. [choice]"""
 USUAL_ERROR_PERCENT, USUAL_ERROR_MS = 2.0, 2.0
 
@@ -415,7 +415,7 @@ def needs_precision_check(protocol: Protocol) -> bool:
 def precision_of(protocol: Protocol | None) -> float:
     """Return half the desired 95 % interval as a share of the mean."""
     decided = None if protocol is None else protocol.analysis
-    return PRECISION if decided is None or decided.precision is None else decided.precision
+    return _PRECISION if decided is None or decided.precision is None else decided.precision
 
 
 def participants_of(study: Study) -> int:
@@ -425,8 +425,8 @@ def participants_of(study: Study) -> int:
 
 def planned_of(study: Study) -> int | None:
     """Return the number of participants that the file plans, even if other parts are faulty; None if it states none."""
-    planned = value_at(study.document, PLANNED)
-    faulty = any(fault.path == PLANNED for fault in study.faults)
+    planned = value_at(study.document, _PLANNED)
+    faulty = any(fault.path == _PLANNED for fault in study.faults)
     return planned if isinstance(planned, int) and not faulty else None
 
 
@@ -434,18 +434,18 @@ def threshold_of(plan: ThresholdPlan) -> float:
     """Return the first simulated threshold (a level): that of viscosity, or one in the middle of the levels."""
     stimulus = plan.stimulus
     low, high = stimulus.levels
-    if stimulus.level_kind == "weber" and low < JND < high:
-        return JND
+    if stimulus.level_kind == "weber" and low < _JND < high:
+        return _JND
     return float(f"{stimulus.level_of(sum(stimulus.domain) / 2):.2g}")
 
 
-def smallest_level(protocol: Protocol, plan: ThresholdPlan) -> float:
+def _smallest_level(protocol: Protocol, plan: ThresholdPlan) -> float:
     """Return the smallest level that can be estimated: twice the largest error of a valid trial."""
     limits = protocol.limits
     if plan.stimulus.vary.endswith("_ms"):
-        return ERRORS * (limits.level_error_ms or USUAL_ERROR_MS)
+        return _ERRORS * (limits.level_error_ms or USUAL_ERROR_MS)
     if plan.stimulus.level_kind == "weber":
-        return ERRORS * (limits.level_error_percent or USUAL_ERROR_PERCENT) / 100
+        return _ERRORS * (limits.level_error_percent or USUAL_ERROR_PERCENT) / 100
     return 0.0
 
 
@@ -477,7 +477,7 @@ def run_simulation(order: Simulation, _send: Send, stop: Stop) -> Simulated:
         most = math.inf if clips is None else clips.highest(plan.stimulus)
         simulated = Simulated(
             simulate_observers(plan, controls.threshold, controls.lapses, check),
-            measurable_thresholds(plan, controls.lapses, smallest_level(protocol, plan), check, most),
+            measurable_thresholds(plan, controls.lapses, _smallest_level(protocol, plan), check, most),
             _group_precision(plan, controls, check),
         )
     shown = tuple(_ratio_sentences(protocol, order.block, controls.participants, check)) if order.block else ()
@@ -502,11 +502,11 @@ def _group_precision(plan: ThresholdPlan, controls: Controls, check: Check) -> G
     shares = [_simulate_studies(part, (people,), check).within(0, precision) for part in (plan, more)]
     enough = people if shares[0] >= ENOUGH else None
     last = people
-    while enough is None and last < MOST_PEOPLE:
-        sizes = range(last + 1, min(2 * last, MOST_PEOPLE) + 1)
+    while enough is None and last < _MOST_PEOPLE:
+        sizes = range(last + 1, min(2 * last, _MOST_PEOPLE) + 1)
         precisions, last = _simulate_studies(plan, sizes, check), sizes[-1]
         enough = next((size for place, size in enumerate(sizes) if precisions.within(place, precision) >= ENOUGH), None)
-    most = max(MOST_PEOPLE, people)
+    most = max(_MOST_PEOPLE, people)
     return GroupPrecision(
         participants=people,
         studies=THRESHOLD_STUDIES,
@@ -532,8 +532,8 @@ def _simulate_studies(plan: ThresholdPlan, sizes: Sequence[int], check: Check) -
     return total
 
 
-SHOWN: Final = "{} of studies of {} show it, if people answer as the model does"
-EQUALITY: Final = "{} of studies of {} show equivalence if there is no difference"
+_SHOWN: Final = "{} of studies of {} show it, if people answer as the model does"
+_EQUALITY: Final = "{} of studies of {} show equivalence if there is no difference"
 
 
 def _ratio_sentences(protocol: Protocol, block: str, people: int, check: Check) -> Iterator[tuple[str, str]]:
@@ -550,7 +550,7 @@ def _ratio_sentences(protocol: Protocol, block: str, people: int, check: Check) 
         for plan in plans if contrast.measure == "threshold" and min(groups) > 1 else ():
             check()
             if plan is not None:
-                batch = study_batch(Case("", plan, (SEED, 0, plan.trials, 0)), (max(people, SPREAD_OF),))
+                batch = study_batch(Case("", plan, (SEED, 0, plan.trials, 0)), (max(people, _SPREAD_OF),))
                 spreads.append(batch.spread / math.sqrt(plan.standards))
         if len(spreads) == len(plans) and all(map(math.isfinite, spreads)):
             spread, alpha = math.hypot(math.log(BETWEEN_PEOPLE), *spreads), decisions(protocol).alphas[-1]
@@ -560,7 +560,7 @@ def _ratio_sentences(protocol: Protocol, block: str, people: int, check: Check) 
                 yield contrast.described(), f"80 % of studies of {people} show a ratio of {math.exp(apart):.2f}"
             elif (bound := log_bound(protocol, contrast)) is not None:
                 share = shown_equal(bound / spread, *groups, alpha=alpha)
-                yield contrast.described(), EQUALITY.format(f"{share:.0%}", people)
+                yield contrast.described(), _EQUALITY.format(f"{share:.0%}", people)
 
 
 def _detectable_differences(order: Simulation, check: Check) -> tuple[Detectable | None, tuple[tuple[str, str], ...]]:
@@ -606,9 +606,9 @@ def _detectable_differences(order: Simulation, check: Check) -> tuple[Detectable
     shown = tuple(
         (
             sentence,
-            SHOWN.format(shares[sentence], people)
+            _SHOWN.format(shares[sentence], people)
             if bound is None
-            else EQUALITY.format(shares[f"{sentence}, {IF_EQUAL}"], people),
+            else _EQUALITY.format(shares[f"{sentence}, {IF_EQUAL}"], people),
         )
         for sentence, bound in stated
         if sentence in shares

@@ -27,7 +27,7 @@ from study_app.protocol.wording.languages import languages_of
 from study_app.store.verification.leaks import Telltales
 from study_app.store.workstation import device_without_force
 
-SHORTEST: Final = 3
+_SHORTEST: Final = 3
 """Letters of an id that does not stand in a text by chance."""
 READ: Final = ("pages", "blocks", "tasks", "designs")
 """Sections whose texts are read before the last answer; statements may name what is compared, as all see the same."""
@@ -65,7 +65,7 @@ def copied_texts(study: Study) -> dict[str, int]:
     return dict(Counter(text.language for text in untranslated_texts(study.document)))
 
 
-def translation_warnings(study: Study) -> tuple[str, ...]:
+def _translation_warnings(study: Study) -> tuple[str, ...]:
     """Return a warning for each language with untranslated texts."""
     return tuple(describe_untranslated(study.document, lists_places=False))
 
@@ -96,7 +96,7 @@ def _telltale_words(protocol: Protocol) -> set[str]:
         for name in names:
             condition = protocol.conditions[name]
             ids = {name, *condition.liquid_ids}
-            telltales |= {name.replace("_", " ").casefold() for name in ids if len(name) >= SHORTEST}
+            telltales |= {name.replace("_", " ").casefold() for name in ids if len(name) >= _SHORTEST}
             if condition.delay_ms:
                 telltales.add(f"{condition.delay_ms:g} ms")
     return telltales
@@ -110,7 +110,7 @@ def text_keys() -> frozenset[str]:
     return frozenset(key for key, node in properties if is_localised(tuple(alternatives(node))))
 
 
-ROUNDS: Final = 8
+_ROUNDS: Final = 8
 """Leaving one element out may break those that name it: so often the rest is examined again."""
 TEXT: Final = "…"
 _STAND_IN: Final = {
@@ -152,7 +152,7 @@ def restored_part(study: Study, before: Mapping[str, Any]) -> ValidPart:
     document: Any = study.document
     faults: list[Fault] = list(study.faults) if study.is_toml else validate_document(document)[1]
     whole = forces = True
-    for number in range(ROUNDS):
+    for number in range(_ROUNDS):
         for fault in sorted(faults, key=_sort_key, reverse=True):
             place, value = _restoring_change(document, fault, before) or _repairing_change(
                 document, fault, of_others=number > 0
@@ -288,7 +288,7 @@ class Facts:
 @lru_cache(maxsize=2)
 def facts(study: Study) -> Facts:
     """Return the facts of a study."""
-    missing, translate = missing_texts(study), translation_warnings(study)
+    missing, translate = missing_texts(study), _translation_warnings(study)
     valid = valid_part(study)
     if (protocol := valid.protocol) is None:
         return Facts(missing=missing, warnings=translate)

@@ -102,18 +102,18 @@ def moment_labels(moments: tuple[Moment, ...]) -> tuple[tuple[Moment, str], ...]
     )
 
 
-Graph: TypeAlias = Mapping[Path, frozenset[Path]]
+_Graph: TypeAlias = Mapping[Path, frozenset[Path]]
 """What each table names, by paths: ``("conditions", "syrup")`` → ``{("liquids", "syrup")}``."""
 
 
 def first_step(shown: Preview, path: Path) -> int | None:
     """Return the index of the first step that shows an element, or a place within it; None if none does."""
-    graph = graph_of(shown.protocol.model_dump())
+    graph = _graph_of(shown.protocol.model_dump())
     tables = (_tables_of_step(shown, step, graph) for step in shown.schedule.steps)
     return next((at for at, tables_of_step in enumerate(tables) if path[:2] in tables_of_step), None)
 
 
-def graph_of(document: Mapping[str, object]) -> Graph:
+def _graph_of(document: Mapping[str, object]) -> _Graph:
     """Return the tables that each table of a study refers to."""
     names: dict[Path, set[Path]] = {}
     for place, named in named_places(document):
@@ -121,7 +121,7 @@ def graph_of(document: Mapping[str, object]) -> Graph:
     return {table: frozenset(named) for table, named in names.items()}
 
 
-def reachable_tables(graph: Graph, first: Iterable[Path]) -> frozenset[Path]:
+def _reachable_tables(graph: _Graph, first: Iterable[Path]) -> frozenset[Path]:
     """Return tables and everything that they refer to, directly or not."""
     tables = dict.fromkeys(first)
     todo = list(tables)
@@ -132,23 +132,23 @@ def reachable_tables(graph: Graph, first: Iterable[Path]) -> frozenset[Path]:
     return frozenset(tables)
 
 
-def _tables_of_step(shown: Preview, step: Step, graph: Graph) -> frozenset[Path]:
+def _tables_of_step(shown: Preview, step: Step, graph: _Graph) -> frozenset[Path]:
     """Return the tables that a step presents and those they refer to; for a trial only its own condition."""
     if isinstance(step, PageStep):
-        return reachable_tables(graph, [("pages", step.page_id)])
+        return _reachable_tables(graph, [("pages", step.page_id)])
     if isinstance(step, FormStep):
-        return reachable_tables(graph, [("questionnaires", step.form)])
+        return _reachable_tables(graph, [("questionnaires", step.form)])
     block: Path = ("blocks", step.block)
     parts = [part for part in graph.get(block, ()) if part[0] not in {"conditions", "pages"}]
     named = (shown.codes[step.block][step.code], shown.protocol.blocks[step.block].standard)
     presented = [("conditions", name) for name in named if name in shown.protocol.conditions]  # not of a varied number
-    return reachable_tables(graph, [*parts, *presented]) | {block}
+    return _reachable_tables(graph, [*parts, *presented]) | {block}
 
 
-Side: TypeAlias = Literal["tank", "questions"]
+_Side: TypeAlias = Literal["tank", "questions"]
 
 STANDALONE: Final = "standalone"
-_SIDES: Final[dict[str, Side]] = {
+_SIDES: Final[dict[str, _Side]] = {
     "liquids": "tank", "tasks": "tank", "stimuli": "tank", "methods": "tank",
     "questionnaires": "questions", "scales": "questions", "designs": "questions",
 }  # fmt: skip
@@ -181,7 +181,7 @@ def step_name(step: Step) -> str:
     return step.block if isinstance(step, Trial) else step.page_id if isinstance(step, PageStep) else step.form
 
 
-def previews(study: Protocol) -> Iterator[tuple[str, Preview]]:
+def _previews(study: Protocol) -> Iterator[tuple[str, Preview]]:
     """Yield each kind of session with its name, the first participant's first and without a name."""
     first = preview(study)
     yield "", first
@@ -196,7 +196,7 @@ def first_showing(study: Protocol, path: Path) -> Found | None:
 
     A page or questionnaire that is in no session is shown on its own.
     """
-    for session, shown in previews(study):
+    for session, shown in _previews(study):
         if (index := first_step(shown, path)) is not None:
             return Found(shown, index, session)
     if len(path) > 1 and path[0] in {"pages", "questionnaires"}:
@@ -214,31 +214,31 @@ def first_showing(study: Protocol, path: Path) -> Found | None:
 
 def same_step(study: Protocol, name: str, trial: int, session: str) -> Found | None:
     """Return the step with a name, for a block the trial with that index or its last; None if it is gone."""
-    for called, shown in previews(study):
-        if called == session and (at := step_of(shown, name, trial)) is not None:
+    for called, shown in _previews(study):
+        if called == session and (at := _step_of(shown, name, trial)) is not None:
             return Found(shown, at, session)
     return None
 
 
-def step_of(shown: Preview, name: str, trial: int) -> int | None:
+def _step_of(shown: Preview, name: str, trial: int) -> int | None:
     """Return the index of the step with a name, for a block the trial with that index or its last; None without one."""
     named = [(at, step) for at, step in enumerate(shown.schedule.steps) if step_name(step) == name]
     exact = (pair for pair in named if isinstance(pair[1], Trial) and pair[1].index == trial)
     return next((at for at, _ in (*exact, *(named[::-1] if trial > 1 else named))), None)
 
 
-def side_of(path: Path) -> Side | None:
+def side_of(path: Path) -> _Side | None:
     """Return the page of a trial that shows an element; None: either."""
     return _SIDES.get(str(path[0])) if path else None
 
 
-MOST_EARLIER: Final = 5
+_MOST_EARLIER: Final = 5
 """So many kept versions are looked at for one without faults."""
 
 
 def last_valid_study(opened: Document) -> Study | None:
     """Return the study of the file or of its newest kept version without faults."""
-    earlier = (kept_content(version.hash) or b"" for version in reversed(kept_versions(opened.file)[-MOST_EARLIER:]))
+    earlier = (kept_content(version.hash) or b"" for version in reversed(kept_versions(opened.file)[-_MOST_EARLIER:]))
     for text in (opened.saved.encode(), *(unbundle(content)[0] for content in earlier)):
         with suppress(Refused):
             study = read_study(text, opened.study.folder)
@@ -290,7 +290,7 @@ def part_to_play(study: Study, path: Path, position: StepPosition | None = None)
     shown = preview(completed.protocol, position.seed)
     step = first_step(shown, path) or 0
     if position.name:
-        step = step_of(shown, position.name, position.trial) or 0
+        step = _step_of(shown, position.name, position.trial) or 0
     return Playable(
         with_liquid_files(completed.text.encode(), completed.folder),
         completed.folder,
@@ -312,7 +312,7 @@ def _edits_to_fill_in(study: Study, language: str) -> Iterator[Edit]:
             yield Set(fault.path, dict.fromkeys(languages_of(study.document), text))
 
 
-OF_THE_STUDY: Final = frozenset({"scene", "velocity", "knee", "body"})
+_OF_THE_STUDY: Final = frozenset({"scene", "velocity", "knee", "body"})
 """Tables of the lab's parameters that a study has once for all of its liquids."""
 
 
@@ -395,7 +395,7 @@ class Feeling(QObject):
         self._sides[side] = after.model_copy(update={"id": before.id})
         self.editing.select(path)
         self.returned.emit()
-        shared = [name for name in setting.changed_names() if name.partition(".")[0] in OF_THE_STUDY]
+        shared = [name for name in setting.changed_names() if name.partition(".")[0] in _OF_THE_STUDY]
         if shared:
             names = ", ".join(parameter(setting.scene, name).label.lower() for name in shared)
             self.place.message.emit(

@@ -86,12 +86,12 @@ from study_app.session.transitions.page_builder import (
     previewed_page,
 )
 
-FRAME_MS: Final = 33
-RING: Final = 2
-LEAVES: Final = "Esc leaves the page"
+_FRAME_MS: Final = 33
+_RING: Final = 2
+_LEAVES: Final = "Esc leaves the page"
 
 
-class LivePage(Coloured, QGraphicsView):
+class _LivePage(Coloured, QGraphicsView):
     """Shows a page in a `ParticipantWindow` that the mouse and the keys reach, at 100 % or as large as there is room.
 
     The page has a keyboard focus of its own, whatever the designer's is on, so that it looks as in a session: it
@@ -112,7 +112,7 @@ class LivePage(Coloured, QGraphicsView):
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setRenderHints(QPainter.RenderHint.SmoothPixmapTransform | QPainter.RenderHint.TextAntialiasing)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAccessibleDescription(f"{LEAVES}; Tab after the last control does the same.")
+        self.setAccessibleDescription(f"{_LEAVES}; Tab after the last control does the same.")
         self.setMinimumHeight(120)
         self.setTransformationAnchor(QGraphicsView.ViewportAnchor.NoAnchor)
         self.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
@@ -124,7 +124,7 @@ class LivePage(Coloured, QGraphicsView):
         self._since_s = 0.0
         _OPEN.add(self)
         self._frames = QTimer(self)
-        self._frames.setInterval(FRAME_MS)
+        self._frames.setInterval(_FRAME_MS)
         self._frames.timeout.connect(self.frame_due)
 
     # display
@@ -290,7 +290,7 @@ class LivePage(Coloured, QGraphicsView):
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         QAbstractScrollArea.focusInEvent(self, event)
-        announce(self, LEAVES)
+        announce(self, _LEAVES)
         self.viewport().update()
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
@@ -313,15 +313,15 @@ class LivePage(Coloured, QGraphicsView):
             inside.addRoundedRect(whole, RADIUS_CONTROL, RADIUS_CONTROL)
             painter.fillPath(corners.subtracted(inside), QColor(self.theme.surface))
         if self.hasFocus():
-            painter.setPen(QPen(QColor(self.theme.accent), RING))
+            painter.setPen(QPen(QColor(self.theme.accent), _RING))
             inset = whole.adjusted(1, 1, -1, -1)
             painter.drawRoundedRect(inset, RADIUS_CONTROL, RADIUS_CONTROL)
             painter.setFont(font("small", weight=600))
-            label = QRectF(painter.fontMetrics().boundingRect(LEAVES)).adjusted(-10, -4, 10, 4)
+            label = QRectF(painter.fontMetrics().boundingRect(_LEAVES)).adjusted(-10, -4, 10, 4)
             label.moveBottomLeft(inset.bottomLeft() + QPointF(6, -6))
             fill_rounded(painter, label, RADIUS_CONTROL, self.theme.accent)
             painter.setPen(QColor(self.theme.on_accent))
-            painter.drawText(label, Qt.AlignmentFlag.AlignCenter, LEAVES)
+            painter.drawText(label, Qt.AlignmentFlag.AlignCenter, _LEAVES)
         painter.end()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -343,7 +343,7 @@ class LivePage(Coloured, QGraphicsView):
             self._proxy.hide()
 
 
-_OPEN: WeakSet[LivePage] = WeakSet()
+_OPEN: WeakSet[_LivePage] = WeakSet()
 
 
 @atexit.register
@@ -358,8 +358,8 @@ def _without_answers(page: Page | None) -> Page | None:
     return replace(page, chosen=()) if isinstance(page, QuestionnairePage) else page
 
 
-NO_ANSWERS: Final[Mapping[str, Value]] = {}
-MOST_IN_ROW: Final = 2
+_NO_ANSWERS: Final[Mapping[str, Value]] = {}
+_MOST_IN_ROW: Final = 2
 
 
 class ParticipantPreview(Card):
@@ -375,7 +375,7 @@ class ParticipantPreview(Card):
         self.view = ParticipantView()
         self._screens_shown: tuple[ScreenSize, ...] = ()
         self._high = 0
-        self.page = LivePage()
+        self.page = _LivePage()
         self.setFocusProxy(self.page)
         self.note = label("", "small", "warn", wraps=True)
         self.note.hide()
@@ -598,7 +598,9 @@ class ParticipantPreview(Card):
         if self._moment not in pages:
             of_side = [moment for moment in pages if (moment.kind == "tank") == (self._side == "tank")]
             self._moment = (of_side or list(pages))[0]
-        page = previewed_page(shown, index, self._moment, self._language, self._answers.get(self._page_key, NO_ANSWERS))
+        page = previewed_page(
+            shown, index, self._moment, self._language, self._answers.get(self._page_key, _NO_ANSWERS)
+        )
         if isinstance(page, TaskPage):
             self._place_ball(page, presented_condition(shown, index))
         now = shown.schedule.steps[index]
@@ -684,7 +686,7 @@ class ParticipantPreview(Card):
         self.after.setEnabled(view.has_after)
         self.moments.setVisible(bool(view.moments))
         self.moments.show_values(view.moments, view.moment)
-        if len(view.moments) > MOST_IN_ROW:
+        if len(view.moments) > _MOST_IN_ROW:
             self._second.insertWidget(0, self.moments)
         else:
             self._row.insertWidget(self._row.indexOf(self.after) + 1, self.moments)

@@ -36,13 +36,13 @@ ENDED: Final = {
     STOP_BUTTON: "the stop button was pressed",
 }
 
-EWMA: Final = 0.1
+_EWMA: Final = 0.1
 """Weight of the velocity of spring and damper for differences over 1 ms: that of the servo's `ewma`."""
-PACE_MPS: Final = 0.03
-PUSH_NPS: Final = 2.0
+_PACE_MPS: Final = 0.03
+_PUSH_NPS: Final = 2.0
 SILENT_TICKS: Final = 20
-SLOW_S: Final = 8e-3  # a first-order filter of 20 Hz: faster motion counts as oscillation
-SHAKE_S: Final = 0.1
+_SLOW_S: Final = 8e-3  # a first-order filter of 20 Hz: faster motion counts as oscillation
+_SHAKE_S: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +76,7 @@ class Excitation:
 
 _AT_REST = asdict(Excitation())
 
-EXCITATION = np.dtype(
+_EXCITATION = np.dtype(
     [
         # the device behind
         ("context", np.intp),
@@ -109,7 +109,7 @@ EXCITATION = np.dtype(
     align=True,
 )
 
-_excitation_at = c_functions.record_at(EXCITATION)
+_excitation_at = c_functions.record_at(_EXCITATION)
 _inner_read, _inner_write = c_functions.call_at(c_functions.READ), c_functions.call_at(c_functions.WRITE)
 
 
@@ -127,7 +127,7 @@ class BenchDriver:
         self.force_limit_n = inner.force_limit_n
         self.dynamics = inner.dynamics
         self._inner = inner
-        self._memory = records(EXCITATION, 1)
+        self._memory = records(_EXCITATION, 1)
         self.state = self._memory[0]
         self.state.context, self.state.read, self.state.write = inner.context, inner.read.address, inner.write.address
         self.state.limit_n = limit_n
@@ -206,7 +206,7 @@ def _is_usable(bench: Any, position_m: Any, now_ns: int) -> bool:
 @kernel
 def _track_position(bench: Any, position_m: Any, now_ns: int) -> None:
     interval_s = (now_ns - bench.new_ns) * 1e-9
-    weight = 1.0 - (1.0 - EWMA) ** (interval_s * 1e3)
+    weight = 1.0 - (1.0 - _EWMA) ** (interval_s * 1e3)
     for axis in range(3):
         if bench.started == 0 or interval_s <= 0.0:
             bench.velocity_mps[axis] = 0.0
@@ -245,14 +245,14 @@ def _excite(bench: Any, elapsed_s: float) -> None:
     bench.damper_nspm = min(bench.damper_nspm + bench.rise_nspm_per_s * elapsed_s, bench.most_nspm)
     shaken_n2 = 0.0
     for axis in range(3):
-        bench.aim_m[axis] += _clamp(bench.centre_m[axis] - bench.aim_m[axis], PACE_MPS * elapsed_s)
+        bench.aim_m[axis] += _clamp(bench.centre_m[axis] - bench.aim_m[axis], _PACE_MPS * elapsed_s)
         off_m = bench.aim_m[axis] - bench.position_m[axis]
         spring_n = bench.stiffness_npm * off_m
         bench.bias_n[axis] += bench.integral_per_s * elapsed_s * spring_n
         bench.bias_n[axis] = _clamp(bench.bias_n[axis], 0.5 * bench.limit_n)
-        bench.pushed_n[axis] += _clamp(bench.push_n[axis] - bench.pushed_n[axis], PUSH_NPS * elapsed_s)
+        bench.pushed_n[axis] += _clamp(bench.push_n[axis] - bench.pushed_n[axis], _PUSH_NPS * elapsed_s)
         damper_n = -bench.damper_nspm * bench.velocity_mps[axis]
-        bench.slow_n[axis] += elapsed_s / (elapsed_s + SLOW_S) * (damper_n - bench.slow_n[axis])
+        bench.slow_n[axis] += elapsed_s / (elapsed_s + _SLOW_S) * (damper_n - bench.slow_n[axis])
         shaken_n2 += (damper_n - bench.slow_n[axis]) ** 2
         bench.force_n[axis] = (
             spring_n
@@ -262,7 +262,7 @@ def _excite(bench: Any, elapsed_s: float) -> None:
             + damper_n
             + (wave_n if axis == bench.axis else 0.0)
         )
-    bench.shake_n2 += elapsed_s / (elapsed_s + SHAKE_S) * (shaken_n2 - bench.shake_n2)
+    bench.shake_n2 += elapsed_s / (elapsed_s + _SHAKE_S) * (shaken_n2 - bench.shake_n2)
     size_n = norm(bench.force_n)
     if not math.isfinite(size_n):
         clear(bench.force_n)
@@ -277,7 +277,7 @@ def _clamp(value: float, most: float) -> float:
 
 
 RATE_HZ: Final = 1000.0
-GREATEST_N: Final = 4.0
+_GREATEST_N: Final = 4.0
 """Greatest force of an excitation, even if the device permits more."""
 _LOOK_S: Final = 0.02
 _ALIVE_NS: Final = 500_000_000
@@ -295,7 +295,7 @@ class Stand:
     def __init__(self, device: Device, clock: Clock | None = None) -> None:
         self.device = device
         self.clock = clock or SystemClock()
-        self.limit_n = min(device.force_limit_n, GREATEST_N)
+        self.limit_n = min(device.force_limit_n, _GREATEST_N)
         self._driver = BenchDriver(device, self.limit_n)
         self._servo = Servo(self._driver, clock=self.clock, rate_hz=RATE_HZ, elements=0)
         self._reader = self._servo.telemetry.reader()

@@ -14,15 +14,15 @@ from study_app.haptics.runtime.telemetry import timing
 Floats = NDArray[np.float64]
 
 GRAVITY_MPS2: Final = 9.80665
-SIGMA_S: Final = 4e-3
+_SIGMA_S: Final = 4e-3
 """Width of the Gaussian that smooths positions and forces: its gain at 40 Hz is one half."""
-SLOW_MPS: Final = 1e-3
+_SLOW_MPS: Final = 1e-3
 """Speed at which the model's friction is three quarters of that in motion."""
-MOST_DELAY_S: Final = 8e-3
-DIFFERENCE: Final = 5
-COUNTING_MPS: Final = (0.02, 0.2)
+_MOST_DELAY_S: Final = 8e-3
+_DIFFERENCE: Final = 5
+_COUNTING_MPS: Final = (0.02, 0.2)
 """Speeds at which positions show the encoder's count."""
-LEAST_COUNTED: Final = 200
+_LEAST_COUNTED: Final = 200
 _MEDIAN_OF_NORMAL: Final = 0.6745  # of a normal distribution's absolute value, by its standard deviation
 _STEP_S: Final = 0.1e-3
 _NEAR: Final = 10
@@ -146,7 +146,7 @@ def motion_under_force(stretches: Sequence[Any], axis: int, rate_hz: float) -> M
         return float(force @ force - np.sum((force @ orthogonal) ** 2)) / len(force)
 
     # Forces are smoothed over 4 ms (SIGMA_S), so the residual has one minimum within 1 ms of the coarse one.
-    nearest_s = min(np.arange(0.0, MOST_DELAY_S, _NEAR * _STEP_S), key=residual_n2)
+    nearest_s = min(np.arange(0.0, _MOST_DELAY_S, _NEAR * _STEP_S), key=residual_n2)
     around_s = nearest_s + np.arange(1 - _NEAR, _NEAR) * _STEP_S
     delay_s = float(min(around_s[around_s >= 0.0], key=residual_n2))
     mass_kg, damping_nspm, friction_n, *_ = np.linalg.solve(triangle, force_n(delay_s) @ orthogonal)
@@ -164,25 +164,25 @@ def motion_under_force(stretches: Sequence[Any], axis: int, rate_hz: float) -> M
 def count_um(stretches: Sequence[Any], axis: int) -> float:
     """Return the encoder count [µm] along an axis; NaN if it moved too little.
 
-    Counting moves a position by up to half a count, evenly distributed: by count / √12 RMS. `DIFFERENCE`th differences
+    Counting moves a position by up to half a count, evenly distributed: by count / √12 RMS. `_DIFFERENCE`th differences
     of positions contain this noise and almost nothing of a motion below 25 Hz. Slower motion would repeat counts; in
     faster motion the uncertain time of samples would count, too.
     """
     noises_m: list[Floats] = []
     for samples in stretches:
         t_s, position_m = _new_positions(samples)
-        if len(t_s) <= DIFFERENCE:
+        if len(t_s) <= _DIFFERENCE:
             continue
         steps_s, x_m = np.diff(t_s), position_m[:, axis]
-        speed_mps = np.abs(x_m[DIFFERENCE:] - x_m[:-DIFFERENCE]) / (t_s[DIFFERENCE:] - t_s[:-DIFFERENCE])
-        longest_s = np.lib.stride_tricks.sliding_window_view(steps_s, DIFFERENCE).max(axis=1)
-        used = (speed_mps > COUNTING_MPS[0]) & (speed_mps < COUNTING_MPS[1]) & (longest_s < 1.5 * np.median(steps_s))
-        noises_m.append(np.diff(x_m, DIFFERENCE)[used])
+        speed_mps = np.abs(x_m[_DIFFERENCE:] - x_m[:-_DIFFERENCE]) / (t_s[_DIFFERENCE:] - t_s[:-_DIFFERENCE])
+        longest_s = np.lib.stride_tricks.sliding_window_view(steps_s, _DIFFERENCE).max(axis=1)
+        used = (speed_mps > _COUNTING_MPS[0]) & (speed_mps < _COUNTING_MPS[1]) & (longest_s < 1.5 * np.median(steps_s))
+        noises_m.append(np.diff(x_m, _DIFFERENCE)[used])
     noise_m = np.concatenate(noises_m) if noises_m else np.empty(0)
-    if len(noise_m) < LEAST_COUNTED:
+    if len(noise_m) < _LEAST_COUNTED:
         return math.nan
     spread_m = float(np.median(np.abs(noise_m))) / _MEDIAN_OF_NORMAL
-    return 1e6 * math.sqrt(12.0 / math.comb(2 * DIFFERENCE, DIFFERENCE)) * spread_m
+    return 1e6 * math.sqrt(12.0 / math.comb(2 * _DIFFERENCE, _DIFFERENCE)) * spread_m
 
 
 class _Prepared(NamedTuple):
@@ -208,7 +208,7 @@ def _prepare_segment(samples: Any, axis: int, step_s: float) -> _Prepared:
     kernels = _gaussians(step_s)
     bell = kernels.bell
     smooth, v_mps, a_mps2 = (np.convolve(x_m - x_m.mean(), it, "valid") for it in (bell, kernels.first, kernels.second))
-    friction = np.convolve(np.tanh(v_mps / SLOW_MPS), bell, "valid")
+    friction = np.convolve(np.tanh(v_mps / _SLOW_MPS), bell, "valid")
     reach = len(bell) // 2
     whole = slice(reach, len(smooth) - reach)  # where friction is smoothed like the rest
     terms = np.column_stack([a_mps2[whole], v_mps[whole], friction, smooth[whole], np.ones_like(friction)])
@@ -246,9 +246,9 @@ class _Kernels(NamedTuple):
 
 def _gaussians(step_s: float) -> _Kernels:
     """Return kernels that are exact for 1, t and t²."""
-    reach = math.ceil(_REACH * SIGMA_S / step_s)
+    reach = math.ceil(_REACH * _SIGMA_S / step_s)
     t_s: Floats = step_s * np.arange(-reach, reach + 1, dtype=float)
-    bell = np.exp(-0.5 * (t_s / SIGMA_S) ** 2)
+    bell = np.exp(-0.5 * (t_s / _SIGMA_S) ** 2)
     bell /= bell.sum()
     first = -t_s * bell
     first /= -(first * t_s).sum()

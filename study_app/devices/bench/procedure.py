@@ -30,29 +30,29 @@ from study_app.haptics.runtime.clocks.clock import Clock
 Ask = Callable[[str, str], Callable[[], str | None]]
 """(the request: "let-go", "scale", "grams", "damping"; its text) -> a function that returns None until the operator has
 answered, then the answer."""
-AXES: Final = "xyz"
-SPRING_NPM: Final = 100.0
-SPRING_NSPM: Final = 6.0
-INTEGRAL_PER_S: Final = 0.7
-WAVE_N: Final = 2.0
-WEAKER: Final = 0.4
-FROM_HZ: Final = 1.5
-TO_HZ: Final = 25.0
-REACH_M: Final = 0.045
-SLIP_M: Final = 0.03
+_AXES: Final = "xyz"
+_SPRING_NPM: Final = 100.0
+_SPRING_NSPM: Final = 6.0
+_INTEGRAL_PER_S: Final = 0.7
+_WAVE_N: Final = 2.0
+_WEAKER: Final = 0.4
+_FROM_HZ: Final = 1.5
+_TO_HZ: Final = 25.0
+_REACH_M: Final = 0.045
+_SLIP_M: Final = 0.03
 """Greatest motion of a handle that pushes on a scale [m]: beyond it, it has slipped off."""
-MOST_NSPM: Final = 150.0
-SHAKE_N: Final = 0.35
+_MOST_NSPM: Final = 150.0
+_SHAKE_N: Final = 0.35
 """Effective force of the damper above 20 Hz that counts as oscillation. [choice]"""
-DRAW_N: Final = 0.6
-DRAW_HZ: Final = 0.7
-LEAST_EXPLAINED: Final = 0.95
+_DRAW_N: Final = 0.6
+_DRAW_HZ: Final = 0.7
+_LEAST_EXPLAINED: Final = 0.95
 """Smallest explained fraction of the force's variance; simulated handles give 0.998 to 0.9996."""
-LEVELS_N: Final = (0.0, 1.0, 2.0, 3.0, 1.0)
+_LEVELS_N: Final = (0.0, 1.0, 2.0, 3.0, 1.0)
 _PATIENCE_S: Final = 600.0
-FORMAT: Final = 1
-NOT_FREE: Final = (
-    f"Mass, damping and friction explain less than {100 * LEAST_EXPLAINED:g} % of the force: somebody touched the "
+_FORMAT: Final = 1
+_NOT_FREE: Final = (
+    f"Mass, damping and friction explain less than {100 * _LEAST_EXPLAINED:g} % of the force: somebody touched the "
     f"handle, or it hit an end stop. Measure again."
 )
 _ENDED: Final = {
@@ -70,7 +70,7 @@ class Durations:
     come_s: float = 6.0  # for the spring to bring the handle to the middle
     wave_s: float = 30.0  # force on each axis for mass and friction
     push_s: float = 4.0  # until the force on the scale is steady
-    damping_s: float = 60.0  # until the damper has grown to `MOST_NSPM`, on each axis
+    damping_s: float = 60.0  # until the damper has grown to `_MOST_NSPM`, on each axis
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,7 @@ class Found:
     @property
     def fits(self) -> bool:
         """Whether mass, damping and friction explain the handle's motion: it was not touched and reached no stop."""
-        return all(motion.explained >= LEAST_EXPLAINED and motion.mass_kg > 0.0 for motion in self.motions)
+        return all(motion.explained >= _LEAST_EXPLAINED and motion.mass_kg > 0.0 for motion in self.motions)
 
 
 def run_bench(
@@ -155,10 +155,10 @@ def run_bench(
 def _hold_excitation(**more: Any) -> Excitation:
     return Excitation(
         **{
-            "stiffness_npm": SPRING_NPM,
-            "damping_nspm": SPRING_NSPM,
-            "integral_per_s": INTEGRAL_PER_S,
-            "reach_m": 2 * REACH_M,
+            "stiffness_npm": _SPRING_NPM,
+            "damping_nspm": _SPRING_NSPM,
+            "integral_per_s": _INTEGRAL_PER_S,
+            "reach_m": 2 * _REACH_M,
             **more,
         }
     )
@@ -168,12 +168,12 @@ def _measure_motion(stand: Stand, axis: int, lasts: Durations, progress: Callabl
     """Bring the handle to the middle, move it by a chirp, and fit its response."""
     stand.excite(_hold_excitation())
     stand.run(lasts.come_s)
-    most_n = min(WAVE_N, stand.limit_n / 2)
-    progress(f"Mass and friction along {AXES[axis]}: {lasts.wave_s:g} s of up to {most_n:.1f} N.")
-    sweep = (TO_HZ - FROM_HZ) / (lasts.wave_s / 2)
+    most_n = min(_WAVE_N, stand.limit_n / 2)
+    progress(f"Mass and friction along {_AXES[axis]}: {lasts.wave_s:g} s of up to {most_n:.1f} N.")
+    sweep = (_TO_HZ - _FROM_HZ) / (lasts.wave_s / 2)
     stretches = []
-    for wave_n in (most_n, WEAKER * most_n):
-        stand.excite(_hold_excitation(integral_per_s=0.0, axis=axis, wave_n=wave_n, from_hz=FROM_HZ, hz_per_s=sweep))
+    for wave_n in (most_n, _WEAKER * most_n):
+        stand.excite(_hold_excitation(integral_per_s=0.0, axis=axis, wave_n=wave_n, from_hz=_FROM_HZ, hz_per_s=sweep))
         samples, _ = stand.run(lasts.wave_s / 2)
         stretches.append(samples)
     stand.rest()
@@ -186,17 +186,17 @@ def _measure_damping(
     """Move the handle back and forth while the damper grows, until it oscillates, is stopped or is greatest."""
     stand.excite(_hold_excitation())
     stand.run(lasts.come_s)
-    progress(f"Stable damping along {AXES[axis]}: up to {MOST_NSPM:g} N·s/m in {lasts.damping_s:g} s.")
+    progress(f"Stable damping along {_AXES[axis]}: up to {_MOST_NSPM:g} N·s/m in {lasts.damping_s:g} s.")
     answered = ask("damping", "It ends when the handle oscillates; press Enter to end it earlier.")
     stand.excite(
         _hold_excitation(
             integral_per_s=0.0,
             axis=axis,
-            wave_n=min(DRAW_N, stand.limit_n / 4),
-            from_hz=DRAW_HZ,
-            rise_nspm_per_s=MOST_NSPM / lasts.damping_s,
-            most_nspm=MOST_NSPM,
-            shake_limit_n=SHAKE_N,
+            wave_n=min(_DRAW_N, stand.limit_n / 4),
+            from_hz=_DRAW_HZ,
+            rise_nspm_per_s=_MOST_NSPM / lasts.damping_s,
+            most_nspm=_MOST_NSPM,
+            shake_limit_n=_SHAKE_N,
         )
     )
     _, answer = stand.run(lasts.damping_s, answered=answered, may_end=True)
@@ -220,10 +220,10 @@ def _measure_gain(stand: Stand, lasts: Durations, ask: Ask, progress: Callable[[
         progress("Force against a scale: omitted.")
         return None
     sent_n, shown_g = [], []
-    for level_n in LEVELS_N:
+    for level_n in _LEVELS_N:
         if level_n > 0.75 * stand.limit_n:
             continue
-        stand.excite(Excitation(push_n=(0.0, -level_n, 0.0), reach_m=SLIP_M))
+        stand.excite(Excitation(push_n=(0.0, -level_n, 0.0), reach_m=_SLIP_M))
         samples, _ = stand.run(lasts.push_s)
         answer = _wait_for_answer(stand, ask("grams", f"{level_n:g} N downward: what does the scale show, in grams?"))
         shown_g.append(_grams(answer))
@@ -251,7 +251,7 @@ def _grams(answer: str) -> float:
 def as_json(results: Found, day: str) -> str:
     """Return the results as JSON text; ``day`` is the date of the bench, such as 2026-11-21."""
     document = {
-        "format": FORMAT,
+        "format": _FORMAT,
         "kind": "devices bench",
         "measured": day,
         "program": __version__,
@@ -310,13 +310,13 @@ def _lines(results: Found, day: str) -> Iterator[str]:
     ):
         yield f"| {label} | {_row(tuple(getattr(motion, name) for motion in results.motions), digits)} |"
     if not results.fits:
-        yield from ("", NOT_FREE)
+        yield from ("", _NOT_FREE)
     yield from ("", "## Greatest stable damping", "", "| axis | N·s/m | ended |", "| --- | ---: | --- |")
-    for axis, damping in zip(AXES, results.damping, strict=True):
+    for axis, damping in zip(_AXES, results.damping, strict=True):
         yield f"| {axis} | {damping.damping_nspm:.0f} | {_ENDED[damping.ended]} |"
     yield from (
         "",
-        (f"The handle was free while a damper grew; more than {SHAKE_N:g} N RMS above 20 Hz counts as oscillation."),
+        (f"The handle was free while a damper grew; more than {_SHAKE_N:g} N RMS above 20 Hz counts as oscillation."),
     )
     yield from ("", "## Force on a scale", "")
     gain = results.gain

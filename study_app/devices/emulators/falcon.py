@@ -267,7 +267,7 @@ def _string_descriptor(index: int, serial: str) -> bytes:
     return bytes((2 + len(text), _STRING_DESCRIPTOR)) + text
 
 
-FAULTY_PATIENCE_S = 5.0  # some faults keep it from being homed
+_FAULTY_PATIENCE_S = 5.0  # some faults keep it from being homed
 _STILL_TICKS = 10  # longer than the pause between two strokes of homing
 
 
@@ -303,7 +303,7 @@ class EmulatedFalcon(FalconDevice):
 
     def take_fault(self, fault: str) -> None:
         self.hand.set_fault(fault)
-        self._patience_s = FAULTY_PATIENCE_S
+        self._patience_s = _FAULTY_PATIENCE_S
 
     def open(self) -> None:
         """Open the device and wait until the hand has moved the grip to the middle after homing."""

@@ -34,14 +34,14 @@ ARMS = np.dtype(
     align=True,
 )
 
-MOST_FORCE_N = 10.0
+_MOST_FORCE_N = 10.0
 """The greatest force of the motors at the grip [N]; beyond it all three torques are reduced by one factor.
 
 Novint advertised more than 8.9 N (2 lbf). Full torque units give 9.8 to 10.2 N across the axis with the gain of Martin
 & Hillier 2009, which agrees, but 24.8 N along it, which is not reported of any Falcon with its 30 W supply. What
 saturates, each motor or their supply, and at how much, is not published: uncertain by 1 N across, by more along z.
 """
-LEAST_LEVER_M = 0.012
+_LEAST_LEVER_M = 0.012
 """Smallest change of the rod's length per arm rotation [m/rad]: below it the arm is nearly stretched, at its stop. All
 that a Falcon is used for is twice as far from that."""
 
@@ -107,7 +107,7 @@ def _reached(arms: Any, hand_m: Any) -> bool:
     held = 0
     for i in range(3):
         at = arms.angle_rad[i]
-        if abs(_stretch(arms, i, at, x, y, z)) < _SLACK_M and -_per_rad(arms, i, x, y, z) > LEAST_LEVER_M:
+        if abs(_stretch(arms, i, at, x, y, z)) < _SLACK_M and -_per_rad(arms, i, x, y, z) > _LEAST_LEVER_M:
             held += 1
     return held == 3
 
@@ -153,9 +153,9 @@ def find_force(arms: Any, torque: Any, hand_m: Any) -> None:
 def saturate(arms: Any) -> None:
     """Limit ``arms.force_n`` to the greatest force of the motors."""
     size_n = norm(arms.force_n)
-    if size_n > MOST_FORCE_N:
+    if size_n > _MOST_FORCE_N:
         for axis in range(3):
-            arms.force_n[axis] *= MOST_FORCE_N / size_n
+            arms.force_n[axis] *= _MOST_FORCE_N / size_n
 
 
 @kernel

@@ -19,8 +19,8 @@ from study_app.haptics.kernels.compiled import kernel
 
 OUT_RING: Final = 4096
 BACK_RING: Final = 4096
-OUT_BUFFER: Final = 128  # the chip's own, to the device
-BACK_BUFFER: Final = 256  # and from it
+_OUT_BUFFER: Final = 128  # the chip's own, to the device
+_BACK_BUFFER: Final = 256  # and from it
 
 BRIDGE = np.dtype(
     [
@@ -48,13 +48,13 @@ BRIDGE = np.dtype(
     align=True,
 )
 
-BYTE = np.dtype([("value", np.uint8)])
-WORD = np.dtype([("value", np.int64)])
-byte_at = record_at(BYTE)
-_word_at = record_at(WORD)
+_BYTE = np.dtype([("value", np.uint8)])
+_WORD = np.dtype([("value", np.int64)])
+byte_at = record_at(_BYTE)
+_word_at = record_at(_WORD)
 
-USB_NS: Final = 30_000  # least duration of a transfer, in the emulator's own time
-ENDLESS_NS: Final = 3_600_000_000_000
+_USB_NS: Final = 30_000  # least duration of a transfer, in the emulator's own time
+_ENDLESS_NS: Final = 3_600_000_000_000
 _BACK_NS: Final = 1_000_000_000  # a clock this far behind is another one, or was reset
 _STATUS = (0x01, 0x60)  # modem status, line status: ready and empty
 _EIGHTHS = (0, 4, 2, 1)  # of a divisor, by its two highest bits
@@ -73,7 +73,7 @@ def power_up(bridge: Any) -> None:
 def begin(bridge: Any) -> int:
     """Begin a transfer; return the jump of the clock meanwhile, by which all other times must be shifted [ns]."""
     if bridge.clock == 0:
-        bridge.now_ns += USB_NS
+        bridge.now_ns += _USB_NS
         return 0
     clock_ns = _word_at(bridge.clock).value
     if bridge.joined == 0 or clock_ns < bridge.now_ns - _BACK_NS:
@@ -86,7 +86,7 @@ def begin(bridge: Any) -> int:
 @kernel
 def end_of(bridge: Any, timeout_ns: int) -> int:
     """Return the time-out of a transfer that begins now [ns]."""
-    lasting = timeout_ns if timeout_ns > 0 else ENDLESS_NS
+    lasting = timeout_ns if timeout_ns > 0 else _ENDLESS_NS
     if bridge.clock == 0:
         return int(bridge.now_ns + lasting)
     return int(max(bridge.now_ns, _word_at(bridge.clock).value + lasting))
@@ -121,7 +121,7 @@ def send(bridge: Any, value: int, end_ns: int) -> bool:
     """Queue a byte for the device when there is room; return False if there is none until ``end_ns``."""
     lasting = byte_ns(bridge.divisor)
     arrival = max(bridge.out_free_ns, bridge.now_ns) + lasting
-    room_ns = arrival - OUT_BUFFER * lasting
+    room_ns = arrival - _OUT_BUFFER * lasting
     if room_ns > end_ns or bridge.out_last - bridge.out_first >= OUT_RING:
         return False
     bridge.now_ns = max(bridge.now_ns, room_ns)
@@ -191,11 +191,11 @@ def overflow(bridge: Any) -> None:
     for k in range(bridge.back_first, bridge.back_last):
         if bridge.back_ns[k % BACK_RING] <= bridge.now_ns:
             held += 1
-    beyond = held - BACK_BUFFER
+    beyond = held - _BACK_BUFFER
     if beyond <= 0:
         return
     bridge.lost += beyond
-    for k in range(bridge.back_first + BACK_BUFFER, bridge.back_last - beyond):
+    for k in range(bridge.back_first + _BACK_BUFFER, bridge.back_last - beyond):
         bridge.back[k % BACK_RING] = bridge.back[(k + beyond) % BACK_RING]
         bridge.back_ns[k % BACK_RING] = bridge.back_ns[(k + beyond) % BACK_RING]
     bridge.back_last -= beyond

@@ -27,7 +27,7 @@ from study_app.haptics.kernels.plant import HANDLE
 from study_app.haptics.model.layout import records
 from study_app.haptics.model.ranges import Vector
 
-EMULATOR = np.dtype(
+_EMULATOR = np.dtype(
     [
         ("bridge", BRIDGE),
         ("faults", falcon_processor.FAULTS),
@@ -44,9 +44,9 @@ EMULATOR = np.dtype(
     align=True,
 )
 
-_emulator_at = record_at(EMULATOR)
-INT = np.dtype([("value", np.int32)])
-_int_at = record_at(INT)
+_emulator_at = record_at(_EMULATOR)
+_INT = np.dtype([("value", np.int32)])
+_int_at = record_at(_INT)
 
 
 @cache
@@ -125,7 +125,7 @@ def _bulk_in(e: Any, data: int, length: int, moved: Any, end_ns: int) -> int:
 
 @kernel
 def poll(e: Any, data: int, length: int, moved: Any) -> int:
-    """Transfer in the chip's bytes up to now, to address ``data``; ``moved`` is a record of ``INT``.
+    """Transfer in the chip's bytes up to now, to address ``data``; ``moved`` is a record of ``_INT``.
 
     Returns ``ERROR_TIMEOUT`` while the transfer is not complete; the rest is requested later.
     """
@@ -256,9 +256,9 @@ def update_force(e: Any) -> None:
     saturate(e.arms)
 
 
-STOPS_M = (0.055, 0.055, 0.050)
+_STOPS_M = (0.055, 0.055, 0.050)
 """Half extents of the housing about the hand's origin, larger than the hand's range of motion."""
-UNITS_PER_NM = 6616.0
+_UNITS_PER_NM = 6616.0
 """Motor units for an arm torque of 1 N m: Martin & Hillier 2009; others measured 10 000."""
 ALL_HOMED = 0b111
 
@@ -291,10 +291,10 @@ class Emulator(HandOrders):
         serial: str = "EMULATED",
         workspace_m: tuple[float, float, float] = (0.05, 0.05, 0.05),
         tremor_m: float = TREMOR_M,
-        units_per_nm: float = UNITS_PER_NM,
+        units_per_nm: float = _UNITS_PER_NM,
         arm_offset_rad: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
-        memory = records(EMULATOR, 1)
+        memory = records(_EMULATOR, 1)
         super().__init__(memory[0], workspace_m)
         self.serial = serial
         self.geometry = geometry_named(geometry) if isinstance(geometry, str) else geometry
@@ -308,7 +308,7 @@ class Emulator(HandOrders):
         power_up(self.state.bridge)
         set_arms(self.state.arms, self.geometry, units_per_nm, arm_offset_rad)
         self.state.handle = new_scripted_handle(quantum_m=0.0)
-        self.state.handle.stop_m = STOPS_M
+        self.state.handle.stop_m = _STOPS_M
         self.state.hand.place_m = self.state.hand.aim_m
         self.state.powered = 1
         unload(self.state)
@@ -338,7 +338,7 @@ class Emulator(HandOrders):
 
         ``ERROR_TIMEOUT`` means that it is not complete: nothing more arrives before ``next_event_ns``.
         """
-        memory, moved = np.zeros(max(size, 1), np.uint8), records(INT, 1)[0]
+        memory, moved = np.zeros(max(size, 1), np.uint8), records(_INT, 1)[0]
         code = int(poll(self.state, memory.ctypes.data, size, moved))
         return code, memory[: moved.value].tobytes()
 

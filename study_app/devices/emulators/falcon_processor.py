@@ -24,13 +24,13 @@ from study_app.errors import DeviceError
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.plant import move, push
 
-CHANCES: Final = ("drop", "truncate", "corrupt", "duplicate", "delay", "stall", "echo", "glued", "echo_prefix")
+_CHANCES: Final = ("drop", "truncate", "corrupt", "duplicate", "delay", "stall", "echo", "glued", "echo_prefix")
 """A reply lost, cut to 14 bytes, with a wrong byte, sent twice or late; a device that receives nothing for some time; a
 byte of firmware echoed wrongly; more bytes behind the answer to a ping, in the same USB packet; 13 41 as the echo of
 'A'."""
-DROP, TRUNCATE, CORRUPT, DUPLICATE, DELAY, STALL, ECHO, GLUED, ECHO_PREFIX = range(len(CHANCES))
+DROP, TRUNCATE, CORRUPT, DUPLICATE, DELAY, STALL, ECHO, GLUED, ECHO_PREFIX = range(len(_CHANCES))
 
-SWITCHES: Final = (
+_SWITCHES: Final = (
     "unplugged",  # the bridge is gone
     "access_denied",  # cannot be opened: no permission
     "not_supported",  # cannot be opened: another driver has it
@@ -49,15 +49,15 @@ POWER_OFF: Final = "power-off"
 
 FAULTS = np.dtype(
     [
-        ("chance", np.float64, (len(CHANCES),)),  # probability at each opportunity
-        ("due", np.int64, (len(CHANCES),)),  # number of occurrences before chance decides
-        ("happened", np.int64, (len(CHANCES),)),
+        ("chance", np.float64, (len(_CHANCES),)),  # probability at each opportunity
+        ("due", np.int64, (len(_CHANCES),)),  # number of occurrences before chance decides
+        ("happened", np.int64, (len(_CHANCES),)),
         ("delay_ns", np.int64),
         ("stall_ns", np.int64),
         ("ignored_pings", np.int64),
         ("state", np.uint64),  # of the generator
         ("was_unplugged", np.int64),  # 1 until the bridge has begun anew
-        *((name, np.int64) for name in SWITCHES),
+        *((name, np.int64) for name in _SWITCHES),
     ],
     align=True,
 )
@@ -138,14 +138,14 @@ class Faults:
         """Set a fault in the notation of the command line: ``drop=0.01`` or ``frozen``."""
         name, equals, value = word.partition("=")
         name = name.strip().replace("-", "_")
-        if name in SWITCHES and not equals:
+        if name in _SWITCHES and not equals:
             self.on(name)
             return
         try:
             chance = float(value)
         except ValueError:
             known = ", ".join(
-                (*(f"{fault_spelling(known)}=CHANCE" for known in CHANCES), *map(fault_spelling, SWITCHES), POWER_OFF)
+                (*(f"{fault_spelling(known)}=CHANCE" for known in _CHANCES), *map(fault_spelling, _SWITCHES), POWER_OFF)
             )
             raise DeviceError(f"fault '{word}' is not known; choose from: {known}") from None
         self.chance(name, chance)
@@ -157,17 +157,17 @@ def fault_spelling(name: str) -> str:
 
 
 def _place(name: str) -> int:
-    if name not in CHANCES:
+    if name not in _CHANCES:
         raise DeviceError(
-            f"fault '{name}' does not come by chance; choose one of: {', '.join(map(fault_spelling, CHANCES))}"
+            f"fault '{name}' does not come by chance; choose one of: {', '.join(map(fault_spelling, _CHANCES))}"
         )
-    return CHANCES.index(name)
+    return _CHANCES.index(name)
 
 
 def _switch(name: str) -> str:
-    if name not in SWITCHES:
+    if name not in _SWITCHES:
         raise DeviceError(
-            f"fault '{name}' cannot be switched on; choose one of: {', '.join(map(fault_spelling, SWITCHES))}"
+            f"fault '{name}' cannot be switched on; choose one of: {', '.join(map(fault_spelling, _SWITCHES))}"
         )
     return name
 
@@ -300,10 +300,10 @@ RUN = np.dtype(
     align=True,
 )
 
-INDEX_RAD: Final = 0.0  # arms are at their index here: further in than any place in use
-ANSWER_NS: Final = 20_000  # from the end of a packet to the start of its reply
+_INDEX_RAD: Final = 0.0  # arms are at their index here: further in than any place in use
+_ANSWER_NS: Final = 20_000  # from the end of a packet to the start of its reply
 
-STROKES_M: Final = (0.047, -0.045, 0.047, 0.0)  # along z: out, in, out, and to the middle
+_STROKES_M: Final = (0.047, -0.045, 0.047, 0.0)  # along z: out, in, out, and to the middle
 _STROKE_NS: Final = 500_000_000
 _STEP_NS: Final = 2_000_000  # longest step with the same force
 LONGEST_NS: Final = 50_000_000  # longest motion computed after a time without access
@@ -395,7 +395,7 @@ def _find_indices(e: Any) -> None:
     """Set an arm's true zero when it passes its index, while homing is on."""
     run = e.run
     for arm in range(3):
-        before, now = run.before_rad[arm] - INDEX_RAD, e.arms.angle_rad[arm] - INDEX_RAD
+        before, now = run.before_rad[arm] - _INDEX_RAD, e.arms.angle_rad[arm] - _INDEX_RAD
         run.before_rad[arm] = e.arms.angle_rad[arm]
         if run.homing and before * now <= 0.0 and before != now and not (e.faults.never_homes or e.faults.frozen):
             run.homed |= 1 << arm
@@ -412,7 +412,7 @@ def _reply(e: Any, at_ns: int) -> None:
         return
     length = constants.PACKET - 2 if is_struck(faults, TRUNCATE) else constants.PACKET
     wrong = int(draw(faults) * length) if is_struck(faults, CORRUPT) else -1
-    since_ns = at_ns + ANSWER_NS
+    since_ns = at_ns + _ANSWER_NS
     if is_struck(faults, DELAY):
         since_ns += faults.delay_ns
     times = 2 if is_struck(faults, DUPLICATE) else 1
@@ -487,7 +487,7 @@ def _stroke(e: Any, now_ns: int) -> None:
         asked = run.homed != 0b111 or run.lights & constants.FLAG_BLUE
         if not run.homing or run.stroke_due == 0 or (run.stroke_due == STROKE_ASKED and not asked):
             return
-    if run.stroke == len(STROKES_M):
+    if run.stroke == len(_STROKES_M):
         run.stroke = 0
         run.stroke_due = STROKE_ASKED
         return
@@ -495,7 +495,7 @@ def _stroke(e: Any, now_ns: int) -> None:
     hand.order.kind = REACH
     hand.order.target_m[0] = 0.0
     hand.order.target_m[1] = 0.0
-    hand.order.target_m[2] = STROKES_M[run.stroke - 1]
+    hand.order.target_m[2] = _STROKES_M[run.stroke - 1]
     hand.order.duration_ns = _STROKE_NS
     hand.began_ns = now_ns
     for i in range(3):

@@ -21,7 +21,7 @@ from study_app.haptics.model.layout import COMMAND, MEASURED_VELOCITY, READING, 
 
 NO_FAULT, FAULT_ERROR, FAULT_NAN, FAULT_FORCE_OFF, FAULT_TIMEGUARD = range(5)
 FAULTS = {"error": FAULT_ERROR, "nan": FAULT_NAN, "force-off": FAULT_FORCE_OFF, "time-guard": FAULT_TIMEGUARD}
-FAULT_AFTER = 1000  # readings
+_FAULT_AFTER = 1000  # readings
 _VELOCITY_THRESHOLD = 2  # its cause in dhdc.h 3.17.5, line 202
 
 EMULATED = np.dtype(
@@ -49,7 +49,7 @@ assert _fields is not None  # noqa: S101 - it is a record
 _READING, _COMMAND = int(_fields["reading"][1]), int(_fields["command"][1])
 
 
-class EmulatedFunctions:
+class _EmulatedFunctions:
     """The library's functions, emulated, with one device, whose handle is that of ``hand``."""
 
     def __init__(self, hand: ScriptedDevice) -> None:
@@ -106,7 +106,7 @@ class EmulatedForceDimension(ForceDimensionDevice):
         limits: dict[str, Any] = {"workspace_m": self.workspace_m, "force_limit_n": self.force_limit_n}
         self.hand = ScriptedDevice(random, tremor_m=tremor_m, **limits)
         self.hand.measure_velocity()
-        self.emulated = EmulatedFunctions(self.hand)
+        self.emulated = _EmulatedFunctions(self.hand)
         self.emulated.state.clock = self.context  # FORCE_DIMENSION begins with the time of the tick
 
     @classmethod
@@ -114,7 +114,7 @@ class EmulatedForceDimension(ForceDimensionDevice):
         return cls(request.random, **request.limits)
 
     def take_fault(self, fault: str) -> None:
-        self.emulated.set_fault(fault, FAULT_AFTER)
+        self.emulated.set_fault(fault, _FAULT_AFTER)
 
     def _connect(self) -> Functions:
         return self.emulated

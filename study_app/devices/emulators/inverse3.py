@@ -14,10 +14,10 @@ from study_app.devices.emulators.inverse3_service import Service, service_calls
 from study_app.devices.inverse3.device import Inverse3Device
 from study_app.devices.inverse3.service import FAILURES, LONGEST, Link, TransferCalls
 
-FAULT_AFTER = 1000  # commands
+_FAULT_AFTER = 1000  # commands
 
 
-class EmulatedLink:
+class _EmulatedLink:
     """The byte stream to an emulated service, which executes each command at once."""
 
     def __init__(self, service: Service) -> None:
@@ -64,7 +64,7 @@ class EmulatedInverse3(Inverse3Device):
         return cls(request.random, progress=request.progress, **request.limits)
 
     def take_fault(self, fault: str) -> None:
-        self.hand.set_fault(fault, FAULT_AFTER)
+        self.hand.set_fault(fault, _FAULT_AFTER)
 
     def open(self) -> None:
         """Open the session; from then on the emulator's time is that of the ticks."""
@@ -77,7 +77,7 @@ class EmulatedInverse3(Inverse3Device):
         self.hand.follow_clock(0)
 
     def _connect(self) -> Link:
-        return EmulatedLink(self.hand)
+        return _EmulatedLink(self.hand)
 
     def _force_scale(self) -> Any:
         return self.hand.force_scale

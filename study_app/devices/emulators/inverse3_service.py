@@ -28,14 +28,14 @@ from study_app.devices.simulated import QUANTUM_M, TREMOR_M, new_scripted_handle
 from study_app.errors import DeviceError
 from study_app.haptics.model.layout import records
 
-DEVICE_ID: Final = "EMU1"
-SLOTS: Final = tuple(f"{name}_{axis}" for name in ("position", "velocity", "force") for axis in "xyz")
-SLOT_WIDTH: Final = 14
+_DEVICE_ID: Final = "EMU1"
+_SLOTS: Final = tuple(f"{name}_{axis}" for name in ("position", "velocity", "force") for axis in "xyz")
+_SLOT_WIDTH: Final = 14
 _UNIT: Final = {"x": 0, "y": 0, "z": 0}
-FACTORY_CONFIG: Final[dict[str, Any]] = {
+_FACTORY_CONFIG: Final[dict[str, Any]] = {
     "type": "inverse3",
     "port": "EMULATED",
-    "device_info": {"major_version": 7, "minor_version": 4, "id": DEVICE_ID, "device_type": 4, "uuid": "00" * 16},
+    "device_info": {"major_version": 7, "minor_version": 4, "id": _DEVICE_ID, "device_type": 4, "uuid": "00" * 16},
     "extended_device_id": "00" * 16,
     "extended_firmware_version": "00" * 16,
     "gravity_compensation": {"enabled": True, "scaling_factor": 1.0},
@@ -48,12 +48,12 @@ FACTORY_CONFIG: Final[dict[str, Any]] = {
     "mount": {"position": dict(_UNIT), "rotation": {"w": 1, "x": 0, "y": 0, "z": 0}, "scale": {"x": 1, "y": 1, "z": 1}},
     "filters": {"force_gate": {"gain": 0.3}, "damping": {"scalar": 0.0}},
 }
-STATUS: Final = {"calibrated": True, "in_use": False, "power_supply": True, "ready": True, "started": True}
-LEGACY_STATE: Final[dict[str, Any]] = {
-    "inverse3": {DEVICE_ID: {"config": {"device_info": {"id": DEVICE_ID}}, "state": {}, "status": {}}}
+_STATUS: Final = {"calibrated": True, "in_use": False, "power_supply": True, "ready": True, "started": True}
+_LEGACY_STATE: Final[dict[str, Any]] = {
+    "inverse3": {_DEVICE_ID: {"config": {"device_info": {"id": _DEVICE_ID}}, "state": {}, "status": {}}}
 }
 """Messages of format 3.0: an object by device id ("Haply Inverse Service" 3.0.x, Devices)."""
-OF_OPENING: Final = (
+_OF_OPENING: Final = (
     "not-websocket",
     "version-3.0",
     "version-3.1",
@@ -66,12 +66,12 @@ OF_OPENING: Final = (
     "force-scale",
     "unknown-scale",  # no answer about the force scale
 )
-OF_TIME: Final = (
+_OF_TIME: Final = (
     "late",  # each state 30 ms late
     "slow",  # each state 1.5 ms late: within what the servo is stable with
     "torn",  # each state in pieces of 300 bytes
 )
-OF_STREAM: Final = (
+_OF_STREAM: Final = (
     "silent",  # no more states
     "closes",  # a close frame (RFC 6455 §5.5.1, status 1001), and the end
     "drops",  # the end of the stream without one
@@ -88,19 +88,19 @@ OF_STREAM: Final = (
     "fragment",  # a message in two frames
     "too-long",  # a frame that says it is 2^63 - 1 bytes long, the most that RFC 6455 permits
 )
-FAULTS: Final = (*OF_OPENING, *OF_TIME, *OF_STREAM)
-STATUS_OF: Final = {"off": {"power_supply": False}, "uncalibrated": {"calibrated": False}, "in-use": {"in_use": True}}
+FAULTS: Final = (*_OF_OPENING, *_OF_TIME, *_OF_STREAM)
+_STATUS_OF: Final = {"off": {"power_supply": False}, "uncalibrated": {"calibrated": False}, "in-use": {"in_use": True}}
 
 
 def config() -> dict[str, Any]:
     """Return a new configuration with factory values."""
-    return copy.deepcopy(FACTORY_CONFIG)
+    return copy.deepcopy(_FACTORY_CONFIG)
 
 
-def state_message(
+def _state_message(
     status: dict[str, Any], buttons: int, full: dict[str, Any] | None = None, session_id: int = 7
 ) -> dict[str, Any]:
-    """Return a state whose numbers are the words of `SLOTS`.
+    """Return a state whose numbers are the words of `_SLOTS`.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def state_message(
         "control_domain": "cartesian",
         "control_mode": "idle",
     }
-    device: dict[str, Any] = {"device_id": DEVICE_ID}
+    device: dict[str, Any] = {"device_id": _DEVICE_ID}
     if full is not None:
         device["config"] = full
     grip = {
@@ -137,18 +137,18 @@ def state_message(
 
 
 def template(message: dict[str, Any]) -> tuple[bytes, list[int]]:
-    """Return a message as text with space for its numbers, and the offset of each of `SLOTS`; -1 if missing."""
+    """Return a message as text with space for its numbers, and the offset of each of `_SLOTS`; -1 if missing."""
     text = json.dumps(message)
-    for slot in SLOTS:
-        text = text.replace(f'"{slot}"', "#" + slot.ljust(SLOT_WIDTH - 1))
-    places = [text.find(f"#{slot}") for slot in SLOTS]
-    for slot in SLOTS:
-        text = text.replace("#" + slot.ljust(SLOT_WIDTH - 1), "0.0".ljust(SLOT_WIDTH))
+    for slot in _SLOTS:
+        text = text.replace(f'"{slot}"', "#" + slot.ljust(_SLOT_WIDTH - 1))
+    places = [text.find(f"#{slot}") for slot in _SLOTS]
+    for slot in _SLOTS:
+        text = text.replace("#" + slot.ljust(_SLOT_WIDTH - 1), "0.0".ljust(_SLOT_WIDTH))
     return text.encode(), places
 
 
 def faulty_bytes(fault: str, message: dict[str, Any]) -> bytes:
-    """Return the bytes sent for a fault of `OF_STREAM` in place of a state."""
+    """Return the bytes sent for a fault of `_OF_STREAM` in place of a state."""
     device = message["inverse3"][0]
     if fault == "no-position":
         del device["state"]["cursor_position"]
@@ -160,8 +160,8 @@ def faulty_bytes(fault: str, message: dict[str, Any]) -> bytes:
         device["status"] = device["status"] | {"calibrated": False}
     text = json.dumps(message)
     number = {"nan": "NaN", "null": "null", "infinite": "1e999"}.get(fault, "0.01")
-    text = text.replace(f'"{SLOTS[0]}"', number)
-    for slot in SLOTS:
+    text = text.replace(f'"{_SLOTS[0]}"', number)
+    for slot in _SLOTS:
         text = text.replace(f'"{slot}"', "0.0")
     if fault == "bad-json":
         text = text[:-2]
@@ -175,7 +175,7 @@ def faulty_bytes(fault: str, message: dict[str, Any]) -> bytes:
     return bytes([first, mask | 126]) + struct.pack(">H", len(data)) + (b"\0\0\0\0" if mask else b"") + data
 
 
-STOPS_M: Final = (0.10, 0.10, 0.10)
+_STOPS_M: Final = (0.10, 0.10, 0.10)
 _ZERO: Final = {"x": 0.0, "y": 0.0, "z": 0.0}
 _GUID: Final = "258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
 
@@ -207,14 +207,14 @@ class Service(HandOrders):
         self.memory = records(SERVICE, 1)
         super().__init__(self.memory[0], workspace_m)
         self.state.handle = new_scripted_handle(quantum_m)
-        self.state.handle.stop_m = STOPS_M
+        self.state.handle.stop_m = _STOPS_M
         self._tremble(random, tremor_m)
         self.config = config()
-        self.status = dict(STATUS)
+        self.status = dict(_STATUS)
         self.force_scale: Any = {"value": 1.0}
         self.version = "3.5"
         self.obeys = True
-        quoted = np.frombuffer(f'"{DEVICE_ID}"'.encode(), np.uint8)
+        quoted = np.frombuffer(f'"{_DEVICE_ID}"'.encode(), np.uint8)
         self.state.id[: quoted.size] = quoted
         self.state.id_size = quoted.size
         self._upgraded = False
@@ -231,7 +231,7 @@ class Service(HandOrders):
         """Compile all functions that answer a client, or load them from the cache: a client waits only for seconds."""
         self.connected()
         self._answer_message(
-            {"inverse3": [{"device_id": DEVICE_ID, "commands": {"set_cursor_force": {"vector": _ZERO}}}]}
+            {"inverse3": [{"device_id": _DEVICE_ID, "commands": {"set_cursor_force": {"vector": _ZERO}}}]}
         )
         inverse3_stream.take_frames(self.state)
         self.give_bytes()
@@ -258,8 +258,8 @@ class Service(HandOrders):
             raise DeviceError(f"fault '{fault}' is not known; choose from: {', '.join(FAULTS)}")
         versions = {"version-3.0": "3.0", "version-3.1": "3.1", "not-websocket": "http", "no-device": "empty"}
         self.version = versions.get(fault, self.version)
-        if fault in STATUS_OF:
-            self.status |= STATUS_OF[fault]
+        if fault in _STATUS_OF:
+            self.status |= _STATUS_OF[fault]
             self._refresh()
         elif fault == "gravity-off":
             self.config["gravity_compensation"]["enabled"] = False
@@ -269,9 +269,9 @@ class Service(HandOrders):
             self.force_scale = {"value": 2.0} if fault == "force-scale" else None
         elif fault == "torn":
             self.state.portion = 300
-        elif fault in OF_TIME:
+        elif fault in _OF_TIME:
             self.state.lag_ns = 30_000_000 if fault == "late" else 1_500_000
-        elif fault in OF_STREAM:
+        elif fault in _OF_STREAM:
             self._fault = (fault, after)
             if self._upgraded:
                 self._arm()
@@ -350,9 +350,9 @@ class Service(HandOrders):
         self._send(self.inventory())
 
     def inventory(self) -> dict[str, Any]:
-        """Return the first message of a session, with the words of ``SLOTS`` for its numbers."""
+        """Return the first message of a session, with the words of ``_SLOTS`` for its numbers."""
         if self.version == "3.0":
-            return LEGACY_STATE
+            return _LEGACY_STATE
         message = self._message(full=True)
         if self.version == "empty":
             message["inverse3"] = []
@@ -362,7 +362,7 @@ class Service(HandOrders):
         return message
 
     def _message(self, *, full: bool = False) -> dict[str, Any]:
-        return state_message(
+        return _state_message(
             self.status, int(self.state.buttons), json.loads(json.dumps(self.config)) if full else None
         )
 
@@ -370,7 +370,7 @@ class Service(HandOrders):
         """Apply settings and command of a message, and answer with a state, including the configuration on request."""
         session = message.get("session", {})
         for entry in message.get("inverse3", []):
-            if entry.get("device_id") == DEVICE_ID:
+            if entry.get("device_id") == _DEVICE_ID:
                 if self.obeys:
                     self._configure(entry.get("configure", {}), session.get("configure", {}))
                 inverse3_stream.go_on(self.state)

@@ -16,13 +16,13 @@ from study_app.haptics.kernels.c_functions import c_function, record_at
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.plant import HANDLE, measure, push, release_handle
 
-SOCKET_CALL = types.intp(types.intp, types.intp, types.uintp, types.int32)
-IDLE_NS: Final = 100_000_000
+_SOCKET_CALL = types.intp(types.intp, types.intp, types.uintp, types.int32)
+_IDLE_NS: Final = 100_000_000
 """Time without commands after which a device is idle [ns]: the return is documented, its time is not."""
 INBOX: Final = 1 << 14
 OUTBOX: Final = 1 << 17
 TEXT: Final = 1 << 12
-FAULTY: Final = 1 << 12
+_FAULTY: Final = 1 << 12
 _QUEUE = 256
 _OWN_STEP_NS = 1_000_000
 _SLOTS = 9
@@ -67,7 +67,7 @@ SERVICE = np.dtype(
         ("close_frames", np.int64),
         # faults
         ("fault_at", np.int64),  # from this command on; 0: none
-        ("faulty", np.uint8, (FAULTY,)),  # bytes in place of a state
+        ("faulty", np.uint8, (_FAULTY,)),  # bytes in place of a state
         ("faulty_size", np.int64),
         ("silent", np.int64),  # 1: nothing
         ("ends", np.int64),  # 1: and the stream is over
@@ -89,7 +89,7 @@ _FORCE, _VECTOR, _SESSION, _CONFIGURE, _X, _Y, _Z = (
 @cache
 def stream_functions() -> tuple[Any, Any]:
     """Compile the functions that replace ``send`` and ``recv``."""
-    return c_function(SOCKET_CALL, _send), c_function(SOCKET_CALL, _receive)
+    return c_function(_SOCKET_CALL, _send), c_function(_SOCKET_CALL, _receive)
 
 
 def _send(handle: int, data: int, size: Any, _flags: int) -> Any:
@@ -241,7 +241,7 @@ def go_on(service: Any) -> None:
     if service.clock == 0:
         service.now_ns += _OWN_STEP_NS
     elapsed_ns = service.now_ns - service.last_ns if service.started else 0
-    if elapsed_ns > IDLE_NS:
+    if elapsed_ns > _IDLE_NS:
         rest(service)
     service.started = 1
     service.last_ns = service.now_ns

@@ -126,10 +126,10 @@ def _refusal(reason: str) -> DeviceFailure:
     return FAILURES.failure("not-firmware", reason)
 
 
-ATTEMPTS: Final = 10
+_ATTEMPTS: Final = 10
 PINGS: Final = 20
-PROBES: Final = 10
-ROUND_TRIPS: Final = 50
+_PROBES: Final = 10
+_ROUND_TRIPS: Final = 50
 
 _PING_S: Final = 0.25
 _STEP_S: Final = 1.0
@@ -213,7 +213,7 @@ def set_event_character(transport: Transport, on: bool) -> None:
 
 def is_running(transport: Transport) -> bool:
     """Return whether the Falcon runs its firmware, that is, answers a quiet packet. The bridge must be configured."""
-    for _ in range(PROBES):
+    for _ in range(_PROBES):
         if _Line(transport).answers(PROBE_S):
             return True
         _purge(transport)
@@ -222,7 +222,7 @@ def is_running(transport: Transport) -> bool:
 
 def measure_round_trip(transport: Transport) -> float:
     """Return the median time from a packet to its reply [s]; a missing reply counts as 50 ms."""
-    return median(_round_trip_s(transport) for _ in range(ROUND_TRIPS))
+    return median(_round_trip_s(transport) for _ in range(_ROUND_TRIPS))
 
 
 def choose_event_character(transport: Transport) -> tuple[float, dict[str, Any]]:
@@ -250,7 +250,7 @@ def _round_trip_s(transport: Transport) -> float:
 
 
 def boot_falcon(
-    transport: Transport, firmware: bytes, *, attempts: int = ATTEMPTS, progress: Callable[[str], object] | None = None
+    transport: Transport, firmware: bytes, *, attempts: int = _ATTEMPTS, progress: Callable[[str], object] | None = None
 ) -> Firmware:
     """Load ``firmware`` and check that it runs; return its description.
 

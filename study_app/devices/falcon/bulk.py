@@ -28,7 +28,7 @@ class BulkCalls(NamedTuple):
     transfer: int
 
 
-BRIDGE = np.dtype(
+_BRIDGE = np.dtype(
     [
         ("handle", np.intp),  # FT_HANDLE
         ("read", np.intp),  # addresses of the library's functions
@@ -40,11 +40,11 @@ BRIDGE = np.dtype(
     ],
     align=True,
 )
-_COUNT_AT = int(BRIDGE.fields["count"][1])  # type: ignore[index]
+_COUNT_AT = int(_BRIDGE.fields["count"][1])  # type: ignore[index]
 _DATA_BYTES = constants.USB_PACKET - constants.STATUS_BYTES
 _GONE = 4  # FT_STATUS 1 to 4: no such handle, device not found, not opened, input/output error
 
-_bridge_at = record_at(BRIDGE)
+_bridge_at = record_at(_BRIDGE)
 _count_at = record_at(np.dtype([("count", np.int32)]))
 _status_at = record_at(np.dtype([("bytes", np.uint8, (constants.STATUS_BYTES,))]))
 _move = call_at(types.uint32(types.intp, types.intp, types.uint32, types.intp))
@@ -54,7 +54,7 @@ _set_timeouts = call_at(types.uint32(types.intp, types.uint32, types.uint32))
 
 def bridge_record(library: Any, handle: Any) -> Any:
     """Return the memory of an open bridge's C function, whose address is its handle."""
-    memory = records(BRIDGE, 1)
+    memory = records(_BRIDGE, 1)
     bridge = memory[0]
     bridge.handle = handle.value
     bridge.read = _address(library.FT_Read)

@@ -33,7 +33,7 @@ from study_app.user_folder import FOLDER_VARIABLE, user_folder
 UNCALIBRATED_UNITS_PER_NM: Final = 6616.0
 """Martin & Hillier 2009, quoted from another source; with libnifalcon's 10 000 forces would be half as strong again."""
 
-LEAST_POSES: Final = 5
+_LEAST_POSES: Final = 5
 MOST_RESIDUAL_N: Final = 0.5
 """Greatest residual of consistent weights."""
 _GAINS: Final = (1000.0, 100_000.0)  # range of every Falcon's gain
@@ -85,8 +85,10 @@ def fit(
     counts, pulled_n, held = (np.asarray(given, np.float64) for given in (poses, forces_n, units))
     if counts.shape != pulled_n.shape or counts.shape != held.shape or counts.ndim != 2 or counts.shape[1:] != (3,):
         raise DeviceError("a calibration needs three numbers per pose (counts, force and motor units)")
-    if len(counts) < LEAST_POSES:
-        raise DeviceError(f"a calibration needs {LEAST_POSES} poses or more, not {len(counts)}: measure at more places")
+    if len(counts) < _LEAST_POSES:
+        raise DeviceError(
+            f"a calibration needs {_LEAST_POSES} poses or more, not {len(counts)}: measure at more places"
+        )
     if np.ptp(pulled_n, axis=0).max() < 0.5:
         raise DeviceError(
             "a calibration needs two weights half a newton apart (one may be zero): also hang another weight"

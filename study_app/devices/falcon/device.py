@@ -23,8 +23,8 @@ from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import new_command, new_reading
 
 PATIENCE_S: Final = 120.0
-ADVICES: Final = 6  # number of advice lines in that time
-MOVED: Final = 60  # counts of an arm that show motion of the grip: two degrees
+_ADVICES: Final = 6  # number of advice lines in that time
+_MOVED: Final = 60  # counts of an arm that show motion of the grip: two degrees
 STROKES: Final = "Homing (red light): pull the grip of the Falcon all the way out, then push it all the way in."
 PULL_OUT: Final = "Homed (blue light): now pull the grip all the way out once more."
 READY: Final = "The Falcon is ready (green light)."
@@ -220,13 +220,13 @@ class FalconDevice(FramedDevice):
             if falcon.homed and not announced:
                 announced = True
                 self._progress(PULL_OUT)
-            moved = (highest - lowest).max() > MOVED
+            moved = (highest - lowest).max() > _MOVED
             mode = "power" if falcon.status.count == 0 else "stroke-in" if moved else "frozen"
             if falcon.homed:
                 mode = "stroke-out"
             if transport.now_s() - began_s > self._patience_s:
                 raise FAILURES.failure(mode)
-            if transport.now_s() - advised_s > self._patience_s / ADVICES:
+            if transport.now_s() - advised_s > self._patience_s / _ADVICES:
                 advised_s = transport.now_s()
                 self._progress(f"Still homing: {FAILURES.sentence(mode)}.")
         self._progress(READY)

@@ -27,11 +27,11 @@ from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import READING, records
 from study_app.haptics.model.slope_limits import SLEW_S, slew_limit_n
 
-MOST_WAITING_N: Final = 0.5
+_MOST_WAITING_N: Final = 0.5
 """Greatest difference between a force and the motors' present force at which a delay measurement may omit it."""
 
-SHORTEST_TICK_S: Final = 1e-3
-LONGEST_TICK_S: Final = 4e-3
+_SHORTEST_TICK_S: Final = 1e-3
+_LONGEST_TICK_S: Final = 4e-3
 """Time that limits the growth of a force in a tick, even if the tick is late."""
 
 
@@ -51,7 +51,7 @@ def set_motor_units(falcon: Any) -> None:
 @kernel
 def can_wait(falcon: Any) -> bool:
     """Return whether the motors may keep their force for a tick: it is close to the requested force, which is not 0."""
-    near: bool = square_distance(falcon.sent_n, falcon.held_n) <= MOST_WAITING_N * MOST_WAITING_N
+    near: bool = square_distance(falcon.sent_n, falcon.held_n) <= _MOST_WAITING_N * _MOST_WAITING_N
     return near and (square(falcon.sent_n) > 0.0 or square(falcon.held_n) == 0.0)
 
 
@@ -98,7 +98,7 @@ def limit_growth(falcon: Any) -> None:
     for axis in range(3):
         square_n2 += (force_n[axis] - kept * held_n[axis] - braking * v_mps[axis]) ** 2
     asked_n2 = square(force_n)
-    most_n = falcon.slew_n_per_s * min(max(falcon.tick_s, SHORTEST_TICK_S), LONGEST_TICK_S)
+    most_n = falcon.slew_n_per_s * min(max(falcon.tick_s, _SHORTEST_TICK_S), _LONGEST_TICK_S)
     if square_n2 > most_n * most_n:
         share = most_n / math.sqrt(square_n2)
         for axis in range(3):
@@ -113,11 +113,11 @@ FORCE_LIMIT_N: Final = 8.0
 LEAST_MASS_KG: Final = 0.1
 """The least effective mass at the grip in any direction [kg], about that of arms and platform of this size. Nobody
 published a measured value; the limits of the loop are held for 30 to 250 g."""
-RAMP_S: Final = 0.5
-SMOOTHING_S: Final = 2e-3
+_RAMP_S: Final = 0.5
+_SMOOTHING_S: Final = 2e-3
 """Time constant of the grip's velocity, which separates a braking force from a driving one."""
 BRIDGE_LOST: Final = FIRST_CAUSE
-LONGEST_GAP_NS: Final = 20_000_000
+_LONGEST_GAP_NS: Final = 20_000_000
 """Greatest waiting time of a reply before the loop reads it: older ones are not used."""
 _BEYOND = 2  # positions in a row that show an out-stroke: a single one may be from a corrupted packet
 _READS = 2  # most reads of the bridge per tick: an answer may contain only status bytes
@@ -125,7 +125,7 @@ _TIMEOUT_MS = 1
 _NORM_SLACK = 1.001
 _DATA = 4 * constants.USB_PACKET
 
-FALCON = np.dtype(
+_FALCON = np.dtype(
     [
         *COMMON,  # the force sent: at the grip's place at the last command
         ("handle", np.intp),  # of the bridge, and
@@ -210,12 +210,12 @@ COUNTERS: Final = (
     "shortened",
 )
 
-_falcon_at = c_functions.record_at(FALCON)
+_falcon_at = c_functions.record_at(_FALCON)
 _transfer = c_functions.call_at(BULK)
 
 
 def _offset(field: str) -> int:
-    fields = FALCON.fields
+    fields = _FALCON.fields
     assert fields is not None  # noqa: S101 - it is a record
     return int(fields[field][1])
 
@@ -228,7 +228,7 @@ def new_exchange(
     calls: BulkCalls, mechanism: Any, geometry: mechanics.Geometry, force_limit_n: float = FORCE_LIMIT_N
 ) -> Any:
     """Return the memory of an exchange over an open bridge, shape (1,): its address is the device's ``context``."""
-    memory = records(FALCON, 1)
+    memory = records(_FALCON, 1)
     falcon = memory[0]
     falcon.handle, falcon.transfer = calls.handle, calls.transfer
     falcon.mechanism = mechanism
@@ -287,7 +287,7 @@ def _take_reply(falcon: Any, context: int, now_ns: int, out: Any) -> int:
     packets = _receive(falcon, context)
     if falcon.ended != RUNS or falcon.unguarded != 0:
         return c_functions.READ_LOST
-    gap = falcon.started == 0 or elapsed_ns <= 0 or elapsed_ns > LONGEST_GAP_NS
+    gap = falcon.started == 0 or elapsed_ns <= 0 or elapsed_ns > _LONGEST_GAP_NS
     falcon.started = 1
     if gap:
         falcon.posed_ns = 0
@@ -392,7 +392,7 @@ def _locate(falcon: Any) -> bool:
 @kernel
 def _follow(falcon: Any) -> None:
     interval_s = (falcon.now_ns - falcon.posed_ns) * 1e-9
-    known, weight = falcon.posed_ns != 0, interval_s / (interval_s + SMOOTHING_S)
+    known, weight = falcon.posed_ns != 0, interval_s / (interval_s + _SMOOTHING_S)
     for axis in range(3):
         moved_mps = (falcon.position_m[axis] - falcon.previous_m[axis]) / interval_s
         falcon.velocity_mps[axis] += weight * (moved_mps - falcon.velocity_mps[axis])
@@ -408,7 +408,7 @@ def _open_gate(falcon: Any, elapsed_s: float) -> None:
     if falcon.beyond >= _BEYOND:
         falcon.pulled_out = 1
     if falcon.pulled_out != 0:
-        falcon.share = min(falcon.share + elapsed_s / RAMP_S, 1.0)
+        falcon.share = min(falcon.share + elapsed_s / _RAMP_S, 1.0)
 
 
 @kernel

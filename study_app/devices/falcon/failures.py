@@ -13,7 +13,7 @@ from study_app.devices.falcon import constants
 from study_app.devices.falcon.constants import PRODUCT_ID, VENDOR_ID
 from study_app.errors import DeviceLost, DeviceNotFound
 
-RULES_FILE: Final = "/etc/udev/rules.d/60-falcon.rules"
+_RULES_FILE: Final = "/etc/udev/rules.d/60-falcon.rules"
 UDEV_RULE: Final = (
     f'SUBSYSTEM=="usb", ATTR{{idVendor}}=="{VENDOR_ID:04x}", ATTR{{idProduct}}=="{PRODUCT_ID:04x}", TAG+="uaccess"'
 )
@@ -38,7 +38,7 @@ def failures_on(platform: str) -> FailureTable:
     """Return the failure modes on a system, named as in ``sys.platform``."""
     phrases = {
         "rule": UDEV_RULE,
-        "rules_file": RULES_FILE,
+        "rules_file": _RULES_FILE,
         "MOST_BROKEN": MOST_BROKEN,
         "slow_ms": 1000 * LONGEST_ROUND_TRIP_S,
     }

@@ -7,8 +7,8 @@ packet only if every byte of it is permitted at its place, keeps a possible star
 once.
 
 A reply cannot be matched to its packet, so replies with a constant delay look like punctual ones after a loss. So the
-delay is measured: when for ``SLOWER_READS`` reads more replies are owed than the delay explains, or for
-``FASTER_READS`` fewer, no packet is sent until a read has no reply; the number of these reads is the delay. Replies
+delay is measured: when for ``_SLOWER_READS`` reads more replies are owed than the delay explains, or for
+``_FASTER_READS`` fewer, no packet is sent until a read has no reply; the number of these reads is the delay. Replies
 still owed then are lost. A longer delay is adopted at once, a shorter one after two measurements in a row, since a lost
 reply looks like a shorter one. If the force changes too fast for a measurement, the delay is set to explain the owed
 replies. Positions later than ``MOST_DELAY`` are not used, nor those read while more than ``MOST_OWED`` replies are owed
@@ -27,10 +27,10 @@ from study_app.devices.falcon import constants
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.model.device_dynamics import MOST_DELAY
 
-NIBBLES = 4
-FLAGS_AT = 13  # flags to the device, status from it; numbers stand at 1, 5 and 9
-UNKNOWN_AT = 14
-STATUS_BITS = 7
+_NIBBLES = 4
+_FLAGS_AT = 13  # flags to the device, status from it; numbers stand at 1, 5 and 9
+_UNKNOWN_AT = 14
+_STATUS_BITS = 7
 
 PARSER = np.dtype(
     [
@@ -56,7 +56,7 @@ STATUS = np.dtype(
 @kernel
 def put_number(out: Any, at: int, value: int) -> None:
     """Write ``value``, as 16 bits with sign, into the four bytes of ``out`` from ``at`` on."""
-    for nibble in range(NIBBLES):
+    for nibble in range(_NIBBLES):
         out[at + nibble] = constants.ZERO + ((value >> (4 * nibble)) & 0xF)
 
 
@@ -64,7 +64,7 @@ def put_number(out: Any, at: int, value: int) -> None:
 def number(data: Any, at: int) -> Any:
     """Return the number (-32768 to 32767) in the four bytes of ``data`` from ``at`` on."""
     value: Any = 0
-    for nibble in range(NIBBLES):
+    for nibble in range(_NIBBLES):
         value += ((np.int64(data[at + nibble]) - constants.ZERO) & 0xF) << (4 * nibble)
     return value - 0x10000 if value >= 0x8000 else value
 
@@ -77,9 +77,9 @@ def pack(torques: Any, flags: int, out: Any) -> None:
     """
     out[0] = constants.START
     for arm in range(3):
-        put_number(out, 1 + NIBBLES * arm, min(max(torques[arm], -constants.MOST_TORQUE), constants.MOST_TORQUE))
-    out[FLAGS_AT] = constants.ZERO + flags
-    out[UNKNOWN_AT] = constants.ZERO
+        put_number(out, 1 + _NIBBLES * arm, min(max(torques[arm], -constants.MOST_TORQUE), constants.MOST_TORQUE))
+    out[_FLAGS_AT] = constants.ZERO + flags
+    out[_UNKNOWN_AT] = constants.ZERO
     out[constants.PACKET - 1] = constants.STOP
 
 
@@ -127,8 +127,8 @@ def _take(parser: Any, byte: Any) -> None:
             parser.skipped += 1
             return
         # Among the bytes that fit, only the unknown one can be another start.
-        if parser.held > UNKNOWN_AT and parser.tail[UNKNOWN_AT] == constants.START:
-            parser.skipped += UNKNOWN_AT
+        if parser.held > _UNKNOWN_AT and parser.tail[_UNKNOWN_AT] == constants.START:
+            parser.skipped += _UNKNOWN_AT
             parser.held = 1
         else:
             parser.skipped += parser.held
@@ -142,36 +142,36 @@ def _fits(at: int, byte: int) -> bool:
     """Return whether ``byte`` can occur at position ``at`` of a packet."""
     if at == 0:
         return byte == constants.START
-    if at < FLAGS_AT:
+    if at < _FLAGS_AT:
         return constants.ZERO <= byte < constants.ZERO + 16
-    if at == FLAGS_AT:
-        return constants.ZERO <= byte < constants.ZERO + (1 << STATUS_BITS)
-    return at == UNKNOWN_AT or byte == constants.STOP
+    if at == _FLAGS_AT:
+        return constants.ZERO <= byte < constants.ZERO + (1 << _STATUS_BITS)
+    return at == _UNKNOWN_AT or byte == constants.STOP
 
 
 @kernel
 def _read(packet: Any, status: Any) -> None:
     for arm in range(3):
-        status.encoders[arm] = number(packet, 1 + NIBBLES * arm)
-    bits = np.int64(packet[FLAGS_AT]) - constants.ZERO
+        status.encoders[arm] = number(packet, 1 + _NIBBLES * arm)
+    bits = np.int64(packet[_FLAGS_AT]) - constants.ZERO
     status.buttons = bits & 0xF
     status.homed = bits >> constants.HOMED_SHIFT
     status.count += 1
 
 
 MOST_OWED: Final = 4
-SLOWER_READS: Final = 8
-FASTER_READS: Final = 200
-GIVEN_UP_READS: Final = 32
-RETEST_TICKS: Final = 30
+_SLOWER_READS: Final = 8
+_FASTER_READS: Final = 200
+_GIVEN_UP_READS: Final = 32
+_RETEST_TICKS: Final = 30
 """For at least this many ticks after a measurement the motors receive a new command in every tick."""
 ALL_HOMED: Final = 0b111
-UNHOMED_PACKETS: Final = 3
+_UNHOMED_PACKETS: Final = 3
 """Number of packets in a row that must report that an arm is no longer homed: a single one may be corrupted."""
 
-LEAP: Final = 24.0
+_LEAP: Final = 24.0
 """Greatest deviation of an arm from its predicted motion [counts]: 0.7 to 1.4 mm of the grip within a tick."""
-DOUBTS: Final = 2  # greatest number of doubted replies in a row
+_DOUBTS: Final = 2  # greatest number of doubted replies in a row
 
 
 @kernel
@@ -201,10 +201,10 @@ def _look_for_change(falcon: Any) -> None:
     """Begin a measurement if more, or for a long time fewer, replies are owed than the delay explains."""
     more, less = falcon.owed > falcon.delay - 1, falcon.owed < falcon.delay - 1
     falcon.astray = falcon.astray + 1 if more or less else max(falcon.astray - 1, 0)
-    due = falcon.unsure != 0 or falcon.delay > MOST_DELAY or falcon.astray >= (SLOWER_READS if more else FASTER_READS)
+    due = falcon.unsure != 0 or falcon.delay > MOST_DELAY or falcon.astray >= (_SLOWER_READS if more else _FASTER_READS)
     if (due and falcon.retest == 0) or (not _has_few_owed(falcon) and falcon.delay <= MOST_DELAY):
         falcon.testing = 1
-    if more and falcon.astray >= GIVEN_UP_READS:  # the force changes too much for a measurement
+    if more and falcon.astray >= _GIVEN_UP_READS:  # the force changes too much for a measurement
         _adopt_delay(falcon, falcon.owed + 1)
 
 
@@ -246,7 +246,7 @@ def _adopt_delay(falcon: Any, delay: int) -> None:
     falcon.measured = 0
     falcon.unsure = 0
     falcon.astray = 0
-    falcon.retest = RETEST_TICKS
+    falcon.retest = _RETEST_TICKS
 
 
 @kernel
@@ -263,7 +263,7 @@ def take_status(falcon: Any) -> bool:
         falcon.unhomed += 1
         falcon.tracked = 0
         falcon.beyond = 0
-        if falcon.unhomed >= UNHOMED_PACKETS:
+        if falcon.unhomed >= _UNHOMED_PACKETS:
             falcon.homed = 0
             falcon.pulled_out = 0
             falcon.share = 0.0
@@ -282,11 +282,11 @@ def is_plausible(falcon: Any) -> bool:
     counts = falcon.status.encoders
     astray, repeated = False, falcon.doubts > 0
     for i in range(3):
-        if abs(counts[i] - falcon.counts[i] - falcon.pace[i] * falcon.apart) > LEAP:
+        if abs(counts[i] - falcon.counts[i] - falcon.pace[i] * falcon.apart) > _LEAP:
             astray = True
-        if abs(counts[i] - falcon.doubted[i]) > LEAP:
+        if abs(counts[i] - falcon.doubted[i]) > _LEAP:
             repeated = False
-    if falcon.tracked != 0 and astray and not repeated and falcon.doubts < DOUBTS:
+    if falcon.tracked != 0 and astray and not repeated and falcon.doubts < _DOUBTS:
         falcon.doubts += 1
         falcon.doubted_at = falcon.apart
         for i in range(3):

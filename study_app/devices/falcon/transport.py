@@ -81,7 +81,7 @@ def open_transport(name: str = "") -> Transport:
         try:
             return FtdiTransport(serial=serial)
         except UsbFailure as also:
-            if also.kind == "not-found" and find_falcons(libusb_package.get_libusb1_backend()):
+            if also.kind == "not-found" and _find_falcons(libusb_package.get_libusb1_backend()):
                 raise UsbFailure("two-drivers", "opening it") from None
             raise failure from None
 
@@ -148,12 +148,12 @@ class PyUsbTransport(Transport):
     def reopen(self) -> None:
         self.close()
         with _failures("looking for it"):
-            devices = find_falcons(self._backend)
+            devices = _find_falcons(self._backend)
         if self.serial is None:
             devices = devices[self._index :]
         else:  # a device without a readable number may be the right one; opening it reports the error
-            devices = [device for device in devices if serial_of(device) in {self.serial, None}]
-            devices.sort(key=lambda device: serial_of(device) is None)
+            devices = [device for device in devices if _serial_of(device) in {self.serial, None}]
+            devices.sort(key=lambda device: _serial_of(device) is None)
         if not devices:
             raise FalconNotFound("not-found", "looking for it")
         self._open(devices[0])
@@ -162,7 +162,7 @@ class PyUsbTransport(Transport):
         try:
             with _failures("opening it"):
                 _claim(device)
-            serial = serial_of(device)
+            serial = _serial_of(device)
             if self.serial not in {None, serial}:
                 raise FalconNotFound("not-found", f"looking for number {self.serial}")
         except UsbFailure:
@@ -218,7 +218,7 @@ class PyUsbTransport(Transport):
         return self._device
 
 
-def find_falcons(backend: Any) -> list[Any]:
+def _find_falcons(backend: Any) -> list[Any]:
     """Return pyusb's device of each Falcon on ``backend``, opened or not."""
     devices = usb.core.find(
         find_all=True, backend=backend, idVendor=constants.VENDOR_ID, idProduct=constants.PRODUCT_ID
@@ -226,7 +226,7 @@ def find_falcons(backend: Any) -> list[Any]:
     return list(devices)
 
 
-def serial_of(device: Any) -> str | None:
+def _serial_of(device: Any) -> str | None:
     """Return the serial number of pyusb's ``device``; None if it has none or cannot be read."""
     with suppress(usb.core.USBError, ValueError, NotImplementedError):
         return device.serial_number or None
@@ -292,7 +292,7 @@ _D2XX_CODES: Final = {
 _PURGE_RX, _PURGE_TX = 1, 2
 _EIGHT_BITS = 8
 
-Setter = Callable[[Any, Any, int], int]
+_Setter = Callable[[Any, Any, int], int]
 """(library, handle, value of the control request) -> FT_STATUS."""
 
 
@@ -315,7 +315,7 @@ def _event_character(library: Any, handle: Any, value: int) -> int:
     return int(library.FT_SetChars(handle, value & 0xFF, 1 if value & constants.EVENT_ENABLED else 0, 0, 0))
 
 
-_SETTERS: Final[dict[int, Setter]] = {
+_SETTERS: Final[dict[int, _Setter]] = {
     constants.REQUEST_RESET: _reset,
     constants.REQUEST_MODEM: _modem,
     constants.REQUEST_FLOW: lambda library, handle, _: int(library.FT_SetFlowControl(handle, 0, 0, 0)),
@@ -451,10 +451,10 @@ def probe(usb: Any = None, platform: str = sys.platform) -> Backend:
     usb = usb if usb is not None else libusb_package.get_libusb1_backend()
     if usb is None:
         return Backend("falcon", by, state=NOT_AVAILABLE, can=can, why=failures_on(platform).mode("no-libusb").cure)
-    falcons = find_falcons(usb)
+    falcons = _find_falcons(usb)
     if not falcons:
         return Backend("falcon", by, state=NONE, can=can, why=failures_on(platform).mode("not-connected").cure)
-    serials = [serial_of(falcon) for falcon in falcons]
+    serials = [_serial_of(falcon) for falcon in falcons]
     why = ""
     if None in serials:
         cause = failures_on(platform).mode("driver" if platform == "win32" else "permission").cause

@@ -11,8 +11,8 @@ from study_app.devices.force_dimension.exchange import COUNTERS, FUNCTIONS, exch
 from study_app.devices.force_dimension.library import CAUSES, FAILURES, OPTION, Library, end_force
 from study_app.errors import DeviceError
 
-WORKSPACE_M: Final = (0.05, 0.05, 0.05)
-FORCE_LIMIT_N: Final = 8.0
+_WORKSPACE_M: Final = (0.05, 0.05, 0.05)
+_FORCE_LIMIT_N: Final = 8.0
 
 
 class Functions(Protocol):
@@ -51,8 +51,8 @@ class ForceDimensionDevice(FramedDevice):
         serial: str = "",
         *,
         library: str | Path | None = None,
-        workspace_m: tuple[float, float, float] = WORKSPACE_M,
-        force_limit_n: float = FORCE_LIMIT_N,
+        workspace_m: tuple[float, float, float] = _WORKSPACE_M,
+        force_limit_n: float = _FORCE_LIMIT_N,
     ) -> None:
         if serial and not serial.isdecimal():
             raise DeviceError(

@@ -38,13 +38,13 @@ STOP = types.int32(types.intp)
 """``dhdStop`` (line 229)."""
 
 TIMEGUARD, MOTOR_SATURATED = 1, 2  # dhdc.h 160, 161
-STATUS_TICKS: Final = 32
+_STATUS_TICKS: Final = 32
 """Number of ticks between reads of the status."""
 _NORM_SLACK = 1.001
 
 ERROR, BAD_NUMBER, FORCE_OFF, UNGUARDED = range(FIRST_CAUSE, FIRST_CAUSE + 4)  # reasons for the end of the exchange
 
-FORCE_DIMENSION = np.dtype(
+_FORCE_DIMENSION = np.dtype(
     [
         *COMMON,
         ("id", np.intp),  # of the device, for every function
@@ -87,7 +87,7 @@ FUNCTIONS: Final = {
     "stop": "dhdStop",
 }
 
-_device_at = c_functions.record_at(FORCE_DIMENSION)
+_device_at = c_functions.record_at(_FORCE_DIMENSION)
 _call_vector, _call_fill, _call_buttons = (
     c_functions.call_at(VECTOR),
     c_functions.call_at(FILL),
@@ -98,7 +98,7 @@ _call_push, _call_push_all, _call_stop = (
     c_functions.call_at(PUSH_ALL),
     c_functions.call_at(STOP),
 )
-_fields = FORCE_DIMENSION.fields
+_fields = _FORCE_DIMENSION.fields
 assert _fields is not None  # noqa: S101 - it is a record
 _POSITION, _VELOCITY, _ROTATION, _GAP, _STATUS = (
     int(_fields[name][1]) for name in ("position_m", "velocity_mps", "rotation", "gap_m", "status")
@@ -107,7 +107,7 @@ _POSITION, _VELOCITY, _ROTATION, _GAP, _STATUS = (
 
 def new_exchange(force_limit_n: float) -> Any:
     """Return the memory of an exchange, shape (1,), without a device: its address is the device's ``context``."""
-    memory = layout.records(FORCE_DIMENSION, 1)
+    memory = layout.records(_FORCE_DIMENSION, 1)
     memory[0].force_limit_n = force_limit_n
     return memory
 
@@ -156,7 +156,7 @@ def _take_sample(device: Any, context: int, now_ns: int, out: Any) -> int:
     device.ticks += 1
     if device.unguarded != 0:
         return _end(device, context, UNGUARDED)
-    if device.ticks % STATUS_TICKS == 0:
+    if device.ticks % _STATUS_TICKS == 0:
         if np.int32(_call_fill(device.get_status, context + _STATUS, device.id)) < 0:
             return _end(device, context, ERROR)
         if device.status[FORCE] == 0:

@@ -33,7 +33,7 @@ CAUSES: Final = {
 
 
 _OUT: Final = POINTER(c_double)
-SIGNATURES: Final[dict[str, tuple[Any, tuple[Any, ...]]]] = {
+_SIGNATURES: Final[dict[str, tuple[Any, tuple[Any, ...]]]] = {
     "dhdErrorGetLastStr": (c_char_p, ()),  # dhdc.h 74
     "dhdGetDeviceCount": (c_int, ()),  # 218
     "dhdGetSerialNumber": (c_int, (POINTER(c_ushort), c_byte)),  # 222
@@ -74,20 +74,20 @@ SIGNATURES: Final[dict[str, tuple[Any, tuple[Any, ...]]]] = {
     "dhdGetWatchdog": (c_int, (POINTER(c_ubyte), c_byte)),  # 374
     "drdIsInitialized": (c_bool, (c_byte,)),  # drdc.h 41
 }
-MOST_JOINTS: Final = 8  # DHD_MAX_DOF, dhdc.h 128
-SYNC: Final = 0  # DHD_COM_MODE_SYNC, dhdc.h 194
-ROUND_TRIPS: Final = 50
-COUNTS: Final = 10
+_MOST_JOINTS: Final = 8  # DHD_MAX_DOF, dhdc.h 128
+_SYNC: Final = 0  # DHD_COM_MODE_SYNC, dhdc.h 194
+_ROUND_TRIPS: Final = 50
+_COUNTS: Final = 10
 """Number of counts of each encoder over which the handle's motion is computed."""
-COUNT_M: Final = (1e-7, 1e-3)
-MASS_KG: Final = (0.01, 5.0)
+_COUNT_M: Final = (1e-7, 1e-3)
+_MASS_KG: Final = (0.01, 5.0)
 """Least and greatest plausible values; others count as unknown."""
 STATUS_WORDS: Final = 32
 """Room for more than the DHD_MAX_STATUS (17) words of 3.17.5 (dhdc.h 164)."""
 RESET, FORCE, FORCE_OFF_CAUSE = 3, 5, 14  # dhdc.h 170, 172, 181
-DEFAULT_TIME_GUARD: Final = -1
+_DEFAULT_TIME_GUARD: Final = -1
 LONGEST_WATCHDOG: Final = 255
-WATCHDOG_S: Final = 125e-6
+_WATCHDOG_S: Final = 125e-6
 """Unit of the watchdog: documentation of forcedimension_core 1.0.0, expert.setWatchdog; CHAI3D 3.3.0 sets 255, too."""
 _ENABLE_S: Final = 0.5
 _CAN: Final = "force up to the device's own limit, through the manufacturer's library; not yet tested on hardware"
@@ -105,10 +105,10 @@ class Library:
 
     def __init__(self, path: str | Path | None = None) -> None:
         self._functions = _load(path)
-        missing = [name for name in SIGNATURES if not hasattr(self._functions, name)]
+        missing = [name for name in _SIGNATURES if not hasattr(self._functions, name)]
         if missing:
             raise FAILURES.failure("old-library", ", ".join(missing))
-        for name, (returned, taken) in SIGNATURES.items():
+        for name, (returned, taken) in _SIGNATURES.items():
             function = getattr(self._functions, name)
             function.restype, function.argtypes = returned, taken
 
@@ -186,7 +186,7 @@ class Library:
         call, device, threshold, watchdog = self._functions, self.id, c_uint(), c_ubyte()
         call.dhdEnableExpertMode()
         try:
-            if call.dhdSetTimeGuard(DEFAULT_TIME_GUARD, device) < 0:
+            if call.dhdSetTimeGuard(_DEFAULT_TIME_GUARD, device) < 0:
                 raise FAILURES.failure("safety", f"time guard: {self._last_error()}")
             if call.dhdGetVelocityThreshold(threshold, device) < 0 or threshold.value == 0:
                 raise FAILURES.failure("safety", f"the velocity threshold is {threshold.value}")
@@ -196,7 +196,7 @@ class Library:
         return {
             "time_guard": "default",
             "velocity_threshold": threshold.value,
-            "watchdog_s": watchdog.value * WATCHDOG_S if watched and watchdog.value else None,
+            "watchdog_s": watchdog.value * _WATCHDOG_S if watched and watchdog.value else None,
         }
 
     def _dynamics(self) -> dict[str, Any]:
@@ -209,14 +209,14 @@ class Library:
         finally:
             self._functions.dhdDisableExpertMode()
         # In other modes than SYNC the next exchange begins while one is under way: a position may be that much older.
-        delay_s = round_trip_s if round_trip_s is None or mode == SYNC else 2 * round_trip_s
+        delay_s = round_trip_s if round_trip_s is None or mode == _SYNC else 2 * round_trip_s
         return {"com_mode": mode, "delay_s": delay_s, "count_m": count_m, "mass_kg": mass_kg}
 
     def _round_trip_s(self) -> float | None:
         """Return the 90th percentile of the time that a zero force and a new position take [s]."""
         call, device, taken = self._functions, self.id, []
         place = [c_double() for _ in range(3)]
-        for _ in range(ROUND_TRIPS):
+        for _ in range(_ROUND_TRIPS):
             time.sleep(0.001)  # the time guard answers earlier readings from memory
             began_s = time.perf_counter()
             call.dhdSetForce(0.0, 0.0, 0.0, device)
@@ -242,25 +242,25 @@ class Library:
         places = []
         for axis in range(-1, 3):
             place = [c_double() for _ in range(3)]
-            moved = (count + COUNTS * (axis == i) for i, count in enumerate(counts))
+            moved = (count + _COUNTS * (axis == i) for i, count in enumerate(counts))
             if call.dhdDeltaEncoderToPosition(*moved, *place, device) < 0:
                 return None, None
             places.append([coordinate.value for coordinate in place])
-        rates_m = (np.array(places[1:]) - places[0]).T / COUNTS
+        rates_m = (np.array(places[1:]) - places[0]).T / _COUNTS
         longest_m = float(np.linalg.norm(rates_m, 2)) if np.isfinite(rates_m).all() else math.nan
-        joints, inertia = (c_double * MOST_JOINTS)(), (c_double * 36)()
+        joints, inertia = (c_double * _MOST_JOINTS)(), (c_double * 36)()
         arms = [c_double() for _ in range(3)]
         if call.dhdGetJointAngles(joints, device) < 0 or call.dhdDeltaEncodersToJointAngles(*counts, *arms, device) < 0:
-            return _within(longest_m, COUNT_M), None
+            return _within(longest_m, _COUNT_M), None
         joints[:3] = [arm.value for arm in arms]
         if call.dhdJointAnglesToInertiaMatrix(joints, inertia, device) < 0:
-            return _within(longest_m, COUNT_M), None
+            return _within(longest_m, _COUNT_M), None
         matrix = np.array(inertia).reshape(6, 6)
         least_kg = math.nan
         if np.isfinite(matrix).all():
             linear, coupled, turning = matrix[:3, :3], matrix[:3, 3:], matrix[3:, 3:]
             least_kg = float(np.linalg.eigvalsh(linear - coupled @ np.linalg.pinv(turning) @ coupled.T).min())
-        return _within(longest_m, COUNT_M), _within(least_kg, MASS_KG)
+        return _within(longest_m, _COUNT_M), _within(least_kg, _MASS_KG)
 
     def _enable_force(self) -> None:
         """Enable the force at zero and wait until the device confirms it."""

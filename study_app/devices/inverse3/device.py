@@ -15,10 +15,10 @@ from study_app.devices.inverse3.opening import Messages, open_session
 from study_app.devices.inverse3.wire import text_hash
 from study_app.errors import DeviceError
 
-REACH_M: Final = 0.10
+_REACH_M: Final = 0.10
 """Radius of the workspace about its middle: docs.haply.co 3.5.x, tutorial 05 (Inverse3; a Minverse reaches 0.04 m)."""
-WORKSPACE_M: Final = (0.05, 0.05, 0.05)
-FORCE_LIMIT_N: Final = 8.0
+_WORKSPACE_M: Final = (0.05, 0.05, 0.05)
+_FORCE_LIMIT_N: Final = 8.0
 
 
 class Inverse3Device(FramedDevice):
@@ -48,14 +48,14 @@ class Inverse3Device(FramedDevice):
         self,
         where: str = "",
         *,
-        workspace_m: tuple[float, float, float] = WORKSPACE_M,
-        force_limit_n: float = FORCE_LIMIT_N,
+        workspace_m: tuple[float, float, float] = _WORKSPACE_M,
+        force_limit_n: float = _FORCE_LIMIT_N,
         progress: Callable[[str], object] | None = None,
     ) -> None:
-        if math.hypot(*workspace_m) > REACH_M:
+        if math.hypot(*workspace_m) > _REACH_M:
             asked = " x ".join(f"{2000 * half:g}" for half in workspace_m)
             raise DeviceError(
-                f"a workspace of {asked} mm exceeds the reach of an Inverse3, a ball of {2000 * REACH_M:g} mm: "
+                f"a workspace of {asked} mm exceeds the reach of an Inverse3, a ball of {2000 * _REACH_M:g} mm: "
                 f"reduce the protocol's workspace_mm"
             )
         super().__init__(new_exchange("", force_limit_n, 1), workspace_m, force_limit_n, exchange_functions())

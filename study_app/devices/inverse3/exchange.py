@@ -2,7 +2,7 @@
 
 The service answers each message with one state and pushes nothing (docs.haply.co 3.5.x, "WebSocket Protocol", core
 rule), so `_write` sends the force and asks for the state that `_read` finds at the next tick. Neither waits: the socket
-does not block. A reply older than `LONGEST_GAP_NS` is ignored, and without replies the servo ends the force after 50
+does not block. A reply older than `_LONGEST_GAP_NS` is ignored, and without replies the servo ends the force after 50
 ms. Any other fault ends the stream at once: zero force is sent, then a close frame, then nothing. Commands are applied
 once and forgotten, and a device without commands returns to idle ("Control Commands"), so the force ends without
 further commands if this program ends or hangs.
@@ -22,15 +22,15 @@ from study_app.haptics.kernels.vector import clear, copy
 from study_app.haptics.kernels.vector import square as square_of
 from study_app.haptics.model.layout import MEASURED_VELOCITY, records
 
-TRANSFER = types.intp(types.intp, types.intp, types.uintp, types.int32)
+_TRANSFER = types.intp(types.intp, types.intp, types.uintp, types.int32)
 """``send`` and ``recv`` of a socket: (handle, address, bytes, flags) -> how many, 0: closed, below 0: none now."""
 
-LONGEST_GAP_NS: Final = 20_000_000
-MOST_UNANSWERED: Final = 4
+_LONGEST_GAP_NS: Final = 20_000_000
+_MOST_UNANSWERED: Final = 4
 """Number of unanswered commands from which only weaker forces are sent: others would queue up."""
-MOST_WEAKER: Final = 60
+_MOST_WEAKER: Final = 60
 """Number of unanswered commands from which only zero force is sent: the servo's fade takes 45 ticks."""
-INBOX: Final = 1 << 16
+_INBOX: Final = 1 << 16
 _OUTBOX = 512
 _TEXT = 384
 _LOG = 64  # commands whose time is stored, more than can wait
@@ -41,14 +41,14 @@ CLOSED, BROKE_PROTOCOL, NOT_A_STATE, DEVICE_GONE, NO_POSITION, BAD_NUMBER, NOT_R
     FIRST_CAUSE, FIRST_CAUSE + 9
 )
 
-INVERSE3 = np.dtype(
+_INVERSE3 = np.dtype(
     [
         *COMMON,
         ("handle", np.intp),  # of the connection, and
-        ("send", np.intp),  # addresses of its functions (``TRANSFER``)
+        ("send", np.intp),  # addresses of its functions (``_TRANSFER``)
         ("receive", np.intp),
         # received data
-        ("inbox", np.uint8, (INBOX,)),
+        ("inbox", np.uint8, (_INBOX,)),
         ("filled", np.int64),
         ("header", np.int64, (2,)),
         ("scan", wire.SCAN),
@@ -78,9 +78,9 @@ INVERSE3 = np.dtype(
 
 COUNTERS: Final = ("ticks", "fresh", "missing", "late", "skipped", "unasked", "sent", "answered")
 
-_device_at = c_functions.record_at(INVERSE3)
-_call = c_functions.call_at(TRANSFER)
-_fields = INVERSE3.fields
+_device_at = c_functions.record_at(_INVERSE3)
+_call = c_functions.call_at(_TRANSFER)
+_fields = _INVERSE3.fields
 assert _fields is not None  # noqa: S101 - it is a record
 _INBOX_AT, _OUTBOX_AT = int(_fields["inbox"][1]), int(_fields["outbox"][1])
 
@@ -90,7 +90,7 @@ _Y, _Z, _END = (np.frombuffer(text, np.uint8) for text in (b',"y":', b',"z":', b
 
 def new_exchange(device_id: str, force_limit_n: float, seed: int) -> Any:
     """Return the memory of an exchange, shape (1,), not connected yet: its address is the device's ``context``."""
-    memory = records(INVERSE3, 1)
+    memory = records(_INVERSE3, 1)
     device = memory[0]
     device.force_limit_n = force_limit_n
     device.key[0] = seed | 1
@@ -136,7 +136,7 @@ def _take_replies(device: Any, context: int, now_ns: int, out: Any) -> int:
     device.ticks += 1
     answered = device.answered
     for _ in range(_RECEIVES):
-        room = INBOX - device.filled
+        room = _INBOX - device.filled
         came = np.int32(
             _call(device.receive, device.handle, context + _INBOX_AT + device.filled, np.uintp(room), np.int32(0))
         )
@@ -155,7 +155,7 @@ def _take_replies(device: Any, context: int, now_ns: int, out: Any) -> int:
         return c_functions.READ_NOTHING_NEW
     row = (device.answered - 1) % _LOG
     device.age_ns = now_ns - device.sent_ns[row]
-    if device.age_ns > LONGEST_GAP_NS:
+    if device.age_ns > _LONGEST_GAP_NS:
         device.late += 1
         return c_functions.READ_NOTHING_NEW
     device.fresh += 1
@@ -192,7 +192,7 @@ def _take_frames(device: Any, context: int) -> int:
         if size == wire.INCOMPLETE:
             break
         opcode, length = device.header[0], device.header[1]
-        if length > INBOX - size:
+        if length > _INBOX - size:
             return TOO_LONG
         at, end = begin + size, begin + size + length
         if end > device.filled:
@@ -258,8 +258,8 @@ def _command(device: Any, context: int, x_n: float, y_n: float, z_n: float) -> N
     if not square <= most_n * most_n:  # nor NaN: the servo sends neither
         x_n = y_n = z_n = square = 0.0
     unanswered = device.sent - device.answered
-    weaker = square < square_of(device.sent_n) and (square == 0.0 or unanswered < MOST_WEAKER)
-    if unanswered >= MOST_UNANSWERED and not weaker:
+    weaker = square < square_of(device.sent_n) and (square == 0.0 or unanswered < _MOST_WEAKER)
+    if unanswered >= _MOST_UNANSWERED and not weaker:
         device.skipped += 1
         return
     if not _flush(device, context):

@@ -18,33 +18,33 @@ from study_app.devices.inverse3.service import FAILURES, ID, LONGEST, Link, shor
 from study_app.devices.inverse3.wire import CLOSE, INCOMPLETE, TEXT, VIOLATION, build_frame, parse_header
 from study_app.errors import DeviceError
 
-PROFILE: Final = "liquid-study:study"
+_PROFILE: Final = "liquid-study:study"
 PRESET: Final = "arm_front_centered"
 """Origin in the middle of the workspace ("Mount & Workspace Transforms", presets)."""
-BASIS: Final = "XYZ"
-FORCE_GATE_GAIN: Final = 0.0
+_BASIS: Final = "XYZ"
+_FORCE_GATE_GAIN: Final = 0.0
 """Attenuation of the force when the service detects an oscillation; the default is 0.3. That 0 disables it is not
 documented: to be tested on the bench."""
 
-SESSION_SCOPED: Final[Mapping[str, Any]] = {
+_SESSION_SCOPED: Final[Mapping[str, Any]] = {
     "preset": PRESET,
-    "basis": {"permutation": BASIS},
-    "filters": {"force_gate": {"gain": FORCE_GATE_GAIN}, "damping": {"scalar": 0.0}},
+    "basis": {"permutation": _BASIS},
+    "filters": {"force_gate": {"gain": _FORCE_GATE_GAIN}, "damping": {"scalar": 0.0}},
 }
-"""The settings of `first_message` as shown in a snapshot of the configuration."""
+"""The settings of `_first_message` as shown in a snapshot of the configuration."""
 
-DEVICE_GLOBAL: Final[Mapping[str, Any]] = {
+_DEVICE_GLOBAL: Final[Mapping[str, Any]] = {
     "gravity_compensation": {"enabled": True, "scaling_factor": 1.0},
     "torque_scaling": {"enabled": True},
 }
 """Factory values, which a message cannot set ("Device Configuration": HTTP only, device-global). They hold for every
 program on the computer, so they are required, not changed."""
 
-RECORDED: Final = (*SESSION_SCOPED, *DEVICE_GLOBAL, "mount", "handedness", "home_return", "streaming_mode")
+_RECORDED: Final = (*_SESSION_SCOPED, *_DEVICE_GLOBAL, "mount", "handedness", "home_return", "streaming_mode")
 _ZERO: Final = {"x": 0.0, "y": 0.0, "z": 0.0}
 
 
-def first_message(device_id: str) -> dict[str, Any]:
+def _first_message(device_id: str) -> dict[str, Any]:
     """Return the message that opens a session: profile, neutral settings and zero force.
 
     ``session.configure`` and a device's ``configure`` are sent once, with the first message ("WebSocket Protocol" and
@@ -53,9 +53,9 @@ def first_message(device_id: str) -> dict[str, Any]:
     configure = {
         "preset": {"preset": PRESET},
         "damping": {"scalar": 0.0, "vector": _ZERO},
-        "force_gate": {"gain": FORCE_GATE_GAIN},
+        "force_gate": {"gain": _FORCE_GATE_GAIN},
     }
-    session = {"configure": {"profile": {"name": PROFILE}, "basis": {"permutation": BASIS}}}
+    session = {"configure": {"profile": {"name": _PROFILE}, "basis": {"permutation": _BASIS}}}
     return {"session": session, **_command(device_id, configure=configure)}
 
 
@@ -64,7 +64,7 @@ def full_state_request(device_id: str) -> dict[str, Any]:
     return {"session": {"force_render_full_state": {}}, **_command(device_id)}
 
 
-def zero_force(device_id: str) -> dict[str, Any]:
+def _zero_force(device_id: str) -> dict[str, Any]:
     """Return a command of zero force ("Control Commands", set_cursor_force)."""
     return _command(device_id)
 
@@ -75,12 +75,12 @@ def _command(device_id: str, **further: Any) -> dict[str, Any]:
     }
 
 
-def receipt_settings(config: Mapping[str, Any]) -> dict[str, Any]:
+def _receipt_settings(config: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings of a configuration that change the force, for the receipt."""
-    return {key: config[key] for key in RECORDED if key in config}
+    return {key: config[key] for key in _RECORDED if key in config}
 
 
-def differing_settings(config: Mapping[str, Any], required: Mapping[str, Any]) -> list[str]:
+def _differing_settings(config: Mapping[str, Any], required: Mapping[str, Any]) -> list[str]:
     """Return a text for each setting that is not as required; numbers are compared as floats."""
     return list(_differing("", config, required))
 
@@ -96,7 +96,7 @@ def _differing(place: str, value: Any, required: Any) -> list[str]:
     return [] if value == required else [f"{place} is {shortened(value)}, and {required!r} is required"]
 
 
-ROUND_TRIPS: Final = 50
+_ROUND_TRIPS: Final = 50
 _MAGIC: Final = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"  # RFC 6455 §1.3
 
 
@@ -201,16 +201,16 @@ def _object(text: bytes) -> dict[str, Any]:
 
 def open_session(messages: Messages, link: Link, wanted_id: str = "") -> Session:
     """Choose the device ("": the first), send the neutral settings with the first message, and confirm them."""
-    entry = find_device(messages.receive(), wanted_id)
+    entry = _find_device(messages.receive(), wanted_id)
     device_id, config = entry["device_id"], entry["config"]
-    check_status(entry.get("status", {}), at_opening=True)
-    messages.ask(first_message(device_id))
-    entry = find_device(messages.ask(full_state_request(device_id)), device_id, inventory=False)
+    _check_status(entry.get("status", {}), at_opening=True)
+    messages.ask(_first_message(device_id))
+    entry = _find_device(messages.ask(full_state_request(device_id)), device_id, inventory=False)
     in_force = entry.get("config")
     snapshot = config if in_force is None else in_force
-    wrong = differing_settings(snapshot, DEVICE_GLOBAL)
+    wrong = _differing_settings(snapshot, _DEVICE_GLOBAL)
     if in_force is not None:
-        wrong += differing_settings(in_force, SESSION_SCOPED)
+        wrong += _differing_settings(in_force, _SESSION_SCOPED)
     if wrong:
         raise FAILURES.failure("settings", "; ".join(wrong))
     round_trip_s = _measure(messages, link, device_id)
@@ -220,8 +220,8 @@ def open_session(messages: Messages, link: Link, wanted_id: str = "") -> Session
         "device_info": config.get("device_info"),
         "firmware": config.get("extended_firmware_version"),
         "service_settings": {
-            "found": receipt_settings(config),
-            "in_force": receipt_settings(snapshot),
+            "found": _receipt_settings(config),
+            "in_force": _receipt_settings(snapshot),
             "confirmed": in_force is not None,
         },
         "round_trip_ms": round(1000 * round_trip_s, 3),
@@ -229,7 +229,7 @@ def open_session(messages: Messages, link: Link, wanted_id: str = "") -> Session
     return Session(device_id, described, round_trip_s)
 
 
-def find_device(message: Mapping[str, Any], wanted_id: str = "", *, inventory: bool = True) -> dict[str, Any]:
+def _find_device(message: Mapping[str, Any], wanted_id: str = "", *, inventory: bool = True) -> dict[str, Any]:
     """Return the entry in a message of the device with this id, or of the first one."""
     listed = message.get("inverse3", [])
     if not isinstance(listed, list):
@@ -251,7 +251,7 @@ def find_device(message: Mapping[str, Any], wanted_id: str = "", *, inventory: b
     raise FAILURES.failure("no-device", f"listed: {shortened(list(entries)) if entries else 'none'}")
 
 
-def check_status(status: Mapping[str, Any], *, at_opening: bool) -> None:
+def _check_status(status: Mapping[str, Any], *, at_opening: bool) -> None:
     """Raise an error for a device that has no power, is not calibrated, or is used by another program."""
     for key, mode in (("power_supply", "not-ready"), ("ready", "not-ready"), ("calibrated", "uncalibrated")):
         if status.get(key) is False:
@@ -263,8 +263,8 @@ def check_status(status: Mapping[str, Any], *, at_opening: bool) -> None:
 def _measure(messages: Messages, link: Link, device_id: str) -> float:
     """Return the 90th percentile of the round trip of a command of zero force [s]."""
     taken = []
-    for _ in range(ROUND_TRIPS):
+    for _ in range(_ROUND_TRIPS):
         began_s = link.now_s()
-        messages.ask(zero_force(device_id))
+        messages.ask(_zero_force(device_id))
         taken.append(link.now_s() - began_s)
     return sorted(taken)[int(0.9 * len(taken))]

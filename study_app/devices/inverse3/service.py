@@ -27,7 +27,7 @@ OPENS_S: Final = 2.0
 """Time limit for opening a session, from the connection to the last reply [s]. [choice]"""
 ANSWER_S: Final = 0.5
 """Time limit for an answer over HTTP, from the connection to its last byte [s]. [choice]"""
-CLOSE_S: Final = 0.2
+_CLOSE_S: Final = 0.2
 LONGEST: Final = 1 << 16
 """Greatest length of a message, of an answer, and of unread data [bytes]."""
 
@@ -116,8 +116,8 @@ class SocketLink(io.RawIOBase):
     def close(self) -> None:
         with suppress(OSError):
             self._socket.shutdown(socket.SHUT_WR)
-            self._socket.settimeout(CLOSE_S)
-            until_s = time.monotonic() + CLOSE_S
+            self._socket.settimeout(_CLOSE_S)
+            until_s = time.monotonic() + _CLOSE_S
             while self._socket.recv(1 << 16) and time.monotonic() < until_s:
                 pass
         self._socket.close()
@@ -133,20 +133,20 @@ PORTS: Final = (10001, 10000)
 """Ports of HTTP: docs.haply.co 3.5.x, "Device Configuration" uses the first, "Settings Reference" names the second."""
 ID: Final = re.compile(r"[!#-\[\]-~]{1,64}")
 """Permitted ids, which are inserted unescaped: printable ASCII without spaces, quotes and backslashes."""
-CAN: Final = "force through the Inverse Service 3.5 or later (Haply Hub); not yet tested on hardware"
+_CAN: Final = "force through the Inverse Service 3.5 or later (Haply Hub); not yet tested on hardware"
 
 
 def probe(host: str = "127.0.0.1", ports: tuple[int, ...] = PORTS) -> Backend:
     """Return the state of the service at ``host`` with its devices (docs.haply.co 3.4.x, "HTTP", GET /devices)."""
-    answer = get_json(host, "/devices", ports)
+    answer = _get_json(host, "/devices", ports)
     by = "Inverse Service"
     if not isinstance(answer, dict):
-        return Backend("inverse3", by, state=NOT_AVAILABLE, can=CAN, why=FAILURES.sentence("no-service"))
+        return Backend("inverse3", by, state=NOT_AVAILABLE, can=_CAN, why=FAILURES.sentence("no-service"))
     listed = answer.get("inverse3")
     ids = [entry.get("device_id") for entry in listed if isinstance(entry, dict)] if isinstance(listed, list) else []
     if names := [name for name in ids if isinstance(name, str) and ID.fullmatch(name)]:
-        return Backend("inverse3", by, state=f"connected: {', '.join(names)}", can=CAN)
-    return Backend("inverse3", by, state=NONE, can=CAN, why=FAILURES.sentence("no-device"))
+        return Backend("inverse3", by, state=f"connected: {', '.join(names)}", can=_CAN)
+    return Backend("inverse3", by, state=NONE, can=_CAN, why=FAILURES.sentence("no-device"))
 
 
 def shortened(value: Any) -> str:
@@ -159,7 +159,7 @@ def force_scale(host: str, ports: tuple[int, ...] = PORTS) -> Any:
 
     Documented: "Filters" 3.5.x (the key), "Settings Reference" 3.5.x (GET /settings/KEY).
     """
-    return get_json(host, "/settings/devices/force_scale", ports)
+    return _get_json(host, "/settings/devices/force_scale", ports)
 
 
 def check_force_scale(answer: Any) -> float:
@@ -177,7 +177,7 @@ def check_force_scale(answer: Any) -> float:
     return 1.0
 
 
-def get_json(host: str, path: str, ports: tuple[int, ...] = PORTS) -> Any:
+def _get_json(host: str, path: str, ports: tuple[int, ...] = PORTS) -> Any:
     """Return the service's JSON answer to a GET request; None if no port answers within `ANSWER_S`.
 
     The connection uses no proxy of the system: the service is in the local network.

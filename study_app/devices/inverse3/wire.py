@@ -137,7 +137,7 @@ NO_DEVICE: Final = 2  # the message does not list the device
 WITHOUT_POSITION: Final = 3  # the device has no position
 NOT_FINITE: Final = 4
 
-DEEPEST: Final = 16
+_DEEPEST: Final = 16
 _OBJECT, _ARRAY = 1, 2
 _FNV_BASIS, _FNV_PRIME = 0xCBF29CE484222325, 0x100000001B3
 
@@ -159,8 +159,8 @@ _NEEDED = 0b111
 SCAN = np.dtype(
     [
         ("own_id", np.uint64),  # hash of the device's id
-        ("kinds", np.int64, (DEEPEST,)),
-        ("paths", np.uint64, (DEEPEST,)),
+        ("kinds", np.int64, (_DEEPEST,)),
+        ("paths", np.uint64, (_DEEPEST,)),
         ("candidate", np.float64, (PLACES,)),  # of the device being read
         ("seen", np.int64),  # bits of the values read for the candidate
         ("value", np.float64, (PLACES,)),  # of the device
@@ -210,7 +210,7 @@ def scan(data: Any, begin: int, end: int, state: Any) -> int:
         byte = data[at]
         if value_due:
             if byte == 123 or byte == 91:  # noqa: PLR1714 - { or [; compiled as it stands
-                if depth + 1 >= DEEPEST:
+                if depth + 1 >= _DEEPEST:
                     return NOT_JSON
                 depth += 1
                 state.kinds[depth] = _OBJECT if byte == 123 else _ARRAY

@@ -26,7 +26,7 @@ FULL_DEFLECTION: Final = 350
 DEAD_DEFLECTION: Final = 20
 """Deflection up to which the cap counts as released, since it does not rest at exactly 0."""
 FULL_SPEED_MPS: Final = 0.25
-USAGE: Final = (1, 8)
+_USAGE: Final = (1, 8)
 """Page and usage of the collection that reports motion: generic desktop, multi-axis controller."""
 
 _PAIR: Final = 0b11
@@ -114,13 +114,13 @@ def _speed(deflection: int) -> float:
     return FULL_SPEED_MPS * (share if deflection > 0 else -share)
 
 
-UDEV_RULES: Final = (
+_UDEV_RULES: Final = (
     'KERNEL=="hidraw*", KERNELS=="*:256F:*", TAG+="uaccess"',
     'KERNEL=="hidraw*", KERNELS=="*:046D:C62[5679B].*", TAG+="uaccess"',
 )
-CANNOT_OPEN: Final = {
+_CANNOT_OPEN: Final = {
     "linux": "this account may not open it: put "
-    + " and ".join(f"'{rule}'" for rule in UDEV_RULES)
+    + " and ".join(f"'{rule}'" for rule in _UDEV_RULES)
     + " into /etc/udev/rules.d/60-spacemouse.rules, run 'sudo udevadm control --reload' and plug it in again",
     "darwin": "3Dconnexion's helper may hold it: quit 3DconnexionHelper (Activity Monitor), or remove 3DxWare",
     "win32": "another program holds it: close it, and 3DxWare",
@@ -160,7 +160,7 @@ def choose_interface(interfaces: list[tuple[Model, dict[str, Any]]]) -> tuple[Mo
             + ", ".join(m.name for m in MODELS)
         )
     usages = [(interface.get("usage_page") or 0, interface.get("usage") or 0) for _, interface in interfaces]
-    for wanted in (USAGE, (0, 0)):
+    for wanted in (_USAGE, (0, 0)):
         if wanted in usages:
             model, chosen = interfaces[usages.index(wanted)]
             return model, chosen["path"]
@@ -173,7 +173,7 @@ def open_interface(hid: Any, model: Model, path: bytes) -> Any:
     try:
         device.open_path(path)
     except OSError as error:
-        cure = CANNOT_OPEN.get(sys.platform, CANNOT_OPEN["win32"])
+        cure = _CANNOT_OPEN.get(sys.platform, _CANNOT_OPEN["win32"])
         raise DeviceError(f"the {model.name} cannot be opened: {cure}") from error
     return device
 

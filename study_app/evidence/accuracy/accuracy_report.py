@@ -19,28 +19,28 @@ from study_app.evidence.accuracy.comparison import Accuracy, Kind, Row, front, w
 from study_app.evidence.reference_solutions import PERCEPTIBLE_N, RELATIVE, ROUNDING
 from study_app.evidence.table import Evidence, Table, duration, plot_files
 
-WIDTH_PT: Final = 85 / 25.4 * 72
-LEFT_PT: Final = 27.0
-RIGHT_PT: Final = 6.0
-PANEL_PT: Final = 128.0
-STRIP_PT: Final = 54.0
-BREAK_PT: Final = 5.0
-HEADING_PT: Final = 11.0
-LINE_PT: Final = 9.0
-FOOT_PT: Final = 24.0
-SMALL: Final = 6.6
-LETTERS: Final = 66
-BUDGET_NS: Final = 1e6
-LABEL_PT: Final = 8.2
-COLUMN_NS: Final = 5e3
-SOLVER_HIGH: Final = 0.38
-SLANT_PT: Final = 4.0
+_WIDTH_PT: Final = 85 / 25.4 * 72
+_LEFT_PT: Final = 27.0
+_RIGHT_PT: Final = 6.0
+_PANEL_PT: Final = 128.0
+_STRIP_PT: Final = 54.0
+_BREAK_PT: Final = 5.0
+_HEADING_PT: Final = 11.0
+_LINE_PT: Final = 9.0
+_FOOT_PT: Final = 24.0
+_SMALL: Final = 6.6
+_LETTERS: Final = 66
+_BUDGET_NS: Final = 1e6
+_LABEL_PT: Final = 8.2
+_COLUMN_NS: Final = 5e3
+_SOLVER_HIGH: Final = 0.38
+_SLANT_PT: Final = 4.0
 """Rise of labels per decade of time, so that hairlines from the left pass below the points to the right."""
 
-ROUNDED: Final = 1e-5
+_ROUNDED: Final = 1e-5
 """Errors below this share of the force are drawn in the strip."""
 
-LOOKS: Final[dict[str, dict[str, Any]]] = {
+_LOOKS: Final[dict[str, dict[str, Any]]] = {
     "tick": {"marker": "o", "facecolor": "#0b65a3"},
     "list": {"marker": "s", "facecolor": "#13202c"},
     "rate": {"marker": "^", "facecolor": "#ffffff"},
@@ -55,20 +55,20 @@ def draw(found: Accuracy) -> Figure:
     """Draw the results: a panel for each kind of reference, the legend below."""
     kinds: tuple[Kind, ...] = ("numerical", "physical")
     panels = [_Panel(found, kind) for kind in kinds if found.of(kind)]
-    key = textwrap.wrap(_KEY + " ".join(f"{note[0].upper()}{note[1:]}." for note in found.notes), LETTERS)
-    height_pt = sum(panel.height_pt for panel in panels) + FOOT_PT + LINE_PT * len(key)
-    figure = Figure(figsize=(WIDTH_PT / 72, height_pt / 72), facecolor="white")
+    key = textwrap.wrap(_KEY + " ".join(f"{note[0].upper()}{note[1:]}." for note in found.notes), _LETTERS)
+    height_pt = sum(panel.height_pt for panel in panels) + _FOOT_PT + _LINE_PT * len(key)
+    figure = Figure(figsize=(_WIDTH_PT / 72, height_pt / 72), facecolor="white")
     least, most = _span(found)
     down_pt = 0.0
     for panel in panels:
         panel.draw(figure, down_pt, height_pt, (least, most), last=panel is panels[-1])
         down_pt += panel.height_pt
     figure.text(
-        4 / WIDTH_PT,
-        (LINE_PT * len(key) + 4) / height_pt,
+        4 / _WIDTH_PT,
+        (_LINE_PT * len(key) + 4) / height_pt,
         "\n".join(key),
         va="top",
-        fontsize=SMALL,
+        fontsize=_SMALL,
         color=style.TEXT_SOFT,
         linespacing=1.2,
     )
@@ -85,7 +85,7 @@ _KEY: Final = (
 def _span(found: Accuracy) -> tuple[float, float]:
     """Return the least and the greatest time on the axis [ns]."""
     times = [row.ns_per_ms for row in found.rows] + [it.computing_s * 1e6 for it in found.truths if it.computing_s]
-    return min(times) / 2, max(*times, BUDGET_NS) * 4
+    return min(times) / 2, max(*times, _BUDGET_NS) * 4
 
 
 class _Panel:
@@ -98,7 +98,7 @@ class _Panel:
         self._front = [self._points[candidate] for candidate in front(self._points)]
         self._solved = [it.computing_s * 1e6 for it in found.truths if it.computing_s]
         self._numerical = kind == "numerical"
-        self._strip = [row for row in self._points.values() if row.error.rms < ROUNDED]
+        self._strip = [row for row in self._points.values() if row.error.rms < _ROUNDED]
         names = ", ".join(dict.fromkeys(row.truth for row in rows))
         if self._numerical:
             self._heading = "Numerical error: compared with the exact sums"
@@ -106,26 +106,28 @@ class _Panel:
         else:
             self._heading = "Physical error: compared with references"
             text = f"{rows[0].liquid}; {names}"
-        self._text = textwrap.wrap(text, LETTERS)
-        self._top_pt = 6 + HEADING_PT + LINE_PT * len(self._text) + 13
+        self._text = textwrap.wrap(text, _LETTERS)
+        self._top_pt = 6 + _HEADING_PT + _LINE_PT * len(self._text) + 13
 
     @property
     def height_pt(self) -> float:
-        return self._top_pt + PANEL_PT + (STRIP_PT + BREAK_PT if self._strip else 0.0) + 12
+        return self._top_pt + _PANEL_PT + (_STRIP_PT + _BREAK_PT if self._strip else 0.0) + 12
 
     def draw(self, figure: Figure, down_pt: float, height_pt: float, span: tuple[float, float], *, last: bool) -> None:
         def place(top_pt: float, tall_pt: float) -> Axes:
-            width = (WIDTH_PT - LEFT_PT - RIGHT_PT) / WIDTH_PT
-            return figure.add_axes((LEFT_PT / WIDTH_PT, 1 - (top_pt + tall_pt) / height_pt, width, tall_pt / height_pt))
+            width = (_WIDTH_PT - _LEFT_PT - _RIGHT_PT) / _WIDTH_PT
+            return figure.add_axes(
+                (_LEFT_PT / _WIDTH_PT, 1 - (top_pt + tall_pt) / height_pt, width, tall_pt / height_pt)
+            )
 
-        figure.text(4 / WIDTH_PT, 1 - (down_pt + 6) / height_pt, self._heading, va="top", fontweight="bold")
-        below = 1 - (down_pt + 6 + HEADING_PT) / height_pt
-        figure.text(4 / WIDTH_PT, below, "\n".join(self._text), va="top", fontsize=SMALL, color=style.TEXT_SOFT)
+        figure.text(4 / _WIDTH_PT, 1 - (down_pt + 6) / height_pt, self._heading, va="top", fontweight="bold")
+        below = 1 - (down_pt + 6 + _HEADING_PT) / height_pt
+        figure.text(4 / _WIDTH_PT, below, "\n".join(self._text), va="top", fontsize=_SMALL, color=style.TEXT_SOFT)
         top_pt = down_pt + self._top_pt
-        main = place(top_pt, PANEL_PT)
+        main = place(top_pt, _PANEL_PT)
         axes = [main]
         if self._strip:
-            axes.append(place(top_pt + PANEL_PT + BREAK_PT, STRIP_PT))
+            axes.append(place(top_pt + _PANEL_PT + _BREAK_PT, _STRIP_PT))
         for it in axes:
             self._axes(it, span, lowest=it is axes[-1], last=last)
         self._main(main)
@@ -139,30 +141,30 @@ class _Panel:
         axes.xaxis.set_major_locator(FixedLocator([10.0**power for power in range(0, 13)]))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda ns, _: duration(ns)))
         axes.minorticks_off()
-        axes.tick_params(labelsize=SMALL, labelbottom=lowest, length=2.5 if lowest else 0, axis="x", pad=2)
-        axes.tick_params(labelsize=SMALL, axis="y", pad=1)
+        axes.tick_params(labelsize=_SMALL, labelbottom=lowest, length=2.5 if lowest else 0, axis="x", pad=2)
+        axes.tick_params(labelsize=_SMALL, axis="y", pad=1)
         axes.spines["bottom"].set_visible(lowest)
-        axes.axvline(BUDGET_NS, color=style.TEXT, linewidth=0.8, linestyle=(0, (1, 1.5)))
+        axes.axvline(_BUDGET_NS, color=style.TEXT, linewidth=0.8, linestyle=(0, (1, 1.5)))
         if lowest and last:
-            axes.set_xlabel("Computation time of 1 ms of motion (one tick at 1 kHz)", fontsize=SMALL + 0.4, labelpad=2)
+            axes.set_xlabel("Computation time of 1 ms of motion (one tick at 1 kHz)", fontsize=_SMALL + 0.4, labelpad=2)
         for one, other in zip(self._front, self._front[1:], strict=False):
             times, errors = (one.ns_per_ms, other.ns_per_ms), (100 * one.error.rms, 100 * other.error.rms)
             axes.plot(times, errors, color=style.ZERO, linewidth=1.2, zorder=2)
 
     def _main(self, axes: Axes) -> None:
         """Draw the points with errors, their labels in a column to the right or next to them, and the target."""
-        shown = [row for row in self._points.values() if row.error.rms >= ROUNDED]
+        shown = [row for row in self._points.values() if row.error.rms >= _ROUNDED]
         target = 100 * min(row.error.target for row in self._rows)
-        lows = [100 * row.error.rms for row in self._rows if row.error.rms >= ROUNDED]
+        lows = [100 * row.error.rms for row in self._rows if row.error.rms >= _ROUNDED]
         axes.set_ylim(min(*lows, target) / 2, max(*lows, target) * 1.6)
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.yaxis.set_minor_formatter(NullFormatter())
-        axes.set_title("Error [% of the force]", fontsize=SMALL, pad=4, x=-0.075)
+        axes.set_title("Error [% of the force]", fontsize=_SMALL, pad=4, x=-0.075)
         axes.axhline(target, color=style.TEXT, linewidth=0.9, linestyle=(0, (5, 2)))
         share = f"{100 * RELATIVE:g} %" if target <= 100 * RELATIVE else f"{PERCEPTIBLE_N:g} N"
-        offset: dict[str, Any] = {"textcoords": "offset points", "fontsize": SMALL}
+        offset: dict[str, Any] = {"textcoords": "offset points", "fontsize": _SMALL}
         axes.annotate(f"target {share}", (axes.get_xlim()[0], target), (3, 2), va="bottom", **offset)
-        axes.annotate("1 ms", (BUDGET_NS, axes.get_ylim()[1]), (2, 0), va="top", **offset)
+        axes.annotate("1 ms", (_BUDGET_NS, axes.get_ylim()[1]), (2, 0), va="top", **offset)
         for row in shown:
             self._point(axes, row)
             least = min(100 * it.error.rms for it in self._rows if it.candidate is row.candidate)
@@ -171,20 +173,20 @@ class _Panel:
         if self._solved and not self._numerical:
             least, greatest = min(self._solved), max(self._solved)
             axes.axvspan(
-                least, greatest, 0, SOLVER_HIGH, facecolor=style.GRID, edgecolor=style.TEXT_SOFT, linewidth=0.8
+                least, greatest, 0, _SOLVER_HIGH, facecolor=style.GRID, edgecolor=style.TEXT_SOFT, linewidth=0.8
             )
             foot = (least, axes.get_ylim()[0])
             axes.annotate("fluid solver", foot, (-2, 3), rotation=90, ha="right", va="bottom", **offset)
 
     def _rounding(self, axes: Axes, main: Axes) -> None:
         errors = [max(100 * row.error.rms, 1e-15) for row in self._strip]
-        axes.set_ylim(10.0 ** (np.floor(np.log10(min(errors))) - 4), 100 * ROUNDED * 10)
+        axes.set_ylim(10.0 ** (np.floor(np.log10(min(errors))) - 4), 100 * _ROUNDED * 10)
         axes.yaxis.set_major_locator(FixedLocator([1e-12, 1e-8, 1e-4]))
         for row in self._strip:
             self._point(axes, row)
             weight = "bold" if row.chosen else "normal"
             at = (row.ns_per_ms, 100 * row.error.rms)
-            axes.annotate(row.candidate.label, at, fontsize=SMALL, fontweight=weight, **self._beside(row))
+            axes.annotate(row.candidate.label, at, fontsize=_SMALL, fontweight=weight, **self._beside(row))
         for it, edge in ((main, 0.0), (axes, 1.0)):
             slash: dict[str, Any] = {"transform": it.transAxes, "color": style.AXIS, "clip_on": False, "linewidth": 0.6}
             it.plot([-0.012, 0.012], [edge - 0.01, edge + 0.01], **slash)
@@ -200,7 +202,7 @@ class _Panel:
         return {"xytext": (4 if side == "right" else 0, 4), "textcoords": "offset points", "ha": side, "va": "bottom"}
 
     def _point(self, axes: Axes, row: Row) -> None:
-        look = LOOKS[row.candidate.family]
+        look = _LOOKS[row.candidate.family]
         at = (row.ns_per_ms, 100 * row.error.rms)
         if row.chosen:
             axes.scatter(*at, s=74, marker="o", facecolor="none", edgecolor=style.TEXT, linewidth=1.1, zorder=5)
@@ -212,19 +214,19 @@ class _Panel:
         near = [row for row in shown if row.candidate.family == "rate"]
         for row in near:
             at = (row.ns_per_ms, 100 * row.error.rms)
-            axes.annotate(row.candidate.label, at, (5, 0), textcoords="offset points", va="center", fontsize=SMALL)
-        place_pt = {row: (np.log(_height(row)) - low) / (high - low) * PANEL_PT for row in shown if row not in near}
-        listed = sorted(place_pt, key=lambda row: place_pt[row] + SLANT_PT * np.log10(row.ns_per_ms))
+            axes.annotate(row.candidate.label, at, (5, 0), textcoords="offset points", va="center", fontsize=_SMALL)
+        place_pt = {row: (np.log(_height(row)) - low) / (high - low) * _PANEL_PT for row in shown if row not in near}
+        listed = sorted(place_pt, key=lambda row: place_pt[row] + _SLANT_PT * np.log10(row.ns_per_ms))
         wanted = [place_pt[row] for row in listed]
-        column_ns = max(COLUMN_NS, *(2.2 * row.ns_per_ms for row in listed))
-        for row, label_pt in zip(listed, spread(wanted, LABEL_PT, PANEL_PT), strict=True):
-            height = float(np.exp(low + label_pt / PANEL_PT * (high - low)))
+        column_ns = max(_COLUMN_NS, *(2.2 * row.ns_per_ms for row in listed))
+        for row, label_pt in zip(listed, spread(wanted, _LABEL_PT, _PANEL_PT), strict=True):
+            height = float(np.exp(low + label_pt / _PANEL_PT * (high - low)))
             axes.annotate(
                 row.candidate.label,
                 (row.ns_per_ms, _height(row)),
                 (column_ns, height),
                 va="center",
-                fontsize=SMALL,
+                fontsize=_SMALL,
                 fontweight="bold" if row.chosen else "normal",
                 arrowprops={
                     "arrowstyle": "-",

@@ -29,7 +29,7 @@ from study_app.haptics.model.scene import Effect, Everywhere, Ewma, Given, Raw, 
 from study_app.haptics.model.slope_limits import DampingLimits
 from study_app.haptics.runtime.pack import Model, pack
 
-TAIL: Final = np.dtype(
+_TAIL: Final = np.dtype(
     [
         ("held", np.int64),
         ("newest", np.int64),  # row of the newest element
@@ -44,9 +44,9 @@ TAIL: Final = np.dtype(
 )
 
 
-def new_list(length: int, dtype: type[np.floating[Any]]) -> tuple[Any, Any, Any, Any]:
+def _new_list(length: int, dtype: type[np.floating[Any]]) -> tuple[Any, Any, Any, Any]:
     """Return an empty list for compiled code: TAIL, elements (N, 3), arcs (N,), segments (N,); -1 is no segment."""
-    tail = records(TAIL, 1)
+    tail = records(_TAIL, 1)
     tail[0].newest = length - 1
     return tail, np.zeros((length, 3), dtype), np.zeros(length), np.full(length, -1)
 
@@ -119,7 +119,7 @@ def list_follow(
         tail.stored_at_m[axis] = place_m[axis]
 
 
-UNLIMITED: Final = DampingLimits(1e9, 1e9)
+_UNLIMITED: Final = DampingLimits(1e9, 1e9)
 """Forces are compared without slope limit, which the table lacks for the slowest candidates."""
 Family: TypeAlias = Literal["tick", "list", "rate", "estimator", "law", "effects"]
 
@@ -187,7 +187,7 @@ class Candidate:
         return [self.forces(case.motion) for case in truth.cases]
 
 
-class UnsteadyDrag(Candidate):
+class _UnsteadyDrag(Candidate):
     """Unsteady drag; against a solved motion of the fit, with constants that are fitted without that motion."""
 
     def forces_against(self, truth: Truth) -> list[Floats]:
@@ -203,7 +203,7 @@ class UnsteadyDrag(Candidate):
         return found
 
 
-class LinearViscosity(Candidate):
+class _LinearViscosity(Candidate):
     """Linear viscosity, F = −6πµR v: all that general libraries ship.
 
     HAPI's and H3D's ``HapticViscosity`` is this; CHAI3D's ``cEffectViscosity`` leaves the factor to the user.
@@ -221,7 +221,7 @@ class LinearViscosity(Candidate):
 
 
 @dataclass(eq=False)
-class WakeList(Candidate):
+class _WakeList(Candidate):
     """The wake as a list, float64 or float32."""
 
     precision: type[np.floating[Any]] = np.float64
@@ -236,7 +236,7 @@ class WakeList(Candidate):
         return self.scene.model_copy(update={"liquids": ()})
 
     def _new_list(self) -> tuple[Any, Any, Any, Any]:
-        return new_list(int(_packed(self.scene).liquids[0].wake.length), self.precision)
+        return _new_list(int(_packed(self.scene).liquids[0].wake.length), self.precision)
 
     @property
     def memory_bytes(self) -> int:
@@ -249,7 +249,7 @@ class WakeList(Candidate):
 
 
 def _packed(scene: Scene) -> Model:
-    return pack(scene, limits=UNLIMITED)
+    return pack(scene, limits=_UNLIMITED)
 
 
 def given(scene: Scene) -> Scene:
@@ -307,8 +307,8 @@ def _by_the_list(tick: Any, liquid: Record, listed: Any, force_n: Any, start: in
 
 
 SLOWER = (2, 4, 10)
-RESOLUTIONS_M = (0.005, 0.02)
-LEAST_RATE_HZ = 50.0
+_RESOLUTIONS_M = (0.005, 0.02)
+_LEAST_RATE_HZ = 50.0
 _WORDS: dict[Effect, str] = {"added_mass": "added mass", "history": "history"}
 _LAWS: dict[Law, tuple[str, str]] = {
     "constant": ("constant C_d", "constant C$_d$"),
@@ -319,7 +319,7 @@ _LAWS: dict[Law, tuple[str, str]] = {
 """Name and initials."""
 
 
-def with_wake(scene: Scene, **changes: Any) -> Scene:
+def _with_wake(scene: Scene, **changes: Any) -> Scene:
     """Return the scene with other parameters of its wake."""
     wake = scene.liquids[0].wake.model_copy(update=changes)
     return scene.model_copy(update={"liquids": (scene.liquids[0].model_copy(update={"wake": wake}),)})
@@ -350,7 +350,7 @@ def numerical(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
     if _has_wake(scene):
         candidates += _lists(exact)
     for every in SLOWER:
-        if scene.rate_hz / every >= LEAST_RATE_HZ:
+        if scene.rate_hz / every >= _LEAST_RATE_HZ:
             slower = exact.model_copy(update={"rate_hz": scene.rate_hz / every})
             hertz = f"{slower.rate_hz:g} Hz"
             candidates.append(Candidate(f"{program.name}, {hertz}", hertz, "rate", slower, every=every))
@@ -368,15 +368,15 @@ def _lists(exact: Scene) -> list[Candidate]:
     length = exact.liquids[0].wake.length
     half, quarter = max(1, length // 2), max(1, length // 4)
     candidates: list[Candidate] = [
-        WakeList("O(N) compiled", "O(N) compiled", "list", exact),
-        WakeList("O(N) compiled, float32", "O(N) float32", "list", exact, precision=np.float32),
-        WakeList("O(N) compiled, tail N/2", "O(N), N/2", "list", with_wake(exact, length=half)),
-        WakeList("O(N) compiled, tail N/4", "O(N), N/4", "list", with_wake(exact, length=quarter)),
-        Candidate("O(1) wake, tail N/4", "tail N/4", "tick", with_wake(exact, length=quarter)),
+        _WakeList("O(N) compiled", "O(N) compiled", "list", exact),
+        _WakeList("O(N) compiled, float32", "O(N) float32", "list", exact, precision=np.float32),
+        _WakeList("O(N) compiled, tail N/2", "O(N), N/2", "list", _with_wake(exact, length=half)),
+        _WakeList("O(N) compiled, tail N/4", "O(N), N/4", "list", _with_wake(exact, length=quarter)),
+        Candidate("O(1) wake, tail N/4", "tail N/4", "tick", _with_wake(exact, length=quarter)),
     ]
-    for step_m in RESOLUTIONS_M:
+    for step_m in _RESOLUTIONS_M:
         step = f"{1e3 * step_m:g} mm"
-        coarse = with_wake(exact, resolution_m=step_m)
+        coarse = _with_wake(exact, resolution_m=step_m)
         candidates.append(Candidate(f"O(1) wake, resolution {step}", f"resolution {step}", "tick", coarse))
     candidates.append(Candidate("drag alone", "drag alone", "tick", with_effects(exact, "drag")))
     return candidates
@@ -385,7 +385,7 @@ def _lists(exact: Scene) -> list[Candidate]:
 def physical(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
     """Return models of a liquid with a viscosity, in order of accuracy; and the one that the gate would choose."""
     exact = given(_only(scene, scene.liquids[0]))
-    candidates: list[Candidate] = [LinearViscosity("linear viscosity", "linear viscosity", "law", exact)]
+    candidates: list[Candidate] = [_LinearViscosity("linear viscosity", "linear viscosity", "law", exact)]
     candidates += [
         Candidate(name, f"{name} ({short})" if len(short) == 2 else short, "law", with_effects(exact, "drag", law=law))
         for law, (name, short) in _LAWS.items()
@@ -394,7 +394,7 @@ def physical(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
     for effect in ("added_mass", "history"):
         carried = (*carried, effect)
         candidates.append(_carrying(exact, REFERENCE, carried))
-    candidates.append(UnsteadyDrag("unsteady drag", "unsteady drag", "effects", with_effects(exact, "unsteady_drag")))
+    candidates.append(_UnsteadyDrag("unsteady drag", "unsteady drag", "effects", with_effects(exact, "unsteady_drag")))
     gated = resolve(_only(scene, scene.liquids[0].model_copy(update={"effects": "auto"}))).liquids[0]
     carried = tuple(it for it in _WORDS if it in gated.effects)
     if "unsteady_drag" in gated.effects:

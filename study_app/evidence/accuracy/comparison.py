@@ -22,21 +22,21 @@ from study_app.haptics.model.scene import Scene
 Kind: TypeAlias = Literal["numerical", "physical"]
 
 
-ALIKE: Final = 1.05
+_ALIKE: Final = 1.05
 """Times within this factor count as equal."""
 
-FINE_S: Final = 1e-6
+_FINE_S: Final = 1e-6
 """Required resolution of the clock: batches take 100 µs and more."""
 
-REPEATS: Final = 5
-BATCHES: Final = 40
-ALLOWANCE_S: Final = 0.8
+_REPEATS: Final = 5
+_BATCHES: Final = 40
+_ALLOWANCE_S: Final = 0.8
 """Time limit of a candidate per repeat; a slower one runs fewer batches, at least one."""
 
 
 def _clock() -> Callable[[], int]:
     """Return a clock [ns] that stops while other programs run, or if that is too coarse, one that does not."""
-    fine = time.get_clock_info("thread_time").resolution <= FINE_S
+    fine = time.get_clock_info("thread_time").resolution <= _FINE_S
     return time.thread_time_ns if fine else time.perf_counter_ns
 
 
@@ -89,9 +89,9 @@ def accuracy(
     *,
     named: str = "the motion",
     notes: Sequence[str] = (),
-    repeats: int = REPEATS,
-    batches: int = BATCHES,
-    allowance_s: float = ALLOWANCE_S,
+    repeats: int = _REPEATS,
+    batches: int = _BATCHES,
+    allowance_s: float = _ALLOWANCE_S,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Accuracy:
     """Measure the candidates of one scene against its definition, and those of another against physics.
@@ -128,7 +128,7 @@ def accuracy(
         measured += _rows("physical", physical, candidates, choice, real, progress)
         found += real
     progress("timing")
-    times = race(tuple(dict.fromkeys(row.candidate for row in measured)), motion, repeats, batches, allowance_s)
+    times = _race(tuple(dict.fromkeys(row.candidate for row in measured)), motion, repeats, batches, allowance_s)
     measured = [replace(row, time=times[row.candidate]) for row in measured]
     by_kind = [[row for row in measured if row.kind == kind] for kind in ("numerical", "physical")]
     fronts = {candidate for rows in by_kind for candidate in front(worst(rows))}
@@ -203,7 +203,7 @@ class _Bench:
         self._at += self._size
 
 
-def race(
+def _race(
     candidates: Sequence[Candidate], motion: Motion, repeats: int, batches: int, allowance_s: float
 ) -> dict[Candidate, Time]:
     """Return the times of all candidates, in alternating batches, so that slow phases of the machine affect all alike.
@@ -252,7 +252,7 @@ def front(points: dict[Candidate, Row]) -> tuple[Candidate, ...]:
     def beats(other: Row, row: Row) -> bool:
         if error(other) == error(row):
             return other.ns_per_ms < row.ns_per_ms
-        return error(other) < error(row) and other.ns_per_ms <= row.ns_per_ms * ALIKE
+        return error(other) < error(row) and other.ns_per_ms <= row.ns_per_ms * _ALIKE
 
     best = [row for row in points.values() if not any(beats(other, row) for other in points.values())]
     return tuple(row.candidate for row in sorted(best, key=lambda row: row.ns_per_ms))

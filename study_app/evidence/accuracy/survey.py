@@ -16,24 +16,24 @@ from study_app.evidence.table import Evidence, Table
 from study_app.haptics.model.laws import LAWS, finite_reynolds
 from study_app.haptics.model.scene import Liquid, Scene
 
-NO_REFERENCE_REYNOLDS: Final = 1000.0
+_NO_REFERENCE_REYNOLDS: Final = 1000.0
 """Greatest Reynolds number with a solution or measurement of an unsteady motion in this program."""
 FILE: Final = "liquids.md"
-REYNOLDS: Final = (1.0, 10.0, 100.0, 200.0, 1e3, 3e3, 1e4, 3e4, 1e5)
+_REYNOLDS: Final = (1.0, 10.0, 100.0, 200.0, 1e3, 3e3, 1e4, 3e4, 1e5)
 
 
-def clift_gauvin(reynolds: float) -> float:
+def _clift_gauvin(reynolds: float) -> float:
     """Return C_d Re/24 of a sphere by Clift & Gauvin 1971, Re ≤ 3·10⁵."""
     return 1 + 0.15 * math.pow(reynolds, 0.687) + 0.42 / 24 * reynolds / (1 + 42500 * math.pow(reynolds, -1.16))
 
 
-def turton_levenspiel(reynolds: float) -> float:
+def _turton_levenspiel(reynolds: float) -> float:
     """Return C_d Re/24 of a sphere by Turton & Levenspiel 1986, Powder Technology 47, Re ≤ 2·10⁵."""
     high = 0.413 / 24 * reynolds / (1 + 16300 * math.pow(reynolds, -1.09))
     return 1 + 0.173 * math.pow(reynolds, 0.657) + high
 
 
-def cheng(reynolds: float) -> float:
+def _cheng(reynolds: float) -> float:
     """Return C_d Re/24 of a sphere by Cheng 2009, Powder Technology 189, Re ≤ 2·10⁵."""
     high = 0.47 / 24 * reynolds * (1 - math.exp(-0.04 * math.pow(reynolds, 0.38)))
     return math.pow(1 + 0.27 * reynolds, 0.43) + high
@@ -41,11 +41,11 @@ def cheng(reynolds: float) -> float:
 
 PUBLISHED: Final[Mapping[str, Callable[[float], float]]] = {
     "Schiller–Naumann 1933": LAWS["schiller-naumann"],
-    "Clift–Gauvin 1971": clift_gauvin,
-    "Turton–Levenspiel 1986": turton_levenspiel,
+    "Clift–Gauvin 1971": _clift_gauvin,
+    "Turton–Levenspiel 1986": _turton_levenspiel,
     "Haider–Levenspiel 1989": LAWS["haider-levenspiel"],
     "Brown–Lawler 2003": LAWS["brown-lawler"],
-    "Cheng 2009": cheng,
+    "Cheng 2009": _cheng,
 }
 
 
@@ -104,7 +104,7 @@ def _surveyed(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) ->
         speed_mps=speed_mps,
         mps_per_reynolds=mps_per_reynolds,
         model=model.name,
-        creeping=creeping if speed_mps <= NO_REFERENCE_REYNOLDS * mps_per_reynolds else None,
+        creeping=creeping if speed_mps <= _NO_REFERENCE_REYNOLDS * mps_per_reynolds else None,
         steady=None if steady is None else share(steady),
         solver=max(map(share, solved)) if solved else None,
         solver_reynolds=(min(speeds) / mps_per_reynolds, max(speeds) / mps_per_reynolds)
@@ -142,7 +142,7 @@ def evidence(found: tuple[Surveyed, ...]) -> Evidence:
         )
         liquids.append(cells)
     laws = []
-    for reynolds in REYNOLDS:
+    for reynolds in _REYNOLDS:
         drags = [law(reynolds) for law in (*PUBLISHED.values(), finite_reynolds)]
         values = [f"{24 / reynolds * ratio:.3g}" for ratio in (*drags, _measured(reynolds))]
         laws.append((f"{reynolds:,g}", *values, _percent(spread(reynolds))))
@@ -162,7 +162,7 @@ _WHAT: Final = (
     "Errors are the RMS error divided by the RMS force, for the worst of several references, at known velocities. The "
     "references are creeping flow at Re 0.01, experiments on steady drag, and a fluid solver at 1 kHz; unsteady drag "
     "predicts each motion with constants fitted to the other motions. Motions are solved up to Re {:.3g}, or up to the "
-    f"scene's greatest speed. Above Re {NO_REFERENCE_REYNOLDS:g} there is no reference for unsteady motion, and the "
+    f"scene's greatest speed. Above Re {_NO_REFERENCE_REYNOLDS:g} there is no reference for unsteady motion, and the "
     "uncertainty of steady drag is the difference between its published laws. "
     "Strokes are compared with the laws at the scene's greatest speed and acceleration, with known velocities and "
     "with velocities of the scene's estimator from encoder counts, after limits. Below, drag coefficients by each law."

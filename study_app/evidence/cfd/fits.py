@@ -33,8 +33,8 @@ from study_app.lab.identify.fit import fit
 from study_app.lab.identify.measured_force import along_a_line
 from study_app.lab.identify.parameters import find_parameters
 
-RATE_HZ: Final = 1000.0
-LAW: Final = "brown-lawler"
+_RATE_HZ: Final = 1000.0
+_LAW: Final = "brown-lawler"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class Model:
 
     name: str
     effects: tuple[Effect, ...]
-    law: str = LAW
+    law: str = _LAW
     free: tuple[str, ...] = ()
 
 
@@ -106,7 +106,7 @@ def fit_one(model: Model, table: SolvedTable) -> tuple[dict[str, float], tuple[s
     if not model.free:
         return {}, ()
     motion, force_n = even(table)
-    found = fit(scene_of(model, table.case), table.case.liquid_id, model.free, motion, force_n)
+    found = fit(_scene_of(model, table.case), table.case.liquid_id, model.free, motion, force_n)
     return {it.name: found.values[it.name] for it in found.parameters}, found.warnings
 
 
@@ -119,10 +119,10 @@ def judge(
 ) -> Fitted:
     """Return the errors of a model with these parameters against the table, and against others of the liquid."""
     motion, solved_n = even(table)
-    force_n = force_along(model, table.case, values, motion)
+    force_n = _force_along(model, table.case, values, motion)
     error_n = np.abs(force_n - solved_n)
     carried = [
-        share_of(force_along(model, it.case, values, other) - truth, truth)
+        _share_of(_force_along(model, it.case, values, other) - truth, truth)
         for it in others
         for other, truth in (even(it),)
     ]
@@ -134,7 +134,7 @@ def judge(
         force_n=force_n,
         rms_n=_rms(error_n),
         worst_n=float(error_n.max()),
-        share=share_of(error_n, solved_n),
+        share=_share_of(error_n, solved_n),
         within=float(np.mean(error_n <= np.maximum(RELATIVE * np.abs(solved_n), PERCEPTIBLE_N))),
         push=float(force_n[after].sum() / solved_n[after].sum()),
         carried=max(carried, default=math.nan),
@@ -142,7 +142,7 @@ def judge(
     )
 
 
-def scene_of(model: Model, case: Case, values: Mapping[str, float] | None = None) -> Scene:
+def _scene_of(model: Model, case: Case, values: Mapping[str, float] | None = None) -> Scene:
     """Return a scene with the model's effects in the liquid of the case, at 1 kHz with given velocities."""
     tables: dict[str, Any] = {}
     if "wake" in model.effects:
@@ -157,25 +157,27 @@ def scene_of(model: Model, case: Case, values: Mapping[str, float] | None = None
         drag={"law": model.law},
         **tables,
     )
-    scene = Scene(scale=1.0, rate_hz=RATE_HZ, body={"diameter_m": case.diameter_m}, liquids=(liquid,), velocity=Given())
+    scene = Scene(
+        scale=1.0, rate_hz=_RATE_HZ, body={"diameter_m": case.diameter_m}, liquids=(liquid,), velocity=Given()
+    )
     return override_all(scene, dict(values or {}))
 
 
-def force_along(model: Model, case: Case, values: Mapping[str, float], motion: Motion) -> Floats:
+def _force_along(model: Model, case: Case, values: Mapping[str, float], motion: Motion) -> Floats:
     """Return the model's force (n,) [N] along a motion along x."""
-    force_n: Floats = np.array(simulate(scene_of(model, case, values), motion).fx_n)
+    force_n: Floats = np.array(simulate(_scene_of(model, case, values), motion).fx_n)
     return force_n
 
 
 def even(table: SolvedTable) -> tuple[Motion, Floats]:
     """Return a table's motion and force (n,) with a row for every tick, so that all times weigh alike."""
     t_s, velocity_mps, force_n = table.columns.values()
-    even_s = np.arange(math.floor(t_s[-1] * RATE_HZ) + 1) / RATE_HZ
+    even_s = np.arange(math.floor(t_s[-1] * _RATE_HZ) + 1) / _RATE_HZ
     even_n = np.interp(even_s, t_s, force_n)
     return along_a_line(even_s, np.interp(even_s, t_s, velocity_mps), even_n).motion, even_n
 
 
-def share_of(error_n: Floats, force_n: Floats) -> float:
+def _share_of(error_n: Floats, force_n: Floats) -> float:
     """Return the RMS error as a share of the RMS force."""
     return _rms(error_n) / _rms(force_n)
 
@@ -184,13 +186,13 @@ def _rms(values: Floats) -> float:
     return math.sqrt(float(np.mean(values**2)))
 
 
-ENGINES: Final[Mapping[str, tuple[int, Mapping[str, float]]]] = {
+_ENGINES: Final[Mapping[str, tuple[int, Mapping[str, float]]]] = {
     "thesis: drag and wake": (1, {"length": 1700, "scaling": 1700.0, "exponent": 0.75}),  # of water, rek2024
     "drag, added mass, history": (8, {}),
     "unsteady drag": (10, {}),
 }
 """The models that are scored by the benchmark of `score`: their places in `MODELS`, and parameters."""
-ROUNDS: Final = 10
+_ROUNDS: Final = 10
 """So often all of them follow a motion in turn; the shortest time of each counts, which other programs delay least."""
 
 
@@ -201,7 +203,7 @@ class Tick:
     """
 
     def __init__(self, name: str, setup: Mapping[str, float], *, sent: bool) -> None:
-        place, values = ENGINES[name]
+        place, values = _ENGINES[name]
         case = Case(
             liquid_id="liquid",
             density_kg_m3=setup["density_kg_m3"],
@@ -209,11 +211,11 @@ class Tick:
             diameter_m=setup["diameter_m"],
             speed_mps=0.0,
         )
-        scene = scene_of(MODELS[place], case, values)
+        scene = _scene_of(MODELS[place], case, values)
         dynamics = None
         if sent:
             scene = scene.model_copy(update={"velocity": Ewma()})
-            delay_s = min(setup["delay_ticks"], MOST_DELAY) / RATE_HZ
+            delay_s = min(setup["delay_ticks"], MOST_DELAY) / _RATE_HZ
             dynamics = Dynamics(delay_s=delay_s, mass_kg=min(setup["handle_kg"], max(score.HANDLES_KG)))
         self._sent = sent
         self._model = ModelAlong(scene, dynamics, given=not sent)
@@ -232,17 +234,17 @@ class Tick:
 
 
 def score_all(progress: Callable[[str], object] = lambda _line: None) -> Evidence:
-    """Score every model of `ENGINES`, the law alone and as sent; they follow each motion in turn, for their times."""
+    """Score every model of `_ENGINES`, the law alone and as sent; they follow each motion in turn, for their times."""
     over = score.motions()
     engines = {
         f"{name}, as sent" if sent else name: partial(Tick, name, sent=sent)
-        for name in ENGINES
+        for name in _ENGINES
         for sent in (False, True)
     }
     scores: dict[str, list[score.Score]] = {title: [] for title in engines}
     for motion in over:
         progress(f"{motion.name} ...")
-        rounds = [[score.score(engine, motion) for engine in engines.values()] for _ in range(ROUNDS)]
+        rounds = [[score.score(engine, motion) for engine in engines.values()] for _ in range(_ROUNDS)]
         for title, of_engine in zip(engines, zip(*rounds, strict=True), strict=True):
             scores[title].append(min(of_engine, key=lambda it: it.tick_ns))
     rows, first = [], next(iter(scores.values()))
@@ -254,27 +256,27 @@ def score_all(progress: Callable[[str], object] = lambda _line: None) -> Evidenc
     return Evidence(text, {"score.md": text, "score.csv": table.csv()})
 
 
-WIDTH_PT: Final = 85 / 25.4 * 72
-PANEL_PT: Final = 118.0
-LOOKS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
+_WIDTH_PT: Final = 85 / 25.4 * 72
+_PANEL_PT: Final = 118.0
+_LOOKS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     "drag of the Reynolds number": ("drag alone", {"color": "#5d6a75", "linestyle": (0, (1, 1.2))}),
     "constant C_d, wake": ("constant $C_d$ and wake", {"color": "#b35600", "linestyle": (0, (5, 2))}),
     "... history, added mass": ("drag, history, added mass", {"color": "#0b65a3", "linestyle": "-"}),
 }
-SOLVER: Final[dict[str, Any]] = {"color": "#13202c", "linewidth": 3.2, "alpha": 0.35}
-AFTER: Final = 8.0
+_SOLVER: Final[dict[str, Any]] = {"color": "#13202c", "linewidth": 3.2, "alpha": 0.35}
+_AFTER: Final = 8.0
 
 
 @style.own_settings(style.PLOT_SETTINGS)
 def draw(tables: Sequence[SolvedTable], fits: Sequence[Fitted]) -> Figure:
     """Draw, for the fastest motion through each liquid, the force from its start to 8 D/U after its stop."""
     shown = {table.case.liquid_id: table for table in sorted(tables, key=lambda it: it.case.speed_mps)}
-    height_pt = PANEL_PT * len(shown) + 30
-    figure = Figure(figsize=(WIDTH_PT / 72, height_pt / 72), facecolor="white")
+    height_pt = _PANEL_PT * len(shown) + 30
+    figure = Figure(figsize=(_WIDTH_PT / 72, height_pt / 72), facecolor="white")
     axes = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
     figure.subplots_adjust(left=0.12, right=0.98, top=1 - 44 / height_pt, bottom=28 / height_pt, hspace=0.42)
     for ax, table in zip(axes, shown.values(), strict=True):
-        _panel(ax, table, [it for it in fits if it.case == table.case and it.model.name in LOOKS])
+        _panel(ax, table, [it for it in fits if it.case == table.case and it.model.name in _LOOKS])
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="upper left", ncols=2, frameon=False, fontsize=6.8, bbox_to_anchor=(0.0, 1.0))
     axes[-1].set_xlabel("time [s]")
@@ -284,11 +286,11 @@ def draw(tables: Sequence[SolvedTable], fits: Sequence[Fitted]) -> Figure:
 def _panel(ax: Axes, table: SolvedTable, fits: Sequence[Fitted]) -> None:
     case, (motion, force_n) = table.case, even(table)
     t_s = motion.t_s
-    kept = t_s <= (STOP + AFTER) * case.unit_s
-    ax.plot(t_s[kept], force_n[kept], label="fluid solver", **SOLVER)
+    kept = t_s <= (STOP + _AFTER) * case.unit_s
+    ax.plot(t_s[kept], force_n[kept], label="fluid solver", **_SOLVER)
     order = [it.name for it in MODELS]
     for it in sorted(fits, key=lambda it: order.index(it.model.name)):
-        label, look = LOOKS[it.model.name]
+        label, look = _LOOKS[it.model.name]
         ax.plot(t_s[kept], it.force_n[kept], label=label, linewidth=1.1, **look)
     even_n = float(np.interp(STOP * case.unit_s * 0.95, t_s, force_n))
     ax.set_ylim(2.3 * even_n, -1.6 * even_n)
@@ -312,8 +314,8 @@ COLUMNS: Final = (
 MITTAL: Final = {50.0: 1.57, 100.0: 1.09}
 """C_d of a sphere by a spectral method: Mittal 1999, Int. J. Numer. Meth. Fluids 30:921, as quoted in the validation of
 Notus CFD, https://doc.notus-cfd.org ("steady flows past a sphere")."""
-CONSTANT: Final = 0.47
-EDGE: Final = 1e-6
+_CONSTANT: Final = 0.47
+_EDGE: Final = 1e-6
 
 
 def clift(reynolds: float) -> float:
@@ -323,19 +325,19 @@ def clift(reynolds: float) -> float:
     return 24 / reynolds * (1 + 0.1935 * math.pow(reynolds, 0.6305))
 
 
-def steady_markdown(table: SolvedTable) -> str:
+def _steady_markdown(table: SolvedTable) -> str:
     """Return steady drag as a Markdown table: the solver's C_d, and by how much others differ from it."""
     names = ["coarser grid", "half the box", "Clift et al. 1978", "Mittal 1999", "experiments", *LAWS, "C_d 0.47"]
     rows = []
     for reynolds, solved, coarse, narrow in zip(*(it.tolist() for it in table.columns.values()), strict=True):
         others = [coarse, narrow, clift(reynolds), MITTAL.get(reynolds), _measured(reynolds)]
         others += [law(reynolds) * 24 / reynolds for law in LAWS.values()]
-        shares = ["" if it is None else _signed(it / solved - 1) for it in (*others, CONSTANT)]
+        shares = ["" if it is None else _signed(it / solved - 1) for it in (*others, _CONSTANT)]
         rows.append((f"{reynolds:g}", f"{solved:.4g}", *shares))
     return Table(("Re", "C_d, solver", *names), rows).markdown()
 
 
-def fits_markdown(fits: Sequence[Fitted]) -> str:
+def _fits_markdown(fits: Sequence[Fitted]) -> str:
     """Return the fits as Markdown, a table for every motion."""
     parts = []
     for case in dict.fromkeys(it.case for it in fits):
@@ -356,7 +358,7 @@ def fits_csv(fits: Sequence[Fitted]) -> str:
 
 def evidence(tables: Sequence[SolvedTable], drag: SolvedTable, fits: Sequence[Fitted]) -> Evidence:
     """Return the fits as CSV, both tables as Markdown, and the figure."""
-    text = f"{steady_markdown(drag)}\n\n{fits_markdown(fits)}\n"
+    text = f"{_steady_markdown(drag)}\n\n{_fits_markdown(fits)}\n"
     files = {FITS_FILE: fits_csv(fits), "cfd.md": text}
     return Evidence(text, files, plot_files("cfd", "Models against a fluid solver", draw, tables, fits))
 
@@ -367,8 +369,8 @@ _HEADINGS: Final = (
 
 
 def _row(it: Fitted) -> tuple[str, ...]:
-    ranges = find_parameters(scene_of(it.model, it.case), it.case.liquid_id, it.model.free) if it.model.free else ()
-    within = {one.name for one in ranges if one.least * (1 + EDGE) < it.values[one.name] < one.most * (1 - EDGE)}
+    ranges = find_parameters(_scene_of(it.model, it.case), it.case.liquid_id, it.model.free) if it.model.free else ()
+    within = {one.name for one in ranges if one.least * (1 + _EDGE) < it.values[one.name] < one.most * (1 - _EDGE)}
     fitted = ", ".join(f"{name} {value:.3g}{'' if name in within else '*'}" for name, value in it.values.items())
     return (
         *(it.model.name, fitted or "nothing", f"{it.rms_n:.2g} N ({it.share:.1%})", f"{it.worst_n:.2g} N"),

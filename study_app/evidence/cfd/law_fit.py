@@ -22,12 +22,12 @@ from study_app.haptics.model.motion import Floats
 
 STEP: Final = 0.005
 """Interval between the rows that are compared [D/U]."""
-BEGIN: Final = Constants(c_m=0.5, c_y=1.0, c_z=2.0, c_s=1.0, beta=1.0, r_0=5.0)
+_BEGIN: Final = Constants(c_m=0.5, c_y=1.0, c_z=2.0, c_s=1.0, beta=1.0, r_0=5.0)
 """Initial values of the search: orders of magnitude."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class MotionError:
+class _MotionError:
     """RMS error as a share of the RMS force, and greatest error as a share of the greatest force, of one motion.
 
     ``fitted`` with the constants fitted to all motions, None of a motion that is held out of the fit; ``left_out`` with
@@ -47,7 +47,7 @@ class Refit:
     """The constants by all motions, and the errors of each motion."""
 
     constants: Constants
-    errors: tuple[MotionError, ...]
+    errors: tuple[_MotionError, ...]
 
 
 class _Solved:
@@ -110,7 +110,7 @@ def refit(
         progress(f"... without {table.case.liquid_id}, {table.notes['title']} ...")
         others = _fit([it for it in solved if it is not one], constants)
         errors.append(
-            MotionError(
+            _MotionError(
                 table=table,
                 others=others,
                 fitted=one.errors(constants),
@@ -119,7 +119,7 @@ def refit(
             )
         )
     errors += [
-        MotionError(
+        _MotionError(
             table=it, others=constants, fitted=None, left_out=_Solved(it).errors(constants), program=_as_run(it)
         )
         for it in held_out
@@ -136,7 +136,7 @@ def _as_run(table: SolvedTable) -> tuple[float, float]:
 
 def fit_constants(tables: Sequence[SolvedTable]) -> Constants:
     """Return the constants by all tables, each of equal weight."""
-    return _fit([_Solved(it) for it in tables], BEGIN)
+    return _fit([_Solved(it) for it in tables], _BEGIN)
 
 
 def _fit(solved: Sequence[_Solved], begin: Constants) -> Constants:

@@ -39,37 +39,37 @@ from numpy.typing import NDArray
 
 Floats: TypeAlias = NDArray[np.float64]
 Step: TypeAlias = Callable[[float, float, float], float]
-Engine: TypeAlias = Callable[[Mapping[str, float]], Step]
+_Engine: TypeAlias = Callable[[Mapping[str, float]], Step]
 
-RATE_HZ: Final = 1000.0
-FOLDERS: Final = {"": True, "training": True, "held_out": False}
+_RATE_HZ: Final = 1000.0
+_FOLDERS: Final = {"": True, "training": True, "held_out": False}
 """Where the tables are, and whether the constants of unsteady drag, this project's law, are fitted to them."""
 LIQUIDS: Final = ("honey", "glycerin", "gear_oil")
 """In which handles are let go."""
 HANDLES_KG: Final = (0.05, 0.2)
-STROKE_M: Final = 0.03
-STROKE_HZ: Final = 2.0
-PHASES: Final = (0.5, 0.625, 0.75)
+_STROKE_M: Final = 0.03
+_STROKE_HZ: Final = 2.0
+_PHASES: Final = (0.5, 0.625, 0.75)
 """When the hand lets go, in periods of its stroke: at its far end, on the way back, and in the middle."""
-FREE_S: Final = 0.6
+_FREE_S: Final = 0.6
 DELAYS: Final = (0, 1, 2, 4, 8, 16, 32)
 """Delays of the force that are tried [ticks]: with 0, a force acts from the reading that it answers to the next one."""
-SETTLES_S: Final = 0.2
-"""A handle that goes on swinging after this time rings: more than `RINGS` changes of direction by `RINGS_MPS`."""
-RINGS: Final = 3
-RINGS_MPS: Final = 0.01
-ALLOWANCE_J: Final = 1e-4
+_SETTLES_S: Final = 0.2
+"""A handle that goes on swinging after this time rings: more than `_RINGS` changes of direction by `_RINGS_MPS`."""
+_RINGS: Final = 3
+_RINGS_MPS: Final = 0.01
+_ALLOWANCE_J: Final = 1e-4
 ANSWER_S: Final = 10.0
 SUMS: Final = "SHA256SUMS"
 
 
-class EngineError(Exception):
+class _EngineError(Exception):
     """The engine did not answer as it must."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Motion:
-    """One solved motion at `RATE_HZ`: place, velocity and the solver's force, each (n,).
+    """One solved motion at `_RATE_HZ`: place, velocity and the solver's force, each (n,).
 
     ``fitted`` says whether this project's law of unsteady drag was fitted to it.
     """
@@ -116,14 +116,14 @@ def motions(folder: Path | None = None, only: str = "") -> tuple[Motion, ...]:
     lines = (folder / SUMS).read_text("utf-8").splitlines()
     sums = {line[66:]: line[:64] for line in lines if not line.startswith("#")}
     found = []
-    for place, fitted in FOLDERS.items():
+    for place, fitted in _FOLDERS.items():
         for path in sorted(it for it in (folder / place).glob("*mmps.csv") if only in it.stem):
             content = path.read_bytes()
             if hashlib.sha256(content).hexdigest() != sums.get(path.relative_to(folder).as_posix()):
-                raise EngineError(f"{path} is not the published table: its checksum is not in {SUMS}")
+                raise _EngineError(f"{path} is not the published table: its checksum is not in {SUMS}")
             found.append(_motion(path.stem, content.decode("utf-8"), fitted=fitted))
     if not found:
-        raise EngineError(f"{folder} does not contain a motion with '{only}' in its name")
+        raise _EngineError(f"{folder} does not contain a motion with '{only}' in its name")
     return tuple(found)
 
 
@@ -132,9 +132,9 @@ def _motion(name: str, text: str, *, fitted: bool) -> Motion:
     notes = dict(line[2:].split(": ", 1) for line in lines if line.startswith("#"))
     rows = [line for line in lines if not line.startswith("#")][1:]
     t_s, velocity_mps, force_n = np.array([[float(cell) for cell in row.split(",")] for row in rows]).T
-    even_s = np.arange(math.floor(t_s[-1] * RATE_HZ) + 1) / RATE_HZ
+    even_s = np.arange(math.floor(t_s[-1] * _RATE_HZ) + 1) / _RATE_HZ
     even_mps = np.interp(even_s, t_s, velocity_mps)
-    place_m = np.concatenate([[0.0], np.cumsum((even_mps[1:] + even_mps[:-1]) / (2 * RATE_HZ))])
+    place_m = np.concatenate([[0.0], np.cumsum((even_mps[1:] + even_mps[:-1]) / (2 * _RATE_HZ))])
     return Motion(
         name=name,
         fitted=fitted,
@@ -146,7 +146,7 @@ def _motion(name: str, text: str, *, fitted: bool) -> Motion:
     )
 
 
-def score(engine: Engine, motion: Motion) -> Score:
+def score(engine: _Engine, motion: Motion) -> Score:
     """Let an engine follow a motion, and compare its forces with the solver's."""
     step = engine({**motion.setup, "handle_kg": math.inf, "delay_ticks": 0})
     ticks = (motion.t_s, motion.position_m, motion.velocity_mps)
@@ -162,7 +162,7 @@ def score(engine: Engine, motion: Motion) -> Score:
             times_ns[k] = time.perf_counter_ns() - began_ns
         tick_ns = float(np.median(times_ns))
     if force_n.shape != motion.force_n.shape or not np.isfinite(force_n).all():
-        raise EngineError(f"{motion.name}: a force is not a finite number, or is missing")
+        raise _EngineError(f"{motion.name}: a force is not a finite number, or is missing")
     error_n = force_n - motion.force_n
     rms = float(np.linalg.norm(error_n) / np.linalg.norm(motion.force_n))
     return Score(
@@ -171,7 +171,7 @@ def score(engine: Engine, motion: Motion) -> Score:
 
 
 def release(
-    engine: Engine, setup: Mapping[str, float], handle_kg: float, phase: float, delay: int
+    engine: _Engine, setup: Mapping[str, float], handle_kg: float, phase: float, delay: int
 ) -> tuple[float, bool]:
     """Move a handle through a liquid, let it go, and follow it.
 
@@ -194,19 +194,19 @@ def release(
         Whether that exceeds what the hand had put into the liquid, or the handle rings on.
     """
     step = engine({**setup, "handle_kg": handle_kg, "delay_ticks": delay})
-    way = 2 * math.pi * STROKE_HZ
-    period_s, held = 1 / RATE_HZ, round((1 + phase) / STROKE_HZ * RATE_HZ)
+    way = 2 * math.pi * _STROKE_HZ
+    period_s, held = 1 / _RATE_HZ, round((1 + phase) / _STROKE_HZ * _RATE_HZ)
     late = deque([0.0] * delay)
     x_m = v_mps = put_in_j = given_j = 0.0
     start_j, turns, heading = math.inf, 0, 0.0
-    for k in range(held + round(FREE_S * RATE_HZ)):
+    for k in range(held + round(_FREE_S * _RATE_HZ)):
         late.append(float(step(k * period_s, x_m, v_mps)))
         acting_n = late.popleft()
         if k < held:
             # from rest at one end of the stroke to the other, and back
-            to_m = STROKE_M * (1 - math.cos(way * (k + 1) * period_s))
+            to_m = _STROKE_M * (1 - math.cos(way * (k + 1) * period_s))
             put_in_j -= acting_n * (to_m - x_m)
-            x_m, v_mps = to_m, STROKE_M * way * math.sin(way * (k + 1) * period_s)
+            x_m, v_mps = to_m, _STROKE_M * way * math.sin(way * (k + 1) * period_s)
             start_j, heading = 0.5 * handle_kg * v_mps**2, math.copysign(1.0, v_mps)
             continue
         v_mps += acting_n / handle_kg * period_s
@@ -214,16 +214,16 @@ def release(
         if not (abs(v_mps) < 100.0 and math.isfinite(put_in_j)):
             return math.inf, True
         given_j = max(given_j, 0.5 * handle_kg * v_mps**2 - start_j)
-        if v_mps * heading < -RINGS_MPS:
-            turns, heading = turns + (k > held + SETTLES_S * RATE_HZ), -heading
-    return given_j, given_j > max(put_in_j, 0.0) + ALLOWANCE_J or turns > RINGS
+        if v_mps * heading < -_RINGS_MPS:
+            turns, heading = turns + (k > held + _SETTLES_S * _RATE_HZ), -heading
+    return given_j, given_j > max(put_in_j, 0.0) + _ALLOWANCE_J or turns > _RINGS
 
 
-def releases(engine: Engine, motion: Motion, delays: Sequence[int] = DELAYS) -> Releases:
+def releases(engine: _Engine, motion: Motion, delays: Sequence[int] = DELAYS) -> Releases:
     """Let handles go in the liquid of a motion, with more and more delay until one fails."""
     given_j, borne = 0.0, -1
     for delay in delays:
-        cases = itertools.product(HANDLES_KG, PHASES)
+        cases = itertools.product(HANDLES_KG, _PHASES)
         found = [release(engine, motion.setup, handle_kg, phase, delay) for handle_kg, phase in cases]
         if delay <= 1:
             given_j = max(given_j, *(one_j for one_j, _ in found))
@@ -234,7 +234,7 @@ def releases(engine: Engine, motion: Motion, delays: Sequence[int] = DELAYS) -> 
 
 
 def measure(
-    engine: Engine,
+    engine: _Engine,
     over: Sequence[Motion],
     delays: Sequence[int] = DELAYS,
     progress: Callable[[str], object] = lambda _line: None,
@@ -248,7 +248,7 @@ def measure(
 
 
 def all_releases(
-    engine: Engine,
+    engine: _Engine,
     over: Sequence[Motion],
     delays: Sequence[int] = DELAYS,
     progress: Callable[[str], object] = lambda _line: None,
@@ -278,7 +278,7 @@ def row(name: str, scores: Sequence[Score], let: Sequence[Releases], against: Se
     others = [it for it in scores if not it.motion.fitted]
     tick_ns = float(np.median([it.tick_ns for it in scores]))
     times = float(np.median([it.tick_ns / other.tick_ns for it, other in zip(scores, against, strict=False)] or [1.0]))
-    borne = {it.liquid: f"{it.delay / RATE_HZ * 1e3:g} ms" if it.delay >= 0 else "none" for it in let}
+    borne = {it.liquid: f"{it.delay / _RATE_HZ * 1e3:g} ms" if it.delay >= 0 else "none" for it in let}
     given_j = max((it.given_j for it in let), default=math.nan)
     return [
         name,
@@ -296,7 +296,7 @@ def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in (headings, marks, *rows))
 
 
-class Program:
+class _Program:
     """A program as an engine, one line to it and one from it at a time."""
 
     def __init__(self, words: Sequence[str]) -> None:
@@ -304,14 +304,14 @@ class Program:
         try:
             self._process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)  # noqa: S603
         except OSError as error:
-            raise EngineError(f"{words[0]} cannot be started: {error.strerror}") from error
+            raise _EngineError(f"{words[0]} cannot be started: {error.strerror}") from error
         self._asked_s, self._late = math.inf, False
         threading.Thread(target=self._watch, daemon=True).start()
 
     def __call__(self, setup: Mapping[str, float]) -> Step:
         told = {name: value if math.isfinite(value) else None for name, value in setup.items()}
         if (said := self._answer(json.dumps(told))) != "ready":
-            raise EngineError(f"{self._name} answered '{said}' to a new ball, not 'ready'")
+            raise _EngineError(f"{self._name} answered '{said}' to a new ball, not 'ready'")
         return self._tick
 
     def _tick(self, t_s: float, x_m: float, v_mps: float) -> float:
@@ -319,7 +319,7 @@ class Program:
         try:
             return float(said)
         except ValueError:
-            raise EngineError(f"{self._name} answered '{said}' to a tick, not a number") from None
+            raise _EngineError(f"{self._name} answered '{said}' to a tick, not a number") from None
 
     def _answer(self, line: str) -> str:
         stdin, stdout = self._process.stdin, self._process.stdout
@@ -334,7 +334,7 @@ class Program:
         if not said:
             code = self._process.wait()  # a program that only closed its output is ended, too
             why = f"gave no answer within {ANSWER_S:g} s" if self._late else f"ended with code {code}"
-            raise EngineError(f"{self._name} {why}")
+            raise _EngineError(f"{self._name} {why}")
         self._asked_s = math.inf
         return said.strip()
 
@@ -360,10 +360,10 @@ class Program:
 
 
 @contextmanager
-def engine_of(words: Sequence[str], function: str) -> Iterator[Engine]:
+def _engine_of(words: Sequence[str], function: str) -> Iterator[_Engine]:
     """Yield a program, or a function named ``module:function``, as an engine."""
     if not function:
-        program = Program(words)
+        program = _Program(words)
         try:
             yield program
         finally:
@@ -374,7 +374,7 @@ def engine_of(words: Sequence[str], function: str) -> Iterator[Engine]:
     try:
         found: Any = getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError, ValueError) as error:
-        raise EngineError(f"--function {function}: {error}; write MODULE:FUNCTION") from error
+        raise _EngineError(f"--function {function}: {error}; write MODULE:FUNCTION") from error
     yield found
 
 
@@ -388,10 +388,10 @@ def main(words: Sequence[str] | None = None) -> int:
     if bool(asked.program) == bool(asked.function):
         parser.error("give either a program or --function MODULE:FUNCTION")
     try:
-        with engine_of(asked.program, asked.function) as engine:
+        with _engine_of(asked.program, asked.function) as engine:
             over = motions(only=asked.only)
             scores, let = measure(engine, over, DELAYS, lambda line: print(line, "...", file=sys.stderr))  # noqa: T201
-    except EngineError as error:
+    except _EngineError as error:
         print(f"score: {error}", file=sys.stderr)  # noqa: T201
         return 2
     name = asked.function or Path(asked.program[0]).name

@@ -19,7 +19,7 @@ from study_app.protocol.source.files import shipped_file
 
 RAMP: Final = 0.2
 STOP: Final = 10.0
-END: Final = 20.0
+_END: Final = 20.0
 _FINE: Final = ((0.5, 1), (1.0, 2))
 _PANEL: Final = 0.5
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(64)
@@ -32,7 +32,7 @@ class Step(NamedTuple):
     by: float
 
 
-class Sine(NamedTuple):
+class _Sine(NamedTuple):
     """A part ``amplitude`` · sin(2πt/period + phase) of the speed."""
 
     amplitude: float
@@ -47,8 +47,8 @@ class VelocityProfile:
     name: str
     words: str
     steps: tuple[Step, ...]
-    sines: tuple[Sine, ...] = ()
-    end: float = END
+    sines: tuple[_Sine, ...] = ()
+    end: float = _END
 
     @property
     def description(self) -> str:
@@ -135,7 +135,7 @@ def _slope(x: Floats) -> Floats:
 
 def _oscillation(keulegan_carpenter: float) -> VelocityProfile:
     """Return four periods of an oscillation by the Keulegan–Carpenter number U T/D."""
-    sine = Sine(amplitude=1.0, period=keulegan_carpenter, phase=0.0)
+    sine = _Sine(amplitude=1.0, period=keulegan_carpenter, phase=0.0)
     words = f"oscillation, KC {keulegan_carpenter:g}"
     return VelocityProfile(
         f"oscillation-kc{keulegan_carpenter:g}", words, (Step(0.0, 1.0),), (sine,), 4 * keulegan_carpenter
@@ -143,39 +143,41 @@ def _oscillation(keulegan_carpenter: float) -> VelocityProfile:
 
 
 STOPPING: Final = VelocityProfile("stop", "stop", (Step(0.0, 1.0), Step(STOP, -1.0)))
-REVERSAL: Final = VelocityProfile("reversal", "reversal", (Step(0.0, 1.0), Step(STOP, -2.0)))
-RETURN: Final = VelocityProfile(
+_REVERSAL: Final = VelocityProfile("reversal", "reversal", (Step(0.0, 1.0), Step(STOP, -2.0)))
+_RETURN: Final = VelocityProfile(
     "return", "return after a pause", (Step(0.0, 1.0), Step(STOP, -1.0), Step(13.0, -1.0)), end=23.0
 )
-MULTI_SINE: Final = VelocityProfile(
+_MULTI_SINE: Final = VelocityProfile(
     "multi-sine",
     "multi-sine",
     (Step(0.0, 1.0),),
     (
-        Sine(amplitude=0.38, period=2.0, phase=0.4),
-        Sine(amplitude=0.38, period=3.7, phase=2.1),
-        Sine(amplitude=0.38, period=6.9, phase=4.4),
-        Sine(amplitude=0.38, period=13.0, phase=1.0),
+        _Sine(amplitude=0.38, period=2.0, phase=0.4),
+        _Sine(amplitude=0.38, period=3.7, phase=2.1),
+        _Sine(amplitude=0.38, period=6.9, phase=4.4),
+        _Sine(amplitude=0.38, period=13.0, phase=1.0),
     ),
     26.0,
 )
-OSCILLATION_KC4: Final = _oscillation(4.0)
-OSCILLATION_KC5: Final = _oscillation(5.0)
-PROFILES: Final = {it.name: it for it in (STOPPING, REVERSAL, RETURN, MULTI_SINE, OSCILLATION_KC4, OSCILLATION_KC5)}
+_OSCILLATION_KC4: Final = _oscillation(4.0)
+_OSCILLATION_KC5: Final = _oscillation(5.0)
+PROFILES: Final = {
+    it.name: it for it in (STOPPING, _REVERSAL, _RETURN, _MULTI_SINE, _OSCILLATION_KC4, _OSCILLATION_KC5)
+}
 
 
-PROTOCOL: Final = "physical_liquids"
+_PROTOCOL: Final = "physical_liquids"
 LIQUIDS: Final = ("honey", "glycerin")
-HIGHEST_REYNOLDS: Final = 200.0
+_HIGHEST_REYNOLDS: Final = 200.0
 """Up to about 210 the flow behind a sphere is axisymmetric (Johnson & Patel 1999, J. Fluid Mech. 378:19)."""
 
 TRAINING: Final = (
-    (MULTI_SINE, "honey", 0.3),
-    (MULTI_SINE, "glycerin", 10.0),
-    (MULTI_SINE, "gear_oil", 60.0),
-    (OSCILLATION_KC5, "glycerin", 20.0),
-    (OSCILLATION_KC4, "gear_oil", 100.0),
-    (REVERSAL, "glycerin", 10.0),
+    (_MULTI_SINE, "honey", 0.3),
+    (_MULTI_SINE, "glycerin", 10.0),
+    (_MULTI_SINE, "gear_oil", 60.0),
+    (_OSCILLATION_KC5, "glycerin", 20.0),
+    (_OSCILLATION_KC4, "gear_oil", 100.0),
+    (_REVERSAL, "glycerin", 10.0),
     (STOPPING, "honey", 1.0),
     (STOPPING, "gear_oil", 100.0),
 )
@@ -185,14 +187,14 @@ They are added to those of `cases`, which alone do not determine the constants: 
 wake.
 """
 HELD_OUT: Final = (
-    (MULTI_SINE, "tar", 0.16),
-    (OSCILLATION_KC4, "honey", 3.0),
-    (OSCILLATION_KC5, "gear_oil", 60.0),
-    (REVERSAL, "honey", 2.0),
-    (REVERSAL, "glycerin", 30.0),
-    (REVERSAL, "gear_oil", 60.0),
-    (REVERSAL, "gear_oil", 100.0),
-    (RETURN, "glycerin", 30.0),
+    (_MULTI_SINE, "tar", 0.16),
+    (_OSCILLATION_KC4, "honey", 3.0),
+    (_OSCILLATION_KC5, "gear_oil", 60.0),
+    (_REVERSAL, "honey", 2.0),
+    (_REVERSAL, "glycerin", 30.0),
+    (_REVERSAL, "gear_oil", 60.0),
+    (_REVERSAL, "gear_oil", 100.0),
+    (_RETURN, "glycerin", 30.0),
     (STOPPING, "gear_oil", 60.0),
 )
 """Motions as those of `TRAINING`, and a return after a pause, that no fit uses: the constants are tested by them.
@@ -213,10 +215,10 @@ class Case:
     profile: VelocityProfile = STOPPING
 
     def __post_init__(self) -> None:
-        if self.reynolds > HIGHEST_REYNOLDS:
+        if self.reynolds > _HIGHEST_REYNOLDS:
             raise StudyError(
                 f"{self.liquid_id} at {self.speed_mps:g} m/s has a Reynolds number of {self.reynolds:.0f}: the flow is "
-                f"axisymmetric, as the solver takes it to be, up to {HIGHEST_REYNOLDS:g}"
+                f"axisymmetric, as the solver takes it to be, up to {_HIGHEST_REYNOLDS:g}"
             )
 
     @property
@@ -249,7 +251,7 @@ def cases() -> tuple[Case, ...]:
     """Return each liquid at the greatest speed of its protocol, in the scene and, as at scale 1, of the hand."""
     found = []
     for liquid_id in LIQUIDS:
-        scene = load_scene(shipped_file(PROTOCOL), liquid_id)
+        scene = load_scene(shipped_file(_PROTOCOL), liquid_id)
         fastest_mps = scene.motion_in(scene.liquids[0]).speed_mps or math.nan
         found += [_case(liquid_id, speed_mps) for speed_mps in (fastest_mps / scene.scale, fastest_mps)]
     return tuple(found)
@@ -265,7 +267,7 @@ def cases_of(motions: Sequence[tuple[VelocityProfile, str, float]]) -> tuple[Cas
 
 
 def _case(liquid_id: str, speed_mps: float, profile: VelocityProfile = STOPPING) -> Case:
-    scene = load_scene(shipped_file(PROTOCOL), liquid_id)
+    scene = load_scene(shipped_file(_PROTOCOL), liquid_id)
     (liquid,) = scene.liquids
     return Case(
         liquid_id=liquid_id,

@@ -33,14 +33,14 @@ from study_app.store.atomic import make_folder, write_file
 COMMAND: Final = "liquid-study cfd --solve"
 GRID: Final = Grid(ahead=40, behind=80, aside=40, ball=0.1, near=0.4, far=8)
 COARSE: Final = Grid(ahead=40, behind=80, aside=40, ball=0.14, near=0.6, far=10)
-BOTH_WAYS: Final = Grid(ahead=40, behind=40, aside=40, ball=0.1, near=0.4, far=8, symmetric=True)
-BOTH_WAYS_COARSE: Final = Grid(ahead=40, behind=40, aside=40, ball=0.14, near=0.6, far=10, symmetric=True)
-WIDE: Final = Grid(ahead=80, behind=160, aside=80, ball=0.07, near=0.25, far=16)
-WIDE_COARSE: Final = Grid(ahead=80, behind=160, aside=80, ball=0.1, near=0.4, far=16)
-STEP: Final = 0.005
+_BOTH_WAYS: Final = Grid(ahead=40, behind=40, aside=40, ball=0.1, near=0.4, far=8, symmetric=True)
+_BOTH_WAYS_COARSE: Final = Grid(ahead=40, behind=40, aside=40, ball=0.14, near=0.6, far=10, symmetric=True)
+_WIDE: Final = Grid(ahead=80, behind=160, aside=80, ball=0.07, near=0.25, far=16)
+_WIDE_COARSE: Final = Grid(ahead=80, behind=160, aside=80, ball=0.1, near=0.4, far=16)
+_STEP: Final = 0.005
 FAST_REYNOLDS: Final = 50.0
 """Above, steps are half as long: on the coarse grid, where they are twice as long, the flow would blow up."""
-REYNOLDS: Final = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
+_REYNOLDS: Final = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 
 PERMITTED: Final = 0.02
 """Greatest difference, as a share of the greatest force: from the coarse solution, and from the exact linear one."""
@@ -61,8 +61,8 @@ def solve(to: Path, executor: Executor, progress: Callable[[str], None]) -> tupl
         folder / f"{case.name}.csv": executor.submit(_solved, case, *grids)
         for some, folder, grids in (
             (cases(), to, (GRID, COARSE)),
-            (cases_of(TRAINING), to / TRAINING_FOLDER, (BOTH_WAYS, BOTH_WAYS_COARSE)),
-            (cases_of(HELD_OUT), to / HELD_OUT_FOLDER, (BOTH_WAYS, BOTH_WAYS_COARSE)),
+            (cases_of(TRAINING), to / TRAINING_FOLDER, (_BOTH_WAYS, _BOTH_WAYS_COARSE)),
+            (cases_of(HELD_OUT), to / HELD_OUT_FOLDER, (_BOTH_WAYS, _BOTH_WAYS_COARSE)),
         )
         for case in some
     }
@@ -75,7 +75,7 @@ def solve(to: Path, executor: Executor, progress: Callable[[str], None]) -> tupl
 
 
 def _solved(case: Case, grid: Grid, coarse: Grid) -> bytes:
-    step = STEP if case.reynolds <= FAST_REYNOLDS else STEP / 2
+    step = _STEP if case.reynolds <= FAST_REYNOLDS else _STEP / 2
     return motion_table(case, flow_of(grid), flow_of(coarse), step)
 
 
@@ -85,8 +85,8 @@ def flow_of(grid: Grid) -> Flow:
     return Flow(grid)
 
 
-def motion_table(case: Case, flow: Flow, coarse: Flow, step: float = STEP) -> bytes:
-    """Return the file of one case, with a row for every `STEP` or ``step``, whichever is longer."""
+def motion_table(case: Case, flow: Flow, coarse: Flow, step: float = _STEP) -> bytes:
+    """Return the file of one case, with a row for every `_STEP` or ``step``, whichever is longer."""
     profile = case.profile
     times, rough = profile.moments(step), profile.moments(2 * step)
 
@@ -117,19 +117,19 @@ def motion_table(case: Case, flow: Flow, coarse: Flow, step: float = STEP) -> by
         "computing_s_per_s": f"{took_s / (profile.end * case.unit_s):.3g}",
     }
     columns = (times * case.unit_s, case.speed_mps * profile.speed(times), 0.0 - drag * case.unit_n)
-    every = max(1, round(STEP / step))
+    every = max(1, round(_STEP / step))
     return text(notes, dict(zip(MOTION, (it[::every] for it in columns), strict=True)))
 
 
 def steady_table() -> bytes:
     """Return the file of steady drag."""
-    solved = [Flow(it) for it in (WIDE, WIDE_COARSE, GRID)]
-    columns = [flow.steady(REYNOLDS) for flow in solved]
+    solved = [Flow(it) for it in (_WIDE, _WIDE_COARSE, GRID)]
+    columns = [flow.steady(_REYNOLDS) for flow in solved]
     method = "; ".join(
-        f"{flow.unknowns} unknowns, {it}" for flow, it in zip(solved, (WIDE, WIDE_COARSE, GRID), strict=True)
+        f"{flow.unknowns} unknowns, {it}" for flow, it in zip(solved, (_WIDE, _WIDE_COARSE, GRID), strict=True)
     )
     notes = {"title": "steady drag of a sphere", **made(), "method": f"axisymmetric, order {ORDER}: {method}"}
-    return text(notes, dict(zip(STEADY, (REYNOLDS, *columns), strict=True)))
+    return text(notes, dict(zip(STEADY, (_REYNOLDS, *columns), strict=True)))
 
 
 def _check(case: Case, what: str, difference: Floats, force: Floats, times: Floats) -> str:

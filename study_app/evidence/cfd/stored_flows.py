@@ -31,7 +31,7 @@ HELD_OUT_FOLDER: Final = "held_out"
 LEFT_OUT: Final = ("motion", *Constants._fields)
 """The constants of unsteady drag that are fitted to all motions but one, for each motion."""
 LEFT_OUT_FILE: Final = "left_out.csv"
-OF_THE_MODEL: Final = ("density_kg_m3", "viscosity_pa_s", "diameter_m", "computing_s_per_s")
+_OF_THE_MODEL: Final = ("density_kg_m3", "viscosity_pa_s", "diameter_m", "computing_s_per_s")
 """The notes of a table of `MOTION` by which models are compared with it."""
 _OF_THE_CASE: Final = ("density_kg_m3", "viscosity_pa_s", "diameter_m", "speed_mps")
 
@@ -89,7 +89,7 @@ def stored(folder: Traversable | None = None, of: str = "") -> tuple[Table, ...]
     files = sorted((it for it in names if it.name.endswith("mmps.csv")), key=lambda it: it.name)
     if not files:
         raise StudyError(f"{place} holds no tables of the fluid solver: make them with liquid-study cfd --solve")
-    return tuple(read(it, MOTION, OF_THE_MODEL) for it in files)
+    return tuple(read(it, MOTION, _OF_THE_MODEL) for it in files)
 
 
 training: Final = partial(stored, of=TRAINING_FOLDER)
@@ -160,7 +160,7 @@ def solver_truths(scene: Scene, folder: Traversable | None = None) -> tuple[Trut
     found = []
     for table in tables:
         notes = table.notes
-        *of, computing_s = (float(notes[name]) for name in OF_THE_MODEL)
+        *of, computing_s = (float(notes[name]) for name in _OF_THE_MODEL)
         if not np.allclose(of, ours, rtol=0.01, atol=0):
             continue
         t_s, velocity_mps, force_n = table.columns.values()

@@ -29,7 +29,7 @@ from study_app.store.atomic import make_folder, write_file
 
 COMMAND: Final = "liquid-study cfd --materials --solve"
 FILE: Final = "herschel_bulkley.csv"
-COMPARISON_FILE: Final = "materials.md"
+_COMPARISON_FILE: Final = "materials.md"
 COLUMNS: Final = ("flow_index", "bingham", "drag", "drag_coarse", "drag_smooth")
 """The drag, the same on a coarser grid, and with 3.3 times the ε."""
 INDICES: Final = (0.3, 0.5, 0.7, 1.0)
@@ -162,4 +162,4 @@ def evidence(columns: dict[str, Floats]) -> Evidence:
         f"The law errs by at most {np.abs(wrong).max():.1%} (permitted: {PERMITTED:.0%}). Edges twice as long change "
         f"the drag by at most {grid:.2%}, 3.3 times the ε by {smooth:.2%}.\n"
     )
-    return Evidence(text, {COMPARISON_FILE: text})
+    return Evidence(text, {_COMPARISON_FILE: text})

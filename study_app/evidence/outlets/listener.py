@@ -20,19 +20,19 @@ import numpy as np
 from study_app.haptics.runtime.clocks.clock import SystemClock
 from study_app.outlets.streams import MARKERS, SAMPLES, ClockMapping, library
 
-FOUND_WITHIN_S: Final = 30.0
-LOOK_S: Final = 0.002
-QUIET_S: Final = 1.0
+_FOUND_WITHIN_S: Final = 30.0
+_LOOK_S: Final = 0.002
+_QUIET_S: Final = 1.0
 """Time without data after the end of the input, after which all is received."""
 
 
 def opened(lsl: Any, name: str) -> Any:
     """Return an open inlet of a stream."""
-    found = lsl.resolve_byprop("name", name, 1, FOUND_WITHIN_S)
+    found = lsl.resolve_byprop("name", name, 1, _FOUND_WITHIN_S)
     if not found:
         sys.exit(f"no stream is called {name!r}")
     inlet = lsl.StreamInlet(found[0])
-    inlet.open_stream(FOUND_WITHIN_S)
+    inlet.open_stream(_FOUND_WITHIN_S)
     return inlet
 
 
@@ -42,11 +42,11 @@ def _await_end(ending: threading.Event) -> None:
     ending.set()
 
 
-def listen() -> dict[str, Any]:
+def _listen() -> dict[str, Any]:
     """Receive both streams until the input ends; return the received data."""
     lsl, clock = library(), SystemClock()
     markers, samples = opened(lsl, MARKERS), opened(lsl, SAMPLES)
-    correction_s = markers.time_correction(FOUND_WITHIN_S)
+    correction_s = markers.time_correction(_FOUND_WITHIN_S)
     mapping = ClockMapping(clock.now_ns, lsl.local_clock)
     ending = threading.Event()
     threading.Thread(target=_await_end, args=(ending,), daemon=True).start()
@@ -55,8 +55,8 @@ def listen() -> dict[str, Any]:
     said: list[tuple[str, float, int]] = []
     count, last_s, worst_gap_s, hashed = 0, 0.0, 0.0, hashlib.sha256()
     quiet_since = time.monotonic()
-    while not ending.is_set() or time.monotonic() - quiet_since < QUIET_S:
-        time.sleep(LOOK_S)
+    while not ending.is_set() or time.monotonic() - quiet_since < _QUIET_S:
+        time.sleep(_LOOK_S)
         texts, stamps_s = markers.pull_chunk(0.0, 64)
         now_ns = clock.now_ns()
         said += [(text[0], stamp_s, now_ns) for text, stamp_s in zip(texts, stamps_s, strict=True)]
@@ -95,4 +95,4 @@ def read(file: int) -> list[tuple[int, int]]:
 
 
 if __name__ == "__main__":
-    json.dump(read(int(sys.argv[1])) if len(sys.argv) > 1 else listen(), sys.stdout)
+    json.dump(read(int(sys.argv[1])) if len(sys.argv) > 1 else _listen(), sys.stdout)

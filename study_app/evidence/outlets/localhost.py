@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-VARIABLE: Final = "LSLAPICFG"
+_VARIABLE: Final = "LSLAPICFG"
 _FILE: Final = """[multicast]
 ResolveScope = machine
 [lab]
@@ -29,5 +29,5 @@ def localhost_only() -> Path:
     with os.fdopen(descriptor, "w", encoding="utf-8") as file:
         file.write(_FILE.format(process=os.getpid()))
     atexit.register(path.unlink, missing_ok=True)
-    os.environ[VARIABLE] = str(path)
+    os.environ[_VARIABLE] = str(path)
     return path

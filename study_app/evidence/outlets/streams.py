@@ -59,7 +59,7 @@ class Listener:
         self._process.communicate()
 
 
-class MeasuredStream(SampleStream):
+class _MeasuredStream(SampleStream):
     """A stream of samples that keeps the SHA-256 of what it sent, and sends nothing while it is held."""
 
     def __init__(self, telemetry: Any, rate_hz: float, now_ns: Callable[[], int]) -> None:
@@ -83,8 +83,8 @@ class MeasuredStream(SampleStream):
         super().close()
 
 
-MOST_ERROR_MS: Final = 1.0
-MARKER_EVERY_S: Final = 0.05
+_MOST_ERROR_MS: Final = 1.0
+_MARKER_EVERY_S: Final = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,7 +113,7 @@ class Streamed:
     @property
     def met(self) -> bool:
         """Whether nothing was lost and the markers' times are accurate."""
-        return self.samples_lost == self.markers_lost == 0 and self.intact and self.error_p99_ms <= MOST_ERROR_MS
+        return self.samples_lost == self.markers_lost == 0 and self.intact and self.error_p99_ms <= _MOST_ERROR_MS
 
 
 def stream(
@@ -123,7 +123,7 @@ def stream(
     servo = Servo(PlayedHand())
     servo.prepare()
     sink = SinkThread(open_sink("lsl", servo.now_ns))
-    samples = MeasuredStream(servo.telemetry, servo.rate_hz, servo.now_ns)
+    samples = _MeasuredStream(servo.telemetry, servo.rate_hz, servo.now_ns)
     sent: list[Marker] = []
     try:
         with Listener() as listener:
@@ -132,9 +132,9 @@ def stream(
             servo.start()
             try:
                 servo.load(FULL)
-                for number in paced(seconds, MARKER_EVERY_S, ending=ending, progress=progress):
+                for number in paced(seconds, _MARKER_EVERY_S, ending=ending, progress=progress):
                     servo.check()
-                    sent.append(numbered(number, servo.now_ns(), origin_ns))
+                    sent.append(_numbered(number, servo.now_ns(), origin_ns))
                     sink.mark(sent[-1])
             finally:
                 servo.stop()
@@ -147,14 +147,14 @@ def stream(
     return _found(seconds, samples, sent, received)
 
 
-def numbered(number: int, now_ns: int, origin_ns: int) -> Marker:
+def _numbered(number: int, now_ns: int, origin_ns: int) -> Marker:
     """Return the marker of an event that happens now, of a trial with this number."""
     marker = marker_of("trial_started", 1e-9 * (now_ns - origin_ns), origin_ns, {"trial": number, "code": "L1"})
     assert marker is not None  # noqa: S101 - such events are markers
     return marker
 
 
-def _found(seconds: float, samples: MeasuredStream, sent: list[Marker], received: dict[str, Any]) -> Streamed:
+def _found(seconds: float, samples: _MeasuredStream, sent: list[Marker], received: dict[str, Any]) -> Streamed:
     times_ns = {marker.text: marker.time_ns for marker in sent}
     markers = received["markers"]
     since_ns = [[it[key] - times_ns[it["text"]] for key in ("time_ns", "arrived_ns")] for it in markers]
@@ -172,7 +172,7 @@ def _found(seconds: float, samples: MeasuredStream, sent: list[Marker], received
     )
 
 
-MOST_RATIO: Final = 1.10
+_MOST_RATIO: Final = 1.10
 _DRAWS: Final = 2000
 
 
@@ -192,9 +192,9 @@ class Ratio:
 
     @property
     def verdict(self) -> str:
-        if self.high <= MOST_RATIO:
+        if self.high <= _MOST_RATIO:
             return "met"
-        return "missed" if self.low > MOST_RATIO else "undecided: measure for longer"
+        return "missed" if self.low > _MOST_RATIO else "undecided: measure for longer"
 
 
 def compare(
@@ -209,7 +209,7 @@ def compare(
     loop = ServoLoop(grants.best or grants.normal, real_time=True, spin_us=None)
     servo, ticks = loop.servo, round(TURN_S * 1e9) // PERIOD_NS
     sink = SinkThread(open_sink("lsl", servo.now_ns))
-    samples = MeasuredStream(servo.telemetry, servo.rate_hz, servo.now_ns)
+    samples = _MeasuredStream(servo.telemetry, servo.rate_hz, servo.now_ns)
     marking, over = threading.Event(), threading.Event()
 
     def mark() -> None:
@@ -217,8 +217,8 @@ def compare(
             marking.wait()
             if over.is_set():
                 return
-            sink.mark(numbered(number, servo.now_ns(), 0))
-            time.sleep(MARKER_EVERY_S)
+            sink.mark(_numbered(number, servo.now_ns(), 0))
+            time.sleep(_MARKER_EVERY_S)
 
     def lateness_ns(active: bool, _round: int) -> NDArray[np.int64]:
         for switch in (samples.running, marking):
@@ -237,10 +237,10 @@ def compare(
         marking.set()
         samples.close()
         sink.close()
-    return tuple(ratio_of(late_ns[True], late_ns[False], percentile) for percentile in (50, 99))
+    return tuple(_ratio_of(late_ns[True], late_ns[False], percentile) for percentile in (50, 99))
 
 
-def ratio_of(active: Sequence[NDArray[np.int64]], rest: Sequence[NDArray[np.int64]], percentile: int) -> Ratio:
+def _ratio_of(active: Sequence[NDArray[np.int64]], rest: Sequence[NDArray[np.int64]], percentile: int) -> Ratio:
     """Return the ratio of a percentile of latenesses [ns] by segments (each (n,)), with and without outlets."""
     rng = np.random.default_rng(1)
     own = np.array([np.percentile(segment, percentile) for segment in active])
@@ -271,14 +271,14 @@ def evidence(found: Streamed, ratios: Sequence[Ratio]) -> Evidence:
         f"  longest gap between their times: {found.worst_gap_ms:.2f} ms",
         f"  markers: {found.markers_sent} sent, {found.markers_lost} lost",
         f"  marker's time against the servo's clock: p50 {p50_us:.1f} us, p99 {1e3 * found.error_p99_ms:.1f} us, "
-        f"limit {1e3 * MOST_ERROR_MS:g} us",
+        f"limit {1e3 * _MOST_ERROR_MS:g} us",
         f"  from event to arrival: p50 {p50_ms:.2f} ms, p99 {p99_ms:.2f} ms",
         f"  {'met' if found.met else 'missed'}",
         "lateness of the servo, with both streams and without, alternating every 0.25 s",
     ]
     lines += [
         f"  p{one.percentile}: {one.with_us:.0f} us with, {one.without_us:.0f} us without, ratio {one.ratio:.3f} "
-        f"({one.low:.3f} to {one.high:.3f}), limit {MOST_RATIO:g}: {one.verdict}"
+        f"({one.low:.3f} to {one.high:.3f}), limit {_MOST_RATIO:g}: {one.verdict}"
         for one in ratios
     ]
     text = "\n".join(lines) + "\n"

@@ -20,7 +20,7 @@ from study_app.outlets.markers import CODES, HIGH_S, SinkThread, TriggerSink, ma
 from study_app.outlets.session_outlets import open_sink
 
 VIRTUAL: Final = "virtual"
-EVERY_S: Final = 0.05
+_EVERY_S: Final = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +39,7 @@ class TriggerDelays:
     wrong: int = 0
 
 
-class VirtualPort:
+class _VirtualPort:
     """A pair of virtual ports: one with an ``address`` to send to, and another whose bytes another process reads."""
 
     def __init__(self) -> None:
@@ -66,7 +66,7 @@ class VirtualPort:
         with suppress(OSError):
             os.close(self._theirs)
 
-    def __enter__(self) -> VirtualPort:
+    def __enter__(self) -> _VirtualPort:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -88,7 +88,7 @@ def measure(
     """
     if port != VIRTUAL:
         return TriggerDelays(port=port, written_us=_written_us(_send(port, seconds, ending, progress)[1]))
-    with VirtualPort() as virtual:
+    with _VirtualPort() as virtual:
         sent, sink = _send(virtual.address, seconds, ending, progress)
         came = virtual.unplug()
     codes = [one for one in came if one[0]]
@@ -118,7 +118,7 @@ def _send(
     thread = SinkThread(sink)
     sent: list[tuple[int, int]] = []
     events = list(CODES)
-    for number in paced(seconds, EVERY_S, ending=ending, progress=progress):
+    for number in paced(seconds, _EVERY_S, ending=ending, progress=progress):
         if thread.lost:
             break
         marker = marker_of(events[number % len(events)], 1e-9 * now_ns(), 0, {})

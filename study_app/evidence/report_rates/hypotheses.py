@@ -29,7 +29,7 @@ from study_app.protocol.trials.stimuli import Stimulus
 from study_app.protocol.warnings.expected_precision import ThresholdPlan
 from study_app.psychophysics.people import BETWEEN_PEOPLE
 
-ALPHA: Final = 0.05
+_ALPHA: Final = 0.05
 
 Trial: TypeAlias = Callable[[np.random.Generator], bool]
 Drawn: TypeAlias = Callable[[np.random.Generator, int], Array]
@@ -46,8 +46,8 @@ class DrawnStudies:
     trial: Trial
 
 
-SHOWN: Final = "shown"
-EQUIVALENT: Final = "called equivalent"
+_SHOWN: Final = "shown"
+_EQUIVALENT: Final = "called equivalent"
 
 
 def false_claims() -> Iterator[DrawnStudies]:
@@ -64,7 +64,7 @@ def powers() -> Iterator[DrawnStudies]:
     yield DrawnStudies(
         name="thresholds of two blocks, 1.5 : 1, 3-down-1-up, 60 trials",
         participants=12,
-        claim=SHOWN,
+        claim=_SHOWN,
         trial=_compares_thresholds(12, 1.5),
     )
 
@@ -74,10 +74,10 @@ def _shows(*samples: Array, alternative: str = "two-sided") -> bool:
     means, *others = (means_of(sample[None], group=group) for group, sample in enumerate(samples))
     for other in others:
         means = means - other
-    return bool(means.error[0] > 0 and max(float(p[0]) for p in p_differs(means, alternative)) <= ALPHA)
+    return bool(means.error[0] > 0 and max(float(p[0]) for p in p_differs(means, alternative)) <= _ALPHA)
 
 
-LEVELS: Final = (0.02, 0.6)
+_LEVELS: Final = (0.02, 0.6)
 DESIGN: Final = ForcedChoice()
 METHOD: Final = UpDown(rule="3down1up", trials=30, tracks=2)
 
@@ -86,14 +86,14 @@ def _thresholds() -> Iterator[DrawnStudies]:
     yield DrawnStudies(
         name="thresholds of two blocks, equal, 3-down-1-up, 60 trials",
         participants=12,
-        claim=SHOWN,
+        claim=_SHOWN,
         trial=_compares_thresholds(12, 1.0),
     )
 
 
 def _compares_thresholds(n: int, ratio: float) -> Trial:
     """Return a trial that compares thresholds of the same people in two blocks, the first ``ratio`` times higher."""
-    plan = ThresholdPlan(Stimulus(vary="damping_nspm", levels=LEVELS), DESIGN, METHOD, catch=0, standards=1)
+    plan = ThresholdPlan(Stimulus(vary="damping_nspm", levels=_LEVELS), DESIGN, METHOD, catch=0, standards=1)
 
     def trial(rng: np.random.Generator) -> bool:
         middle = sum(plan.stimulus.domain) / 2
@@ -107,8 +107,8 @@ def _compares_thresholds(n: int, ratio: float) -> Trial:
         found = plan.grouped(fits, 2 * n)  # both blocks have a width in common
         values, variances = found.medians[:n] - found.medians[n:], found.variances[:n] + found.variances[n:]
         sample = tuple(Measured(value=values[k], variance=variances[k]) for k in np.argsort(values))
-        means = Compared(samples=(sample,), left_out={}).means(ALPHA)
-        return means is not None and max(float(p[0]) for p in p_differs(means, "two-sided")) <= ALPHA
+        means = Compared(samples=(sample,), left_out={}).means(_ALPHA)
+        return means is not None and max(float(p[0]) for p in p_differs(means, "two-sided")) <= _ALPHA
 
     return trial
 
@@ -138,9 +138,9 @@ def _recognises(n: int, share: float, known: tuple[int, ...]) -> Trial:
         names = np.where(rng.random((n, 3)) < share, 0, 2) if known else rng.integers(0, 3, (n, 3))
         names[:, list(known)] = known
         found = recognition(names, [0, 1, 2], 3, seed=None)
-        verdict: Verdict = "shown" if found.p is not None and found.p <= ALPHA else "not shown"
+        verdict: Verdict = "shown" if found.p is not None and found.p <= _ALPHA else "not shown"
         named = RecognitionResult(LIQUIDS, LIQUIDS, LIQUIDS, found, verdict)
-        return bool({*recognised(named, ALPHA)} - {*known})
+        return bool({*recognised(named, _ALPHA)} - {*known})
 
     return trial
 
@@ -151,13 +151,13 @@ def _equivalence() -> Iterator[DrawnStudies]:
         for words, others in (("0", (0.0,)), ("−1, 0 or 1", (-1.0, 0.0, 0.0, 1.0))):
             name = f"one in {1 / share:.0f} differs by 6 points, the others by {words}, bound {bound:g}"
             for n in (14, 20, 30, 40):
-                yield DrawnStudies(name=name, participants=n, claim=EQUIVALENT, trial=_misses(n, share, others, bound))
+                yield DrawnStudies(name=name, participants=n, claim=_EQUIVALENT, trial=_misses(n, share, others, bound))
     for members in (1, 4, 6):
         words = "one hypothesis" if members == 1 else f"{members} hypotheses"
         yield DrawnStudies(
             name=f"{words} at the bound, normal",
             participants=20,
-            claim=f"any {EQUIVALENT}",
+            claim=f"any {_EQUIVALENT}",
             trial=_calls_equivalent(20, members),
         )
 
@@ -174,7 +174,7 @@ def _calls_equivalent(n: int, members: int) -> Trial:
     def trial(rng: np.random.Generator) -> bool:
         means = means_of(rng.normal(1.0, 1.0, (members, n)))
         ps = holm(p_equivalent(means, 1.0, n, STEPS).tolist())
-        return min(p for p in ps if p is not None) <= ALPHA
+        return min(p for p in ps if p is not None) <= _ALPHA
 
     return trial
 
@@ -184,19 +184,19 @@ def _contrasts() -> Iterator[DrawnStudies]:
         for ratio in (1, 3, 6):
             name = f"two groups, sizes 1 : 2, SDs {ratio} : 1"
             yield DrawnStudies(
-                name=name, participants=n, claim=SHOWN, trial=_compares_groups(round(n / 3), n - round(n / 3), ratio)
+                name=name, participants=n, claim=_SHOWN, trial=_compares_groups(round(n / 3), n - round(n / 3), ratio)
             )
     for n in (8, 12, 20, 30):
         yield DrawnStudies(
             name="paired, one in six 5 points higher, the others 1 lower",
             participants=n,
-            claim=SHOWN,
+            claim=_SHOWN,
             trial=_compares_pairs(n, _one_in_six),
         )
     yield DrawnStudies(
         name="paired, exponential",
         participants=30,
-        claim=SHOWN,
+        claim=_SHOWN,
         trial=_compares_pairs(30, lambda rng, n: rng.exponential(size=n) - 1),
     )
 
@@ -214,9 +214,9 @@ def _one_in_six(rng: np.random.Generator, n: int) -> Array:
 
 
 DELAYS: Final = np.linspace(-1.0, 1.0, 7)
-SLOPE: Final = 1.2
-NOISE: Final = 0.7
-MANY: Final = 20_000
+_SLOPE: Final = 1.2
+_NOISE: Final = 0.7
+_MANY: Final = 20_000
 
 
 def _trends() -> Iterator[DrawnStudies]:
@@ -237,7 +237,7 @@ def _trends() -> Iterator[DrawnStudies]:
 def _follows(n: int, shift: float, claim: str) -> Trial:
     def trial(rng: np.random.Generator) -> bool:
         found = trend(_answers(rng, n, shift), None, seed=None)
-        claimed = found.p is not None and found.p <= ALPHA
+        claimed = found.p is not None and found.p <= _ALPHA
         return claimed and (claim == "either" or (found.effect or 0.0) > 0)
 
     return trial
@@ -245,8 +245,8 @@ def _follows(n: int, shift: float, claim: str) -> Trial:
 
 def _answers(rng: np.random.Generator, n: int, shift: float) -> Array:
     """Return answers (participants, delays) of people whose slopes are exponential with mean ``shift``."""
-    slopes = SLOPE * (rng.exponential(size=(n, 1)) - 1 + shift)
-    return np.clip(np.round(4 + slopes * DELAYS + NOISE * rng.normal(size=(n, len(DELAYS)))), 1, 7)
+    slopes = _SLOPE * (rng.exponential(size=(n, 1)) - 1 + shift)
+    return np.clip(np.round(4 + slopes * DELAYS + _NOISE * rng.normal(size=(n, len(DELAYS)))), 1, 7)
 
 
 @cache
@@ -254,6 +254,6 @@ def _shift_without_trend() -> float:
     """Return the mean of skewed slopes at which the mean rank correlation is 0, found from many people."""
 
     def correlation(shift: float) -> float:
-        return trend(_answers(np.random.default_rng(0), MANY, shift), None, seed=None).effect or 0.0
+        return trend(_answers(np.random.default_rng(0), _MANY, shift), None, seed=None).effect or 0.0
 
     return float(brentq(correlation, 0.0, 1.0, xtol=1e-3))

@@ -37,29 +37,29 @@ from study_app.evidence.table import Evidence, Table
 from study_app.protocol.raters import REHEARSED
 
 Generator: TypeAlias = Literal["answer model", "ordinal probit"]
-Extent: TypeAlias = Literal["empty", "own trends", "partial", "full"]
+_Extent: TypeAlias = Literal["empty", "own trends", "partial", "full"]
 GENERATORS: Final[tuple[Generator, ...]] = get_args(Generator)
-EXTENTS: Final[tuple[Extent, ...]] = get_args(Extent)
-NO_EFFECT: Final[tuple[Extent, ...]] = ("empty", "own trends")
+EXTENTS: Final[tuple[_Extent, ...]] = get_args(_Extent)
+_NO_EFFECT: Final[tuple[_Extent, ...]] = ("empty", "own trends")
 """No setting differs from another in the mean over all people."""
 
-LEVELS: Final = np.array([-2.0, -1.2, -0.4, 0.4, 1.2, 2.0])
+_LEVELS: Final = np.array([-2.0, -1.2, -0.4, 0.4, 1.2, 2.0])
 """Where the latent answer of the probit model goes from one of the seven levels to the next."""
 
 PEOPLE: Final = REHEARSED.model_copy(update={"lapse_rate": 0.1})
 """Who answers as the answer model says."""
-LEANING: Final = 0.7
-SLOPE: Final = 0.3
+_LEANING: Final = 0.7
+_SLOPE: Final = 0.3
 """Standard deviations between people: of their response bias, and of their sensitivity to an effect."""
 
 TRUTH: Final = 4000
 """The true differences of means are those of so many simulated people."""
 
 
-def alike(block: Block, extent: Extent) -> Mapping[int, int]:
+def alike(block: Block, extent: _Extent) -> Mapping[int, int]:
     """Return which settings (places) are equal in truth to which earlier one."""
     k = len(block.settings)
-    if extent in NO_EFFECT:
+    if extent in _NO_EFFECT:
         return dict.fromkeys(range(1, k), 0)
     if extent == "full":
         return {}
@@ -67,7 +67,7 @@ def alike(block: Block, extent: Extent) -> Mapping[int, int]:
 
 
 def answers(
-    simulation: Plan, generator: Generator, extent: Extent, participants: int, seed: int, study: int
+    simulation: Plan, generator: Generator, extent: _Extent, participants: int, seed: int, study: int
 ) -> tuple[Array, ...]:
     """Return the answers (participants, settings, items) of one simulated study, block by block."""
     if generator == "answer model":
@@ -75,11 +75,11 @@ def answers(
         rng = np.random.default_rng([seed, study, participants])
         return tuple(_opined(block, one, extent, rng) for block, one in zip(simulation.blocks, thought, strict=True))
     rng = np.random.default_rng([seed, study])
-    leaning, slope = LEANING * rng.normal(size=participants), 1 + SLOPE * rng.normal(size=participants)
+    leaning, slope = _LEANING * rng.normal(size=participants), 1 + _SLOPE * rng.normal(size=participants)
     return tuple(_probit(simulation, block, extent, leaning, slope, rng) for block in simulation.blocks)
 
 
-def _opined(block: Block, opinions: Opinions, extent: Extent, rng: np.random.Generator) -> Array:
+def _opined(block: Block, opinions: Opinions, extent: _Extent, rng: np.random.Generator) -> Array:
     """Return the answer model's answers; equal settings have equal effects."""
     if extent == "empty":
         return opinions.answers(0.0, PEOPLE)
@@ -93,17 +93,17 @@ def _opined(block: Block, opinions: Opinions, extent: Extent, rng: np.random.Gen
 
 
 def _probit(
-    simulation: Plan, block: Block, extent: Extent, leaning: Array, slope: Array, rng: np.random.Generator
+    simulation: Plan, block: Block, extent: _Extent, leaning: Array, slope: Array, rng: np.random.Generator
 ) -> Array:
     effects = _effects(simulation, block)
     if extent == "own trends":
         latent = leaning[:, None, None] + _own(block, (len(leaning), *effects.shape), rng)
         latent += rng.normal(size=latent.shape)
-        return np.add(np.searchsorted(LEVELS, latent), 1, dtype=np.float64)
+        return np.add(np.searchsorted(_LEVELS, latent), 1, dtype=np.float64)
     for place, other in alike(block, extent).items():
         effects[place] = effects[other]
     latent = leaning[:, None, None] + slope[:, None, None] * effects + rng.normal(size=(len(leaning), *effects.shape))
-    return np.add(np.searchsorted(LEVELS, latent), 1, dtype=np.float64)
+    return np.add(np.searchsorted(_LEVELS, latent), 1, dtype=np.float64)
 
 
 def _own(block: Block, shape: tuple[int, ...], rng: np.random.Generator) -> Array:
@@ -131,7 +131,7 @@ def _effects(simulation: Plan, block: Block) -> Array:
     return np.asarray(found)
 
 
-def true_differences(simulation: Plan, generator: Generator, extent: Extent) -> tuple[Array, ...]:
+def _true_differences(simulation: Plan, generator: Generator, extent: _Extent) -> tuple[Array, ...]:
     """Return the true differences of mean answers to the first setting (settings, items), block by block."""
     found = []
     for block, given in zip(simulation.blocks, answers(simulation, generator, extent, TRUTH, 0, 0), strict=True):
@@ -142,20 +142,20 @@ def true_differences(simulation: Plan, generator: Generator, extent: Extent) -> 
     return tuple(found)
 
 
-Limit: TypeAlias = Literal["none", "at most 5 %", "at least 93 %", "60 to 80 %", "counted"]
+_Limit: TypeAlias = Literal["none", "at most 5 %", "at least 93 %", "60 to 80 %", "counted"]
 
-Verdict: TypeAlias = Literal["yes", "no", "too few studies", "counted"]
+_Verdict: TypeAlias = Literal["yes", "no", "too few studies", "counted"]
 
-COMPARED: Final = 400
+_COMPARED: Final = 400
 """More rates than are compared with limits."""
 
-SURE: Final = 1 - 0.05 / COMPARED
+SURE: Final = 1 - 0.05 / _COMPARED
 """Confidence of the interval that must lie beyond a limit to say that a rate does not keep to it.
 
 Of so many rates that are exactly at their limits none exceeds it by chance in 95 % of runs (Bonferroni).
 """
 
-ALLOWED: Final[dict[Limit, tuple[float, float, float, float]]] = {
+_ALLOWED: Final[dict[_Limit, tuple[float, float, float, float]]] = {
     "at most 5 %": (0.0, 0.05, 0.0, 0.075),
     "at least 93 %": (0.93, 1.0, 0.905, 1.0),
     "60 to 80 %": (0.6, 0.8, 0.0, 1.0),
@@ -170,7 +170,7 @@ class Rate:
     cell: str
     participants: int
     what: str
-    limit: Limit
+    limit: _Limit
     hits: int
     studies: int
 
@@ -195,7 +195,7 @@ class Rate:
         return interval(self.share, self.studies) if self.studies else (0.0, 1.0)
 
     @property
-    def holds(self) -> Verdict:
+    def holds(self) -> _Verdict:
         """Whether the rate keeps to its limit.
 
         "no" where the interval of confidence `SURE` lies beyond the limit: of a hundred rates that are exactly at their
@@ -208,7 +208,7 @@ class Rate:
             return "no" if self.hits else "yes"
         if not self.studies:
             return "too few studies"
-        lowest, highest, least, most = ALLOWED[self.limit]
+        lowest, highest, least, most = _ALLOWED[self.limit]
         low, high = binomtest(self.hits, self.studies).proportion_ci(SURE, method="wilson")
         if high < lowest or low > highest:
             return "no"
@@ -247,19 +247,19 @@ def evidence(rates: Sequence[Rate], heading: str) -> Evidence:
     return Evidence(text, files, missed=beyond > 0, undecided=undecided > 0 or not limited, closing=closing)
 
 
-BATCH: Final = 25
-DRAWS: Final = 999
+_BATCH: Final = 25
+_DRAWS: Final = 999
 """Of the test over all statements: its error rate holds with any number."""
 
-Event: TypeAlias = tuple[str, Limit]
+Event: TypeAlias = tuple[str, _Limit]
 """What is counted, and its limit."""
 
-Truth: TypeAlias = tuple[Array, ...]
+_Truth: TypeAlias = tuple[Array, ...]
 """True differences of means to the first setting (settings, items), of each block."""
 
 LOST: Final[Event] = ("a part of the report is lost", "none")
 CLAIMED: Final = "the first page claims something"
-ANYWHERE: Final = "anything in the report claims something"
+_ANYWHERE: Final = "anything in the report claims something"
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,7 +267,7 @@ class Cell:
     """Studies of one kind: model of the answers, true effects, number of participants, and planned looks if any."""
 
     generator: Generator
-    extent: Extent
+    extent: _Extent
     participants: int
     looks: tuple[int, ...] = ()
     spending: Spending = "obrien-fleming"
@@ -278,15 +278,15 @@ class Cell:
         return f"{self.generator}, {self.extent}{looks}"
 
 
-def truth(simulation: Plan, cell: Cell) -> Truth:
+def truth(simulation: Plan, cell: Cell) -> _Truth:
     """Return the true effects in the studies of a cell, which do not depend on their size."""
-    return true_differences(simulation, cell.generator, cell.extent)
+    return _true_differences(simulation, cell.generator, cell.extent)
 
 
-def count_studies(simulation: Plan, cell: Cell, truth: Truth, seed: int, batch: int, studies: int) -> tuple[Rate, ...]:
+def count_studies(simulation: Plan, cell: Cell, truth: _Truth, seed: int, batch: int, studies: int) -> tuple[Rate, ...]:
     """Return the rates of so many studies of a cell, those of batch number ``batch``."""
     events: dict[Event, int] = {}
-    for study in range(batch * BATCH, batch * BATCH + studies):
+    for study in range(batch * _BATCH, batch * _BATCH + studies):
         for event, happened in _study(simulation, cell, truth, seed, study).items():
             events[event] = events.get(event, 0) + happened
     return tuple(
@@ -295,7 +295,7 @@ def count_studies(simulation: Plan, cell: Cell, truth: Truth, seed: int, batch: 
     )
 
 
-def _study(simulation: Plan, cell: Cell, truth: Truth, seed: int, study: int) -> dict[Event, bool]:
+def _study(simulation: Plan, cell: Cell, truth: _Truth, seed: int, study: int) -> dict[Event, bool]:
     failures = Failures()
     given = answers(simulation, cell.generator, cell.extent, cell.participants, seed, study)
     if cell.looks:
@@ -304,7 +304,7 @@ def _study(simulation: Plan, cell: Cell, truth: Truth, seed: int, study: int) ->
             report(simulation, planned.at(n), [values[:n] for values in given], study, failures)[1] for n in cell.looks
         )
         claimed = any(any(map(_claims, results)) for results in seen)
-        return {(f"{ANYWHERE}, at any look", "at most 5 %"): claimed, LOST: bool(failures.found)}
+        return {(f"{_ANYWHERE}, at any look", "at most 5 %"): claimed, LOST: bool(failures.found)}
     decided = simulation.decided if cell.extent != "partial" else replace(simulation.decided, noticed=None)
     asked, results = report(simulation, decided, given, study, failures)
     found: dict[Event, bool] = {}
@@ -320,9 +320,9 @@ def _study(simulation: Plan, cell: Cell, truth: Truth, seed: int, study: int) ->
     if cell.extent != "partial":
         people = asked[0].people
         whole = Results(simulation.decided, people, results, delivered=(), orders={}, performance=None, seed=1)
-        limit: Limit = "counted" if cell.extent == "full" else "at most 5 %"
+        limit: _Limit = "counted" if cell.extent == "full" else "at most 5 %"
         found[CLAIMED, limit] = any(one.claims for one in answered(whole))
-        found[ANYWHERE, limit] = any(map(_claims, results))
+        found[_ANYWHERE, limit] = any(map(_claims, results))
     return found
 
 
@@ -343,7 +343,7 @@ def report(
         )
         for block, values in zip(simulation.blocks, given, strict=True)
     ]
-    asked = [replace(answers, seed=1) for answers in gated(tables, DRAWS)]
+    asked = [replace(answers, seed=1) for answers in gated(tables, _DRAWS)]
     return asked, tuple(evaluate_block(None, answers) for answers in asked)
 
 
@@ -361,7 +361,7 @@ def _modelled(found: BlockResult) -> Iterator[tuple[Event, bool]]:
 
 
 def _in_liquids(asked: BlockAnswers, found: BlockResult, cell: Cell, _truth: Array) -> Iterator[tuple[Event, bool]]:
-    if cell.extent in NO_EFFECT:
+    if cell.extent in _NO_EFFECT:
         yield (
             ("settings differ in a statement", "at most 5 %"),
             any(one.verdict in FOUND for one in SettingsDiffer.of(found)),
@@ -382,7 +382,7 @@ def _recognised(found: BlockResult) -> bool:
     return recognition is not None and recognition.verdict in FOUND
 
 
-def _equal_pairs(block: Block, extent: Extent) -> set[tuple[str, str]]:
+def _equal_pairs(block: Block, extent: _Extent) -> set[tuple[str, str]]:
     """Return the pairs of codes whose settings are equal in truth."""
     like = alike(block, extent)
     codes = block.codes
@@ -397,14 +397,14 @@ def _equal_pairs(block: Block, extent: Extent) -> set[tuple[str, str]]:
 def _in_delays(asked: BlockAnswers, found: BlockResult, cell: Cell, truth: Array) -> Iterator[tuple[Event, bool]]:
     block = asked.block
     null = [block.settings[at].delay_ms or 0.0 for at in alike(block, cell.extent)]
-    if cell.extent in NO_EFFECT:
+    if cell.extent in _NO_EFFECT:
         yield ("trend in a statement", "at most 5 %"), any(one.verdict in FOUND for one in DelayTrend.of(found))
         yield ("detection threshold printed", "at most 5 %"), _printed(found)
         yield from _modelled(found)
     if null:
         low = any(one.over_all_ms is not None and one.over_all_ms <= max(null) for one in LowestDelay.of(found))
         yield ("lowest delay stated too low", "at most 5 %"), low
-    if cell.extent not in NO_EFFECT:
+    if cell.extent not in _NO_EFFECT:
         yield from _equivalence(asked, found, truth)
     if cell.extent == "full":
         yield ("lowest delay stated", "counted"), any(one.over_all_ms is not None for one in LowestDelay.of(found))
@@ -437,7 +437,7 @@ def _equivalence(asked: BlockAnswers, found: BlockResult, truth: Array) -> Itera
     yield ("“unchanged up to” too long", "at most 5 %"), too_far
 
 
-Case: TypeAlias = tuple[str, int]
+_Case: TypeAlias = tuple[str, int]
 """What is simulated, and how many participants take part."""
 
 Trial: TypeAlias = Callable[[np.random.Generator], float | None]
@@ -448,17 +448,17 @@ HALF: Final = "half the interval covers the threshold"
 """Of a normal distribution 67 %; 51 % where intervals are 30 % narrower, 80 % where they are 30 % wider."""
 PRINTED: Final = "threshold printed, with its interval"
 
-BOUND: Final = 1.0
-LEVELS_MS: Final = np.array([0, 50, 75, 100, 125, 150, 200])
-TRUE_MS: Final = 120.0
-WIDTH_MS: Final = 60.0
-LAPSE: Final = 0.02
+_BOUND: Final = 1.0
+_LEVELS_MS: Final = np.array([0, 50, 75, 100, 125, 150, 200])
+_TRUE_MS: Final = 120.0
+_WIDTH_MS: Final = 60.0
+_LAPSE: Final = 0.02
 
 
 @cache
-def single_tests() -> Mapping[Case, tuple[Limit, str, Trial]]:
+def _single_tests() -> Mapping[_Case, tuple[_Limit, str, Trial]]:
     """Return all cases: the limit of their rate, what is counted, and how one study is simulated."""
-    found: dict[Case, tuple[Limit, str, Trial]] = {}
+    found: dict[_Case, tuple[_Limit, str, Trial]] = {}
     for n in (5, 12, 24):
         for words, most in (("-1, 0, 1", (-1.0, 0.0, 1.0)), ("0", (0.0,))):
             found[f"one in five differs by 5 points, the others by {words}", n] = (
@@ -481,16 +481,16 @@ def single_tests() -> Mapping[Case, tuple[Limit, str, Trial]]:
     return found
 
 
-def count_single(case: Case, seed: int, batch: int, studies: int) -> tuple[Rate, ...]:
+def count_single(case: _Case, seed: int, batch: int, studies: int) -> tuple[Rate, ...]:
     """Return the rates of so many studies of a case, those of batch number ``batch``."""
-    limit, what, trial = single_tests()[case]
-    number = list(single_tests()).index(case)
+    limit, what, trial = _single_tests()[case]
+    number = list(_single_tests()).index(case)
     rng = np.random.default_rng([seed, number, batch])
     found = [one for _ in range(studies) if (one := trial(rng)) is not None]
     rate = partial(Rate, cell=case[0], participants=case[1])
     if what != COVERS:
         return (rate(what=what, limit=limit, hits=sum(map(bool, found)), studies=len(found)),)
-    half: Limit = "counted" if case[1] == SIZES[0] else "60 to 80 %"  # of five people intervals are wide by t
+    half: _Limit = "counted" if case[1] == _SIZES[0] else "60 to 80 %"  # of five people intervals are wide by t
     return (
         rate(what=PRINTED, limit="at least 93 %", hits=len(found), studies=studies),
         rate(what=what, limit=limit, hits=sum(one <= 1.0 for one in found), studies=len(found)),
@@ -500,17 +500,17 @@ def count_single(case: Case, seed: int, batch: int, studies: int) -> tuple[Rate,
 
 def _leaning(n: int, most: tuple[float, ...]) -> Trial:
     def trial(rng: np.random.Generator) -> bool:
-        return tost(np.where(rng.random(n) < 0.2, 5.0, rng.choice(most, n)), BOUND).verdict == "equivalent"
+        return tost(np.where(rng.random(n) < 0.2, 5.0, rng.choice(most, n)), _BOUND).verdict == "equivalent"
 
     return trial
 
 
 def _covered(n: int, spread_ms: float, never: float) -> Trial:
     def trial(rng: np.random.Generator) -> float | None:
-        found = noticed(_people(rng, n, spread_ms, never), LEVELS_MS.tolist())
+        found = noticed(_people(rng, n, spread_ms, never), _LEVELS_MS.tolist())
         if found.interval is None or found.effect is None:
             return None
-        error = TRUE_MS - found.effect
+        error = _TRUE_MS - found.effect
         end = found.interval.high if error > 0 else found.interval.low
         return abs(error) / abs(end - found.effect)
 
@@ -519,29 +519,29 @@ def _covered(n: int, spread_ms: float, never: float) -> Trial:
 
 def _people(rng: np.random.Generator, n: int, spread_ms: float, never: float) -> Array:
     """Return answers (n, levels), 6 for noticed and 2 for not, of people whose thresholds lie about the true one."""
-    at = TRUE_MS + spread_ms * rng.normal(size=(n, 1))
-    chance = LAPSE + (1 - 2 * LAPSE) * expit(2 * np.log(19) * (LEVELS_MS - at) / WIDTH_MS)
-    chance[rng.random(n) < never] = LAPSE
+    at = _TRUE_MS + spread_ms * rng.normal(size=(n, 1))
+    chance = _LAPSE + (1 - 2 * _LAPSE) * expit(2 * np.log(19) * (_LEVELS_MS - at) / _WIDTH_MS)
+    chance[rng.random(n) < never] = _LAPSE
     return np.where(rng.random(chance.shape) < chance, 6.0, 2.0)
 
 
-SIZES: Final = (5, 12, 24)
+_SIZES: Final = (5, 12, 24)
 
-LOOKS: Final = (12, 18, 24)
-ROUNDS: Final = 4
+_LOOKS: Final = (12, 18, 24)
+_ROUNDS: Final = 4
 """A cell with an undecided rate is continued until it has so many times the studies that were asked for."""
 
-Key: TypeAlias = tuple[str, int]
+_Key: TypeAlias = tuple[str, int]
 """The name of a cell and its number of participants."""
 
-Count: TypeAlias = Callable[[int, int, int], tuple[Rate, ...]]
+_Count: TypeAlias = Callable[[int, int, int], tuple[Rate, ...]]
 """Returns the rates of a batch: seed, number of the batch, studies in it."""
 
 
-def cells(sizes: Sequence[int] = SIZES) -> tuple[Cell, ...]:
+def cells(sizes: Sequence[int] = _SIZES) -> tuple[Cell, ...]:
     """Return every kind of study by every generator at every size, and empty studies with planned looks."""
     every = [Cell(generator, extent, n) for generator in GENERATORS for extent in EXTENTS for n in sizes]
-    looked = [Cell("ordinal probit", "empty", LOOKS[-1], LOOKS, spending) for spending in get_args(Spending)]
+    looked = [Cell("ordinal probit", "empty", _LOOKS[-1], _LOOKS, spending) for spending in get_args(Spending)]
     return (*every, *looked)
 
 
@@ -551,18 +551,18 @@ def validate(
     executor: Executor,
     *,
     seed: int = 1,
-    sizes: Sequence[int] = SIZES,
+    sizes: Sequence[int] = _SIZES,
     progress: Callable[[str], object] = str,
 ) -> Iterator[tuple[int, tuple[Rate, ...]]]:
     """Yield after every batch how many studies were simulated so far in all, and the rates of them.
 
-    Cells with an undecided rate are continued with as many further studies, up to ``ROUNDS`` times as many in all. A
+    Cells with an undecided rate are continued with as many further studies, up to ``_ROUNDS`` times as many in all. A
     continued cell counts all of its rates on, those that hold included; ``progress`` is called with a line for it.
     Every batch draws from a stream of its own, so what is counted does not depend on the executor.
     """
-    counts = cell_counts(simulation, sizes)
+    counts = _cell_counts(simulation, sizes)
     done, total = 0, dict[tuple[str, int, str], Rate]()
-    for finished in range(ROUNDS):
+    for finished in range(_ROUNDS):
         waiting = [
             executor.submit(count, seed, batch, many)
             for batch, many in _batches(studies, finished)
@@ -579,12 +579,12 @@ def validate(
         counts = {key: counts[key] for key in dict.fromkeys((rate.cell, rate.participants) for rate in undecided)}
         if not counts:
             return
-        if finished + 1 < ROUNDS:
+        if finished + 1 < _ROUNDS:
             for rate in undecided:
                 progress(f"continued: {rate}")
 
 
-def cell_counts(simulation: Plan, sizes: Sequence[int]) -> Mapping[Key, Count]:
+def _cell_counts(simulation: Plan, sizes: Sequence[int]) -> Mapping[_Key, _Count]:
     """Return how the rates of every cell are counted."""
     every = cells(sizes)
     kinds = {(cell.generator, cell.extent): cell for cell in every}
@@ -596,11 +596,11 @@ def cell_counts(simulation: Plan, sizes: Sequence[int]) -> Mapping[Key, Count]:
             )
             for cell in every
         },
-        **{case: partial(count_single, case) for case in single_tests()},
+        **{case: partial(count_single, case) for case in _single_tests()},
     }
 
 
 def _batches(studies: int, finished: int) -> list[tuple[int, int]]:
     """Return the numbers and sizes of the batches of so many studies, after so many finished rounds of them."""
-    starts = range(0, studies, BATCH)
-    return [(number, min(BATCH, studies - start)) for number, start in enumerate(starts, start=finished * len(starts))]
+    starts = range(0, studies, _BATCH)
+    return [(number, min(_BATCH, studies - start)) for number, start in enumerate(starts, start=finished * len(starts))]

@@ -29,11 +29,11 @@ from study_app.haptics.runtime.clocks.clock import VIRTUAL, Clock
 
 NON_FINITE, GLITCH, SILENCE, JUMP, BUTTON, LOST, LOST_AT_WRITE = range(7)
 KINDS: Final = ("non_finite", "glitch", "silence", "clock_jump", "stop_button", "lost", "lost_at_write")
-NONE: Final = -1
+_NONE: Final = -1
 
 GLITCH_M: Final = 0.1  # in a millisecond: 100 m/s
-SHORTEST_JUMP_NS: Final = 1_000_000
-LONGEST_JUMP_NS: Final = 2_000_000_000
+_SHORTEST_JUMP_NS: Final = 1_000_000
+_LONGEST_JUMP_NS: Final = 2_000_000_000
 
 FAULTS = np.dtype(
     [
@@ -91,7 +91,7 @@ class FaultyDevice:
         self.state.device, self.state.read, self.state.write = inner.context, inner.read.address, inner.write.address
         self.state.clock = clock.context if self.jumps else 0
         self.state.random = 0x9E3779B97F4A7C15 ^ (seed + 1)
-        self.state.kind = NONE
+        self.state.kind = _NONE
         self.context = int(self._memory.ctypes.data)
         self.read, self.write = _functions()
 
@@ -112,7 +112,7 @@ class FaultyDevice:
         if not self.jumps:
             state.share[JUMP] = 0.0
         state.gap = gap
-        state.kind = NONE
+        state.kind = _NONE
 
 
 @cache
@@ -124,18 +124,18 @@ def _functions() -> tuple[Any, Any]:
 def _due(faults: Any) -> int:
     """Return the kind of fault this reading has, or NONE."""
     kind: int = faults.kind  # read once: the host may allow other faults meanwhile
-    if kind == NONE:
+    if kind == _NONE:
         kind = _draw(faults)
-    if kind == NONE:
-        return NONE
+    if kind == _NONE:
+        return _NONE
     if faults.wait > 0:
         faults.wait -= 1
-        return NONE
+        return _NONE
     faults.left -= 1
     faults.injected[kind] += 1
     if faults.left <= 0:
         faults.episodes[kind] += 1
-        faults.kind = NONE
+        faults.kind = _NONE
     return kind
 
 
@@ -146,7 +146,7 @@ def _draw(faults: Any) -> int:
     for share in faults.share:
         total += share
     if total <= 0.0:
-        return NONE
+        return _NONE
     place = total * random(faults)
     kind = 0
     while kind < len(KINDS) - 1 and place >= faults.share[kind]:
@@ -192,7 +192,7 @@ def _read(context: int, now_ns: int, reading: int) -> int:
     elif kind == LOST_AT_WRITE:
         faults.losing = 1
     elif kind == JUMP:
-        jump_ns = _between(faults, SHORTEST_JUMP_NS, LONGEST_JUMP_NS)
+        jump_ns = _between(faults, _SHORTEST_JUMP_NS, _LONGEST_JUMP_NS)
         _virtual_at(faults.clock).now_ns += jump_ns
         faults.jumped_ns += jump_ns
     return answer

@@ -18,9 +18,9 @@ from study_app.haptics.model.force_rules import CURRENT
 from study_app.haptics.model.layout import LIMITER_GLITCH, SAMPLE, records
 from study_app.haptics.model.scene import Everywhere, Liquid, Scene
 
-REFUSALS_IN_A_ROW: Final = 5
-SHORTEST_NS: Final = 200_000
-LONGEST_NS: Final = 20_000_000
+_REFUSALS_IN_A_ROW: Final = 5
+_SHORTEST_NS: Final = 200_000
+_LONGEST_NS: Final = 20_000_000
 
 _LEDGER = np.dtype(
     [
@@ -118,12 +118,12 @@ def write_down(ledger: Any, wake: Any, elements: Any, samples: Any, first: int, 
             continue
         if sample.limiters & LIMITER_GLITCH:
             ledger.rejected += 1
-            if ledger.rejected == REFUSALS_IN_A_ROW:
+            if ledger.rejected == _REFUSALS_IN_A_ROW:
                 ledger.tracking = 0
             continue
         interval_ns = ledger.period_ns
         if ledger.tracking != 0 and not _begins_anew(ledger, sample):
-            interval_ns = min(max(sample.time_ns - ledger.accepted_ns, SHORTEST_NS), LONGEST_NS)
+            interval_ns = min(max(sample.time_ns - ledger.accepted_ns, _SHORTEST_NS), _LONGEST_NS)
         else:
             ledger.tracking = 1
             wake.stored = wake.held = wake.segment = wake.age_ns = 0

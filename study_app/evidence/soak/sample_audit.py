@@ -29,7 +29,7 @@ from study_app.haptics.model.layout import (
 
 TOLERANCE_N: Final = 1e-9
 
-COUNTS = np.dtype(
+_COUNTS = np.dtype(
     [
         ("limit_n", np.float64),  # of the force
         ("slew_n", np.float64),  # of its change from tick to tick
@@ -79,7 +79,7 @@ class Audit:
     """
 
     def __init__(self, limit_n: float, slew_n: float, period_ns: int, reach_m: float) -> None:
-        self._memory = records(COUNTS, 1)
+        self._memory = records(_COUNTS, 1)
         self.counts = self._memory[0]
         self.counts.limit_n, self.counts.slew_n = limit_n, slew_n
         self.counts.period_ns, self.counts.first_tick = period_ns, -1
@@ -92,7 +92,7 @@ class Audit:
 
 def prepare() -> None:
     """Compile what looks, or load it from the cache."""
-    look(records(COUNTS, 1)[0], records(SAMPLE, 0), 1.0)
+    look(records(_COUNTS, 1)[0], records(SAMPLE, 0), 1.0)
 
 
 @kernel

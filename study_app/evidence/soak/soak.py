@@ -49,13 +49,13 @@ from study_app.haptics.runtime.pack import elements_needed
 from study_app.haptics.runtime.servo import Servo
 from study_app.haptics.runtime.telemetry import HISTORY
 
-REACH_M: Final = 0.04  # how far from the middle it goes, to every side
-ROW_S: Final = 4e-3
-SLOWEST_MPS: Final = 0.02
-FASTEST_MPS: Final = 1.0
+_REACH_M: Final = 0.04  # how far from the middle it goes, to every side
+_ROW_S: Final = 4e-3
+_SLOWEST_MPS: Final = 0.02
+_FASTEST_MPS: Final = 1.0
 
 
-class RestlessHand(ScriptedDevice):
+class _RestlessHand(ScriptedDevice):
     """A hand that draws what it does next from a stream of its own."""
 
     def __init__(self, random: Random, *, force_limit_n: float = 8.0) -> None:
@@ -88,17 +88,17 @@ class RestlessHand(ScriptedDevice):
         return duration_s + 0.3 * self._draw()
 
     def _speed_mps(self) -> float:
-        return float(SLOWEST_MPS * (FASTEST_MPS / SLOWEST_MPS) ** self._draw())
+        return float(_SLOWEST_MPS * (_FASTEST_MPS / _SLOWEST_MPS) ** self._draw())
 
     def _place_m(self) -> Vector:
-        x_m, y_m, z_m = (REACH_M * (2 * self._draw() - 1) for _ in range(3))
+        x_m, y_m, z_m = (_REACH_M * (2 * self._draw() - 1) for _ in range(3))
         return x_m, y_m, z_m
 
     def _circle(self) -> float:
         """Go around at an even speed, up and down meanwhile."""
-        radius_m = REACH_M * (0.1 + 0.9 * self._draw())
+        radius_m = _REACH_M * (0.1 + 0.9 * self._draw())
         duration_s = 1.0 + 5.0 * self._draw()
-        t_s = np.arange(round(duration_s / ROW_S) + 1) * ROW_S
+        t_s = np.arange(round(duration_s / _ROW_S) + 1) * _ROW_S
         angle = t_s * self._speed_mps() / radius_m + 2 * math.pi * self._draw()
         y_m = 0.3 * radius_m * np.sin(0.37 * angle)
         self.follow(t_s, np.column_stack([radius_m * np.cos(angle), y_m, radius_m * np.sin(angle)]))
@@ -109,26 +109,26 @@ class RestlessHand(ScriptedDevice):
         legs = 4 + int(8 * self._draw())
         places_m = np.array([self._place_m() for _ in range(legs)])
         lengths_m = np.linalg.norm(np.diff(places_m, axis=0), axis=1)
-        t_s = np.concatenate([[0.0], np.cumsum(np.maximum(lengths_m / self._speed_mps(), ROW_S))])
+        t_s = np.concatenate([[0.0], np.cumsum(np.maximum(lengths_m / self._speed_mps(), _ROW_S))])
         self.follow(t_s, places_m)
         return float(min(t_s[-1], 8.0))
 
 
-MOST_HOURS: Final = 10_000.0
-FEWEST_TICKS: Final = 1_000
-LONGEST_ROUND_S: Final = 3600.0
-SHORTEST_ROUND_S: Final = 5.0
-ROUGH: Final = 0.35  # share of a round
-SETTLING_S: Final = 2.0  # until a hand that keeps still has come to rest, and its velocity too
-LONGEST_REST: Final = 0.4  # share of a round; where a rest takes more, there is none
-MOST_TICKS: Final = (
+_MOST_HOURS: Final = 10_000.0
+_FEWEST_TICKS: Final = 1_000
+_LONGEST_ROUND_S: Final = 3600.0
+_SHORTEST_ROUND_S: Final = 5.0
+_ROUGH: Final = 0.35  # share of a round
+_SETTLING_S: Final = 2.0  # until a hand that keeps still has come to rest, and its velocity too
+_LONGEST_REST: Final = 0.4  # share of a round; where a rest takes more, there is none
+_MOST_TICKS: Final = (
     1000  # between two looks: fewer than a wake is long, so that what spoils it is seen before it is gone
 )
-WAITING_S: Final = 0.25  # likewise, on a clock that runs by itself
+_WAITING_S: Final = 0.25  # likewise, on a clock that runs by itself
 PATIENCE_S: Final = 10.0  # with a servo that takes no tick
 
 # kind: share of all faults, fewest and most readings
-ROUGH_FAULTS: Final = {
+_ROUGH_FAULTS: Final = {
     NON_FINITE: (4.0, 1, 8),
     GLITCH: (4.0, 1, 8),
     SILENCE: (4.0, 3, 60),
@@ -137,9 +137,9 @@ ROUGH_FAULTS: Final = {
     LOST: (1.0, 1, 1),
     LOST_AT_WRITE: (1.0, 1, 1),
 }
-STEADY_FAULTS: Final = {NON_FINITE: (1.0, 1, 4), GLITCH: (1.0, 1, 4), SILENCE: (1.0, 3, 40), JUMP: (0.5, 1, 1)}
-ROUGH_GAP: Final = (20, 600)
-STEADY_GAP: Final = (50, 4000)
+_STEADY_FAULTS: Final = {NON_FINITE: (1.0, 1, 4), GLITCH: (1.0, 1, 4), SILENCE: (1.0, 3, 40), JUMP: (0.5, 1, 1)}
+_ROUGH_GAP: Final = (20, 600)
+_STEADY_GAP: Final = (50, 4000)
 
 Part: TypeAlias = Literal["rough", "steady", "rest"]
 
@@ -175,13 +175,13 @@ class Soak:
         self._lasting = [name for name in self._names if wake_of(self._scenes[name])] or self._names
         self._rate_hz = next(iter(self._scenes.values())).rate_hz
         self.hours, self.virtual, self.seed = hours, virtual, seed
-        fewest = FEWEST_TICKS / self._rate_hz / 3600
-        if not fewest <= hours <= MOST_HOURS:
-            raise StudyError(f"a soak lasts {fewest:.2g} to {MOST_HOURS:g} hours, not {hours:g}")
+        fewest = _FEWEST_TICKS / self._rate_hz / 3600
+        if not fewest <= hours <= _MOST_HOURS:
+            raise StudyError(f"a soak lasts {fewest:.2g} to {_MOST_HOURS:g} hours, not {hours:g}")
         self.ticks = round(hours * 3600 * self._rate_hz)
         self._draw = Random(seed).random  # noqa: S311 - faults keep no secrets
         clock = VirtualClock() if virtual else SystemClock()
-        hand = RestlessHand(Random(seed + 1))  # noqa: S311
+        hand = _RestlessHand(Random(seed + 1))  # noqa: S311
         self.hand = hand
         self.device = FaultyDevice(hand, clock, seed)
         self._longest_wake = max(elements_needed(scene) for scene in self._scenes.values())
@@ -230,11 +230,11 @@ class Soak:
             self._enter(stretch, tick)
         self._act(stretch, tick)
         due = [at for at in (self._due.motion, self._due.scene, self._due.stop, self._due.fade) if at > tick]
-        ticks = min(MOST_TICKS, self.ticks - tick, stretch.end - tick, *(at - tick for at in due))
+        ticks = min(_MOST_TICKS, self.ticks - tick, stretch.end - tick, *(at - tick for at in due))
         if self.virtual:
             self.servo.advance(ticks)
         else:
-            (ending or threading.Event()).wait(min(ticks / self._rate_hz, WAITING_S))
+            (ending or threading.Event()).wait(min(ticks / self._rate_hz, _WAITING_S))
         self._look()
         if self.servo.fault is not None:
             self._recover()
@@ -278,14 +278,14 @@ class Soak:
         )
 
     def _at(self, tick: int) -> Stretch:
-        length = round(self._rate_hz * min(max(900 * self.hours, SHORTEST_ROUND_S), LONGEST_ROUND_S))
+        length = round(self._rate_hz * min(max(900 * self.hours, _SHORTEST_ROUND_S), _LONGEST_ROUND_S))
         number = tick // length
-        rest = round(SETTLING_S * self._rate_hz) + self._longest_wake
-        if rest > LONGEST_REST * length:
+        rest = round(_SETTLING_S * self._rate_hz) + self._longest_wake
+        if rest > _LONGEST_REST * length:
             rest = 0
         first = number * length
         ends: tuple[tuple[Part, int], ...] = (
-            ("rough", first + round(ROUGH * length)),
+            ("rough", first + round(_ROUGH * length)),
             ("steady", first + length - rest),
             ("rest", first + length),
         )
@@ -296,16 +296,16 @@ class Soak:
         self._due = _Due(motion=tick)
         if stretch.part == "rest":
             self._still_from = tick
-            self.device.allow({}, ROUGH_GAP)
+            self.device.allow({}, _ROUGH_GAP)
             self.servo.fade_in()
             self.hand.keep_still()
             self._due.motion = -1
         elif stretch.part == "steady":
-            self.device.allow(STEADY_FAULTS, STEADY_GAP)
+            self.device.allow(_STEADY_FAULTS, _STEADY_GAP)
             self.servo.fade_in()
             self._load(self._lasting[stretch.round % len(self._lasting)])
         else:
-            self.device.allow(ROUGH_FAULTS, ROUGH_GAP)
+            self.device.allow(_ROUGH_FAULTS, _ROUGH_GAP)
             self._due.scene = tick
             self._due.stop = self._later(tick, 1.0, 10.0)
 

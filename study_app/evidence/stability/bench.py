@@ -32,10 +32,10 @@ from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import Model, pack
 
 MOVING_S: Final = 1.2
-LASTS_S: Final = 1.8
-FREE_S: Final = 1.2
+_LASTS_S: Final = 1.8
+_FREE_S: Final = 1.2
 """How long a handle that was let go is watched."""
-TREMOR_M: Final = 20e-6
+_TREMOR_M: Final = 20e-6
 FORCE_LIMIT_N: Final = 8.0
 DIRECTION: Final = np.array([0.8, 0.0, 0.6])
 """Of straight motions."""
@@ -65,7 +65,7 @@ class Bench:
         loop.way_m = case.way_mm * 1e-3
         loop.moving_s = max(MOVING_S, case.release_s) if case.hand == LETS_GO else MOVING_S
         loop.release_s = {THROWN: 0.0, LETS_GO: case.release_s}.get(case.hand, math.inf)
-        loop.tremor_m = 0.0 if case.hand == THROWN else TREMOR_M
+        loop.tremor_m = 0.0 if case.hand == THROWN else _TREMOR_M
         loop.noise_m = case.noise_um * 1e-6
         loop.lost, loop.duplicated, loop.burst_s = case.lost, case.duplicated, case.burst_ms * 1e-3
         loop.jump_m, loop.outliers, loop.outlier_m = case.jump_mm * 1e-3, case.outliers, case.outlier_mm * 1e-3
@@ -94,7 +94,7 @@ class Bench:
             quantum_m=case.quantum_um * 1e-6,
             **device,
         )
-        self.model: Model = pack(scene or scene_of(case), limits=limits, dynamics=dynamics or dynamics_of(case))
+        self.model: Model = pack(scene or scene_of(case), limits=limits, dynamics=dynamics or _dynamics_of(case))
         self.pace = new_schedule(1.0 / case.rate_hz, jitter_s=case.jitter / case.rate_hz, missed=case.missed)
         self.sample = records(SAMPLE, 1)
 
@@ -137,7 +137,7 @@ class Bench:
 
 def lasts_s(case: Case) -> float:
     """Return how long a case lasts [s]."""
-    return max(LASTS_S, case.release_s + FREE_S) if case.hand == LETS_GO else LASTS_S
+    return max(_LASTS_S, case.release_s + _FREE_S) if case.hand == LETS_GO else _LASTS_S
 
 
 def new_trace(case: Case, seconds: float | None = None) -> Any:
@@ -145,7 +145,7 @@ def new_trace(case: Case, seconds: float | None = None) -> Any:
     return records(TRACE, math.ceil(((seconds or lasts_s(case)) + 0.1) * case.rate_hz))
 
 
-def dynamics_of(case: Case) -> Dynamics:
+def _dynamics_of(case: Case) -> Dynamics:
     """Return what the device states: its least mass and its delay, as they are believed, and its velocity's lag."""
     least_kg = case.believed_kg or (min(case.mass_kg, case.other_kg) if case.other_kg else case.mass_kg)
     lag_s = case.velocity_lag / case.rate_hz if case.estimator == DEVICE else None

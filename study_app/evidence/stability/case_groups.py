@@ -33,20 +33,20 @@ from study_app.evidence.stability.stability_cases import (
     scenes,
 )
 
-SCALES: Final = (1.0, 3.0, 10.0, 20.0, 40.0)
-RATES_HZ: Final = (250.0, 500.0, 1000.0, 2000.0)
-HANDLES_KG: Final = (0.03, 0.05, 0.1, 0.25)
-FALCONS_KG: Final = (0.1, 0.25, 0.6)
+_SCALES: Final = (1.0, 3.0, 10.0, 20.0, 40.0)
+_RATES_HZ: Final = (250.0, 500.0, 1000.0, 2000.0)
+_HANDLES_KG: Final = (0.03, 0.05, 0.1, 0.25)
+_FALCONS_KG: Final = (0.1, 0.25, 0.6)
 """Handles of the cases through the Falcon's driver, which says that its grip is no lighter."""
-FALCONS_HZ: Final = (500.0, 1000.0)
-PHASES: Final = 12
-FIRST_RELEASE_S: Final = 0.6
-CASES: Final = 1500
+_FALCONS_HZ: Final = (500.0, 1000.0)
+_PHASES: Final = 12
+_FIRST_RELEASE_S: Final = 0.6
+_CASES: Final = 1500
 """Of each group of misjudged delays and masses and of disturbed samples."""
-KALMAN_CASES: Final = 250
+_KALMAN_CASES: Final = 250
 """Of each group that is judged with the Kalman filter, too."""
 
-DRAWN: Final[Mapping[str, tuple[Any, ...]]] = {
+_DRAWN: Final[Mapping[str, tuple[Any, ...]]] = {
     "estimator": ("ewma", "ewma", "ewma", "raw", "raw", "raw"),
     "motion": (REACHES, CIRCLES, STROKE),
     "speed_mps": (0.1, 0.3, 0.6, 1.0),
@@ -60,7 +60,7 @@ DRAWN: Final[Mapping[str, tuple[Any, ...]]] = {
 }
 
 
-LINKS: Final[Mapping[str, tuple[Any, ...]]] = {
+_LINKS: Final[Mapping[str, tuple[Any, ...]]] = {
     "estimator": ("ewma", "kalman"),
     "motion": (REACHES, CIRCLES, SINE),
     "release_s": (0.6, 0.7, 0.8),
@@ -69,22 +69,22 @@ LINKS: Final[Mapping[str, tuple[Any, ...]]] = {
     "force_loss": (0.0, 0.0, 0.1, 0.5),
 }
 """How a study delays forces; a link that does nothing is one of 48."""
-OUTLIERS: Final[Mapping[str, tuple[Any, ...]]] = {"outliers": (0.002, 0.02), "outlier_mm": (0.5, 2.0, 5.0, 20.0)}
-JUMPS: Final[Mapping[str, tuple[Any, ...]]] = {"burst_ms": (4.0, 8.0, 20.0, 40.0), "jump_mm": (0.5, 2.0, 5.0, 20.0)}
+_OUTLIERS: Final[Mapping[str, tuple[Any, ...]]] = {"outliers": (0.002, 0.02), "outlier_mm": (0.5, 2.0, 5.0, 20.0)}
+_JUMPS: Final[Mapping[str, tuple[Any, ...]]] = {"burst_ms": (4.0, 8.0, 20.0, 40.0), "jump_mm": (0.5, 2.0, 5.0, 20.0)}
 DELAYS: Final[Mapping[str, tuple[Any, ...]]] = {"slows_to": (2, 3, 4), "swaps": (1,)}
-DISTURBED: Final[Mapping[str, Mapping[str, tuple[Any, ...]]]] = {
-    "outliers": OUTLIERS,
-    "jumps at a reconnection": JUMPS,
+_DISTURBED: Final[Mapping[str, Mapping[str, tuple[Any, ...]]]] = {
+    "outliers": _OUTLIERS,
+    "jumps at a reconnection": _JUMPS,
     "delay that jumps": DELAYS,
-    "everything at once": {**OUTLIERS, **JUMPS, **DELAYS, "lost": (0.0, 0.1), "duplicated": (0.0, 0.05)},
+    "everything at once": {**_OUTLIERS, **_JUMPS, **DELAYS, "lost": (0.0, 0.1), "duplicated": (0.0, 0.05)},
 }
 """What is wrong with the samples or the delay of a device, by group."""
-LATE_CASES: Final = 1000
+_LATE_CASES: Final = 1000
 """Loops with a force link."""
-DEVICE_CASES: Final = 500
+_DEVICE_CASES: Final = 500
 """Loops whose device measures the velocity."""
 
-MEASURED: Final[Mapping[str, tuple[Any, ...]]] = {
+_MEASURED: Final[Mapping[str, tuple[Any, ...]]] = {
     "estimator": (DEVICE,),
     "motion": (REACHES, CIRCLES, SINE),
     "release_s": (0.6, 0.7, 0.8),
@@ -95,9 +95,9 @@ MEASURED: Final[Mapping[str, tuple[Any, ...]]] = {
 }
 """How devices measure it: the noise of ``line`` with 2 to 15 samples at a count of 38 um lies between."""
 
-FALCONS: Final[Mapping[str, tuple[Any, ...]]] = {
-    **DRAWN,
-    "mass_kg": FALCONS_KG,
+_FALCONS: Final[Mapping[str, tuple[Any, ...]]] = {
+    **_DRAWN,
+    "mass_kg": _FALCONS_KG,
     "motion": (REACHES, CIRCLES, SINE),
     "noise_um": (0.0,),
     "jitter": (0.0,),
@@ -121,14 +121,14 @@ def sweep(seed: str = "stability") -> tuple[Case, ...]:
 
 def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ...]:
     """Return all groups but the sweep itself, with at most ``count`` cases each."""
-    light = {**DRAWN, "mass_kg": HANDLES_KG}
+    light = {**_DRAWN, "mass_kg": _HANDLES_KG}
     held, released = [tuple(_grid(hands)) for hands in (("light", "middle", "firm"), (LETS_GO, THROWN))]
     both = [dataclasses.replace(case, plant=plant) for plant in PLANTS for case in (*held, *released)]
-    releases = tuple(_releases(f"{seed} releases", PLANTS, HANDLES_KG))
+    releases = tuple(_releases(f"{seed} releases", PLANTS, _HANDLES_KG))
 
     def changed(name: str, change: Callable[[Case], Case | None], cases: Iterable[Case]) -> Group:
         found = tuple(case for case in map(change, cases) if case is not None)
-        return Group(name, tuple(_drawn(f"{seed} {name}", some(found, min(CASES, count or CASES)), light)))
+        return Group(name, tuple(_drawn(f"{seed} {name}", some(found, min(_CASES, count or _CASES)), light)))
 
     found = [
         Group(
@@ -141,33 +141,33 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
         )
         for name, cases in (("second plant, held", held), ("second plant, let go", released))
     ]
-    for name, change in CHANGES.items():
+    for name, change in _CHANGES.items():
         found.append(changed(name, change, both))
     found += [
-        Group(name, tuple(map(change, _drawn(f"{seed} {name}", some(both, min(CASES, count or CASES)), light))))
-        for name, change in MASSES.items()
+        Group(name, tuple(map(change, _drawn(f"{seed} {name}", some(both, min(_CASES, count or _CASES)), light))))
+        for name, change in _MASSES.items()
     ]
-    for name, own in DISTURBED.items():
-        cases = some(both, min(CASES, count or CASES))
+    for name, own in _DISTURBED.items():
+        cases = some(both, min(_CASES, count or _CASES))
         found.append(Group(name, tuple(_drawn(f"{seed} {name}", cases, {**light, **own}))))
     found.append(Group("let go in mid-stroke", some(releases, count)))
     in_gap = tuple(_in_gap(f"{seed} let go in a gap", releases))
-    found.append(Group("let go in a gap of samples", some(in_gap, min(CASES, count or CASES))))
-    for name in (*MISJUDGED, *MASSES):
-        cases = tuple(case for case in map({**CHANGES, **MASSES}[name], releases) if case is not None)
-        found.append(Group(f"let go in mid-stroke, {name}", some(cases, min(CASES, count or CASES))))
+    found.append(Group("let go in a gap of samples", some(in_gap, min(_CASES, count or _CASES))))
+    for name in (*_MISJUDGED, *_MASSES):
+        cases = tuple(case for case in map({**_CHANGES, **_MASSES}[name], releases) if case is not None)
+        found.append(Group(f"let go in mid-stroke, {name}", some(cases, min(_CASES, count or _CASES))))
     driven = "through the Falcon's driver"
-    driven_held = some(tuple(_grid(("light", "middle", "firm"), (FALCON,), FALCONS_HZ, (1,))), count)
-    driven_held = tuple(_drawn(f"{seed} {driven}", driven_held, FALCONS))
+    driven_held = some(tuple(_grid(("light", "middle", "firm"), (FALCON,), _FALCONS_HZ, (1,))), count)
+    driven_held = tuple(_drawn(f"{seed} {driven}", driven_held, _FALCONS))
     found.append(Group(f"{driven}, held", driven_held))
-    driven_free = (dataclasses.replace(case, delay=1) for case in _releases(f"{seed} {driven}", (FALCON,), FALCONS_KG))
+    driven_free = (dataclasses.replace(case, delay=1) for case in _releases(f"{seed} {driven}", (FALCON,), _FALCONS_KG))
     found.append(Group(f"{driven}, let go in mid-stroke", some(tuple(driven_free), count)))
     found += _of_liquids("non-Newtonian liquids", materials, seed, light, count)
     found += _of_liquids("liquids of physical2", of_physical2, seed, light, count)
-    found.append(_half_damper("late forces", min(LATE_CASES, count or LATE_CASES), seed, {**light, **LINKS}))
-    devices = min(DEVICE_CASES, count or DEVICE_CASES)
-    by_device = _half_damper("velocity measured by the device", devices, seed, {**light, **MEASURED})
-    fewer = min(KALMAN_CASES, count or KALMAN_CASES)
+    found.append(_half_damper("late forces", min(_LATE_CASES, count or _LATE_CASES), seed, {**light, **_LINKS}))
+    devices = min(_DEVICE_CASES, count or _DEVICE_CASES)
+    by_device = _half_damper("velocity measured by the device", devices, seed, {**light, **_MEASURED})
+    fewer = min(_KALMAN_CASES, count or _KALMAN_CASES)
     again = (Group("first plant", sweep(seed)), *found)
     by_kalman = [
         Group(f"kalman: {name}", tuple(dataclasses.replace(case, estimator="kalman") for case in some(cases, fewer)))
@@ -182,11 +182,11 @@ def _of_liquids(
     """Yield groups for liquids outside the sweep: its own cases, with misjudged delays, and with releases."""
     whole = tuple(_grid(GRIPS, names=names))
     yield Group(name, tuple(_drawn(f"{seed} {name}", some(whole, count), choices)))
-    for change in MISJUDGED:
-        cases = [case for case in map(CHANGES[change], whole) if case is not None]
-        few = some(cases, min(CASES, count or CASES))
+    for change in _MISJUDGED:
+        cases = [case for case in map(_CHANGES[change], whole) if case is not None]
+        few = some(cases, min(_CASES, count or _CASES))
         yield Group(f"{name}, {change}", tuple(_drawn(f"{seed} {name} {change}", few, choices)))
-    free = tuple(_releases(f"{seed} {name}", PLANTS, HANDLES_KG, names))
+    free = tuple(_releases(f"{seed} {name}", PLANTS, _HANDLES_KG, names))
     yield Group(f"{name}, let go in mid-stroke", some(free, count))
 
 
@@ -223,7 +223,7 @@ def _measuring(less: int) -> Callable[[Case], Case | None]:
     return change
 
 
-CHANGES: Final[Mapping[str, Callable[[Case], Case | None]]] = {
+_CHANGES: Final[Mapping[str, Callable[[Case], Case | None]]] = {
     "delay believed one tick too short": _believing(1),
     "delay believed one tick too long": _believing(-1),
     "device slower by a tick after 0.5 s": lambda case: (
@@ -235,8 +235,8 @@ CHANGES: Final[Mapping[str, Callable[[Case], Case | None]]] = {
     "5 % of samples repeated": lambda case: dataclasses.replace(case, duplicated=0.05),
     "no sample for 20 ms, again and again": lambda case: dataclasses.replace(case, burst_ms=20.0),
 }
-MISJUDGED: Final = tuple(CHANGES)[:3]
-MASSES: Final[Mapping[str, Callable[[Case], Case]]] = {
+_MISJUDGED: Final = tuple(_CHANGES)[:3]
+_MASSES: Final[Mapping[str, Callable[[Case], Case]]] = {
     "least mass stated at half": lambda case: dataclasses.replace(case, believed_kg=0.5 * case.mass_kg),
     "least mass stated at 1.25 times": lambda case: dataclasses.replace(case, believed_kg=1.25 * case.mass_kg),
     "mass doubled and halved every 150 ms": lambda case: dataclasses.replace(case, other_kg=2.0 * case.mass_kg),
@@ -247,18 +247,18 @@ MASSES: Final[Mapping[str, Callable[[Case], Case]]] = {
 def _grid(
     hands: Iterable[str],
     plants: Iterable[str] = (FIRST,),
-    rates_hz: Iterable[float] = RATES_HZ,
+    rates_hz: Iterable[float] = _RATES_HZ,
     delays: Iterable[int] = range(5),
     names: Callable[[], Iterable[str]] = liquids,
 ) -> Iterator[Case]:
     """Yield each liquid, by default of the sweep, at each scale, rate, delay and grip."""
     for liquid, scale, rate_hz, delay, hand, plant in itertools.product(
-        names(), SCALES, rates_hz, delays, hands, plants
+        names(), _SCALES, rates_hz, delays, hands, plants
     ):
         yield Case(liquid=liquid, scale=scale, rate_hz=rate_hz, delay=delay, hand=hand, plant=plant)
 
 
-def _drawn(seed: str, cases: Iterable[Case], choices: Mapping[str, tuple[Any, ...]] = DRAWN) -> Iterator[Case]:
+def _drawn(seed: str, cases: Iterable[Case], choices: Mapping[str, tuple[Any, ...]] = _DRAWN) -> Iterator[Case]:
     """Yield cases, the rest of each drawn from ``choices``."""
     draw = Random(seed)  # noqa: S311 - the same cases in every run
     for case in cases:
@@ -273,7 +273,7 @@ def _releases(
     The damper's are drawn from a stream of their own, so that those of the liquids stay the ones that were judged.
     """
     shared, own = Random(seed), {DAMPER: Random(f"{seed} {DAMPER}")}  # noqa: S311 - the same cases in every run
-    for plant, liquid, mass_kg, phase in itertools.product(plants, names(), masses_kg, range(PHASES)):
+    for plant, liquid, mass_kg, phase in itertools.product(plants, names(), masses_kg, range(_PHASES)):
         draw = own.get(liquid, shared)
         case = Case(liquid=liquid, hand=LETS_GO, motion=SINE, mass_kg=mass_kg, plant=plant)
         hz = _one(draw, (1.0, 2.0, 4.0))
@@ -283,7 +283,7 @@ def _releases(
             delay=_one(draw, (0, 1, 1, 2)),
             viscous_nspm=_one(draw, (0.0, 0.5)),
             speed_mps=round(peak_mps(hz, 0.5e-3 * case.way_mm), 5),
-            release_s=round(FIRST_RELEASE_S + phase / (PHASES * hz), 5),
+            release_s=round(_FIRST_RELEASE_S + phase / (_PHASES * hz), 5),
         )
 
 
@@ -291,7 +291,7 @@ def _in_gap(seed: str, cases: Iterable[Case]) -> Iterator[Case]:
     """Yield releases at a moment at which samples are missing, after which they may be off."""
     draw = Random(seed)  # noqa: S311 - the same cases in every run
     for case in cases:
-        burst_ms, jump_mm = _one(draw, JUMPS["burst_ms"]), _one(draw, (0.0, *JUMPS["jump_mm"]))
+        burst_ms, jump_mm = _one(draw, _JUMPS["burst_ms"]), _one(draw, (0.0, *_JUMPS["jump_mm"]))
         release_s = round(3 * BURST_PERIOD_S - 1e-3 * burst_ms * draw.random(), 5)
         yield dataclasses.replace(case, burst_ms=burst_ms, jump_mm=jump_mm, release_s=release_s)
 

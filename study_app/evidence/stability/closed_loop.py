@@ -42,7 +42,7 @@ NONE, AVERAGE, FIRST_ORDER, LATE = range(4)
 """Filters, as `stability_cases.FILTERS` names them; NONE: the device measures no velocity."""
 _KEPT: Final = 16  # ticks: the longest mean is of 16
 
-MEASURED = np.dtype(
+_MEASURED = np.dtype(
     [
         ("filter", np.int64),
         ("lag", np.float64),  # mean [ticks]
@@ -91,7 +91,7 @@ def _mean(measured: Any, newest: int, oldest: int, axis: int) -> float:
     return float(total / (oldest - newest + 1))
 
 
-ARM = np.dtype(
+_ARM = np.dtype(
     [
         ("used", np.int64),  # 1 where this plant moves the handle
         ("held", np.int64),  # 0: let go
@@ -116,8 +116,8 @@ ARM = np.dtype(
     align=True,
 )
 
-LONGEST_STEP_S: Final = 25e-6
-SMOOTH_MPS: Final = 1e-3
+_LONGEST_STEP_S: Final = 25e-6
+_SMOOTH_MPS: Final = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,8 +133,8 @@ class Arm:
 
 LIGHT: Final = Arm(mass_kg=0.554, stiffness_npm=135.0, damping_nspm=6.45, tissue_npm=100.0, tissue_nspm=2.0)
 MIDDLE: Final = Arm(mass_kg=0.554, stiffness_npm=135.0, damping_nspm=6.45, tissue_npm=400.0, tissue_nspm=5.0)
-FIRM: Final = Arm(mass_kg=1.5, stiffness_npm=500.0, damping_nspm=25.0, tissue_npm=1000.0, tissue_nspm=15.0)
-ARMS: Final[Mapping[str, Arm]] = {"light": LIGHT, "middle": MIDDLE, "firm": FIRM, "lets-go": MIDDLE, "thrown": MIDDLE}
+_FIRM: Final = Arm(mass_kg=1.5, stiffness_npm=500.0, damping_nspm=25.0, tissue_npm=1000.0, tissue_nspm=15.0)
+ARMS: Final[Mapping[str, Arm]] = {"light": LIGHT, "middle": MIDDLE, "firm": _FIRM, "lets-go": MIDDLE, "thrown": MIDDLE}
 
 
 def new_arm(
@@ -148,7 +148,7 @@ def new_arm(
     delay: int = 0,
 ) -> Any:
     """Return the record of an arm that holds a handle, both at rest in the middle of the workspace."""
-    record = records(ARM, 1)[0]
+    record = records(_ARM, 1)[0]
     record.used = record.held = 1
     record.arm_kg, record.arm_npm, record.arm_nspm = arm.mass_kg, arm.stiffness_npm, arm.damping_nspm
     record.tissue_npm, record.tissue_nspm = arm.tissue_npm, arm.tissue_nspm
@@ -162,7 +162,7 @@ def advance(arm: Any, from_m: Any, to_m: Any, duration_s: float) -> None:
     """Let ``duration_s`` pass while the intended position goes straight ``from_m`` to ``to_m`` (each (3,) [m])."""
     if duration_s <= 0.0:
         return
-    steps = math.ceil(duration_s / LONGEST_STEP_S)
+    steps = math.ceil(duration_s / _LONGEST_STEP_S)
     for k in range(steps):
         _midpoint_step(arm, from_m, to_m, duration_s, (k + 0.5) / steps, duration_s / steps)
 
@@ -175,7 +175,7 @@ def _midpoint_step(arm: Any, from_m: Any, to_m: Any, duration_s: float, share: f
         tissue_npm, tissue_nspm = arm.tissue_npm, arm.tissue_nspm
     for i in range(3):
         speed_mps2 += arm.handle_mps[i] * arm.handle_mps[i]
-    friction_nspm = arm.viscous_nspm + arm.coulomb_n / math.sqrt(speed_mps2 + SMOOTH_MPS * SMOOTH_MPS)
+    friction_nspm = arm.viscous_nspm + arm.coulomb_n / math.sqrt(speed_mps2 + _SMOOTH_MPS * _SMOOTH_MPS)
     half_s = 0.5 * step_s
     coupling = tissue_nspm + half_s * tissue_npm
     arm_impedance = arm.arm_kg / half_s + arm.arm_nspm + half_s * arm.arm_npm + coupling
@@ -212,11 +212,11 @@ def write_force(arm: Any, force_n: Any) -> None:
 REACHES, CIRCLES, STROKE, SINE = range(4)
 
 BURST_PERIOD_S: Final = 0.3
-SLOWER_S: Final = 0.5
+_SLOWER_S: Final = 0.5
 MEASURED_S: Final = 0.03
 """How long a device takes to measure its delay."""
 
-STRETCH_S: Final = 0.15
+_STRETCH_S: Final = 0.15
 """After so long the mass of the handle or the delay changes, in cases where it does: within each stroke of a hand."""
 
 # Hand, servo and encoder, in addition to the handle and the model.
@@ -242,18 +242,18 @@ LOOP = np.dtype(
         ("error_m", np.float64, (3,)),  # of the newest position: offset and outlier
         ("in_burst", np.int64),  # 1 during such a gap
         ("delay", np.int64),  # of the device [ticks]
-        ("slows_to", np.int64),  # its delay from `SLOWER_S` on; above 0: it measures its delay, `MEASURED_S` late
-        ("swaps", np.int64),  # 1: this delay in every second stretch of `STRETCH_S` alone
+        ("slows_to", np.int64),  # its delay from `_SLOWER_S` on; above 0: it measures its delay, `MEASURED_S` late
+        ("swaps", np.int64),  # 1: this delay in every second stretch of `_STRETCH_S` alone
         ("mass_kg", np.float64),  # of the handle
-        ("other_kg", np.float64),  # the same in every second stretch of `STRETCH_S`; 0: always the same
+        ("other_kg", np.float64),  # the same in every second stretch of `_STRETCH_S`; 0: always the same
         ("now_s", np.float64),
         ("broken", np.int64),  # 1 once a force or the handle's position was not finite
         ("was_m", np.float64, (3,)),  # where the hand is
         ("goes_m", np.float64, (3,)),  # where it will be at the next tick
         ("measured", np.int64),  # 1 where it is of this tick
         ("seen_m", np.float64, (3,)),  # the last sample
-        ("arm", ARM),  # the second plant, where it is used
-        ("velocity", MEASURED),  # what the device measures itself
+        ("arm", _ARM),  # the second plant, where it is used
+        ("velocity", _MEASURED),  # what the device measures itself
     ],
     align=True,
 )
@@ -337,7 +337,7 @@ def run(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any,
             if loop.slows_to > 0:
                 handle.delay = loop.arm.delay = delay_at(loop, loop.now_s)
             if loop.other_kg > 0.0:
-                other = math.floor(loop.now_s / STRETCH_S) % 2.0 == 1.0
+                other = math.floor(loop.now_s / _STRETCH_S) % 2.0 == 1.0
                 handle.mass_kg = loop.arm.handle_kg = loop.other_kg if other else loop.mass_kg
             _move(handle, loop, elapsed_s)
             copy(loop.goes_m, loop.was_m)
@@ -357,7 +357,7 @@ def run(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any,
 @kernel
 def delay_at(loop: Any, t_s: float) -> int:
     """Return the delay of the device [ticks] at a time."""
-    slower = t_s >= SLOWER_S and (loop.swaps == 0 or math.floor(t_s / STRETCH_S) % 2.0 == 1.0)
+    slower = t_s >= _SLOWER_S and (loop.swaps == 0 or math.floor(t_s / _STRETCH_S) % 2.0 == 1.0)
     return int(max(loop.delay, loop.slows_to) if slower else loop.delay)
 
 

@@ -21,34 +21,34 @@ from study_app.haptics.model.slope_limits import INERTIA_SHARE, DampingLimits, E
 PERIODS_S: Final = (0.5e-3, 1e-3, 2e-3, 4e-3)
 DELAYS: Final = (0, 1, 2, 3, 4)
 FREE_HANDLE_KG: Final = 0.1
-FRICTION_NSPM: Final = 0.5
+_FRICTION_NSPM: Final = 0.5
 
-UNALTERED_NSPM: Final = 53.0
+_UNALTERED_NSPM: Final = 53.0
 """What is felt as it is at 1 kHz, up to one tick of delay, with "ewma" and "kalman": light oil has a secant of 55 N·s/m
 where it reaches 8 N at scale 10; this takes 4 % of that one force, and with "ewma" is 75 % of what a free handle of
 0.1 kg is stable with."""
-UNALTERED_SHARE: Final = 0.75
+_UNALTERED_SHARE: Final = 0.75
 """Of the boundary that a limit takes there at most, if the filter is another."""
-UNALTERED_INERTIA_SHARE: Final = 0.85
+_UNALTERED_INERTIA_SHARE: Final = 0.85
 """Of this limit, for added mass and history: those of honey are felt as they are, too."""
-SHARE: Final = 0.5
+_SHARE: Final = 0.5
 """Of the boundary that a limit takes elsewhere: a quadratic law has twice the slope of its secant."""
-FAST_SHARE: Final = 0.4
+_FAST_SHARE: Final = 0.4
 """The same beyond 1 kHz, where a count of the encoder is a greater speed and the slew limit a steeper force."""
-FAST_NSPM: Final = 40.0
+_FAST_NSPM: Final = 40.0
 """The most there."""
-FAST_KALMAN_NSPM: Final = 22.0
+_FAST_KALMAN_NSPM: Final = 22.0
 """The same with "kalman", which passes on more of a hand that lets go while a wake breaks."""
-KALMAN_SHARE: Final = 0.64
+_KALMAN_SHARE: Final = 0.64
 """Of the limits above, with "kalman", up to 1 kHz, but where liquids are felt as they are: at 1, a held one in tar was
 restless at 250 Hz, and one let go swung at 500 Hz, the delay one tick longer than believed; at 0.8, one let go in gear
 oil at scale 40 was restless with 3 ticks of delay."""
-COUNT_N: Final = 0.25
+_COUNT_N: Final = 0.25
 """The most that one count of a Falcon's encoder may be felt as [N]."""
-COUNT_M: Final = 38e-6
+_COUNT_M: Final = 38e-6
 NOMINAL_S: Final = 1e-3
 
-SWING_MPS: Final = 0.04
+_SWING_MPS: Final = 0.04
 """A handle that swings slower than this is at rest where the encoder has counts: they alone keep it moving."""
 
 _THROWN_MPS = 0.02
@@ -64,7 +64,7 @@ def boundary_nspm(
     *,
     believed: int | None = None,
     mass_kg: float = FREE_HANDLE_KG,
-    friction_nspm: float = FRICTION_NSPM,
+    friction_nspm: float = _FRICTION_NSPM,
 ) -> float:
     """Return the greatest linear damping [N·s/m] under which a handle let go comes to rest, to 1 %.
 
@@ -112,7 +112,7 @@ def measure_limits(
 def _entry(velocity: Velocity, period_s: float, delay: int) -> Entry:
     unaltered = velocity.kind in {"ewma", "kalman"} and period_s == NOMINAL_S and delay <= 1
     drag = _limit_nspm(velocity, period_s, delay, unaltered=unaltered)
-    inertia = (UNALTERED_INERTIA_SHARE if unaltered else INERTIA_SHARE) * drag
+    inertia = (_UNALTERED_INERTIA_SHARE if unaltered else INERTIA_SHARE) * drag
     limits = DampingLimits(_rounded_down(drag), _rounded_down(inertia))
     return Entry(velocity.kind, velocity.alpha if isinstance(velocity, Ewma) else None, period_s, delay, limits)
 
@@ -123,21 +123,21 @@ def _limit_nspm(velocity: Velocity, period_s: float, delay: int, *, unaltered: b
     The raw difference passes a count of the encoder on whole, EWMA as `_weight` says.
     """
     fast = period_s < NOMINAL_S
-    share = UNALTERED_SHARE if unaltered else FAST_SHARE if fast else SHARE
+    share = _UNALTERED_SHARE if unaltered else _FAST_SHARE if fast else _SHARE
     limits = [share * boundary_nspm(velocity, period_s, delay)]
     if unaltered:
-        limits.append(UNALTERED_NSPM)
+        limits.append(_UNALTERED_NSPM)
     if fast:
-        limits.append(FAST_KALMAN_NSPM if isinstance(velocity, Kalman) else FAST_NSPM)
+        limits.append(_FAST_KALMAN_NSPM if isinstance(velocity, Kalman) else _FAST_NSPM)
     if not isinstance(velocity, Kalman):
         weight = _weight(velocity.alpha, period_s) if isinstance(velocity, Ewma) else 1.0
-        limits.append(COUNT_N * period_s / COUNT_M / weight)
+        limits.append(_COUNT_N * period_s / _COUNT_M / weight)
     else:
         wrong = (it for it in (delay - 1, delay + 1) if it <= MOST_DELAY)
         limits += [boundary_nspm(velocity, period_s, it, believed=delay) for it in wrong]
-        limits.append(UNALTERED_SHARE * boundary_nspm(Ewma(), period_s, delay))
+        limits.append(_UNALTERED_SHARE * boundary_nspm(Ewma(), period_s, delay))
         if not unaltered and not fast:
-            return KALMAN_SHARE * min(limits)
+            return _KALMAN_SHARE * min(limits)
     return min(limits)
 
 
@@ -179,12 +179,12 @@ def _comes_to_rest(
     )
     scene = Scene(scale=1.0, rate_hz=1.0 / period_s, liquids=(stokes,), velocity=velocity, knee=Knee(law="none"))
     limits = DampingLimits(damping_nspm, damping_nspm)
-    dynamics = Dynamics(delay_s=delays[1] * period_s, count_m=COUNT_M, mass_kg=mass_kg)
+    dynamics = Dynamics(delay_s=delays[1] * period_s, count_m=_COUNT_M, mass_kg=mass_kg)
     bench = Bench(case, safe=False, limits=limits, scene=scene, dynamics=dynamics)
     bench.loop.moving_s, bench.handle.motor_step_n = math.inf, 0.0
-    bench.handle.quantum_m = COUNT_M if counts else 0.0
+    bench.handle.quantum_m = _COUNT_M if counts else 0.0
     bench.begin()
     trace = records(TRACE, round(_LASTS_S / period_s))
     bench.run(trace, 0, math.inf)
     speeds_mps = np.linalg.norm(trace.velocity_mps[-len(trace) // 10 :], axis=1)
-    return bool(not bench.loop.broken and speeds_mps.max() < (SWING_MPS if counts else _TIRED * _THROWN_MPS))
+    return bool(not bench.loop.broken and speeds_mps.max() < (_SWING_MPS if counts else _TIRED * _THROWN_MPS))

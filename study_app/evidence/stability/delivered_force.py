@@ -29,19 +29,19 @@ from study_app.evidence.stability.verdict import judge
 from study_app.evidence.table import Evidence, run
 
 
-class Limit(NamedTuple):
-    """The greatest error [%], or multiple of the Wiener bound for liquids of `BOUNDED`, and share withheld [%]."""
+class _Limit(NamedTuple):
+    """The greatest error [%], or multiple of the Wiener bound for liquids of `_BOUNDED`, and share withheld [%]."""
 
     error: float
     withheld: float
 
 
-HONEY: Final = "honey of physical2"
-BOUNDED: Final = "others of physical2"
-STEEP: Final = "steeper than a loop bears"
-THESIS: Final = "rek2024"
-GROUPS: Final = {
-    "physical2_": BOUNDED,
+_HONEY: Final = "honey of physical2"
+_BOUNDED: Final = "others of physical2"
+_STEEP: Final = "steeper than a loop bears"
+_THESIS: Final = "rek2024"
+_GROUPS: Final = {
+    "physical2_": _BOUNDED,
     "physical_": "physical_liquids",
     "slime_": "slime",
     "forcedelay_": "dampers",
@@ -49,25 +49,25 @@ GROUPS: Final = {
     "thickness_": "dampers",
 }
 """By the beginning of a liquid's name; all others are of the thesis."""
-SINGLE: Final = {
-    "physical2_honey": HONEY,
-    **dict.fromkeys(("physical_tar", "physical2_tar", "slime_toothpaste", "slime_cornstarch"), STEEP),
+_SINGLE: Final = {
+    "physical2_honey": _HONEY,
+    **dict.fromkeys(("physical_tar", "physical2_tar", "slime_toothpaste", "slime_cornstarch"), _STEEP),
 }
-LIMITS: Final[Mapping[tuple[str, str], tuple[Limit, Limit, Limit]]] = {
-    (HONEY, "kalman"): (Limit(15, 13), Limit(18, 18), Limit(72, 75)),
-    (BOUNDED, "kalman"): (Limit(1.6, 1), Limit(1.6, 5), Limit(12, 80)),
-    (THESIS, "kalman"): (Limit(9, 2), Limit(42, 36), Limit(70, 65)),
-    ("physical_liquids", "kalman"): (Limit(18, 13), Limit(20, 21), Limit(75, 77)),
-    ("slime", "kalman"): (Limit(13, 5), Limit(67, 66), Limit(82, 81)),
-    ("dampers", "kalman"): (Limit(3, 1), Limit(3, 1), Limit(3, 1)),
-    (STEEP, "kalman"): (Limit(85, 87), Limit(92, 92), Limit(95, 95)),
-    (HONEY, "ewma"): (Limit(40, 5), Limit(40, 26), Limit(74, 70)),
-    (BOUNDED, "ewma"): (Limit(4.2, 5), Limit(4.2, 5), Limit(11, 70)),
-    (THESIS, "ewma"): (Limit(18, 5), Limit(40, 30), Limit(67, 60)),
-    ("physical_liquids", "ewma"): (Limit(40, 5), Limit(40, 27), Limit(76, 73)),
-    ("slime", "ewma"): (Limit(17, 5), Limit(58, 58), Limit(76, 76)),
-    ("dampers", "ewma"): (Limit(11, 1), Limit(11, 1), Limit(11, 1)),
-    (STEEP, "ewma"): (Limit(92, 88), Limit(95, 95), Limit(97, 97)),
+_LIMITS: Final[Mapping[tuple[str, str], tuple[_Limit, _Limit, _Limit]]] = {
+    (_HONEY, "kalman"): (_Limit(15, 13), _Limit(18, 18), _Limit(72, 75)),
+    (_BOUNDED, "kalman"): (_Limit(1.6, 1), _Limit(1.6, 5), _Limit(12, 80)),
+    (_THESIS, "kalman"): (_Limit(9, 2), _Limit(42, 36), _Limit(70, 65)),
+    ("physical_liquids", "kalman"): (_Limit(18, 13), _Limit(20, 21), _Limit(75, 77)),
+    ("slime", "kalman"): (_Limit(13, 5), _Limit(67, 66), _Limit(82, 81)),
+    ("dampers", "kalman"): (_Limit(3, 1), _Limit(3, 1), _Limit(3, 1)),
+    (_STEEP, "kalman"): (_Limit(85, 87), _Limit(92, 92), _Limit(95, 95)),
+    (_HONEY, "ewma"): (_Limit(40, 5), _Limit(40, 26), _Limit(74, 70)),
+    (_BOUNDED, "ewma"): (_Limit(4.2, 5), _Limit(4.2, 5), _Limit(11, 70)),
+    (_THESIS, "ewma"): (_Limit(18, 5), _Limit(40, 30), _Limit(67, 60)),
+    ("physical_liquids", "ewma"): (_Limit(40, 5), _Limit(40, 27), _Limit(76, 73)),
+    ("slime", "ewma"): (_Limit(17, 5), _Limit(58, 58), _Limit(76, 76)),
+    ("dampers", "ewma"): (_Limit(11, 1), _Limit(11, 1), _Limit(11, 1)),
+    (_STEEP, "ewma"): (_Limit(92, 88), _Limit(95, 95), _Limit(97, 97)),
 }
 """By group and estimator: at one, two and three ticks of delay, on every device."""
 
@@ -86,11 +86,11 @@ DEVICES: Final[Mapping[str, Device]] = {
     "force-dimension": Device(count_um=10.0, mass_kg=0.2, least_kg=0.2),
 }
 """A count of the Inverse3 is not published: [choice]. All drivers permit 8 N."""
-ESTIMATORS: Final = ("kalman", "ewma")
+_ESTIMATORS: Final = ("kalman", "ewma")
 DELAYS: Final = (1, 2, 3)
-LASTS_S: Final = 6.0
-SETTLED_S: Final = 1.5
-RELEASES: Final = 4
+_LASTS_S: Final = 6.0
+_SETTLED_S: Final = 1.5
+_RELEASES: Final = 4
 
 
 class Delivered(NamedTuple):
@@ -107,18 +107,18 @@ class Delivered(NamedTuple):
 
     @property
     def group(self) -> str:
-        of_file = (group for name, group in GROUPS.items() if self.liquid.startswith(name))
-        return SINGLE.get(self.liquid) or next(of_file, THESIS)
+        of_file = (group for name, group in _GROUPS.items() if self.liquid.startswith(name))
+        return _SINGLE.get(self.liquid) or next(of_file, _THESIS)
 
     @property
     def share_of_limits(self) -> tuple[float, float]:
-        limit = LIMITS[self.group, self.estimator][self.delay - 1]
-        most = limit.error * self.bound if self.group == BOUNDED else limit.error
+        limit = _LIMITS[self.group, self.estimator][self.delay - 1]
+        most = limit.error * self.bound if self.group == _BOUNDED else limit.error
         return self.error / most, self.withheld / limit.withheld
 
 
 @cache
-def shipped_liquids() -> Mapping[str, tuple[str, ...]]:
+def _shipped_liquids() -> Mapping[str, tuple[str, ...]]:
     """Return the liquids of all shipped studies, those of the same force once, with the names of the others."""
     found: dict[str, list[str]] = {}
     for name, scene in scenes().items():
@@ -131,14 +131,14 @@ def shipped_liquids() -> Mapping[str, tuple[str, ...]]:
 
 def measure(
     names: Sequence[str] | None = None,
-    estimators: Sequence[str] = ESTIMATORS,
+    estimators: Sequence[str] = _ESTIMATORS,
     delays: Sequence[int] = DELAYS,
     devices: Sequence[str] = tuple(DEVICES),
     *,
     executor: Executor | None = None,
 ) -> tuple[Delivered, ...]:
     """Return what arrives of liquids (by default all), by an executor or here."""
-    planned = itertools.product(devices, estimators, names or shipped_liquids(), delays)
+    planned = itertools.product(devices, estimators, names or _shipped_liquids(), delays)
     return run(_measured, planned, executor)
 
 
@@ -174,9 +174,9 @@ class Errors(NamedTuple):
 def errors(case: Case) -> Errors:
     """Return the errors in a held stroke."""
     scene = without_buoyancy(scene_of(case))
-    path_m = sine_path(WHOLE.amplitude_m, 2 * math.pi * WHOLE.frequency_hz, LASTS_S, case.rate_hz)
+    path_m = sine_path(WHOLE.amplitude_m, 2 * math.pi * WHOLE.frequency_hz, _LASTS_S, case.rate_hz)
     trace = Bench(case, scene=scene).follow(path_m)
-    counted = trace.t_s >= SETTLED_S
+    counted = trace.t_s >= _SETTLED_S
     law_n = law_along(scene, trace)[counted]
     sent_n, asked_n = trace.sent_n[counted], trace.asked_n[counted]
     error = math.sqrt(float(np.sum((sent_n - law_n) ** 2) / np.sum(law_n**2)))
@@ -189,8 +189,8 @@ def _strokes(case: Case) -> Iterator[Case]:
     """Yield the strokes that are judged: held, and released at phases of a cycle."""
     for hand in ("light", "middle", "firm"):
         yield replace(case, hand=hand)
-    for plant, phase in itertools.product((FIRST, SECOND), range(RELEASES)):
-        released_s = round(0.6 + phase / (RELEASES * WHOLE.frequency_hz), 5)
+    for plant, phase in itertools.product((FIRST, SECOND), range(_RELEASES)):
+        released_s = round(0.6 + phase / (_RELEASES * WHOLE.frequency_hz), 5)
         yield replace(case, hand=LETS_GO, plant=plant, release_s=released_s)
 
 
@@ -210,10 +210,10 @@ def _lines(found: Sequence[Delivered]) -> Iterator[str]:
         yield f"{device}, {DEVICES[device].count_um:g} µm, {estimator}"
         for liquid, rows in itertools.groupby(of_loop, key=lambda one: one.liquid):
             cells = (f"{it.error:6.1f} {it.bound:5.1f} {it.withheld:5.1f} {len(it.unstable):2d}" for it in rows)
-            same = "".join(f" = {name}" for name in shipped_liquids().get(liquid, ()))
+            same = "".join(f" = {name}" for name in _shipped_liquids().get(liquid, ()))
             yield f"  {liquid:20}{'  '.join(cells)}{same}"
     yield ""
-    for (group, estimator), limits in LIMITS.items():
+    for (group, estimator), limits in _LIMITS.items():
         for delay, limit in enumerate(limits, start=1):
             of_limit = [it for it in found if (it.group, it.estimator, it.delay) == (group, estimator, delay)]
             if of_limit:
@@ -223,8 +223,8 @@ def _lines(found: Sequence[Delivered]) -> Iterator[str]:
     yield from map(str, unstable)
 
 
-def _verdict(rows: Sequence[Delivered], limit: Limit, what: str) -> str:
-    units = " times the least" if rows[0].group == BOUNDED else " %", " %"
+def _verdict(rows: Sequence[Delivered], limit: _Limit, what: str) -> str:
+    units = " times the least" if rows[0].group == _BOUNDED else " %", " %"
     shares = (max(shares) for shares in zip(*(it.share_of_limits for it in rows), strict=True))
     said = (
         f"{name} at most {most:g}{unit}: {'met' if share <= 1.0 else 'not met'} ({share * most:.3g})"

@@ -46,15 +46,15 @@ from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.pack import pack
 from study_app.haptics.runtime.telemetry import Telemetry
 
-DELAY: Final = 1
+_DELAY: Final = 1
 """Ticks that a Falcon's force is late."""
-BEYOND_SCRIPTED_J: Final = 2e-3
-SHIFTS_S: Final = (-2e-3, -1e-3, 1e-3, 2e-3)
-COUNTS_M: Final = (38e-6, 48e-6, 57e-6)
+_BEYOND_SCRIPTED_J: Final = 2e-3
+_SHIFTS_S: Final = (-2e-3, -1e-3, 1e-3, 2e-3)
+_COUNTS_M: Final = (38e-6, 48e-6, 57e-6)
 """Of a Falcon's encoders at the grip, over its workspace."""
-STOP_M: Final = (0.055, 0.055, 0.05)
-AT_STOP: Final = 0.999
-MOTOR_STEP_N: Final = 0.1
+_STOP_M: Final = (0.055, 0.055, 0.05)
+_AT_STOP: Final = 0.999
+_MOTOR_STEP_N: Final = 0.1
 """What the units of three motors may add to the limit."""
 
 _READY_S = 0.3  # the hand goes to where the motion begins
@@ -84,34 +84,34 @@ class _Scripted(ScriptedDevice):
 
     def __init__(self, count_m: float) -> None:
         super().__init__(tremor_m=0.0, quantum_m=count_m)
-        self.state.handle.delay = DELAY
+        self.state.handle.delay = _DELAY
 
 
 def judge_driven(case: Case) -> Verdict:
     """Run a case through the Falcon's driver, and say whether it is stable."""
-    falcon = opened_falcon()
+    falcon = _opened_falcon()
     falcon.renew()
     dynamics = falcon.dynamics
     trace = _trace(case, falcon, falcon.hand, dynamics)
     trace.acting_n[:-1] = trace.acting_n[1:]  # of the handle, which keeps what acted up to the present
     if not (np.isfinite(trace.sent_n).all() and np.isfinite(trace.position_m).all()):
         return not_finite(case, trace, safe=True)
-    others = scripted_traces(case, dynamics)
+    others = _scripted_traces(case, dynamics)
     balance_j, strongest_n, longest_m = lowest_balance(trace)
-    permitted_j = -ALLOWANCE_J - (1 + DELAY) * strongest_n * longest_m
+    permitted_j = -ALLOWANCE_J - (1 + _DELAY) * strongest_n * longest_m
     lacks = balance_j < permitted_j
     if case.hand == LETS_GO:
         balance_j = -_given_out(case, trace)
-        permitted_j = -BEYOND_SCRIPTED_J - max(_given_out(case, other) for other in others)
-        for shift_s in SHIFTS_S:
+        permitted_j = -_BEYOND_SCRIPTED_J - max(_given_out(case, other) for other in others)
+        for shift_s in _SHIFTS_S:
             if balance_j < permitted_j:
                 near = dataclasses.replace(case, release_s=case.release_s + shift_s)
-                given_j = max(_given_out(near, other) for other in scripted_traces(near, dynamics))
-                permitted_j = min(permitted_j, -BEYOND_SCRIPTED_J - given_j)
+                given_j = max(_given_out(near, other) for other in _scripted_traces(near, dynamics))
+                permitted_j = min(permitted_j, -_BEYOND_SCRIPTED_J - given_j)
     swing_mps = swing(trace, case)
     fast_n, scripted_n = _restlessness(case, trace, others)
     reasons = reasons_of(
-        np.linalg.norm(trace.sent_n, axis=1).max() > FORCE_LIMIT_N + MOTOR_STEP_N,
+        np.linalg.norm(trace.sent_n, axis=1).max() > FORCE_LIMIT_N + _MOTOR_STEP_N,
         lacks or balance_j < permitted_j,
         swing_mps > SWING_MPS,
         fast_n - scripted_n > RESTLESS_N,
@@ -129,13 +129,13 @@ def judge_driven(case: Case) -> Verdict:
     )
 
 
-def scripted_traces(case: Case, dynamics: Dynamics) -> list[Any]:
+def _scripted_traces(case: Case, dynamics: Dynamics) -> list[Any]:
     """Return the traces of a case on scripted devices, one for each encoder count."""
-    devices = [_Scripted(count_m) for count_m in COUNTS_M]
+    devices = [_Scripted(count_m) for count_m in _COUNTS_M]
     return [_trace(case, device, device, dynamics) for device in devices]
 
 
-def opened_falcon() -> _Falcon:
+def _opened_falcon() -> _Falcon:
     """Return the opened Falcon of this thread."""
     if not hasattr(_ours, "falcon"):
         _ours.falcon = _Falcon()
@@ -149,7 +149,7 @@ def _trace(case: Case, device: Driver, hand: Any, dynamics: Dynamics) -> Any:
     handle, grip = hand.state.handle, GRIPS[case.hand]
     handle.mass_kg, handle.viscous_nspm, handle.coulomb_n = case.mass_kg, case.viscous_nspm, case.coulomb_n
     handle.hand_kg, handle.stiffness_npm, handle.damping_nspm = grip.mass_kg, grip.stiffness_npm, grip.damping_nspm
-    handle.stop_m = STOP_M
+    handle.stop_m = _STOP_M
     hand.follow(*_motion(case))
     clock, control = VirtualClock(), records(CONTROL, 1)
     control[0].period_ns = control[0].deadline_ns = round(1e9 / case.rate_hz)
@@ -198,7 +198,7 @@ def _follow(
         write_row(models[0], safety[0], sample, handle, trace[k])
         trace[k].t_s = k * 1e-9 * control[0].period_ns
         copy(safety[0].passivity.lift_n, trace[k].lift_n)
-        trace[k].delay = DELAY
+        trace[k].delay = _DELAY
     return int(trace.shape[0])
 
 
@@ -220,7 +220,7 @@ def _places(loop: Any, t_s: Any, out_m: Any) -> None:
 def _given_out(case: Case, trace: Any) -> float:
     """Return the most that the motors gave to the handle from its release until it met an end stop [J]."""
     first = int(np.searchsorted(trace.t_s, case.release_s - 1e-9))
-    met = (np.abs(trace.position_m[first:]) >= AT_STOP * np.array(STOP_M)).any(axis=1)
+    met = (np.abs(trace.position_m[first:]) >= _AT_STOP * np.array(_STOP_M)).any(axis=1)
     last = first + int(np.argmax(met)) if met.any() else len(trace)
     return float(given_out_j(trace[first:last]))
 

@@ -28,20 +28,20 @@ LIQUIDS: Final = (
     "syrup",
     *(f"physical2_{name}" for name in ("water", "olive_oil", "glycerin", "gear_oil", "honey")),
 )
-ESTIMATORS: Final = ("ewma", "kalman")
-HANDS: Final = ("light", "middle", "firm")
-DELAYS_MS: Final = (0, 1, 2, 5, 10, 20, 50, 100, 200)
-AMPLITUDE_M: Final = 0.03
-SPEED_MPS: Final = 0.2
-LASTS_S: Final = 6.0
-SETTLED_S: Final = 1.0
+_ESTIMATORS: Final = ("ewma", "kalman")
+_HANDS: Final = ("light", "middle", "firm")
+_DELAYS_MS: Final = (0, 1, 2, 5, 10, 20, 50, 100, 200)
+_AMPLITUDE_M: Final = 0.03
+_SPEED_MPS: Final = 0.2
+_LASTS_S: Final = 6.0
+_SETTLED_S: Final = 1.0
 
 
 def measure(
     liquids: Iterable[str] = LIQUIDS,
-    estimators: Iterable[str] = ESTIMATORS,
-    hands: Iterable[str] = HANDS,
-    delays_ms: Iterable[float] = DELAYS_MS,
+    estimators: Iterable[str] = _ESTIMATORS,
+    hands: Iterable[str] = _HANDS,
+    delays_ms: Iterable[float] = _DELAYS_MS,
     progress: Callable[[int], object] = lambda _done: None,
 ) -> tuple[Entry, ...]:
     """Return the table, line by line; ``progress`` is called with the number of lines so far."""
@@ -65,7 +65,7 @@ def evidence(entries: Sequence[Entry], file: str) -> Evidence:
 
 def delayed_trace(case: Case) -> Any:
     """Return the trace of a hand that stirs the case's liquid, buoyancy aside, with the case's delay of the force."""
-    path_m = sine_path(AMPLITUDE_M, SPEED_MPS / AMPLITUDE_M, LASTS_S, case.rate_hz)
+    path_m = sine_path(_AMPLITUDE_M, _SPEED_MPS / _AMPLITUDE_M, _LASTS_S, case.rate_hz)
     return Bench(case, scene=without_buoyancy(scene_of(case))).follow(path_m)
 
 
@@ -73,7 +73,7 @@ def _entry(liquid: str, estimator: str, hand: str, delay_ms: float) -> Entry:
     scale = scenes()[liquid].scale
     case = Case(liquid=liquid, scale=scale, estimator=estimator, hand=hand, force_delay_ms=delay_ms)
     trace = delayed_trace(case)
-    counted = trace[trace.t_s >= SETTLED_S]
+    counted = trace[trace.t_s >= _SETTLED_S]
     sent_n = np.linalg.norm(counted.sent_n, axis=1)
     left = math.sqrt(float(np.mean(sent_n**2) / np.mean(counted.permitted_n**2)))
     withheld = float(np.sum(counted.withheld_n) / np.sum(counted.permitted_n))

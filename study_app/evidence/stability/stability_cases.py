@@ -37,7 +37,7 @@ FALCON: Final = "falcon"
 DAMPER: Final = "damper"
 """The strongest linear damper that a file may ask for."""
 
-OF_SWEEP: Final = {"rek2024": "", "physical_liquids": "physical_"}
+_OF_SWEEP: Final = {"rek2024": "", "physical_liquids": "physical_"}
 """Studies whose liquids the sweep presents, and what precedes their names."""
 
 THROWN: Final = "thrown"
@@ -45,14 +45,14 @@ LETS_GO: Final = "lets-go"
 
 DEVICE: Final = "device"
 """The estimator of cases whose device measures the velocity itself."""
-AVERAGE: Final = "average"
-FIRST_ORDER: Final = "first-order"
-LATE: Final = "late"
-FILTERS: Final = (AVERAGE, FIRST_ORDER, LATE)
+_AVERAGE: Final = "average"
+_FIRST_ORDER: Final = "first-order"
+_LATE: Final = "late"
+FILTERS: Final = (_AVERAGE, _FIRST_ORDER, _LATE)
 """Why the velocity of such a device lags: a mean over twice the lag, a filter of first order, or delay alone."""
-OF_DEVICE: Final = ("velocity_lag", "velocity_filter", "velocity_noise_mmps", "velocity_count_mmps")
+_OF_DEVICE: Final = ("velocity_lag", "velocity_filter", "velocity_noise_mmps", "velocity_count_mmps")
 """Fields of cases with such a device, which the line of any other leaves out."""
-OF_SOME: Final = ("swaps", "jump_mm", "outliers", "outlier_mm")
+_OF_SOME: Final = ("swaps", "jump_mm", "outliers", "outlier_mm")
 """Fields that a line leaves out where they are 0: the seed of a force link is that of the line."""
 
 
@@ -73,7 +73,7 @@ GRIPS: Final[Mapping[str, Grip]] = {
     THROWN: Grip(mass_kg=0.554, stiffness_npm=135.0, damping_nspm=6.45),
 }
 
-RANGES: Final[Mapping[str, tuple[float, float]]] = {
+_RANGES: Final[Mapping[str, tuple[float, float]]] = {
     "scale": (0.1, 100.0),
     "rate_hz": (250.0, 5000.0),
     "delay": (0, 4),
@@ -107,7 +107,7 @@ RANGES: Final[Mapping[str, tuple[float, float]]] = {
 }
 """What a case may be made of; the sweep's own choices lie within."""
 
-ESTIMATORS: Final[Mapping[str, Any]] = {it.name: it.model() for it in KINDS if it.of_device}
+_ESTIMATORS: Final[Mapping[str, Any]] = {it.name: it.model() for it in KINDS if it.of_device}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,7 +161,7 @@ class Case:
     force_jitter_ms: float = 0.0
     force_loss: float = 0.0
     velocity_lag: float = 0.0
-    velocity_filter: str = AVERAGE
+    velocity_filter: str = _AVERAGE
     velocity_noise_mmps: float = 0.0
     velocity_count_mmps: float = 0.0
     swaps: int = 0
@@ -180,9 +180,9 @@ class Case:
         return self.believed_delay != self.delay or self.slows_to > self.delay
 
     def __str__(self) -> str:
-        unused = () if self.estimator == DEVICE else OF_DEVICE
+        unused = () if self.estimator == DEVICE else _OF_DEVICE
         names = [field.name for field in fields(self) if field.name not in unused]
-        names = [name for name in names if name not in OF_SOME or getattr(self, name)]
+        names = [name for name in names if name not in _OF_SOME or getattr(self, name)]
         return " ".join(f"{name}={_word(getattr(self, name))}" for name in names)
 
 
@@ -212,14 +212,14 @@ def parse(line: str) -> Case:
                 f"{name}={value} must be {'a number' if kinds[name] is float else 'a whole number'}"
             ) from error
     case = Case(**values)
-    for name, (low, high) in RANGES.items():
+    for name, (low, high) in _RANGES.items():
         if not low <= getattr(case, name) <= high:
             raise StudyError(f"{name}={getattr(case, name):g} must lie between {low:g} and {high:g}")
     for name, permitted in (
         ("liquid", scenes()),
         ("hand", GRIPS),
         ("motion", MOTIONS),
-        ("estimator", (*ESTIMATORS, DEVICE)),
+        ("estimator", (*_ESTIMATORS, DEVICE)),
         ("velocity_filter", FILTERS),
         ("plant", (*PLANTS, FALCON)),
     ):
@@ -238,7 +238,7 @@ def liquids() -> Mapping[str, Scene]:
     ask for.
     """
     found: dict[str, Scene] = {}
-    for protocol, prefix in OF_SWEEP.items():
+    for protocol, prefix in _OF_SWEEP.items():
         study = load(shipped_file(protocol))
         found |= {f"{prefix}{name}": study.scene_of(name) for name in study.liquids}
     damper = Liquid(id=DAMPER, density_kg_m3=1000, drag=Drag(law="linear", damping_nspm=DAMPING_NSPM[1]))
@@ -252,7 +252,7 @@ def scenes() -> Mapping[str, Scene]:
     """Return what a case may present: what the sweep does, and the liquids of all other shipped studies."""
     found = dict(liquids())
     for protocol in shipped():
-        if protocol in OF_SWEEP:
+        if protocol in _OF_SWEEP:
             continue
         study = load(shipped_file(protocol))
         found |= {f"{protocol}_{name}": study.scene_of(name) for name in study.liquids}
@@ -273,7 +273,7 @@ def of_physical2() -> tuple[str, ...]:
 
 def scene_of(case: Case) -> Scene:
     """Return what the case presents."""
-    velocity = ESTIMATORS["ewma" if case.estimator == DEVICE else case.estimator]  # a device's own takes its place
+    velocity = _ESTIMATORS["ewma" if case.estimator == DEVICE else case.estimator]  # a device's own takes its place
     link = _link_of(case)
     changed = {"scale": case.scale, "rate_hz": case.rate_hz, "velocity": velocity, "link": link}
     return Scene.model_validate(scenes()[case.liquid].model_copy(update=changed).model_dump())

@@ -42,48 +42,48 @@ from study_app.haptics.model.scene import Ewma
 from study_app.haptics.model.slope_limits import slope_limit, slope_limit_table
 from study_app.store.csv_files import csv_text_of
 
-HEIGHT_PT: Final = 256.0
-PLOT_PT: Final = 146.0
-FOOT_PT: Final = 62.0
-FRICTIONS_NSPM: Final = (0.1, 0.3, 1.0, 3.0, 10.0)
-MAP_DELAYS: Final = (0, 1, 2, 4)
-LIMIT_DELAYS: Final = (1, 2, 4)
-COLOURS: Final = dict(zip(MAP_DELAYS, (style.STEPS[0], style.STEPS[1], style.STEPS[3], style.STEPS[4]), strict=True))
-CAPTION: Final = (
+_HEIGHT_PT: Final = 256.0
+_PLOT_PT: Final = 146.0
+_FOOT_PT: Final = 62.0
+_FRICTIONS_NSPM: Final = (0.1, 0.3, 1.0, 3.0, 10.0)
+_MAP_DELAYS: Final = (0, 1, 2, 4)
+_LIMIT_DELAYS: Final = (1, 2, 4)
+_COLOURS: Final = dict(zip(_MAP_DELAYS, (style.STEPS[0], style.STEPS[1], style.STEPS[3], style.STEPS[4]), strict=True))
+_CAPTION: Final = (
     "Lines show the boundary measured with the servo's own tick, an exact encoder and safety off. The dashed "
     "line is b = B·α/(2 − α), extended to a delay; below it the loop is stable for any hand. Bars show the "
     "limits in use; they exceed half of the boundary only at 1 kHz with up to one tick of delay."
 )
-CAPTION_LETTERS: Final = 112
-MARKS: Final = dict(zip(MAP_DELAYS, "osD^", strict=True))
+_CAPTION_LETTERS: Final = 112
+_MARKS: Final = dict(zip(_MAP_DELAYS, "osD^", strict=True))
 
 
 @style.own_settings(style.PLOT_SETTINGS)
 def draw_map(off: Sequence[Verdict]) -> Figure:
     """Draw the map; ``off`` are the verdicts of a sweep without safety."""
-    figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, HEIGHT_PT / 72), facecolor="white")
+    figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, _HEIGHT_PT / 72), facecolor="white")
     width_pt = style.PAGE_WIDTH_PT
     axes = [
-        figure.add_axes((left_pt / width_pt, FOOT_PT / HEIGHT_PT, wide_pt / width_pt, PLOT_PT / HEIGHT_PT))
+        figure.add_axes((left_pt / width_pt, _FOOT_PT / _HEIGHT_PT, wide_pt / width_pt, _PLOT_PT / _HEIGHT_PT))
         for left_pt, wide_pt in ((34, 150), (232, 118), (400, 105))
     ]
     _boundary(axes[0])
     _limits(axes[1])
     _found(axes[2], off)
-    caption = textwrap.fill(CAPTION, CAPTION_LETTERS)
-    figure.text(34 / width_pt, 6 / HEIGHT_PT, caption, color=style.TEXT_SOFT, linespacing=1.25)
+    caption = textwrap.fill(_CAPTION, _CAPTION_LETTERS)
+    figure.text(34 / width_pt, 6 / _HEIGHT_PT, caption, color=style.TEXT_SOFT, linespacing=1.25)
     return figure
 
 
 def _boundary(axes: Axes) -> None:
     """Draw the maximum stable damping of a handle with some friction, and that which its friction alone proves."""
-    for delay in MAP_DELAYS:
-        measured = [boundary_nspm(Ewma(), NOMINAL_S, delay, friction_nspm=b) for b in FRICTIONS_NSPM]
-        proved = [passive_nspm(b, NOMINAL_S, delay) for b in FRICTIONS_NSPM]
-        look: dict[str, Any] = {"color": COLOURS[delay]}
-        axes.plot(FRICTIONS_NSPM, measured, marker=MARKS[delay], markersize=3, label=str(delay), **look)
-        axes.plot(FRICTIONS_NSPM, proved, linestyle=(0, (3, 2)), linewidth=0.9, **look)
-    _logarithmic(axes, FRICTIONS_NSPM, (1, 10, 100))
+    for delay in _MAP_DELAYS:
+        measured = [boundary_nspm(Ewma(), NOMINAL_S, delay, friction_nspm=b) for b in _FRICTIONS_NSPM]
+        proved = [passive_nspm(b, NOMINAL_S, delay) for b in _FRICTIONS_NSPM]
+        look: dict[str, Any] = {"color": _COLOURS[delay]}
+        axes.plot(_FRICTIONS_NSPM, measured, marker=_MARKS[delay], markersize=3, label=str(delay), **look)
+        axes.plot(_FRICTIONS_NSPM, proved, linestyle=(0, (3, 2)), linewidth=0.9, **look)
+    _logarithmic(axes, _FRICTIONS_NSPM, (1, 10, 100))
     axes.set_title(f"Maximum stable damping B [N·s/m]\nof {FREE_HANDLE_KG:g} kg at 1 kHz", pad=26)
     axes.set_xlabel("Friction b of the handle [N·s/m]", loc="right", labelpad=1)
     _name_curves(axes, 4)
@@ -91,11 +91,11 @@ def _boundary(axes: Axes) -> None:
 
 def _limits(axes: Axes) -> None:
     periods_ms = [period_s * 1e3 for period_s in PERIODS_S]
-    for delay in LIMIT_DELAYS:
+    for delay in _LIMIT_DELAYS:
         measured = [boundary_nspm(Ewma(), period_s, delay) for period_s in PERIODS_S]
         allowed = [slope_limit(period_s, delay) for period_s in PERIODS_S]
-        look: dict[str, Any] = {"color": COLOURS[delay]}
-        axes.plot(periods_ms, measured, marker=MARKS[delay], markersize=3, label=str(delay), **look)
+        look: dict[str, Any] = {"color": _COLOURS[delay]}
+        axes.plot(periods_ms, measured, marker=_MARKS[delay], markersize=3, label=str(delay), **look)
         for period_ms, limit in zip(periods_ms, allowed, strict=True):
             axes.plot((period_ms / 1.18, period_ms * 1.18), (limit, limit), linewidth=2.2, **look)
     _logarithmic(axes, periods_ms, (3, 10, 30, 100))
@@ -152,12 +152,12 @@ def _name_curves(axes: Axes, columns: int) -> None:
 
 LOOPS: Final = ((1000.0, 0), (1000.0, 1), (1000.0, 2), (1000.0, 4), (2000.0, 1), (500.0, 1), (250.0, 1))
 """Ticks a second and ticks of delay; the first two are those of a study."""
-MOTIONS: Final = (REACHES, CIRCLES, STROKE)
-SPEEDS_MPS: Final = (0.1, 0.3, 0.6, 1.0)
-RELATIVE: Final = 0.05
-ABSOLUTE_N: Final = 0.05
-SETTLED_S: Final = 0.2
-MOVING_S: Final = 1.2
+_MOTIONS: Final = (REACHES, CIRCLES, STROKE)
+_SPEEDS_MPS: Final = (0.1, 0.3, 0.6, 1.0)
+_RELATIVE: Final = 0.05
+_ABSOLUTE_N: Final = 0.05
+_SETTLED_S: Final = 0.2
+_MOVING_S: Final = 1.2
 
 
 class Fidelity(NamedTuple):
@@ -181,7 +181,7 @@ class Fidelity(NamedTuple):
     @property
     def target_n(self) -> float:
         """How great the difference may be."""
-        return max(RELATIVE * self.force_n, ABSOLUTE_N)
+        return max(_RELATIVE * self.force_n, _ABSOLUTE_N)
 
     @property
     def within(self) -> bool:
@@ -210,7 +210,7 @@ def _worst_fidelity(liquid: str, loop: tuple[float, int]) -> Fidelity:
 
 def _motions(liquid: str, rate_hz: float, delay: int) -> Iterator[Fidelity]:
     scene = liquids()[liquid]
-    for motion, speed_mps in itertools.product(MOTIONS, SPEEDS_MPS):
+    for motion, speed_mps in itertools.product(_MOTIONS, _SPEEDS_MPS):
         case = Case(
             liquid=liquid,
             scale=scene.scale,
@@ -223,7 +223,7 @@ def _motions(liquid: str, rate_hz: float, delay: int) -> Iterator[Fidelity]:
         bench, trace = Bench(case), new_trace(case)
         bench.begin()
         trace = trace[: bench.run(trace, 0, lasts_s(case))]
-        trace = trace[(trace.t_s > SETTLED_S) & (trace.t_s < MOVING_S)]
+        trace = trace[(trace.t_s > _SETTLED_S) & (trace.t_s < _MOVING_S)]
         yield _compare(case, trace)
 
 
@@ -239,15 +239,15 @@ def _compare(case: Case, trace: Any) -> Fidelity:
         delay=case.delay,
         difference_n=float(np.sqrt(np.mean(off_n**2))),
         force_n=float(np.sqrt(np.mean(force_n**2))),
-        beyond=float(np.mean(off_n > np.maximum(RELATIVE * force_n, ABSOLUTE_N))),
+        beyond=float(np.mean(off_n > np.maximum(_RELATIVE * force_n, _ABSOLUTE_N))),
     )
 
 
-MEASURES: Final = ("balance_j", "permitted_j", "swing_mps", "fast_n", "played_n")
+_MEASURES: Final = ("balance_j", "permitted_j", "swing_mps", "fast_n", "played_n")
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class _Judged:
     """The verdicts on a group of cases, with safety on."""
 
     name: str
@@ -265,7 +265,7 @@ class Swept:
     off: tuple[Verdict, ...]
     on: tuple[Verdict, ...]
     took_s: float
-    others: tuple[Judged, ...] = ()
+    others: tuple[_Judged, ...] = ()
 
     @property
     def unstable(self) -> tuple[Verdict, ...]:
@@ -273,9 +273,9 @@ class Swept:
         return tuple(verdict for one in self.groups for verdict in one.unstable)
 
     @property
-    def groups(self) -> tuple[Judged, ...]:
+    def groups(self) -> tuple[_Judged, ...]:
         """All groups, the sweep with safety on, if it was judged, before the others."""
-        return (*([Judged("first plant", self.on)] if self.on else []), *self.others)
+        return (*([_Judged("first plant", self.on)] if self.on else []), *self.others)
 
 
 def run_sweep(
@@ -293,7 +293,7 @@ def run_sweep(
     planned += [(case, True) for group in others for case in group.cases]
     verdicts = iter(run(_judge, planned, executor, lambda done: progress(done, len(planned))))
     off, on = [tuple(itertools.islice(verdicts, len(cases))) for _ in range(2)]
-    judged = [Judged(group.name, tuple(itertools.islice(verdicts, len(group.cases)))) for group in others]
+    judged = [_Judged(group.name, tuple(itertools.islice(verdicts, len(group.cases)))) for group in others]
     return Swept(off, on, time.perf_counter() - began, tuple(judged))
 
 
@@ -410,11 +410,11 @@ def limits(executor: Executor, progress: Callable[[int, int], object], file: str
 
 
 def _cases_csv(swept: Swept) -> str:
-    names = [f"{name}_{safety}" for safety in ("off", "on") for name in ("unstable", *MEASURES)]
+    names = [f"{name}_{safety}" for safety in ("off", "on") for name in ("unstable", *_MEASURES)]
     rows: list[Sequence[Any]] = [(*(field.name for field in fields(Case)), *names, *(f"{n}_on" for n in LIMITER_NAMES))]
     for off, on in zip(swept.off, swept.on, strict=True):
         row = list(astuple(off.case))
         for verdict in (off, on):
-            row += ["; ".join(verdict.reasons), *(f"{getattr(verdict, name):.4g}" for name in MEASURES)]
+            row += ["; ".join(verdict.reasons), *(f"{getattr(verdict, name):.4g}" for name in _MEASURES)]
         rows.append((*row, *(f"{share:.4g}" for share in on.acted)))
     return csv_text_of(rows)

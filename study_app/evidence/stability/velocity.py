@@ -36,17 +36,17 @@ from study_app.haptics.model.slope_limits import slope_limit
 from study_app.haptics.runtime.offline import simulate
 
 COUNT_M: Final = 38e-6
-RATE_HZ: Final = 1000.0
-JITTER_S: Final = 40e-6
-SETTLED: Final = 500
+_RATE_HZ: Final = 1000.0
+_JITTER_S: Final = 40e-6
+_SETTLED: Final = 500
 """Samples before errors count."""
 PLACES: Final = 4
 """Motions are repeated from as many positions between two counts."""
-NOISE_HZ: Final = 20.0
-TREMOR_M: Final = 20e-6
-TREMOR_HZ: Final = 9.0
-NOISE_MPS: Final = (0.0, 0.005, 0.02, 0.05)
-BATCHES: Final = 200
+_NOISE_HZ: Final = 20.0
+_TREMOR_M: Final = 20e-6
+_TREMOR_HZ: Final = 9.0
+_NOISE_MPS: Final = (0.0, 0.005, 0.02, 0.05)
+_BATCHES: Final = 200
 
 
 class Stroke(NamedTuple):
@@ -76,31 +76,31 @@ class Stroke(NamedTuple):
         return (self.places_m(t_s + step_s) - self.places_m(t_s - step_s)) / (2 * step_s)
 
 
-SMOOTH: Final = (
+_SMOOTH: Final = (
     Stroke(0.03, 1.0),
     Stroke(0.03, 2.0),
     Stroke(0.03, 3.0),
     Stroke(0.03, reach_s=0.5),
     Stroke(0.03, reach_s=0.3),
 )
-FASTEST: Final = (Stroke(0.03, 5.0), Stroke(0.01, 5.0), Stroke(0.03, reach_s=0.2))
-SHOWN: Final = (Stroke(0.01, 8.0),)
+_FASTEST: Final = (Stroke(0.03, 5.0), Stroke(0.01, 5.0), Stroke(0.03, reach_s=0.2))
+_SHOWN: Final = (Stroke(0.01, 8.0),)
 """Faster than strokes of participants: shown, without a goal."""
 
 
 def errors(velocity: Velocity) -> Mapping[Stroke, float]:
     """Return the error of v·|v| [%] in each stroke."""
-    return {stroke: _error(velocity, stroke) for stroke in (*SMOOTH, *FASTEST, *SHOWN)}
+    return {stroke: _error(velocity, stroke) for stroke in (*_SMOOTH, *_FASTEST, *_SHOWN)}
 
 
 def _error(velocity: Velocity, stroke: Stroke) -> float:
     wrong = right = 0.0
     for k in range(PLACES):
         random = np.random.default_rng(k)
-        t_s = np.arange(4000) / RATE_HZ
-        t_s = t_s + random.uniform(-0.5, 0.5, len(t_s)) * math.sqrt(12) * JITTER_S
-        true_mps = stroke.speeds_mps(t_s)[SETTLED:]
-        found_mps = estimated(velocity, t_s, stroke.places_m(t_s) + k / PLACES * COUNT_M)[SETTLED:]
+        t_s = np.arange(4000) / _RATE_HZ
+        t_s = t_s + random.uniform(-0.5, 0.5, len(t_s)) * math.sqrt(12) * _JITTER_S
+        true_mps = stroke.speeds_mps(t_s)[_SETTLED:]
+        found_mps = estimated(velocity, t_s, stroke.places_m(t_s) + k / PLACES * COUNT_M)[_SETTLED:]
         wrong += float(np.sum((found_mps * abs(found_mps) - true_mps * abs(true_mps)) ** 2))
         right += float(np.sum(true_mps**4))
     return 100 * math.sqrt(wrong / right)
@@ -109,15 +109,15 @@ def _error(velocity: Velocity, stroke: Stroke) -> float:
 def noise_mmps(velocity: Velocity) -> Mapping[float, float]:
     """Return the velocity above 20 Hz [mm/s, RMS of an axis] at constant speeds [m/s], at rest with tremor."""
     found = {}
-    t_s = np.arange(5000) / RATE_HZ
-    for speed_mps in NOISE_MPS:
-        tremor_m = TREMOR_M * np.sin(2 * math.pi * TREMOR_HZ * t_s) * (speed_mps == 0)
+    t_s = np.arange(5000) / _RATE_HZ
+    for speed_mps in _NOISE_MPS:
+        tremor_m = _TREMOR_M * np.sin(2 * math.pi * _TREMOR_HZ * t_s) * (speed_mps == 0)
         squares = []
         for seed in range(6):
             place_m = np.random.default_rng(seed).uniform(0, COUNT_M)
             v_mps = estimated(velocity, t_s, place_m + speed_mps * t_s + tremor_m)
             axes_mps = np.column_stack([v_mps, 0 * v_mps, 0 * v_mps])
-            squares.append(fast_part(axes_mps, RATE_HZ, NOISE_HZ, 1000, len(t_s)) ** 2)
+            squares.append(fast_part(axes_mps, _RATE_HZ, _NOISE_HZ, 1000, len(t_s)) ** 2)
         found[speed_mps] = 1e3 * math.sqrt(statistics.mean(squares))
     return found
 
@@ -130,28 +130,28 @@ def estimated(velocity: Velocity, t_s: Floats, x_m: Floats) -> Floats:
     return found
 
 
-def cost_ns(velocity: Velocity) -> float:
+def _cost_ns(velocity: Velocity) -> float:
     """Return the computation time of a tick [ns] less that with the raw difference; medians of batches."""
-    dynamics = Dynamics(delay_s=1 / RATE_HZ)
+    dynamics = Dynamics(delay_s=1 / _RATE_HZ)
     benches = [TickTimer(Scene(velocity=it), dynamics) for it in (velocity, Raw())]
-    for _ in range(BATCHES):
+    for _ in range(_BATCHES):
         for bench in benches:
             bench.batch()
     own_ns, least_ns = (statistics.median(bench.costs_ns) for bench in benches)
     return own_ns - least_ns
 
 
-HANDS: Final = ("light", "middle", "firm")
-DELAY: Final = 1
-LASTS_S: Final = 4.0
-SETTLED_S: Final = 1.5
+_HANDS: Final = ("light", "middle", "firm")
+_DELAY: Final = 1
+_LASTS_S: Final = 4.0
+_SETTLED_S: Final = 1.5
 
-STROKES: Final = tuple(Stroke(0.02, hz) for hz in (1.0, 2.0, 3.0))
-QUICK: Final = Stroke(0.01, 5.0)
+_STROKES: Final = tuple(Stroke(0.02, hz) for hz in (1.0, 2.0, 3.0))
+_QUICK: Final = Stroke(0.01, 5.0)
 DAMPING_NSPM: Final = 20.0
 WHOLE: Final = Stroke(0.02, 1.6)
-WHOLE_SCALE: Final = 3.0
-WHOLE_LIQUIDS: Final = ("water", "glycerin", "honey", "gear_oil")
+_WHOLE_SCALE: Final = 3.0
+_WHOLE_LIQUIDS: Final = ("water", "glycerin", "honey", "gear_oil")
 
 
 def plain_forces() -> tuple[Scene, ...]:
@@ -161,36 +161,36 @@ def plain_forces() -> tuple[Scene, ...]:
     return Scene(scale=1, liquids=(damper,), knee=Knee(law="none")), Scene(scale=10, liquids=(quadratic,))
 
 
-def whole_forces() -> tuple[Scene, ...]:
+def _whole_forces() -> tuple[Scene, ...]:
     """Return the liquids of physical2, effects chosen, without buoyancy."""
     return tuple(
-        without_buoyancy(scenes()[f"physical2_{name}"].model_copy(update={"scale": WHOLE_SCALE}))
-        for name in WHOLE_LIQUIDS
+        without_buoyancy(scenes()[f"physical2_{name}"].model_copy(update={"scale": _WHOLE_SCALE}))
+        for name in _WHOLE_LIQUIDS
     )
 
 
-def plain_errors(velocity: Velocity, strokes: Iterable[Stroke] = STROKES) -> tuple[float, ...]:
+def _plain_errors(velocity: Velocity, strokes: Iterable[Stroke] = _STROKES) -> tuple[float, ...]:
     """Return the error [%] of each plain force, in each grip and stroke."""
     return tuple(
-        held_error(scene, velocity, hand, stroke) for scene in plain_forces() for hand in HANDS for stroke in strokes
+        held_error(scene, velocity, hand, stroke) for scene in plain_forces() for hand in _HANDS for stroke in strokes
     )
 
 
 def held_error(scene: Scene, velocity: Velocity, hand: str, stroke: Stroke) -> float:
     """Return the error of a scene's force [%] in a loop of one tick of delay."""
     scene = scene.model_copy(update={"velocity": velocity})
-    bench = Bench(Case(delay=DELAY, hand=hand), scene=scene)
+    bench = Bench(Case(delay=_DELAY, hand=hand), scene=scene)
     bench.handle.motor_step_n = 0.0
-    trace = bench.follow(sine_path(stroke.amplitude_m, 2 * math.pi * stroke.frequency_hz, LASTS_S, RATE_HZ))
-    law_n, counted = law_along(scene, trace), trace.t_s >= SETTLED_S
+    trace = bench.follow(sine_path(stroke.amplitude_m, 2 * math.pi * stroke.frequency_hz, _LASTS_S, _RATE_HZ))
+    law_n, counted = law_along(scene, trace), trace.t_s >= _SETTLED_S
     off_n, right_n = (trace.asked_n - law_n)[counted], law_n[counted]
     return 100 * math.sqrt(float(np.sum(off_n**2) / np.sum(right_n**2)))
 
 
-DAMPING_RATIO: Final = 0.85
-ROWS: Final = 2**15
+_DAMPING_RATIO: Final = 0.85
+_ROWS: Final = 2**15
 """Rows of a period of the motion."""
-TAPS: Final = 400
+_TAPS: Final = 400
 """Positions that the filter uses."""
 
 
@@ -202,24 +202,24 @@ def wiener_bound(scene: Scene, count_m: float, delay_s: float) -> float:
     turns, power_m2 = _spectrum(scene.rate_hz)
     response = turns * _linear_law(scene, turns, np.sqrt(power_m2))
     variance_n2 = float(np.sum(np.abs(response) ** 2 * power_m2))
-    covariance_m2 = _course(power_m2)[:TAPS]
+    covariance_m2 = _course(power_m2)[:_TAPS]
     covariance_m2[0] += count_m**2 / 12
-    covariance_nm = _course(response * np.exp(turns * delay_s) * power_m2)[:TAPS]
+    covariance_nm = _course(response * np.exp(turns * delay_s) * power_m2)[:_TAPS]
     explained_n2 = float(solve_toeplitz(covariance_m2, covariance_nm) @ covariance_nm)
     return math.sqrt(max(1 - explained_n2 / variance_n2, 0.0))
 
 
 def _spectrum(rate_hz: float) -> tuple[Any, Floats]:
     """Return iω [1/s] and the motion's power [m²] at each frequency above 0."""
-    frequency_hz = np.fft.rfftfreq(ROWS, 1 / rate_hz)[1:-1]
+    frequency_hz = np.fft.rfftfreq(_ROWS, 1 / rate_hz)[1:-1]
     ratio = frequency_hz / WHOLE.frequency_hz
-    power_m2 = 1 / ((1 - ratio**2) ** 2 + (2 * DAMPING_RATIO * ratio) ** 2) ** 2
+    power_m2 = 1 / ((1 - ratio**2) ** 2 + (2 * _DAMPING_RATIO * ratio) ** 2) ** 2
     return 2j * math.pi * frequency_hz, WHOLE.amplitude_m**2 / 2 * power_m2 / power_m2.sum()
 
 
 def _course(values: Any) -> Floats:
-    """Return the real course (`ROWS`,) of sines whose amplitude and phase at each frequency above 0 are given."""
-    found: Floats = np.fft.irfft(np.concatenate([[0], values, [0]]), ROWS) * ROWS / 2
+    """Return the real course (`_ROWS`,) of sines whose amplitude and phase at each frequency above 0 are given."""
+    found: Floats = np.fft.irfft(np.concatenate([[0], values, [0]]), _ROWS) * _ROWS / 2
     return found
 
 
@@ -232,28 +232,28 @@ def _linear_law(scene: Scene, turns: Any, size_m: Floats) -> Any:
     x_m = np.sqrt(2) * size_m * np.exp(1j * phase)
     v_mps = turns * x_m
     places_m, speeds_mps = (scene.scale * np.tile(_course(it), 2) for it in (x_m, v_mps))
-    law_n = simulate(scene, along_x(np.arange(2 * ROWS) / scene.rate_hz, places_m, speeds_mps)).fx_n[ROWS:]
+    law_n = simulate(scene, along_x(np.arange(2 * _ROWS) / scene.rate_hz, places_m, speeds_mps)).fx_n[_ROWS:]
     parts = np.stack([np.ones_like(turns), turns, np.sqrt(turns)])
     courses = np.column_stack([_course(it * v_mps) for it in parts])
     return np.linalg.lstsq(courses, law_n - law_n.mean(), rcond=None)[0] @ parts
 
 
-ESTIMATORS: Final[tuple[Velocity, ...]] = (Kalman(), Ewma())
+_ESTIMATORS: Final[tuple[Velocity, ...]] = (Kalman(), Ewma())
 """The estimator that is judged, then its references."""
-PERIOD_S: Final = 1e-3
-MASSES_KG: Final = (0.05, 0.1, 0.2, 0.25, 0.5)
-LOOPS: Final = ((1, 1), (2, 1), (0, 1), (2, 2))
+_PERIOD_S: Final = 1e-3
+_MASSES_KG: Final = (0.05, 0.1, 0.2, 0.25, 0.5)
+_LOOPS: Final = ((1, 1), (2, 1), (0, 1), (2, 2))
 """Delay of the device and delay believed [ticks]."""
-SMOOTH_PERCENT: Final = 2.5
-FASTEST_PERCENT: Final = 5.0
-HELD_PERCENT: Final = 3.0
-REST_NOISE: Final = 1.3
-LEAST_LIMIT_NSPM: Final = 53.0
-LEAST_LATE_NSPM: Final = 40.0
-MOST_COST_NS: Final = 100.0
-WHOLE_PERCENT: Final = {"water": 20.0, "glycerin": 14.0, "honey": 18.0, "gear_oil": 15.0}
+_SMOOTH_PERCENT: Final = 2.5
+_FASTEST_PERCENT: Final = 5.0
+_HELD_PERCENT: Final = 3.0
+_REST_NOISE: Final = 1.3
+_LEAST_LIMIT_NSPM: Final = 53.0
+_LEAST_LATE_NSPM: Final = 40.0
+_MOST_COST_NS: Final = 100.0
+_WHOLE_PERCENT: Final = {"water": 20.0, "glycerin": 14.0, "honey": 18.0, "gear_oil": 15.0}
 
-Progress = Callable[[str], None]
+_Progress = Callable[[str], None]
 
 
 class Row(NamedTuple):
@@ -276,7 +276,7 @@ class Row(NamedTuple):
         return self.values[0] >= self.goal if self.least else self.values[0] <= self.goal
 
 
-def measure(progress: Progress) -> tuple[Row, ...]:
+def measure(progress: _Progress) -> tuple[Row, ...]:
     """Measure everything; ``progress`` is called with the name of each part before it is measured."""
     found: list[Row] = []
     for name, part in PARTS.items():
@@ -293,8 +293,8 @@ def evidence(rows: Sequence[Row]) -> Evidence:
 
 def _lines(rows: Sequence[Row]) -> Iterator[str]:
     width = max(len(row.name) for row in rows)
-    names = "".join(f"{it.kind:>9}" for it in ESTIMATORS)
-    yield f"{'1 kHz, encoder count 38 µm':{width}} {names}   goal of {ESTIMATORS[0].kind}"
+    names = "".join(f"{it.kind:>9}" for it in _ESTIMATORS)
+    yield f"{'1 kHz, encoder count 38 µm':{width}} {names}   goal of {_ESTIMATORS[0].kind}"
     for row in rows:
         values = "".join(f"{value:9.4g}" if value >= 100 else f"{value:9.2f}" for value in row.values)
         goal = "" if row.goal is None else f"   {'≥' if row.least else '≤'} {row.goal:.3g}: "
@@ -304,56 +304,58 @@ def _lines(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def _each(measured: Callable[[Velocity], Any]) -> tuple[Any, ...]:
-    return tuple(measured(velocity) for velocity in ESTIMATORS)
+    return tuple(measured(velocity) for velocity in _ESTIMATORS)
 
 
 def _imposed() -> Iterator[Row]:
     by_estimator: tuple[Mapping[Stroke, float], ...] = _each(errors)
-    for stroke in (*SMOOTH, *FASTEST, *SHOWN):
-        goal = SMOOTH_PERCENT if stroke in SMOOTH else FASTEST_PERCENT if stroke in FASTEST else None
+    for stroke in (*_SMOOTH, *_FASTEST, *_SHOWN):
+        goal = _SMOOTH_PERCENT if stroke in _SMOOTH else _FASTEST_PERCENT if stroke in _FASTEST else None
         yield Row(f"error of v·|v|, {stroke} [%]", tuple(found[stroke] for found in by_estimator), goal)
 
 
 def _noise() -> Iterator[Row]:
     noise: tuple[Mapping[float, float], ...] = _each(noise_mmps)
-    for speed_mps in NOISE_MPS:
+    for speed_mps in _NOISE_MPS:
         values = tuple(found[speed_mps] for found in noise)
         where = f"at {1e3 * speed_mps:g} mm/s" if speed_mps else "at rest"
-        yield Row(f"noise above 20 Hz {where} [mm/s]", values, values[1] * (1.0 if speed_mps else REST_NOISE))
+        yield Row(f"noise above 20 Hz {where} [mm/s]", values, values[1] * (1.0 if speed_mps else _REST_NOISE))
 
 
 def _boundaries() -> Iterator[Row]:
-    limits = _each(lambda velocity: slope_limit(PERIOD_S, 1, velocity))
-    yield Row("slope limit, 1 tick of delay [N·s/m]", limits, LEAST_LIMIT_NSPM, least=True)
-    for delay, believed in LOOPS:
-        for mass_kg in MASSES_KG:
-            values = tuple(boundary_nspm(it, PERIOD_S, delay, believed=believed, mass_kg=mass_kg) for it in ESTIMATORS)
+    limits = _each(lambda velocity: slope_limit(_PERIOD_S, 1, velocity))
+    yield Row("slope limit, 1 tick of delay [N·s/m]", limits, _LEAST_LIMIT_NSPM, least=True)
+    for delay, believed in _LOOPS:
+        for mass_kg in _MASSES_KG:
+            values = tuple(
+                boundary_nspm(it, _PERIOD_S, delay, believed=believed, mass_kg=mass_kg) for it in _ESTIMATORS
+            )
             goal = values[1] if (delay, believed) == (1, 1) else None
             if (delay, believed, mass_kg) == (2, 2, 0.1):
-                goal = LEAST_LATE_NSPM
+                goal = _LEAST_LATE_NSPM
             mistaken = "" if believed == delay else f", believed {believed}"
             yield Row(f"stable damping, {mass_kg:g} kg, delay {delay}{mistaken} [N·s/m]", values, goal, least=True)
 
 
 def _held() -> Iterator[Row]:
-    errors = _each(plain_errors)
-    yield Row("held, 1–3 Hz ±20 mm, mean error [%]", tuple(map(statistics.mean, errors)), HELD_PERCENT)
+    errors = _each(_plain_errors)
+    yield Row("held, 1–3 Hz ±20 mm, mean error [%]", tuple(map(statistics.mean, errors)), _HELD_PERCENT)
     yield Row("held, 1–3 Hz ±20 mm, greatest error [%]", tuple(map(max, errors)))
-    quick = _each(lambda velocity: statistics.mean(plain_errors(velocity, (QUICK,))))
-    yield Row(f"held, {QUICK}, mean error [%]", quick)
+    quick = _each(lambda velocity: statistics.mean(_plain_errors(velocity, (_QUICK,))))
+    yield Row(f"held, {_QUICK}, mean error [%]", quick)
 
 
 def _whole() -> Iterator[Row]:
-    for name, scene in zip(WHOLE_LIQUIDS, whole_forces(), strict=True):
-        bound = 100 * wiener_bound(scene, COUNT_M, DELAY * PERIOD_S)
-        for hand in HANDS:
-            values = tuple(held_error(scene, it, hand, WHOLE) for it in ESTIMATORS)
-            goal = WHOLE_PERCENT[name] if hand == "middle" else None
+    for name, scene in zip(_WHOLE_LIQUIDS, _whole_forces(), strict=True):
+        bound = 100 * wiener_bound(scene, COUNT_M, _DELAY * _PERIOD_S)
+        for hand in _HANDS:
+            values = tuple(held_error(scene, it, hand, WHOLE) for it in _ESTIMATORS)
+            goal = _WHOLE_PERCENT[name] if hand == "middle" else None
             yield Row(f"whole force, {WHOLE}, scale 3, {name}, {hand} [%]", values, goal, bound=bound)
 
 
 def _cost() -> Iterator[Row]:
-    yield Row("cost above the plain difference [ns per tick]", _each(cost_ns), MOST_COST_NS)
+    yield Row("cost above the plain difference [ns per tick]", _each(_cost_ns), _MOST_COST_NS)
 
 
 PARTS: Final[Mapping[str, Callable[[], Iterator[Row]]]] = {

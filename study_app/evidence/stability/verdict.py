@@ -47,24 +47,24 @@ from study_app.haptics.model.slope_limits import DampingLimits
 
 REASONS: Final = ("not finite", "limit", "energy", "oscillation", "force")
 
-SETTLES_S: Final = 0.2
-LEAD_S: Final = 0.06
+_SETTLES_S: Final = 0.2
+_LEAD_S: Final = 0.06
 """How long before a stretch is compared its playing begins, for filters to settle."""
 
 ALLOWANCE_J: Final = 1e-3
 MISJUDGED_ALLOWANCE_J: Final = 10e-3
 """The same where the device's delay is another than the loop believes, or changes."""
-SLOW_HZ: Final = 12.0
+_SLOW_HZ: Final = 12.0
 FAST_HZ: Final = 40.0
 SWING_MPS: Final = 0.04
-LATE_SWING_MPS: Final = 0.1
+_LATE_SWING_MPS: Final = 0.1
 """The same of a force that a study delays: 1 mJ, which the controller tolerates, moves 0.2 kg at this speed."""
-LATE_SHARE: Final = 0.2
+_LATE_SHARE: Final = 0.2
 """Such a force is restless beyond this share of the one without feedback: jitter and loss make steps of its size."""
 ONCE_S: Final = 0.1
-TIRED: Final = 0.8
+_TIRED: Final = 0.8
 RESTLESS_N: Final = 0.05
-SPREAD_S: Final = math.sqrt(math.log(2.0)) / (2.0 * math.pi * FAST_HZ)  # a Gaussian mean that halves 40 Hz's power
+_SPREAD_S: Final = math.sqrt(math.log(2.0)) / (2.0 * math.pi * FAST_HZ)  # a Gaussian mean that halves 40 Hz's power
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,7 +120,7 @@ def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Ver
     row = 0
     before = []
     for start_s, _ in windows(case):
-        row = bench.run(trace, row, start_s - LEAD_S)
+        row = bench.run(trace, row, start_s - _LEAD_S)
         before.append((row, bench.copy()))
     trace = trace[: bench.run(trace, row, lasts_s(case))]
     if bench.loop.broken:
@@ -137,8 +137,8 @@ def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Ver
     reasons = reasons_of(
         safe and np.linalg.norm(trace.sent_n, axis=1).max() > FORCE_LIMIT_N * (1.0 + 1e-9),
         balance_j < permitted_j,
-        swing_mps > (LATE_SWING_MPS if linked else SWING_MPS),
-        fast_n - played_n > (max(RESTLESS_N, LATE_SHARE * played_n) if linked else RESTLESS_N),
+        swing_mps > (_LATE_SWING_MPS if linked else SWING_MPS),
+        fast_n - played_n > (max(RESTLESS_N, _LATE_SHARE * played_n) if linked else RESTLESS_N),
     )
     return Verdict(
         case=case,
@@ -156,34 +156,34 @@ def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Ver
 def windows(case: Case) -> Iterator[tuple[float, float]]:
     """Yield the stretches of time [s] over which the force's fast part is compared."""
     if case.hand == THROWN:
-        yield SETTLES_S, 1.0
+        yield _SETTLES_S, 1.0
         yield 1.0, lasts_s(case)
     elif case.hand == LETS_GO:
-        yield SETTLES_S, case.release_s
-        yield case.release_s + SETTLES_S, lasts_s(case)
+        yield _SETTLES_S, case.release_s
+        yield case.release_s + _SETTLES_S, lasts_s(case)
     else:
-        yield SETTLES_S, MOVING_S
-        yield MOVING_S + SETTLES_S, lasts_s(case)
+        yield _SETTLES_S, MOVING_S
+        yield MOVING_S + _SETTLES_S, lasts_s(case)
 
 
 def swing(trace: Any, case: Case) -> float:
     """Return the least swing [m/s] over the last 0.4 s if it does not tire, or over a second of the motion before."""
-    moving = swing_between(trace, case, FAST_HZ, np.linspace(SETTLES_S, SETTLES_S + 1.0, 6))
-    return max(resting_swing(trace, case, lasts_s(case)), moving)
+    moving = _swing_between(trace, case, FAST_HZ, np.linspace(_SETTLES_S, _SETTLES_S + 1.0, 6))
+    return max(_resting_swing(trace, case, lasts_s(case)), moving)
 
 
-def resting_swing(trace: Any, case: Case, end_s: float) -> float:
+def _resting_swing(trace: Any, case: Case, end_s: float) -> float:
     """Return the least swing [m/s] over the 0.4 s before a time [s] if it does not tire."""
-    return swing_between(trace, case, SLOW_HZ, np.linspace(end_s - 0.4, end_s, 5))
+    return _swing_between(trace, case, _SLOW_HZ, np.linspace(end_s - 0.4, end_s, 5))
 
 
-def swing_between(trace: Any, case: Case, corner_hz: float, times_s: Any) -> float:
+def _swing_between(trace: Any, case: Case, corner_hz: float, times_s: Any) -> float:
     """Return the least swing above a frequency [m/s] over the stretches between times [s]; 0 if it tires."""
     rows = np.searchsorted(trace.t_s, times_s)
     found = [
         fast_part(trace.velocity_mps, case.rate_hz, corner_hz, first, last) for first, last in itertools.pairwise(rows)
     ]
-    return min(found) if found[-1] > TIRED * found[0] else 0.0
+    return min(found) if found[-1] > _TIRED * found[0] else 0.0
 
 
 def _restlessness(
@@ -191,7 +191,7 @@ def _restlessness(
 ) -> tuple[float, float]:
     """Return the force's fast part, and that of the same motion without feedback, where they differ most."""
     calm_m, calm_n = np.zeros((len(trace), 3)), np.zeros((len(trace), 3))
-    smooth(trace, SPREAD_S, calm_m, calm_n)
+    smooth(trace, _SPREAD_S, calm_m, calm_n)
     calm_mps = np.gradient(calm_m, trace.t_s, axis=0)
     undecided_m = case.quantum_um * 1e-6 * (np.random.default_rng(1).random(calm_m.shape) - 0.5)
     passive = _passive(case, bool(before[0][1].loop.safe), limits)

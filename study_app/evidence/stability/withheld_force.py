@@ -22,7 +22,7 @@ from study_app.evidence.stability.stability_cases import Case, liquids
 from study_app.evidence.table import Evidence, run
 
 
-class Stroke(NamedTuple):
+class _Stroke(NamedTuple):
     """A straight motion to and fro."""
 
     frequency_hz: float
@@ -32,37 +32,37 @@ class Stroke(NamedTuple):
         return f"{self.frequency_hz:g} Hz ±{self.amplitude_mm:g}"
 
 
-SLOW: Final = (Stroke(1.0, 30.0), Stroke(2.0, 30.0), Stroke(3.0, 30.0))
-QUICK: Final = (Stroke(4.0, 30.0), Stroke(5.0, 20.0), Stroke(5.0, 30.0), Stroke(8.0, 10.0))
-STROKES: Final = SLOW + QUICK
+_SLOW: Final = (_Stroke(1.0, 30.0), _Stroke(2.0, 30.0), _Stroke(3.0, 30.0))
+QUICK: Final = (_Stroke(4.0, 30.0), _Stroke(5.0, 20.0), _Stroke(5.0, 30.0), _Stroke(8.0, 10.0))
+STROKES: Final = _SLOW + QUICK
 SHOWN_SHAKE: Final = QUICK[2]
-RATE_HZ: Final = 1000.0
-STROKE_S: Final = 3.0
-SHAKE_S: Final = 0.9
-STIRRING_MPS: Final = 0.2
-STIRRING_M: Final = 0.03
+_RATE_HZ: Final = 1000.0
+_STROKE_S: Final = 3.0
+_SHAKE_S: Final = 0.9
+_STIRRING_MPS: Final = 0.2
+_STIRRING_M: Final = 0.03
 SECONDS: Final = 4
 
-HAND_KG: Final = 0.554
-HAND_NPM: Final = 2000.0
-HAND_NSPM: Final = 60.0
+_HAND_KG: Final = 0.554
+_HAND_NPM: Final = 2000.0
+_HAND_NSPM: Final = 60.0
 """Mass of the middle grip, with stiffness and damping that keep the handle on its path at 8 Hz. [choice]"""
-HANDLE_KG: Final = 0.1
-SHAKEN_KG: Final = 0.2
+_HANDLE_KG: Final = 0.1
+_SHAKEN_KG: Final = 0.2
 """In tissue: with `ewma`, one of 0.1 kg swings in physical honey by itself."""
 
-MOST: Final = 0.05
-MOST_REVERSED: Final = 0.08
-REVERSED: Final = ("physical_honey", "kalman")
+_MOST: Final = 0.05
+_MOST_REVERSED: Final = 0.08
+_REVERSED: Final = ("physical_honey", "kalman")
 """Its force reverses from +8 N to −8 N (the force limit), which takes the slew limit 13 ms. [choice]"""
 MOST_AFTER: Final = 0.005
-EXEMPT: Final = ("physical_tar",)
-ESTIMATORS: Final = ("ewma", "kalman")
+_EXEMPT: Final = ("physical_tar",)
+_ESTIMATORS: Final = ("ewma", "kalman")
 """Those that studies use."""
-IMPOSED: Final = "position imposed"
-HELD: Final = "handle held"
+_IMPOSED: Final = "position imposed"
+_HELD: Final = "handle held"
 SHAKEN: Final = "hand shaken"
-MODES: Final = (IMPOSED, HELD, SHAKEN)
+MODES: Final = (_IMPOSED, _HELD, SHAKEN)
 
 
 class Withheld(NamedTuple):
@@ -81,7 +81,7 @@ class Withheld(NamedTuple):
 
     @property
     def most(self) -> float:
-        return MOST_REVERSED if (self.liquid, self.estimator) == REVERSED else MOST
+        return _MOST_REVERSED if (self.liquid, self.estimator) == _REVERSED else _MOST
 
     @property
     def lasting(self) -> float:
@@ -91,12 +91,12 @@ class Withheld(NamedTuple):
     @property
     def met(self) -> bool:
         """Whether the liquid keeps both goals; tar has none."""
-        return self.liquid in EXEMPT or (self.quick <= self.most and self.lasting < MOST_AFTER)
+        return self.liquid in _EXEMPT or (self.quick <= self.most and self.lasting < MOST_AFTER)
 
 
 def measure(
     names: Sequence[str] | None = None,
-    estimators: Sequence[str] = ESTIMATORS,
+    estimators: Sequence[str] = _ESTIMATORS,
     *,
     delay: int = 1,
     executor: Executor | None = None,
@@ -110,7 +110,7 @@ def measure(
                 scale=liquids()[liquid].scale,
                 delay=delay,
                 estimator=estimator,
-                mass_kg=SHAKEN_KG if mode == SHAKEN else HANDLE_KG,
+                mass_kg=_SHAKEN_KG if mode == SHAKEN else _HANDLE_KG,
             ),
             mode,
         )
@@ -134,15 +134,15 @@ def _lines(found: Sequence[Withheld]) -> Iterator[str]:
         yield f"{f'{estimator}, {mode}':21}{strokes}{after}"
         for row in rows:
             after = "".join(f"{100 * share:7.1f}" for share in row.after[QUICK.index(SHOWN_SHAKE)])
-            goals = "no goal" if row.liquid in EXEMPT else "met" if row.met else "not met"
+            goals = "no goal" if row.liquid in _EXEMPT else "met" if row.met else "not met"
             strokes = "".join(f"{100 * share:11.1f}" for share in row.strokes)
             yield f"  {row.liquid:19}{strokes}  {after}{100 * row.lasting:10.1f}   {goals}"
-    counted = [one for one in found if one.liquid not in EXEMPT]
+    counted = [one for one in found if one.liquid not in _EXEMPT]
     lasting = max(one.lasting for one in counted)
     yield ""
     for most in sorted({one.most for one in counted}):
         quick = max(one.quick for one in counted if one.most == most)
-        which = "tar aside" if most == MOST else " with ".join(REVERSED)
+        which = "tar aside" if most == _MOST else " with ".join(_REVERSED)
         yield f"at most {most:.0%} in every stroke, {which}: {_goal(quick <= most)} ({quick:.1%})"
     met = _goal(lasting < MOST_AFTER)
     yield f"nothing (< {MOST_AFTER:.1%}) from one second after a shake on, tar aside: {met} ({lasting:.1%})"
@@ -153,35 +153,35 @@ def _goal(met: bool) -> str:
 
 
 def _measured(case: Case, mode: str) -> Withheld:
-    strokes = tuple(_share(_played(case, _stroke_m(stroke, STROKE_S), mode)) for stroke in STROKES)
+    strokes = tuple(_share(_played(case, _stroke_m(stroke, _STROKE_S), mode)) for stroke in STROKES)
     after = []
     for shake in QUICK:
-        shaken_m = _stroke_m(shake, SHAKE_S)
+        shaken_m = _stroke_m(shake, _SHAKE_S)
         trace = _played(case, np.concatenate([shaken_m, _stirring_m(shaken_m[-1])]), mode)
         seconds = np.split(trace[len(shaken_m) :], SECONDS)
         after.append(tuple(_share(second) for second in seconds))
     return Withheld(liquid=case.liquid, estimator=case.estimator, mode=mode, strokes=strokes, after=tuple(after))
 
 
-def _stroke_m(stroke: Stroke, lasts_s: float) -> NDArray[np.float64]:
-    t_s = np.arange(round(lasts_s * RATE_HZ)) / RATE_HZ
+def _stroke_m(stroke: _Stroke, lasts_s: float) -> NDArray[np.float64]:
+    t_s = np.arange(round(lasts_s * _RATE_HZ)) / _RATE_HZ
     along_m = 1e-3 * stroke.amplitude_mm * np.cos(2.0 * math.pi * stroke.frequency_hz * t_s)
     return np.outer(along_m, DIRECTION)
 
 
 def _stirring_m(from_m: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return places (rows, 3) [m] of slow stirring that begins at a place."""
-    angle = STIRRING_MPS / STIRRING_M * np.arange(1, round(SECONDS * RATE_HZ) + 1) / RATE_HZ
-    return from_m + STIRRING_M * np.column_stack([np.cos(angle) - 1.0, np.zeros_like(angle), np.sin(angle)])
+    angle = _STIRRING_MPS / _STIRRING_M * np.arange(1, round(SECONDS * _RATE_HZ) + 1) / _RATE_HZ
+    return from_m + _STIRRING_M * np.column_stack([np.cos(angle) - 1.0, np.zeros_like(angle), np.sin(angle)])
 
 
 def _played(case: Case, path_m: NDArray[np.float64], mode: str) -> Any:
     bench = Bench(case)
     handle = bench.handle
-    handle.hand_kg, handle.stiffness_npm, handle.damping_nspm = HAND_KG, HAND_NPM, HAND_NSPM
+    handle.hand_kg, handle.stiffness_npm, handle.damping_nspm = _HAND_KG, _HAND_NPM, _HAND_NSPM
     if mode == SHAKEN:
         handle.hand_kg, handle.stiffness_npm, handle.damping_nspm = 0.0, MIDDLE.tissue_npm, MIDDLE.tissue_nspm
-    return bench.follow(path_m, rigid=mode == IMPOSED)
+    return bench.follow(path_m, rigid=mode == _IMPOSED)
 
 
 def _share(trace: Any) -> float:

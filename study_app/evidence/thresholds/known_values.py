@@ -56,7 +56,7 @@ from study_app.store.unblinding import unblind
 from study_app.store.verification.reproduction import reproduce_session
 from study_app.store.verification.verify_study import verify_study
 
-SHIPPED: Final[dict[str, Observer]] = {
+_SHIPPED: Final[dict[str, Observer]] = {
     "viscosityjnd": OBSERVER,
     "delaydetect": Observer(delay_jnd_s=0.045),
     "delayjnd": OBSERVER,
@@ -65,28 +65,28 @@ SHIPPED: Final[dict[str, Observer]] = {
 """The shipped studies with thresholds. Known are a Weber fraction of 0.24 at 75 % correct, which is 0.19 at 71 %
 (Jones, Hunter & Lafontaine 1997), 45 ms (Vogels 2004), 25 ms at every standard (below 33 ms: Ellis et al. 1999),
 and 15 ms of a force (Rank et al. 2010)."""
-NAMES: Final = (*SHIPPED, "thickness")
+NAMES: Final = (*_SHIPPED, "thickness")
 """The shipped studies that are validated."""
 EXPONENT: Final = 0.44
 """Of perceived thickness over viscosity (Stevens & Guirao 1964)."""
-POINTS: Final = 64
-BETWEEN_SESSIONS: Final = 10**SESSION_SD
+_POINTS: Final = 64
+_BETWEEN_SESSIONS: Final = 10**SESSION_SD
 """Factor between a person's thresholds of several sessions, as measured."""
 
 PEOPLE: Final = 20
-"""Of a study: so many, and ±`NEAR`, are planned in the shipped studies (``analysis.participants``, ``precision``)."""
+"""Of a study: so many, and ±`_NEAR`, are planned in the shipped studies (``analysis.participants``, ``precision``)."""
 REHEARSED: Final = 3
-ERROR_MOST: Final = 0.05
-NEAR: Final = 0.15
-NEAR_SHARE: Final = 0.95
+_ERROR_MOST: Final = 0.05
+_NEAR: Final = 0.15
+_NEAR_SHARE: Final = 0.95
 COVERAGE_LEAST: Final = 0.93
-OWN_COVERAGE_MOST: Final = 0.98
-SLOPE_ERROR_MOST: Final = 0.15
-EXPONENT_ERROR_MOST: Final = 0.03
-DELIVERED_LEAST: Final = 0.99
-FAMILY_ERROR: Final = 0.05
+_OWN_COVERAGE_MOST: Final = 0.98
+_SLOPE_ERROR_MOST: Final = 0.15
+_EXPONENT_ERROR_MOST: Final = 0.03
+_DELIVERED_LEAST: Final = 0.99
+_FAMILY_ERROR: Final = 0.05
 """Probability that chance alone takes any value beyond its limit, shared equally among all (Bonferroni)."""
-KIND_SHARE: Final = 20
+_KIND_SHARE: Final = 20
 """For each kind of people there is one study to so many others."""
 
 
@@ -140,8 +140,8 @@ class Measure:
 
 
 def verdicts_on(measures: Sequence[Measure]) -> list[Verdict]:
-    """Return the verdicts: that any limit is exceeded by chance has a probability of at most `FAMILY_ERROR`."""
-    return [one.judged(1.0 - FAMILY_ERROR / len(measures)) for one in measures]
+    """Return the verdicts: that any limit is exceeded by chance has a probability of at most `_FAMILY_ERROR`."""
+    return [one.judged(1.0 - _FAMILY_ERROR / len(measures)) for one in measures]
 
 
 def mean_interval(values: ArrayLike) -> Callable[[float], tuple[float, float]]:
@@ -206,7 +206,7 @@ class Rehearsed:
 
 
 @dataclass(frozen=True, slots=True)
-class KnownValue(ABC):
+class _KnownValue(ABC):
     """A study's main block, of which the true value is known."""
 
     name: str
@@ -241,7 +241,7 @@ class KnownValue(ABC):
 
 
 @dataclass(frozen=True, slots=True)
-class KnownThreshold(KnownValue):
+class KnownThreshold(_KnownValue):
     """The threshold of a block with an adaptive method, by its observer; errors are of its logarithm."""
 
     observer: Observer = OBSERVER
@@ -273,7 +273,7 @@ class KnownThreshold(KnownValue):
         for one in apart:
             own = replace(self.observer, person=of_kind(kind, draw) if kind else Person(lapse=LAPSES_MOST * draw()))
             own = replace(own, **{name: getattr(own, name) * math.exp(one)})
-            today = getattr(own, name) * BETWEEN_SESSIONS ** normal(draw)
+            today = getattr(own, name) * _BETWEEN_SESSIONS ** normal(draw)
             yield replace(own, **{name: today}), self._threshold(own)
 
     def simulate(self, number: int, seed: int, kind: str = "", observers: Sequence[Observer] = ()) -> StudyFound:
@@ -312,14 +312,14 @@ class KnownThreshold(KnownValue):
     def measures(self, studies: Sequence[StudyFound]) -> Iterator[Measure]:
         """Yield error and, with several standards, the slope of ln JND over ln standard."""
         errors = self.errors(studies)
-        yield error_measure(self.name, errors)
-        near = np.abs(np.expm1(errors)) <= NEAR
+        yield _error_measure(self.name, errors)
+        near = np.abs(np.expm1(errors)) <= _NEAR
         yield Measure(
             study=self.name,
             what=f"studies of {PEOPLE} within ±15 %",
             value=float(near.mean()),
             interval=share_interval(near, 1),
-            least=NEAR_SHARE,
+            least=_NEAR_SHARE,
             limit="at least 95 %",
             written=percent,
         )
@@ -337,9 +337,9 @@ class KnownThreshold(KnownValue):
             what="exponent of JND over standard",
             value=float(of_studies.mean()),
             interval=mean_interval(of_studies),
-            least=true - SLOPE_ERROR_MOST,
-            most=true + SLOPE_ERROR_MOST,
-            limit=f"{true:g} ± {SLOPE_ERROR_MOST:g}",
+            least=true - _SLOPE_ERROR_MOST,
+            most=true + _SLOPE_ERROR_MOST,
+            limit=f"{true:g} ± {_SLOPE_ERROR_MOST:g}",
             written="{:.3f}".format,
         )
 
@@ -351,7 +351,7 @@ class KnownThreshold(KnownValue):
         error = self.error(values)
 
         def ends(confidence: float) -> tuple[float, float]:
-            half = normal_half(confidence) * spread
+            half = _normal_half(confidence) * spread
             return self.threshold * math.exp(error - half), self.threshold * math.exp(error + half)
 
         return Measure(
@@ -367,7 +367,7 @@ class KnownThreshold(KnownValue):
 
 
 @dataclass(frozen=True, slots=True)
-class KnownExponent(KnownValue):
+class KnownExponent(_KnownValue):
     """The exponent of a block of magnitude estimation.
 
     ``resistances`` are those of each level, ascending: mean force over RMS speed at the pace [N·s/m].
@@ -409,9 +409,9 @@ class KnownExponent(KnownValue):
             what=f"exponent over {stimulus_of(self.protocol, self.block).vary}",
             value=float(np.mean(of_studies)),
             interval=mean_interval(of_studies),
-            least=EXPONENT - EXPONENT_ERROR_MOST,
-            most=EXPONENT + EXPONENT_ERROR_MOST,
-            limit=f"{EXPONENT:g} ± {EXPONENT_ERROR_MOST:g}",
+            least=EXPONENT - _EXPONENT_ERROR_MOST,
+            most=EXPONENT + _EXPONENT_ERROR_MOST,
+            limit=f"{EXPONENT:g} ± {_EXPONENT_ERROR_MOST:g}",
             written="{:.3f}".format,
         )
 
@@ -425,7 +425,7 @@ class KnownExponent(KnownValue):
             study=self.name,
             what=f"exponent of {len(values)} people",
             value=mean,
-            interval=lambda sure: (mean - normal_half(sure) * spread, mean + normal_half(sure) * spread),
+            interval=lambda sure: (mean - _normal_half(sure) * spread, mean + _normal_half(sure) * spread),
             least=EXPONENT,
             most=EXPONENT,
             limit=f"{EXPONENT:g}",
@@ -455,7 +455,7 @@ def known_value(name: str, protocol: Protocol) -> Known:
     for block in blocks:
         standards = standards_of(protocol, block)
         if stimulus_of(protocol, block).level_kind != "value" and not all(one is None for one in standards):
-            return KnownThreshold(name, protocol, block, SHIPPED.get(name, OBSERVER))
+            return KnownThreshold(name, protocol, block, _SHIPPED.get(name, OBSERVER))
     raise ValueError(
         f"{name} has no main block with levels above a standard, or with magnitude estimation of a liquid at a pace: "
         "nothing is known of it in advance"
@@ -469,8 +469,8 @@ def _levels(protocol: Protocol, block: Block) -> list[float]:
 
 def _resistance(scene: Any, fastest_mps: float) -> float:
     """Return mean force over RMS speed [N·s/m] in a sinusoidal motion with this peak speed."""
-    speeds = [fastest_mps * math.sin(math.pi * (point + 0.5) / POINTS) for point in range(POINTS)]
-    mean_n = sum(steady_force(scene, speed).drag_n for speed in speeds) / POINTS
+    speeds = [fastest_mps * math.sin(math.pi * (point + 0.5) / _POINTS) for point in range(_POINTS)]
+    mean_n = sum(steady_force(scene, speed).drag_n for speed in speeds) / _POINTS
     return mean_n / (fastest_mps / math.sqrt(2))
 
 
@@ -497,12 +497,12 @@ def percent(share: float) -> str:
     return f"{100 * share:.1f} %"
 
 
-def normal_half(confidence: float) -> float:
+def _normal_half(confidence: float) -> float:
     """Return half the interval of a normal distribution [standard deviations]."""
     return NormalDist().inv_cdf((1 + confidence) / 2)
 
 
-def error_measure(study: str, errors: Array) -> Measure:
+def _error_measure(study: str, errors: Array) -> Measure:
     """Return the mean error of thresholds from errors of their logarithm in each study."""
     ends = mean_interval(errors)
     return Measure(
@@ -510,8 +510,8 @@ def error_measure(study: str, errors: Array) -> Measure:
         what="mean error of the threshold",
         value=math.expm1(float(errors.mean())),
         interval=lambda sure: (math.expm1(ends(sure)[0]), math.expm1(ends(sure)[1])),
-        least=-ERROR_MOST,
-        most=ERROR_MOST,
+        least=-_ERROR_MOST,
+        most=_ERROR_MOST,
         limit="within ±5 %",
         written=lambda share: f"{100 * share:+.1f} %",
     )
@@ -523,7 +523,7 @@ def coverage(name: str, studies: Sequence[StudyFound]) -> Iterator[Measure]:
     of_people = [
         [one.covered for person in found.own for one in person if not math.isnan(one.low)] for found in studies
     ]
-    for whose, covered, most in (("the group's", of_groups, 1.0), ("participants'", of_people, OWN_COVERAGE_MOST)):
+    for whose, covered, most in (("the group's", of_groups, 1.0), ("participants'", of_people, _OWN_COVERAGE_MOST)):
         shares = [float(np.mean(of_study)) for of_study in covered if of_study]
         if not shares:
             continue
@@ -546,7 +546,7 @@ def rehearsed_measures(one: Known, found: Rehearsed, spread: float) -> Iterator[
         what="intervals delivered as requested",
         value=found.delivered,
         interval=lambda _confidence: (found.delivered, found.delivered),
-        least=DELIVERED_LEAST,
+        least=_DELIVERED_LEAST,
         limit="at least 99 %",
         written=percent,
     )
@@ -593,12 +593,12 @@ def validate(
         say(f"{one.name}: {len(cases)} studies and {REHEARSED} rehearsed participants")
     measures += coverage("all of them", every)
     of_thresholds = [one for _, one in known if isinstance(one, KnownThreshold)]
-    cases = cases[:: max(1, min(KIND_SHARE, len(cases) // 2))]
+    cases = cases[:: max(1, min(_KIND_SHARE, len(cases) // 2))]
     for kind in (*KINDS, MIXED) if of_thresholds else ():
         progress(f"people: {kind}", None)
         found_of = [run(one.simulate, [(*it, kind) for it in cases], executor) for one in of_thresholds]
         errors = np.concatenate([one.errors(found) for one, found in zip(of_thresholds, found_of, strict=True)])
-        measures += [error_measure(kind, errors), *coverage(kind, [one for found in found_of for one in found])]
+        measures += [_error_measure(kind, errors), *coverage(kind, [one for found in found_of for one in found])]
         say(f"people, {kind}: {len(errors)} studies")
     return verdicts_on(measures)
 

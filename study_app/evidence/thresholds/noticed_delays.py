@@ -28,13 +28,13 @@ from study_app.psychophysics.people import normal
 
 JND_S: Final = 0.045
 """Of a delay, at 75 % correct in two intervals (Vogels 2004)."""
-BETWEEN_PEOPLE: Final = 1.2
+_BETWEEN_PEOPLE: Final = 1.2
 MEAN_CRITERION_S: Final = 0.13
 """Of the answer model, which was chosen to agree with the thesis."""
 CRITERIA_S: Final = (0.06, 0.095, MEAN_CRITERION_S, 0.165)
-ADAPTED_S: Final = 0.03
+_ADAPTED_S: Final = 0.03
 """How far earlier delays have moved the delay that seems to be none."""
-STATEMENT: Final = "different"
+_STATEMENT: Final = "different"
 LIKERT, FORCED_CHOICE = "rek2024", "delaydetect"
 
 
@@ -89,7 +89,7 @@ def people_of(count: int, seed: int) -> tuple[Person, ...]:
     found = []
     for number in range(1, count + 1):
         draw = stream(seed, f"noticed/person/{number}").random
-        jnd_s = JND_S * BETWEEN_PEOPLE ** normal(draw)
+        jnd_s = JND_S * _BETWEEN_PEOPLE ** normal(draw)
         found.append(Person(Observer(delay_jnd_s=jnd_s), rater(draw)))
     return tuple(found)
 
@@ -97,7 +97,7 @@ def people_of(count: int, seed: int) -> tuple[Person, ...]:
 def compare(count: int, seed: int) -> Compared:
     """Return what ``count`` people, three or more, detect and rate as noticed."""
     people = people_of(count, seed)
-    both = [(criterion_s, 0.0) for criterion_s in CRITERIA_S] + [(MEAN_CRITERION_S, ADAPTED_S)]
+    both = [(criterion_s, 0.0) for criterion_s in CRITERIA_S] + [(MEAN_CRITERION_S, _ADAPTED_S)]
     return Compared(count, seed, detected(people, seed), tuple(rated(people, *one, seed) for one in both))
 
 
@@ -127,10 +127,10 @@ def rated(people: Sequence[Person], criterion_s: float, adapted_s: float, seed: 
 
 def _rating(person: Person, delay_s: float, draw: Draw) -> int:
     perceived_s = delay_s + person.observer.delay_noise_s * normal(draw)
-    return rate([STATEMENT], replace(NO_FEATURES, delay_s=perceived_s), person.rater, draw)[STATEMENT]
+    return rate([_STATEMENT], replace(NO_FEATURES, delay_s=perceived_s), person.rater, draw)[_STATEMENT]
 
 
-THESIS_MS: Final = 125.0
+_THESIS_MS: Final = 125.0
 GUESS, LAPSE = 0.5, 0.02
 TITLE: Final = "Which delay is noticed? Two questions to the same people"
 
@@ -153,7 +153,9 @@ def draw(found: Compared) -> Figure:
     shares.plot([middle], [GUESS + (1 - GUESS - LAPSE) / 2], "s", markersize=4, color=style.TEXT)
     thresholds.axhspan(low, high, color=style.BAND, linewidth=0)
     thresholds.axhline(middle, color=style.TEXT, dashes=(4, 2), label=FORCED_CHOICE)
-    thresholds.axhline(THESIS_MS, color=style.TEXT_SOFT, linewidth=0.8, dashes=(1, 1.5), label="“125 ms” of the thesis")
+    thresholds.axhline(
+        _THESIS_MS, color=style.TEXT_SOFT, linewidth=0.8, dashes=(1, 1.5), label="“125 ms” of the thesis"
+    )
     for one, colour in zip(found.rated, (*style.STEPS[1 : 1 + len(criteria)], style.WARN), strict=True):
         test, at = one.found, 1000 * one.criterion_s + (5 if one.adapted_s else 0)
         if test.effect is None or test.width is None or test.guess is None or test.lapse is None:
@@ -172,7 +174,7 @@ def draw(found: Compared) -> Figure:
     return figure
 
 
-CAPTION: Final = (
+_CAPTION: Final = (
     "Simulated people answer two questions about the delay of the picture. Left: proportion correct in the "
     f"forced choice of {FORCED_CHOICE} (dashed) and proportion of agreement with “different” in {LIKERT} (dots "
     "with fitted curves), for mean criteria of 60, 95, 130 and 165 ms. Right: both thresholds against the "
@@ -188,7 +190,7 @@ def evidence(found: Compared) -> Evidence:
     rows = [(f"{FORCED_CHOICE}: forced choice, 75 % correct", "–", f"{middle:.0f} ms", f"{low:.0f} to {high:.0f} ms")]
     for one in found.rated:
         adapted = f", adapted to {1000 * one.adapted_s:.0f} ms" if one.adapted_s else ""
-        name = f"{LIKERT}: rating of “{STATEMENT}”, half agree{adapted}"
+        name = f"{LIKERT}: rating of “{_STATEMENT}”, half agree{adapted}"
         effect, threshold = one.found.effect, one.found
         value = "none" if effect is None else f"{effect:.0f} ms"
         known = threshold.lower is not None and threshold.upper is not None
@@ -205,4 +207,4 @@ def evidence(found: Compared) -> Evidence:
             for form in style.FORMATS
         }
 
-    return Evidence(text, {"delay-thresholds.md": text, "delay-thresholds.txt": f"{CAPTION}\n"}, figures)
+    return Evidence(text, {"delay-thresholds.md": text, "delay-thresholds.txt": f"{_CAPTION}\n"}, figures)

@@ -30,9 +30,9 @@ BESIDE: Final[dict[LoadName, str]] = {
     "gui+cpu": "with the cockpit and busy cores",
 }
 
-MEAN_FRAMES: Final = 0.5
-TAIL_FRAMES: Final = 1.0
-TAIL_PERCENT: Final = 99.0
+_MEAN_FRAMES: Final = 0.5
+_TAIL_FRAMES: Final = 1.0
+_TAIL_PERCENT: Final = 99.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,8 +95,8 @@ class Shown:
     def held(self) -> bool:
         """Whether the mean error is at most half a refresh, and its 99th percentile at most one."""
         return (
-            abs(self.mean_ms) <= MEAN_FRAMES * self.frame_ms
-            and self.percentile_ms(TAIL_PERCENT) <= TAIL_FRAMES * self.frame_ms
+            abs(self.mean_ms) <= _MEAN_FRAMES * self.frame_ms
+            and self.percentile_ms(_TAIL_PERCENT) <= _TAIL_FRAMES * self.frame_ms
         )
 
 
@@ -129,21 +129,21 @@ class Delayed:
     def _of(self, screen: str, load: LoadName) -> str:
         trials = self.on(screen, load)
         mean = max(abs(one.mean_ms) / one.frame_ms for one in trials)
-        tail = max(one.percentile_ms(TAIL_PERCENT) / one.frame_ms for one in trials)
+        tail = max(one.percentile_ms(_TAIL_PERCENT) / one.frame_ms for one in trials)
         means_ms = [one.mean_ms for one in trials]
         return (
-            f"{screen}, {BESIDE[load]}: mean error at most {mean:.2f} of a frame (limit {MEAN_FRAMES:g}), "
-            f"99th percentile at most {tail:.2f} (limit {TAIL_FRAMES:g}), "
+            f"{screen}, {BESIDE[load]}: mean error at most {mean:.2f} of a frame (limit {_MEAN_FRAMES:g}), "
+            f"99th percentile at most {tail:.2f} (limit {_TAIL_FRAMES:g}), "
             f"means within {max(means_ms) - min(means_ms):.2f} ms of each other: "
             f"{'met' if all(one.held for one in trials) else 'missed'}"
         )
 
 
-LAYOUT: Final = Layout(height_pt=212, top_pt=46, left_pt=34, gap_pt=46, right_pt=44)
-MOST_FRAMES: Final = 1.5  # of the axis: what lies beyond is written at its top
-APART: Final = 0.34
+_LAYOUT: Final = Layout(height_pt=212, top_pt=46, left_pt=34, gap_pt=46, right_pt=44)
+_MOST_FRAMES: Final = 1.5  # of the axis: what lies beyond is written at its top
+_APART: Final = 0.34
 
-LOOKS: Final[dict[LoadName, dict[str, Any]]] = {
+_LOOKS: Final[dict[LoadName, dict[str, Any]]] = {
     "none": {"color": "#0b65a3", "marker": "o", "markerfacecolor": "#0b65a3"},
     "gui": {"color": "#b35600", "marker": "^", "markerfacecolor": "white"},
     "gui+cpu": {"color": "#7a3e8f", "marker": "D", "markerfacecolor": "white"},
@@ -155,15 +155,15 @@ def draw(found: Delayed) -> Figure:
     """Draw what was found."""
     width, height = found.size_px
     caption = (
-        f"Marks: mean of all frames; lines reach up to the {TAIL_PERCENT:g}th percentile, which is written if it is "
+        f"Marks: mean of all frames; lines reach up to the {_TAIL_PERCENT:g}th percentile, which is written if it is "
         f"off the scale. {found.seconds:g} s of reaching at each delay with the tank at {width} × {height}, from the "
         f"sample that is drawn to the end of its painting. {found.machine}."
     )
     handles = [
-        Line2D([], [], markersize=4.5, linewidth=1.3, label=BESIDE[load].capitalize(), **LOOKS[load])
+        Line2D([], [], markersize=4.5, linewidth=1.3, label=BESIDE[load].capitalize(), **_LOOKS[load])
         for load in found.loads
     ]
-    figure, panels = panels_abreast(LAYOUT, len(found.screens), handles, 2.6, caption)
+    figure, panels = panels_abreast(_LAYOUT, len(found.screens), handles, 2.6, caption)
     for axes, screen in zip(panels, found.screens, strict=True):
         _panel(axes, found, screen, first=axes is panels[0])
     return figure
@@ -172,9 +172,9 @@ def draw(found: Delayed) -> Figure:
 def _panel(axes: Axes, found: Delayed, screen: str, *, first: bool) -> None:
     """Draw every trial on a screen: a sign at the mean, a line from there to the 99th percentile."""
     frame_ms = found.on(screen, found.loads[0])[0].frame_ms
-    top_ms = MOST_FRAMES * frame_ms
+    top_ms = _MOST_FRAMES * frame_ms
     for number, load in enumerate(found.loads):
-        aside = APART * (number - (len(found.loads) - 1) / 2)
+        aside = _APART * (number - (len(found.loads) - 1) / 2)
         for place, trial in enumerate(found.on(screen, load)):
             _trial(axes, trial, place + aside, top_ms)
     for share, words in ((0.5, "½ frame"), (1.0, "1 frame")):
@@ -201,8 +201,8 @@ def _panel(axes: Axes, found: Delayed, screen: str, *, first: bool) -> None:
 
 
 def _trial(axes: Axes, trial: Shown, at: float, top_ms: float) -> None:
-    look = LOOKS[trial.load]
-    tail_ms = trial.percentile_ms(TAIL_PERCENT)
+    look = _LOOKS[trial.load]
+    tail_ms = trial.percentile_ms(_TAIL_PERCENT)
     axes.plot([at, at], [trial.mean_ms, min(tail_ms, top_ms)], color=look["color"], linewidth=1.3, zorder=4)
     if tail_ms < top_ms:
         axes.plot([at - 0.09, at + 0.09], [tail_ms, tail_ms], color=look["color"], linewidth=1.3, zorder=4)
@@ -226,7 +226,7 @@ COLUMNS: Final = (
     "error_p95_ms", "error_p99_ms", "error_max_ms", "error_mean_frames", "error_p50_frames", "error_p95_frames",
     "error_p99_frames", "error_max_frames", "late", "refreshes_missed",
 )  # fmt: skip
-PERCENTILES: Final = (50.0, 95.0, 99.0)
+_PERCENTILES: Final = (50.0, 95.0, 99.0)
 _HEADINGS: Final = (
     "requested", "achieved", *("mean", "p95", "p99", "worst") * 2, "late", "missed",
 )  # fmt: skip
@@ -275,7 +275,7 @@ def evidence(found: Delayed) -> Evidence:
 
 
 def _values(trial: Shown) -> tuple[object, ...]:
-    errors_ms = (trial.mean_ms, *map(trial.percentile_ms, PERCENTILES), trial.worst_ms)
+    errors_ms = (trial.mean_ms, *map(trial.percentile_ms, _PERCENTILES), trial.worst_ms)
     return (
         *(trial.screen, trial.paced, trial.load),
         *(f"{1e3 * trial.delay_s:g}", f"{trial.achieved_ms:.3f}", trial.frames),

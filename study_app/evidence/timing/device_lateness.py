@@ -18,8 +18,8 @@ from study_app.devices.registry import all_devices, open_device
 from study_app.evidence.table import TURN_S, Evidence, check_seconds, take_turns
 from study_app.evidence.timing.measurement import PERIOD_NS, ServoLoop, granted
 
-REFERENCE: Final = "scripted"
-MOST_RATIO: Final = 1.5
+_REFERENCE: Final = "scripted"
+_MOST_RATIO: Final = 1.5
 _DRAWS: Final = 1000
 _REACH_M: Final = 0.02
 
@@ -42,19 +42,19 @@ class DeviceLateness:
     @property
     def missed(self) -> bool:
         """Whether the ratio is above the limit, and not by chance."""
-        return self.low > MOST_RATIO
+        return self.low > _MOST_RATIO
 
     @property
     def verdict(self) -> str:
         if self.missed:
             return "missed"
-        return "met" if self.ratio <= MOST_RATIO else "undecided: measure for longer"
+        return "met" if self.ratio <= _MOST_RATIO else "undecided: measure for longer"
 
 
 def emulated_devices() -> tuple[str, ...]:
     """Return the names of the devices that move by themselves, the scripted hand first."""
     names = [device.name for device in all_devices() if device.moves_by_itself]
-    return (REFERENCE, *(name for name in names if name != REFERENCE))
+    return (_REFERENCE, *(name for name in names if name != _REFERENCE))
 
 
 def time_devices(
@@ -92,7 +92,7 @@ def time_devices(
 
 
 def _compared(name: str, late_ns: dict[str, list[NDArray[np.int64]]]) -> DeviceLateness:
-    own, reference = late_ns[name], late_ns[REFERENCE]
+    own, reference = late_ns[name], late_ns[_REFERENCE]
     rng = np.random.default_rng(1)
     draws = [_ratio(own, reference, rng.integers(0, len(own), len(own))) for _ in range(_DRAWS)]
     p50_ns, p99_ns = np.percentile(np.concatenate(own), [50, 99])
@@ -116,9 +116,9 @@ def _ratio(own: list[NDArray[np.int64]], reference: list[NDArray[np.int64]], rou
 
 def evidence(found: Sequence[DeviceLateness]) -> Evidence:
     """Return the table as text."""
-    lines = [f"{'device':<28}{'ticks':>8}{'p50 us':>9}{'p99 us':>9}   p99 : {REFERENCE} (95 % interval)"]
+    lines = [f"{'device':<28}{'ticks':>8}{'p50 us':>9}{'p99 us':>9}   p99 : {_REFERENCE} (95 % interval)"]
     for one in found:
-        ratio = f"   {one.ratio:.2f} ({one.low:.2f} to {one.high:.2f}): {one.verdict}" if one.name != REFERENCE else ""
+        ratio = f"   {one.ratio:.2f} ({one.low:.2f} to {one.high:.2f}): {one.verdict}" if one.name != _REFERENCE else ""
         lines.append(f"{one.name:<28}{one.ticks:>8}{one.p50_us:>9.0f}{one.p99_us:>9.0f}{ratio}")
-    text = "\n".join((*lines, f"limit: {MOST_RATIO:g}; missed where the whole interval is above it")) + "\n"
+    text = "\n".join((*lines, f"limit: {_MOST_RATIO:g}; missed where the whole interval is above it")) + "\n"
     return Evidence(text, {"devices.txt": text}, missed=any(one.missed for one in found))

@@ -98,7 +98,7 @@ def _write(_context: int, _command: int) -> int:
 
 
 Kind: TypeAlias = Literal["servo", "bare", "thread", "qt"]
-Whole: TypeAlias = NDArray[np.int64]
+_Whole: TypeAlias = NDArray[np.int64]
 
 PERIOD_NS: Final = 1_000_000
 LEAD_IN: Final = 50  # ticks at the start of each while that are not counted: threads begin, scenes are loaded
@@ -115,12 +115,12 @@ _sleep = call_at(SLEEP)
 class Ticks(NamedTuple):
     """What a loop did: how late each tick began, how long it took [ns] (n,), and how many deadlines it passed over."""
 
-    lateness_ns: Whole
-    busy_ns: Whole
+    lateness_ns: _Whole
+    busy_ns: _Whole
     overruns: int
 
 
-Timer: TypeAlias = Callable[[int, int, Callable[[], object]], int]
+_Timer: TypeAlias = Callable[[int, int, Callable[[], object]], int]
 """Calls a function every so many milliseconds and so many times, and returns its start by ``time.monotonic_ns``."""
 
 
@@ -165,7 +165,7 @@ class ServoLoop:
         return Ticks(samples.lateness_ns.copy(), samples.busy_ns.copy(), overruns)
 
 
-class BareLoop:
+class _BareLoop:
     """The limit of this machine: compiled like the servo, sleeping by the same C function on a clock like its own."""
 
     kind: Kind = "bare"
@@ -213,7 +213,7 @@ class _SameTick:
         self.servo.advance(1)
 
 
-class ThreadLoop:
+class _ThreadLoop:
     """What is usual: a thread of Python that sleeps until its deadline and calls the same tick."""
 
     kind: Kind = "thread"
@@ -246,12 +246,12 @@ class ThreadLoop:
         return ticks_at(start_ns, times)
 
 
-class QtLoop:
+class _QtLoop:
     """What a program of windows offers: a precise timer of Qt, in their thread, that calls the same tick."""
 
     kind: Kind = "qt"
 
-    def __init__(self, grant: Grant, timer: Timer) -> None:
+    def __init__(self, grant: Grant, timer: _Timer) -> None:
         self.grant = grant
         self._timer = timer
         self.tick = _SameTick()
@@ -313,10 +313,10 @@ def granted() -> Classes:
 LATE_NS: Final = 1_000_000
 PERCENTILES: Final = (50.0, 90.0, 99.0, 99.9)
 
-MEDIAN_US: Final = 15.0
-TAIL_RATIO: Final = 2.5
-FEWER_LATE: Final = 5.0
-BUSY_US: Final = 5.0
+_MEDIAN_US: Final = 15.0
+_TAIL_RATIO: Final = 2.5
+_FEWER_LATE: Final = 5.0
+_BUSY_US: Final = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -325,8 +325,8 @@ class LoopTiming:
 
     kind: Kind
     grant: Grant
-    lateness_ns: Whole
-    busy_ns: Whole
+    lateness_ns: _Whole
+    busy_ns: _Whole
     overruns: int
 
     @property
@@ -404,15 +404,18 @@ class Timed:
         took_us = servo.busy_us(99)
         late = (
             f"{servo.late:,} ticks over 1 ms late, {_fewer(thread, servo)} than with a Python thread "
-            f"(at least {FEWER_LATE:g} times fewer; the bare loop: {_fewer(thread, bare)})"
+            f"(at least {_FEWER_LATE:g} times fewer; the bare loop: {_fewer(thread, bare)})"
         )
         return tuple(
             Limit(level, said, held)
             for said, held in (
-                (f"median {above_us:+.1f} µs against the bare loop (at most +{MEDIAN_US:g} µs)", above_us <= MEDIAN_US),
-                (f"p99 {ratio:.2f} times the bare loop's (at most {TAIL_RATIO:g})", ratio <= TAIL_RATIO),
-                (late, thread.late_share >= FEWER_LATE * servo.late_share),
-                (f"a tick took {took_us:.1f} µs at p99 (at most {BUSY_US:g} µs)", took_us <= BUSY_US),
+                (
+                    f"median {above_us:+.1f} µs against the bare loop (at most +{_MEDIAN_US:g} µs)",
+                    above_us <= _MEDIAN_US,
+                ),
+                (f"p99 {ratio:.2f} times the bare loop's (at most {_TAIL_RATIO:g})", ratio <= _TAIL_RATIO),
+                (late, thread.late_share >= _FEWER_LATE * servo.late_share),
+                (f"a tick took {took_us:.1f} µs at p99 (at most {_BUSY_US:g} µs)", took_us <= _BUSY_US),
             )
         )
 
@@ -424,7 +427,7 @@ def _fewer(thread: LoopTiming, other: LoopTiming) -> str:
     return f"{thread.late_share / other.late_share:.1f} times fewer"
 
 
-def loop_timing(kind: Kind, grant: Grant, parts: Sequence[Ticks]) -> LoopTiming:
+def _loop_timing(kind: Kind, grant: Grant, parts: Sequence[Ticks]) -> LoopTiming:
     """Return what a loop did in all its turns."""
     return LoopTiming(
         kind,
@@ -467,10 +470,10 @@ def timing(
     for grant in (classes.normal, *([classes.best] if classes.best else [])):
         real_time = grant is classes.best
         servos.append(ServoLoop(grant, real_time=real_time, spin_us=spin_us))
-        bare = BareLoop(grant, real_time=real_time, clock=SystemClock(spin_us))
-        loops += [servos[-1], bare, ThreadLoop(grant, real_time=real_time)]
+        bare = _BareLoop(grant, real_time=real_time, clock=SystemClock(spin_us))
+        loops += [servos[-1], bare, _ThreadLoop(grant, real_time=real_time)]
         if windows is not None and not real_time:
-            loops.append(QtLoop(grant, windows.timer))
+            loops.append(_QtLoop(grant, windows.timer))
     notes = [f"priority: {classes.best or classes.normal}", *(() if classes.best else classes.normal.advice)]
     if windows is None:
         notes.append("Qt is not available: its timer was not measured")
@@ -490,7 +493,7 @@ def timing(
             spin_us=servos[0].clock.spin_us,
             spun_share=sum(servo.clock.spun_ns for servo in servos) / (len(servos) * each_ns),
             frames_hz=frames_hz if load != "none" else None,
-            loops=tuple(loop_timing(loop.kind, loop.grant, parts) for loop, parts in found.items()),
+            loops=tuple(_loop_timing(loop.kind, loop.grant, parts) for loop, parts in found.items()),
             notes=tuple(notes),
         )
 

@@ -19,8 +19,8 @@ from study_app.evidence.table import Evidence, Table, duration, plot_files
 from study_app.evidence.timing.measurement import LATE_NS, NAMES, PERCENTILES, Kind, LoopTiming, Timed
 from study_app.haptics.runtime.clocks.grants import Level
 
-FOOT_PT: Final = 62.0
-LETTERS: Final = 132
+_FOOT_PT: Final = 62.0
+_LETTERS: Final = 132
 
 
 class Layout(NamedTuple):
@@ -40,9 +40,9 @@ def panels_abreast(
     width_pt, height_pt = style.PAGE_WIDTH_PT, layout.height_pt
     figure = Figure(figsize=(width_pt / 72, height_pt / 72), facecolor="white")
     panel_pt = (width_pt - layout.left_pt - layout.right_pt - layout.gap_pt * (count - 1)) / count
-    tall = (height_pt - layout.top_pt - FOOT_PT) / height_pt
+    tall = (height_pt - layout.top_pt - _FOOT_PT) / height_pt
     lefts = [(layout.left_pt + k * (panel_pt + layout.gap_pt)) / width_pt for k in range(count)]
-    panels = [figure.add_axes((left, FOOT_PT / height_pt, panel_pt / width_pt, tall)) for left in lefts]
+    panels = [figure.add_axes((left, _FOOT_PT / height_pt, panel_pt / width_pt, tall)) for left in lefts]
     figure.legend(
         handles=handles,
         loc="upper left",
@@ -53,24 +53,24 @@ def panels_abreast(
         handlelength=handlelength,
         columnspacing=2.2,
     )
-    text = "\n".join(textwrap.wrap(caption, LETTERS))
+    text = "\n".join(textwrap.wrap(caption, _LETTERS))
     figure.text(4 / width_pt, 29 / height_pt, text, va="top", fontsize=6.6, color=style.TEXT_SOFT)
     return figure, panels
 
 
-LAYOUT: Final = Layout(height_pt=224, top_pt=36, left_pt=36, gap_pt=30, right_pt=16)
-LOWEST_US: Final = 1.0
+_LAYOUT: Final = Layout(height_pt=224, top_pt=36, left_pt=36, gap_pt=30, right_pt=16)
+_LOWEST_US: Final = 1.0
 BINS_A_DECADE: Final = 10
 
-LOOKS: Final[dict[Kind, dict[str, Any]]] = {
+_LOOKS: Final[dict[Kind, dict[str, Any]]] = {
     "servo": {"color": "#0b65a3", "linestyle": "-", "linewidth": 1.7, "zorder": 5},
     "bare": {"color": "#13202c", "linestyle": (0, (1, 1.2)), "linewidth": 1.3, "zorder": 6},
     "thread": {"color": "#b35600", "linestyle": (0, (5, 2)), "linewidth": 1.3, "zorder": 4},
     "qt": {"color": "#7a3e8f", "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 1.2, "zorder": 3},
 }
-MARKS: Final[dict[Kind, str]] = {"servo": "o", "bare": "s", "thread": "^", "qt": "D"}
+_MARKS: Final[dict[Kind, str]] = {"servo": "o", "bare": "s", "thread": "^", "qt": "D"}
 
-LOADS: Final = {
+_LOADS: Final = {
     "none": "no other load in the program",
     "gui": "the participant's and the operator's windows painting",
     "gui+cpu": "both windows painting, and a busy Python process on every core",
@@ -82,17 +82,17 @@ def draw(found: Timed) -> Figure:
     """Draw what was found."""
     caption = (
         f"Share of ticks in each of {BINS_A_DECADE} bins per decade; marks at the bottom: the 99th percentile of each. "
-        f"{found.seconds:g} s of each loop at 1 kHz alternating every quarter second, {LOADS[found.load]}. "
+        f"{found.seconds:g} s of each loop at 1 kHz alternating every quarter second, {_LOADS[found.load]}. "
         f"{found.machine}."
     )
     handles = []
     for kind in (kind for kind in NAMES if any(loop.kind == kind for loop in found.loops)):
-        face = LOOKS[kind]["color"] if kind in {"servo", "thread"} else "white"
-        look = {name: value for name, value in LOOKS[kind].items() if name != "zorder"}
+        face = _LOOKS[kind]["color"] if kind in {"servo", "thread"} else "white"
+        look = {name: value for name, value in _LOOKS[kind].items() if name != "zorder"}
         handles.append(
-            Line2D([], [], marker=MARKS[kind], markersize=4, markerfacecolor=face, label=NAMES[kind], **look)
+            Line2D([], [], marker=_MARKS[kind], markersize=4, markerfacecolor=face, label=NAMES[kind], **look)
         )
-    figure, panels = panels_abreast(LAYOUT, len(found.levels), handles, 3.4, caption)
+    figure, panels = panels_abreast(_LAYOUT, len(found.levels), handles, 3.4, caption)
     highest_us = float(10 ** np.ceil(np.log10(max(2e3, *(loop.late_us(100) for loop in found.loops)))))
     for axes, level in zip(panels, found.levels, strict=True):
         _panel(axes, found, level, highest_us, first=axes is panels[0])
@@ -101,17 +101,17 @@ def draw(found: Timed) -> Figure:
 
 def _panel(axes: Axes, found: Timed, level: Level, highest_us: float, *, first: bool) -> None:
     """Draw the loops of a class as steps, each with a mark at its 99th percentile."""
-    decades = np.log10(highest_us / LOWEST_US)
-    edges = np.logspace(np.log10(LOWEST_US), np.log10(highest_us), round(BINS_A_DECADE * decades) + 1)
+    decades = np.log10(highest_us / _LOWEST_US)
+    edges = np.logspace(np.log10(_LOWEST_US), np.log10(highest_us), round(BINS_A_DECADE * decades) + 1)
     loops = [loop for loop in found.loops if loop.grant.level == level]
     least = 1 / max(loop.ticks for loop in found.loops)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_xlim(LOWEST_US, highest_us)
+    axes.set_xlim(_LOWEST_US, highest_us)
     axes.set_ylim(0.6 * least, 1.4)
     for loop in loops:
-        shares = np.histogram(np.clip(loop.lateness_ns * 1e-3, LOWEST_US, None), edges)[0] / loop.ticks
-        axes.stairs(np.where(shares > 0, shares, 0.1 * least), edges, baseline=None, **LOOKS[loop.kind])
+        shares = np.histogram(np.clip(loop.lateness_ns * 1e-3, _LOWEST_US, None), edges)[0] / loop.ticks
+        axes.stairs(np.where(shares > 0, shares, 0.1 * least), edges, baseline=None, **_LOOKS[loop.kind])
     _tails(axes, loops, least)
     axes.axvline(LATE_NS * 1e-3, color=style.ZERO, linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1)
     axes.annotate("1 ms", (LATE_NS * 1e-3, 1.3), (2, -1), textcoords="offset points", va="top", fontsize=6.6)
@@ -129,12 +129,12 @@ def _panel(axes: Axes, found: Timed, level: Level, highest_us: float, *, first: 
 def _tails(axes: Axes, loops: list[LoopTiming], least: float) -> None:
     """Mark the 99th percentiles along the foot of a panel."""
     for loop in loops:
-        look = LOOKS[loop.kind]
+        look = _LOOKS[loop.kind]
         face = look["color"] if loop.kind in {"servo", "thread"} else "white"
         axes.plot(
             [loop.late_us(99)],
             [0.6 * least],
-            marker=MARKS[loop.kind],
+            marker=_MARKS[loop.kind],
             markersize=5,
             markerfacecolor=face,
             markeredgecolor=look["color"],
@@ -156,7 +156,7 @@ _HEADINGS: Final = (
 def evidence(found: Timed) -> Evidence:
     """Return the report for a terminal, as Markdown between comments for docs/timing.md, as CSV, and the figure."""
     head = (
-        f"{found.seconds:g} s of each loop at 1 kHz, alternating every quarter second; {LOADS[found.load]}"
+        f"{found.seconds:g} s of each loop at 1 kHz, alternating every quarter second; {_LOADS[found.load]}"
         f"{'' if found.frames_hz is None else f', {found.frames_hz:.0f} frames per second'}. {found.machine}."
     )
     notes = found.notes

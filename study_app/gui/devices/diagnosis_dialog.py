@@ -22,9 +22,9 @@ from study_app.store.support import NAME, write_support
 from study_app.store.workstation import MachineSettings
 from study_app.workers.server import Crashed, Refused
 
-LOOK_MS = 100
-PREPARING = "Preparing … The driver is compiled at the first use, which takes about a minute."
-SIZE = QSize(820, 700)
+_LOOK_MS = 100
+_PREPARING = "Preparing … The driver is compiled at the first use, which takes about a minute."
+_SIZE = QSize(820, 700)
 
 
 Begin: TypeAlias = Callable[..., ExaminationClient]
@@ -63,7 +63,7 @@ class DiagnosisDialog(QDialog):
         self.leaving: ExaminationClient | None = None
         self._wanted = False
         self.report: Report | None = None
-        self.step = label(PREPARING, "body", "text2", wraps=True)
+        self.step = label(_PREPARING, "body", "text2", wraps=True)
         self.note = label(note, "label", "warn", wraps=True)
         self.note.setVisible(bool(note))
         self.saved = label("", "label", "text2", wraps=True, weight=400)
@@ -82,9 +82,9 @@ class DiagnosisDialog(QDialog):
         self._connect()
         self.setMinimumSize(680, 420)
         room = self.screen().availableSize()
-        self.resize(SIZE.boundedTo(QSize(room.width() - 40, room.height() - 60)))
+        self.resize(_SIZE.boundedTo(QSize(room.width() - 40, room.height() - 60)))
         apply_theme(self, theme)
-        self._timer = QTimer(self, interval=LOOK_MS)
+        self._timer = QTimer(self, interval=_LOOK_MS)
         self._timer.timeout.connect(self._read_answers)
         self.examine()
 
@@ -117,7 +117,7 @@ class DiagnosisDialog(QDialog):
     def examine(self) -> None:
         self._end_process()
         self.report = None
-        self._show_step(PREPARING, "text2", "pulse", "accent")
+        self._show_step(_PREPARING, "text2", "pulse", "accent")
         self.saved.hide()
         self.text.clear()
         self.bar.show()
@@ -208,7 +208,7 @@ def _sentence(text: str) -> str:
     return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
 
 
-HELD = (
+_HELD = (
     "This session uses the device, so some checks cannot run. For a full diagnosis, end the session first; you can "
     "resume it later."
 )
@@ -219,7 +219,7 @@ def open_diagnosis(
 ) -> DiagnosisDialog:
     """Open the diagnosis of a device; ``held``: a session has the device open."""
     options = descriptor_of(name).window_values(settings.device_options)
-    made = DiagnosisDialog(parent, theme, name, options=options, note=HELD if held else "")
+    made = DiagnosisDialog(parent, theme, name, options=options, note=_HELD if held else "")
     made.finished.connect(made.deleteLater)
     if settings.sound:
         made.over.connect(lambda _well: QApplication.beep())

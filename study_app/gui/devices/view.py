@@ -21,7 +21,7 @@ from study_app.gui.widgets.labels import label, set_ink
 from study_app.gui.widgets.main_view import Place
 from study_app.store.workstation import DEFAULTS, MachineSettings
 
-INSET = 30  # behind a radio's mark
+_INSET = 30  # behind a radio's mark
 
 
 class DeviceRow(QWidget):
@@ -40,10 +40,10 @@ class DeviceRow(QWidget):
         self.diagnose.setAccessibleName(f"Diagnose {shown.title}")
         self.diagnose.setVisible(shown.diagnosable)
         self.diagnose.clicked.connect(lambda: diagnose(self.name))
-        inset = () if shown.choosable else (INSET,)
+        inset = () if shown.choosable else (_INSET,)
         head = hbox(*inset, self.title, STRETCH, self.chip, spacing=10)
         text = vbox(self.can, self.why, self.by, STRETCH, spacing=4)
-        below = hbox((text, 1), (self.diagnose, 0, Qt.AlignmentFlag.AlignTop), spacing=16, margins=(INSET, 0, 0, 0))
+        below = hbox((text, 1), (self.diagnose, 0, Qt.AlignmentFlag.AlignTop), spacing=16, margins=(_INSET, 0, 0, 0))
         vbox(head, below, spacing=2, margins=(0, 6, 0, 6), parent=self)
         self.show_device(shown)
 
@@ -64,13 +64,13 @@ def _text_label(ink: str, *, small: bool = False) -> QLabel:
     return made
 
 
-STACKED_BELOW = 1000
-COLUMN_PX = 340
-NONE = "No file chosen"
+_STACKED_BELOW = 1000
+_COLUMN_PX = 340
+_NONE = "No file chosen"
 PATIENCE_S = 5.0
 
 
-class OptionCard(Card):
+class _OptionCard(Card):
     """The file of a device's option; an empty field is none."""
 
     def __init__(self, option: DeviceOption) -> None:
@@ -78,12 +78,12 @@ class OptionCard(Card):
         about = label(option.about, "label", "text2", wraps=True, weight=400)
         about.setMinimumWidth(LEAST_WORDS)
         exists = partial(typed_file, option.name)
-        field = Field(option.name, "File", "file", (), placeholder=NONE, file_filter=option.file_filter, parse=exists)
+        field = Field(option.name, "File", "file", (), placeholder=_NONE, file_filter=option.file_filter, parse=exists)
         self.editor = Editor(field)
         add_parts(self.column, about, self.editor)
 
 
-class HelpCard(Card):
+class _HelpCard(Card):
     """What to do next with a Falcon: the words that need no window."""
 
     def __init__(self) -> None:
@@ -122,8 +122,8 @@ class DevicesPlace(Place):
         self._group = QButtonGroup(self)
         self.lists = {False: Card("Input devices", gap=6), True: Card("Simulated devices", gap=6)}
         self.rows: dict[str, DeviceRow] = {}
-        self.options = {option.name: OptionCard(option) for option in remembered_options()}
-        self.help = HelpCard()
+        self.options = {option.name: _OptionCard(option) for option in remembered_options()}
+        self.help = _HelpCard()
         self.refresh = ActionButton("repeat", "Refresh", key="F5")
         self.refresh.clicked.connect(self.look_for_devices)
         for card in self.options.values():
@@ -224,9 +224,9 @@ class DevicesPlace(Place):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        stacked = self.width() < STACKED_BELOW
+        stacked = self.width() < _STACKED_BELOW
         way = QBoxLayout.Direction.TopToBottom if stacked else QBoxLayout.Direction.LeftToRight
         self._body.setDirection(way)
         for card in (*self.options.values(), self.help):
-            card.setMinimumWidth(0 if stacked else COLUMN_PX)
-            card.setMaximumWidth(QWIDGETSIZE_MAX if stacked else COLUMN_PX)
+            card.setMinimumWidth(0 if stacked else _COLUMN_PX)
+            card.setMaximumWidth(QWIDGETSIZE_MAX if stacked else _COLUMN_PX)

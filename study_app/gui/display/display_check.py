@@ -18,7 +18,7 @@ PACKAGES = (
     "libegl1 libgl1 libglib2.0-0 libfontconfig1 libdbus-1-3 libxkbcommon-x11-0 libxcb-cursor0 libxcb-icccm4 "
     "libxcb-image0 libxcb-keysyms1 libxcb-randr0 libxcb-render-util0 libxcb-shape0 libxcb-xinerama0 libxcb-xkb1"
 )
-NEEDS_NO_DISPLAY = "liquid-study rehearse, check, export and plot do not need a display"
+_NEEDS_NO_DISPLAY = "liquid-study rehearse, check, export and plot do not need a display"
 
 
 def check_display(environment: Mapping[str, str] = os.environ, platform: str = sys.platform) -> None:
@@ -40,7 +40,7 @@ def check_display(environment: Mapping[str, str] = os.environ, platform: str = s
     if not display:
         raise DisplayError(
             "there is no display for a window: DISPLAY and WAYLAND_DISPLAY are not set; start from a desktop "
-            f"session, or over SSH with ssh -X ({NEEDS_NO_DISPLAY})"
+            f"session, or over SSH with ssh -X ({_NEEDS_NO_DISPLAY})"
         )
     _load_plugin()
     _connect_to_display(display)
@@ -49,7 +49,7 @@ def check_display(environment: Mapping[str, str] = os.environ, platform: str = s
 def missing_for_windows() -> str:
     """Return the system library that Qt's X11 plugin lacks and its package, even without a display; "" if none."""
     try:
-        if platform_is_linux():
+        if _platform_is_linux():
             _load_plugin()
     except DisplayError as error:
         return str(error)
@@ -59,10 +59,10 @@ def missing_for_windows() -> str:
 def missing_library(error: OSError | ImportError) -> DisplayError:
     """Return the error about a system library that Qt could not load."""
     library = str(error).partition(":")[0]
-    if platform_is_linux():
+    if _platform_is_linux():
         return DisplayError(
             f"Qt cannot be loaded: {library} is missing on this system; on Debian or Ubuntu: "
-            f"sudo apt install {PACKAGES} ({NEEDS_NO_DISPLAY})"
+            f"sudo apt install {PACKAGES} ({_NEEDS_NO_DISPLAY})"
         )
     return DisplayError(f"Qt cannot be loaded ({error}): reinstall liquid-study with pip")
 
@@ -82,7 +82,7 @@ def naming_missing_library() -> Iterator[None]:
         raise missing_library(missing) from missing
 
 
-def platform_is_linux() -> bool:
+def _platform_is_linux() -> bool:
     """Return whether system libraries come as Linux packages here."""
     return sys.platform == "linux"
 
@@ -115,5 +115,5 @@ def _connect_to_display(display: str) -> None:
     if failed:
         raise DisplayError(
             f"the display {display!r} (DISPLAY) cannot be reached: check that its X server is running and that "
-            f"you have access ({NEEDS_NO_DISPLAY})"
+            f"you have access ({_NEEDS_NO_DISPLAY})"
         )

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QWidget
 
 from study_app.errors import DisplayError
 
-FRAME_LOOKS_MS = (300, 1000, 3000)  # delay before measuring a window manager's frame around a new window
+_FRAME_LOOKS_MS = (300, 1000, 3000)  # delay before measuring a window manager's frame around a new window
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,11 +95,11 @@ def place_window(window: QWidget, screen: QScreen, *, corner: bool) -> None:
     room = screen.availableGeometry()
     window.setScreen(screen)
     window.setGeometry(_rectangle_inside(window, room, corner=corner))
-    for after_ms in FRAME_LOOKS_MS:
-        QTimer.singleShot(after_ms, window, partial(make_room_for_frame, window, corner=corner))
+    for after_ms in _FRAME_LOOKS_MS:
+        QTimer.singleShot(after_ms, window, partial(_make_room_for_frame, window, corner=corner))
 
 
-def make_room_for_frame(window: QWidget, *, corner: bool = False) -> None:
+def _make_room_for_frame(window: QWidget, *, corner: bool = False) -> None:
     """Move ``window`` with its frame wholly onto its screen, below its minimum size if necessary."""
     room, outer, inner = window.screen().availableGeometry(), window.frameGeometry(), window.geometry()
     if window.isFullScreen() or window.isMaximized() or room.contains(outer):
@@ -126,7 +126,7 @@ def _rectangle_inside(window: QWidget, room: QRect, *, corner: bool) -> QRect:
 # What Qt's window system needs on Debian and its relatives, beyond a minimal installation.
 
 
-GL_RENDERER: Final = 0x1F01
+_GL_RENDERER: Final = 0x1F01
 IN_SOFTWARE: Final = ("llvmpipe", "softpipe", "swrast", "swiftshader", "gdi generic", "software", "basic render")
 WITHOUT_OPENGL: Final = {"offscreen", "minimal", "vnc", "linuxfb"}
 
@@ -144,7 +144,7 @@ def opengl_renderer() -> str | None:
     if not context.makeCurrent(surface):
         return None
     try:
-        return str(context.functions().glGetString(GL_RENDERER))
+        return str(context.functions().glGetString(_GL_RENDERER))
     finally:
         context.doneCurrent()
 
@@ -157,7 +157,7 @@ def has_graphics_card() -> bool:
 
 LEAD_NS: Final = 5_000_000  # time before a swap at which a frame is drawn: twice the tank's drawing time at 1080p
 STALE_REFRESHES: Final = 8  # refreshes without a swap after which the clock alone paces
-NS_PER_S: Final = 1_000_000_000
+_NS_PER_S: Final = 1_000_000_000
 LOCKED, BY_CLOCK = "locked to the screen's swaps", "by the clock"
 
 
@@ -170,10 +170,10 @@ class Frames(QObject):
         self, refresh_hz: float, *, now_ns: Callable[[], int] = time.perf_counter_ns, parent: QObject | None = None
     ) -> None:
         super().__init__(parent)
-        self.period_ns = round(NS_PER_S / max(refresh_hz, 1.0))
+        self.period_ns = round(_NS_PER_S / max(refresh_hz, 1.0))
         self._now_ns = now_ns
         self._next_ns = 0
-        self._drawn_ns = -NS_PER_S
+        self._drawn_ns = -_NS_PER_S
         self._swapped_ns: int | None = None
         self._timer = QTimer(self, timerType=Qt.TimerType.PreciseTimer, singleShot=True)
         self._timer.timeout.connect(self._request_frame)

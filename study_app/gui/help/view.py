@@ -41,8 +41,8 @@ from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.main_view import Place
 
-FIRST_PAGE: Final = documentation.INDEX
-PAGES_OF_PLACES: Final = {
+_FIRST_PAGE: Final = documentation.INDEX
+_PAGES_OF_PLACES: Final = {
     "home": "first-session",
     "designer": "designer",
     "results": "answers-to-report",
@@ -70,7 +70,7 @@ class HelpEntry:
 @cache
 def help_entries() -> tuple[HelpEntry, ...]:
     """Return the pages in the order of the sections, each page followed by its sections."""
-    rows = [HelpEntry(page=FIRST_PAGE, title="Start page", heads=True)]
+    rows = [HelpEntry(page=_FIRST_PAGE, title="Start page", heads=True)]
     for section, pages in documentation.sections().items():
         rows.append(HelpEntry(page=section, title=plain(documentation.title(section)), heads=True))
         rows += [HelpEntry(page=page, title=plain(documentation.title(page))) for page in pages]
@@ -102,26 +102,26 @@ def page_markdown(page: str) -> str:
     )
 
 
-ENDING = ".md"
+_ENDING = ".md"
 CELL_PADDING, MARGIN = 6, 28
-WIDEST_TEXT = 860  # px: longer lines are hard to read
-HEADING_SIZES = {1: 26, 2: 20, 3: 16, 4: 15}  # px
-CODE_SIZE = 14  # px
-PICTURE = "\N{OBJECT REPLACEMENT CHARACTER}"
+_WIDEST_TEXT = 860  # px: longer lines are hard to read
+_HEADING_SIZES = {1: 26, 2: 20, 3: 16, 4: 15}  # px
+_CODE_SIZE = 14  # px
+_PICTURE = "\N{OBJECT REPLACEMENT CHARACTER}"
 CODE = (QTextFormat.Property.BlockCodeFence, QTextFormat.Property.BlockCodeLanguage)
 
 
-def heading_font(level: int) -> QFont:
+def _heading_font(level: int) -> QFont:
     """Return the font of a heading; levels count from 1."""
     made = font("title" if level == 1 else "card")
-    made.setPixelSize(HEADING_SIZES[min(level, 4)])
+    made.setPixelSize(_HEADING_SIZES[min(level, 4)])
     return made
 
 
-def code_font() -> QFont:
+def _code_font() -> QFont:
     """Return the font of code."""
     made = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
-    made.setPixelSize(CODE_SIZE)
+    made.setPixelSize(_CODE_SIZE)
     return made
 
 
@@ -131,7 +131,7 @@ def _text_format(used: QFont) -> QTextCharFormat:
     return made
 
 
-class PageReader(Coloured, QTextBrowser):
+class _PageReader(Coloured, QTextBrowser):
     """A page; ``page_asked(name, anchor)`` where a link leads to another one. Other links open outside the program."""
 
     page_asked = Signal(str, str)
@@ -167,7 +167,7 @@ class PageReader(Coloured, QTextBrowser):
         path = name.toString() if isinstance(name, QUrl) else name
         picture = QImage(str(self._folder / self._path_from_docs(path)))
         ratio = self.devicePixelRatioF()
-        width = round(max(200, min(WIDEST_TEXT, self.viewport().width() - 2 * MARGIN)) * ratio)
+        width = round(max(200, min(_WIDEST_TEXT, self.viewport().width() - 2 * MARGIN)) * ratio)
         if picture.width() > width:
             picture = picture.scaledToWidth(width, Qt.TransformationMode.SmoothTransformation)
         picture.setDevicePixelRatio(ratio)
@@ -205,17 +205,17 @@ class PageReader(Coloured, QTextBrowser):
             cursor.movePosition(QTextCursor.MoveOperation.EndOfBlock, QTextCursor.MoveMode.KeepAnchor)
             shape = block.blockFormat()
             if shape.headingLevel():
-                cursor.mergeCharFormat(_text_format(heading_font(shape.headingLevel())))
+                cursor.mergeCharFormat(_text_format(_heading_font(shape.headingLevel())))
                 shape.setTopMargin(0 if shape.headingLevel() == 1 else 22)
                 shape.setBottomMargin(6)
             elif any(shape.hasProperty(key) for key in CODE):
-                cursor.mergeCharFormat(_text_format(code_font()))
+                cursor.mergeCharFormat(_text_format(_code_font()))
                 shape.setBackground(QColor(self.theme.sunk))
                 shape.setNonBreakableLines(False)
             elif not in_table:
                 shape.setTopMargin(6)
                 shape.setBottomMargin(4)
-                if PICTURE not in block.text():
+                if _PICTURE not in block.text():
                     shape.setLineHeight(125, QTextBlockFormat.LineHeightTypes.ProportionalHeight.value)
             cursor.setBlockFormat(shape)
             self._colour_links(block)
@@ -271,14 +271,14 @@ class PageReader(Coloured, QTextBrowser):
             QDesktopServices.openUrl(link)
         elif not path:
             self._scroll_to(anchor)
-        elif path.endswith(ENDING):
-            self.page_asked.emit(self._path_from_docs(path.removesuffix(ENDING)), anchor)
+        elif path.endswith(_ENDING):
+            self.page_asked.emit(self._path_from_docs(path.removesuffix(_ENDING)), anchor)
 
 
 LIST_WIDTH, ROW_PX, HEAD_PX = 280, 30, 40
 PAGE, ANCHOR = Qt.ItemDataRole.UserRole, Qt.ItemDataRole.UserRole + 1
-MOVES = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
-ENTERS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
+_MOVES = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
+_ENTERS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
 
 class HelpPlace(Place):
@@ -297,7 +297,7 @@ class HelpPlace(Place):
         self.list.setFrameShape(QFrame.Shape.NoFrame)
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.nothing = label("No page contains these words.", "label", "text2", wraps=True)
-        self.reader = PageReader(documentation.folder() if folder is None else folder)
+        self.reader = _PageReader(documentation.folder() if folder is None else folder)
         self.back = ActionButton("chevron_left", "Back", height=38)
         self.back.setEnabled(False)
         self._lay_out()
@@ -311,7 +311,7 @@ class HelpPlace(Place):
         QShortcut(QKeySequence("Esc"), self, self._go_to_origin)
         QShortcut(QKeySequence(QKeySequence.StandardKey.Find), self, self.words.setFocus)
         self._show_rows(help_entries())
-        self.open_page(FIRST_PAGE)
+        self.open_page(_FIRST_PAGE)
 
     def _lay_out(self) -> None:
         pages, page = Card(padding=14, gap=10), Card(padding=6, gap=0)
@@ -334,10 +334,10 @@ class HelpPlace(Place):
 
     def open_from(self, place: str) -> None:
         """Show the page about another place, to which *Back* returns; from Help itself, the first page."""
-        if place not in PAGES_OF_PLACES:
-            self.open_page(FIRST_PAGE)
+        if place not in _PAGES_OF_PLACES:
+            self.open_page(_FIRST_PAGE)
             return
-        self.open_page(PAGES_OF_PLACES[place])
+        self.open_page(_PAGES_OF_PLACES[place])
         self._before, self._came_from = [], place
         self.back.setEnabled(True)
 
@@ -387,10 +387,10 @@ class HelpPlace(Place):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Let arrow keys in the search field move in the list; the first one, and Enter, open its first page."""
-        if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent) and event.key() in (*MOVES, *ENTERS):
+        if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent) and event.key() in (*_MOVES, *_ENTERS):
             if not self.list.selectedItems():
                 self.list.setCurrentRow(0)
-            elif event.key() in MOVES:
+            elif event.key() in _MOVES:
                 self.list.keyPressEvent(event)
             return True
         return super().eventFilter(watched, event)

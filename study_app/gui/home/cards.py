@@ -24,7 +24,7 @@ from study_app.gui.widgets.labels import Clamped, Elided, label, set_ink
 from study_app.number_text import counted
 
 PICTURE, INSET = 56, 8
-WAKE_POINTS = 48
+_WAKE_POINTS = 48
 
 
 class DeviceCard(Card):
@@ -94,11 +94,11 @@ def _paint_wake(painter: QPainter, water: QRectF) -> None:
             water.left() + water.width() * (0.08 + 0.74 * share),
             water.center().y() + 0.16 * water.height() * math.sin(5.6 * share + 0.4),
         )
-        for share in (k / WAKE_POINTS for k in range(WAKE_POINTS + 1))
+        for share in (k / _WAKE_POINTS for k in range(_WAKE_POINTS + 1))
     ]
     ink = QColor(TANK.lit)
     for k, (start, end) in enumerate(pairwise(points)):
-        share = k / WAKE_POINTS
+        share = k / _WAKE_POINTS
         ink.setAlphaF(0.15 + 0.8 * share)
         painter.setPen(QPen(ink, 1.0 + 3.0 * share, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
         painter.drawLine(start, end)
@@ -154,14 +154,14 @@ COLUMNS = (
     Column("validity", "Validity", 130, 134),
     Column("answers", "Answers", 80, 78),
 )
-EVERY = "every"
+_EVERY = "every"
 LEAST_HEIGHT = 200
-NONE = {
+_NONE = {
     "": "No sessions of participants yet. The first session appears here when it starts.",
     "pilot": "No pilot sessions.",
     "simulated": "No simulated sessions.",
     "sample": "No sample sessions.",
-    EVERY: "No sessions yet. The first session appears here when it starts.",
+    _EVERY: "No sessions yet. The first session appears here when it starts.",
 }
 
 
@@ -189,7 +189,7 @@ class SessionsCard(Card):
         self.all = ActionButton("chevron", "All results", role="plain", height=34)
         self.nothing = label("", "body", "text2", wraps=True)
         parts = (label("Sessions", "card"), (self.nothing, 1), self.kind, (self.where, 1), self.details, self.all)
-        self.rows = SessionsTable(COLUMNS, NONE[""])
+        self.rows = SessionsTable(COLUMNS, _NONE[""])
         add_parts(self.column, hbox(*parts, spacing=12, margins=(12, 0, 12, 0)), (self.rows, 1))
         self.kind.currentIndexChanged.connect(self._apply_filter)
         self.rows.opened.connect(self.open_asked)
@@ -217,7 +217,7 @@ class SessionsCard(Card):
         self._apply_filter()
 
     def show_kind(self, kind: str) -> None:
-        """Show the sessions of a kind: "" for participants', one of `KINDS`, or `EVERY`."""
+        """Show the sessions of a kind: "" for participants', one of `KINDS`, or `_EVERY`."""
         self.kind.setCurrentIndex(self.kind.findData(kind))
 
     def _show_kinds(self) -> None:
@@ -227,18 +227,18 @@ class SessionsCard(Card):
             for kind, plural in KINDS.items():
                 count = sum(session.kind == kind for session in self._found)
                 self.kind.addItem(f"{plural} ({count})", kind)
-            self.kind.addItem(f"All ({len(self._found)})", EVERY)
+            self.kind.addItem(f"All ({len(self._found)})", _EVERY)
             self.kind.setCurrentIndex(self.kind.findData(chosen))
 
     def _apply_filter(self) -> None:
-        kind = str(self.kind.currentData() or "") if self._found else EVERY
-        self.rows.show_matching(lambda session: kind in (session.kind, EVERY))
+        kind = str(self.kind.currentData() or "") if self._found else _EVERY
+        self.rows.show_matching(lambda session: kind in (session.kind, _EVERY))
         hidden = [
             counted(count, f"{other or 'participant'} session")
             for other in KINDS
             if (count := sum(session.kind == other for session in self._found))
         ]
-        self.nothing.setText(f"{NONE[kind]} Not shown: {', '.join(hidden)}." if hidden else NONE[kind])
+        self.nothing.setText(f"{_NONE[kind]} Not shown: {', '.join(hidden)}." if hidden else _NONE[kind])
         emptied = self.rows.isHidden() != self.is_empty
         self.nothing.setVisible(self.is_empty)
         for part in (self.where, self.details, self.rows):
@@ -250,13 +250,13 @@ class SessionsCard(Card):
             self.emptied.emit()
 
 
-LEAST_WIDTH = 330
-GAP = 18
+_LEAST_WIDTH = 330
+_GAP = 18
 TITLE_LINES, ABOUT_LINES = 2, 2
 Facts: TypeAlias = StudyFacts | BrokenFacts | DraftFacts
 
 
-class FileCard(Card):
+class _FileCard(Card):
     """A study: its title, where it is from, and its draft where one was not saved; ``edit`` carries its facts.
 
     Parameters
@@ -298,7 +298,7 @@ class FileCard(Card):
         self.pen.clicked.connect(lambda: self.edit.emit(facts))
 
 
-class StudyCard(FileCard):
+class StudyCard(_FileCard):
     """A study that can be run; ``new_session`` and ``rehearsal`` carry its facts.
 
     ``shipped`` says that it ships with the program, ``first`` that it is what one most likely goes on with.
@@ -329,7 +329,7 @@ class StudyCard(FileCard):
         add_layout(self.column, hbox((self.new, 1), (self.rehearse, 1), spacing=12))
 
 
-class BrokenCard(FileCard):
+class BrokenCard(_FileCard):
     """A protocol file that cannot be used, and why, or a study without a file."""
 
     def __init__(self, facts: BrokenFacts | DraftFacts, *, first: bool = False) -> None:
@@ -353,14 +353,14 @@ class CardGrid(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.cards: list[QWidget] = []
-        self._grid = grid(GAP, GAP, margins=0, parent=self)
-        self._across, self._least = 0, LEAST_WIDTH
+        self._grid = grid(_GAP, _GAP, margins=0, parent=self)
+        self._across, self._least = 0, _LEAST_WIDTH
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
 
     @property
     def row_height(self) -> int:
         """The height of the first row of cards at their present width."""
-        wide = (self.width() - self._grid.contentsMargins().right() + GAP) // max(1, self._across) - GAP
+        wide = (self.width() - self._grid.contentsMargins().right() + _GAP) // max(1, self._across) - _GAP
         heights = (
             card.heightForWidth(wide) if card.hasHeightForWidth() else card.sizeHint().height()
             for card in self.cards[: self._across]
@@ -377,7 +377,7 @@ class CardGrid(QWidget):
             remove_widget(card)
         self.cards = cards
         self._across = 0
-        self._least = max([LEAST_WIDTH, *(card.minimumSizeHint().width() for card in cards)])
+        self._least = max([_LEAST_WIDTH, *(card.minimumSizeHint().width() for card in cards)])
         self.arrange(self.width())
 
     def leave_room(self, width: int) -> None:
@@ -391,7 +391,7 @@ class CardGrid(QWidget):
 
     def arrange(self, width: int) -> None:
         """Place the cards in a width; a single card is not stretched."""
-        across = max(1, (width + GAP) // (self._least + GAP))
+        across = max(1, (width + _GAP) // (self._least + _GAP))
         if across == self._across:
             return
         for column in range(self._grid.columnCount()):

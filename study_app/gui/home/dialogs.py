@@ -42,8 +42,8 @@ from study_app.store.workstation import DEFAULTS, MachineSettings
 from study_app.workers.client import WorkerClient
 from study_app.workspace import workspace
 
-MAX_PARTICIPANTS = 200
-LISTEN_MS = 40
+_MAX_PARTICIPANTS = 200
+_LISTEN_MS = 40
 
 
 class RehearsalDialog(Work):
@@ -71,7 +71,7 @@ class RehearsalDialog(Work):
             f"stored separately, in {self.folder}.{dealt}",
             ActionButton("fast_forward", "Rehearse", role="primary"),
             fields=(
-                Field("participants", "Simulated participants", "count", limits=(1, MAX_PARTICIPANTS)),
+                Field("participants", "Simulated participants", "count", limits=(1, _MAX_PARTICIPANTS)),
                 Field("seed", "Seed", "count", limits=(0, MAX_SEED)),
             ),
             width=520,
@@ -84,7 +84,7 @@ class RehearsalDialog(Work):
         self.begun.connect(self._start_rehearsal)
         self.stop_asked.connect(self._stop_rehearsal)
         self.opened.connect(lambda: self.done(QDialog.DialogCode.Accepted.value))
-        self._listening = QTimer(self, interval=LISTEN_MS)
+        self._listening = QTimer(self, interval=_LISTEN_MS)
         self._listening.timeout.connect(self._read_answers)
 
     def _start_rehearsal(self) -> None:
@@ -135,12 +135,12 @@ class RehearsalDialog(Work):
             self.worker.wait_until_ended()
 
 
-FRAME = 60  # of a window, at most
+_FRAME = 60  # of a window, at most
 INSIDE, OUTSIDE = "in the workspace", "outside the workspace: Home will not list its sessions"
-HOLDS = "It will contain the folders protocols and results."
-ROW_HINT = "the session uses that participant's order; leave empty for its own order"
-PLACE_HINT = "the session uses that participant's order and position in the group; leave empty for its own"
-GROUP_HINT = "a property of the participant; it is recorded"
+_HOLDS = "It will contain the folders protocols and results."
+_ROW_HINT = "the session uses that participant's order; leave empty for its own order"
+_PLACE_HINT = "the session uses that participant's order and position in the group; leave empty for its own"
+_GROUP_HINT = "a property of the participant; it is recorded"
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +160,7 @@ class StudyFolderState:
         return next((claim.group for claim in self.held if claim.participant == participant), None)
 
 
-def read_study_folder_state(path: Path, protocol: Protocol) -> StudyFolderState:
+def _read_study_folder_state(path: Path, protocol: Protocol) -> StudyFolderState:
     """Read a study's folder; ``fault`` says why it cannot be used."""
     folder, fault = StudyFolder(path), ""
     used = UsedIds(path, frozenset(), ())
@@ -240,9 +240,9 @@ class NewSessionDialog(QDialog):
             Field("windowed", "In a window instead of full screen", "check"),
             Field("pilot", "Pilot: marked by a frame, stored separately", "check"),
             Field("results", "Results folder of this study", "folder"),
-            choice_field("group", "Group", {name: name for name in self.facts.protocol.groups}, aside=GROUP_HINT),
+            choice_field("group", "Group", {name: name for name in self.facts.protocol.groups}, aside=_GROUP_HINT),
             Field(
-                "row_of", "Replaces participant", aside=PLACE_HINT if self.facts.protocol.groups else ROW_HINT,
+                "row_of", "Replaces participant", aside=_PLACE_HINT if self.facts.protocol.groups else _ROW_HINT,
                 parse=lambda text: text or None,
             ),
             *(
@@ -335,7 +335,7 @@ class NewSessionDialog(QDialog):
         needed = inside.totalHeightForWidth(wide)
         self._area.setMinimumHeight(0)
         around = whole.totalMinimumSize().height() - self._area.minimumSizeHint().height()
-        self._area.setMinimumHeight(min(needed, self.screen().availableSize().height() - FRAME - around))
+        self._area.setMinimumHeight(min(needed, self.screen().availableSize().height() - _FRAME - around))
         self.adjustSize()
 
     def _choose_device(self) -> None:
@@ -366,7 +366,7 @@ class NewSessionDialog(QDialog):
         """Check the answers, and read the folder again outside the windows' thread."""
         self._show_verdict()
         if text := self._value("results"):
-            self._reader.run(partial(read_study_folder_state, Path(text), self.facts.protocol))
+            self._reader.run(partial(_read_study_folder_state, Path(text), self.facts.protocol))
 
     def _take_state(self, state: StudyFolderState) -> None:
         if state.path == Path(self._value("results")) and state != self._state:
@@ -377,7 +377,7 @@ class NewSessionDialog(QDialog):
         """Return the last state of the study's folder; read a newly chosen folder at once."""
         path = Path(self._value("results") or ".")
         if self._state is None or self._state.path != path:
-            self._state = read_study_folder_state(path, self.facts.protocol)
+            self._state = _read_study_folder_state(path, self.facts.protocol)
         return self._state
 
     def _show_verdict(self) -> None:
@@ -463,7 +463,7 @@ class WorkspaceDialog(Question):
             "wherever they are started. You can change it later under This machine.",
             ActionButton("check", "Use this folder", role="primary"),
             back="Not now",
-            fields=(Field("workspace", "Workspace folder", "folder", hint=HOLDS),),
+            fields=(Field("workspace", "Workspace folder", "folder", hint=_HOLDS),),
             needs={"workspace": "Please choose a folder."},
             width=620,
         )

@@ -22,10 +22,10 @@ from study_app.gui.widgets.main_view import Place, last_focused
 
 WIDE_RAIL, NARROW_RAIL = 216, 72
 WIDE_MARGIN, NARROW_MARGIN = 12, 4
-FOCUS_RING = 2  # px
+_FOCUS_RING = 2  # px
 
 
-class Destination(NamedTuple):
+class _Destination(NamedTuple):
     """A place by its name in the program, with its icon, its word, and the word for a narrow rail."""
 
     name: str
@@ -35,17 +35,17 @@ class Destination(NamedTuple):
 
 
 DESTINATIONS = (
-    Destination(name="home", icon="home", word="Home", short="Home"),
-    Destination(name="designer", icon="designer", word="Study designer", short="Designer"),
-    Destination(name="results", icon="bars", word="Results", short="Results"),
-    Destination(name="lab", icon="sliders", word="Liquid lab", short="Lab"),
-    Destination(name="devices", icon="device", word="Devices", short="Devices"),
-    Destination(name="machine", icon="screen", word="This machine", short="Machine"),
-    Destination(name="help", icon="info", word="Help", short="Help"),
+    _Destination(name="home", icon="home", word="Home", short="Home"),
+    _Destination(name="designer", icon="designer", word="Study designer", short="Designer"),
+    _Destination(name="results", icon="bars", word="Results", short="Results"),
+    _Destination(name="lab", icon="sliders", word="Liquid lab", short="Lab"),
+    _Destination(name="devices", icon="device", word="Devices", short="Devices"),
+    _Destination(name="machine", icon="screen", word="This machine", short="Machine"),
+    _Destination(name="help", icon="info", word="Help", short="Help"),
 )
 
 
-class RailButton(Themed, PressedByEnter):
+class _RailButton(Themed, PressedByEnter):
     """A place to go, or a switch, in the rail: icon and word; side by side when wide, one below the other else."""
 
     def __init__(self, icon: str, word: str, short: str) -> None:
@@ -99,7 +99,7 @@ class RailButton(Themed, PressedByEnter):
             painter.setBrush(QColor(t.accent))
             painter.drawRoundedRect(QRectF(0, 6, 3, rect.height() - 12), 1.5, 1.5)
         if self.hasFocus():
-            painter.setPen(QPen(QColor(t.accent), FOCUS_RING))
+            painter.setPen(QPen(QColor(t.accent), _FOCUS_RING))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawRoundedRect(rect.adjusted(1, 1, -1, -1), RADIUS_CONTROL - 1, RADIUS_CONTROL - 1)
         ink = t.accent if self.here else t.text2
@@ -115,7 +115,7 @@ class RailButton(Themed, PressedByEnter):
         painter.drawText(room, align, self.text())
 
 
-class Rail(Coloured, QWidget):
+class _Rail(Coloured, QWidget):
     """The strip; ``go_asked`` carries the name of a place.
 
     Parameters
@@ -130,13 +130,13 @@ class Rail(Coloured, QWidget):
         give_ground(self, "rail")
         names = set(names)
         self.name = label("Liquid Study", "card")
-        self.switch = RailButton("moon", "Dark theme", "Dark")
+        self.switch = _RailButton("moon", "Dark theme", "Dark")
         self._head = hbox(Logo(), self.name, STRETCH, spacing=10)
         self.buttons = {place.name: self._make_button(place) for place in DESTINATIONS if place.name in names}
         self._column = vbox(self._head, 22, *self.buttons.values(), STRETCH, self.switch, spacing=6, parent=self)
 
-    def _make_button(self, place: Destination) -> RailButton:
-        made = RailButton(place.icon, place.word, place.short)
+    def _make_button(self, place: _Destination) -> _RailButton:
+        made = _RailButton(place.icon, place.word, place.short)
         made.clicked.connect(lambda: self.go_asked.emit(place.name))
         return made
 
@@ -159,8 +159,8 @@ class Rail(Coloured, QWidget):
 
 
 FULL = QSize(1440, 900)
-LEAST = QSize(1024, 640)
-NARROW_BELOW = 1680
+_LEAST = QSize(1024, 640)
+_NARROW_BELOW = 1680
 
 
 def bug_sentence(error: BaseException) -> str:
@@ -186,7 +186,7 @@ class MainWindow(Themed, QMainWindow):
     def __init__(self, makers: Mapping[str, Callable[[], Place]], *, theme: Theme = LIGHT) -> None:
         super().__init__()
         self.setWindowTitle("Liquid Study")
-        self.setMinimumSize(LEAST)
+        self.setMinimumSize(_LEAST)
         self.notice: Question | None = None
         self._notice_of = ""  # the place of the message
         self._resting = False  # whether a session uses the screen
@@ -195,7 +195,7 @@ class MainWindow(Themed, QMainWindow):
         self._makers = makers
         self._places: dict[str, Place] = {}
         self._here = next(iter(makers))
-        self.rail = Rail(makers)
+        self.rail = _Rail(makers)
         self.stack = QStackedWidget()
         whole = QWidget(accessibleName="Liquid Study")
         whole.setProperty("role", "window")
@@ -326,7 +326,7 @@ class MainWindow(Themed, QMainWindow):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self.rail.set_narrow(self.width() < NARROW_BELOW)
+        self.rail.set_narrow(self.width() < _NARROW_BELOW)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         for place in self._places.values():

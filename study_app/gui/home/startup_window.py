@@ -17,7 +17,7 @@ from study_app.gui.widgets.labels import figures, label
 from study_app.number_text import minutes
 
 LONG_AFTER_S = 4.0
-STEP = "Opening the device and the force model …"
+_STEP = "Opening the device and the force model …"
 FIRST_TIME = (
     "The force model is being compiled. This happens once after each installation or update and takes about a minute."
 )
@@ -35,7 +35,7 @@ class OpeningWindow(QWidget):
         self.setWindowTitle("Liquid Study")
         self.setProperty("role", "window")
         self.setFixedSize(560, 260)
-        self.step = label(STEP, "body", "text2", wraps=True)
+        self.step = label(_STEP, "body", "text2", wraps=True)
         self.lasted = figures("", "label", "text2")
         self.cancel = ActionButton("", "Cancel")
         self.cancel.clicked.connect(self.close)

@@ -46,7 +46,7 @@ from study_app.store.workstation import recent_protocols
 from study_app.workspace import workspace
 
 SHIPPED: Final = "Shipped study"
-FIRST_STUDY: Final = "demo"
+_FIRST_STUDY: Final = "demo"
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +145,7 @@ def last_written_ns(session: Path) -> int:
     return 0
 
 
-def last_study(results: Path) -> str:
+def _last_study(results: Path) -> str:
     """Return the study of the latest session under ``results``, samples excluded; "" if there is none."""
     folders = results.glob("*/data/sub-*/ses-*")
     with suppress(StudyError, ValueError):
@@ -166,7 +166,7 @@ def read_studies(
     ``results``; before the first session the demo.
     """
     opened = tuple(opened)
-    last = "" if results is None else last_study(results)
+    last = "" if results is None else _last_study(results)
     begins = results is not None and not last
     drafts = (_draft_facts(file, draft_words) for file in unsaved_files(workspace().protocols))
     facts = (
@@ -175,7 +175,7 @@ def read_studies(
     )
 
     def place(it: StudyFacts | BrokenFacts | DraftFacts) -> tuple[float, bool, bool]:
-        first = it.name == last if last and isinstance(it, StudyFacts) else it.source == FIRST_STUDY and begins
+        first = it.name == last if last and isinstance(it, StudyFacts) else it.source == _FIRST_STUDY and begins
         return 0.0 if it.draft is None else -_seconds(it.draft.kept_at), it.source not in opened, not first
 
     return tuple(sorted(facts, key=place))
@@ -187,7 +187,7 @@ def _draft_facts(file: Path, draft_words: LoadWords) -> DraftFacts | None:
         return None
     title = draft_words().draft_title(draft.text, file.parent) if draft_words else ""
     note = DraftNote(f"Draft of {time_text(draft.kept_at)}, never saved", draft.kept_at)
-    return DraftFacts(source=str(file), title=title or file.stem, origin=origin_of(str(file)), draft=note)
+    return DraftFacts(source=str(file), title=title or file.stem, origin=_origin_of(str(file)), draft=note)
 
 
 def holds_liquids_alone(source: str) -> bool:
@@ -216,7 +216,7 @@ def is_shipped(source: str) -> bool:
         return False
 
 
-def origin_of(source: str) -> str:
+def _origin_of(source: str) -> str:
     """Return the origin of a study: "Shipped study", "Copy of demo" or "Own study"."""
     if is_shipped(source):
         return SHIPPED
@@ -237,7 +237,7 @@ def study_facts(source: str, draft_words: LoadWords = None) -> StudyFacts | Brok
         return BrokenFacts(
             source=source,
             problem=f"{error.problems[0]}{others}",
-            origin=origin_of(source),
+            origin=_origin_of(source),
             draft=_draft_note(source, draft_words),
         )
     language = operator_language(protocol)
@@ -257,7 +257,7 @@ def study_facts(source: str, draft_words: LoadWords = None) -> StudyFacts | Brok
         ),
         duration=f"about {extent.duration}",
         needs=f"Haptic device or mouse; at most {protocol.device.force_limit_n:g} N",
-        origin=origin_of(source),
+        origin=_origin_of(source),
         draft=_draft_note(source, draft_words),
     )
 
@@ -331,7 +331,7 @@ def interrupted_session(
             step = resume_at(protocol, schedule, lines).step
         except StudyError:
             continue  # its errors are reported when its folder is requested
-        where = place_text(protocol, schedule, step)
+        where = _place_text(protocol, schedule, step)
         stopped = start_time_text(datetime.fromisoformat(lines[-1].at).astimezone(now.tzinfo), now)
         whole = f" of {session.answers_of}" if session.answers_of is not None else ""
         kind = "Pilot " if session.pilot else ""
@@ -345,7 +345,7 @@ def interrupted_session(
     return None
 
 
-def place_text(protocol: Protocol, schedule: Schedule, step: int) -> str:
+def _place_text(protocol: Protocol, schedule: Schedule, step: int) -> str:
     """Return where a session resumes, without a condition: "in part 2, delay setting 3"."""
     language = operator_language(protocol)
     if step >= len(schedule.steps):

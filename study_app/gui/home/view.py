@@ -54,12 +54,12 @@ from study_app.session.start import resumed_choices
 from study_app.store.workstation import DEFAULTS, MachineSettings
 from study_app.workspace import workspace
 
-STACKED_BELOW = 1080
-COLUMN_PX = 326
+_STACKED_BELOW = 1080
+_COLUMN_PX = 326
 MARGIN, BAR_PX = 28, 12
-NEXT_ROW_PX = 30
+_NEXT_ROW_PX = 30
 """So much of the second row of cards is seen at least, which says that there is one."""
-LOW_PX = 150
+_LOW_PX = 150
 """The least height of the sessions in a low window: a row or two."""
 CARDS_SHARE, BELOW_SHARE = 4, 3
 """How the cards and the sessions share the height."""
@@ -372,7 +372,7 @@ class HomePlace(Place):
         self.show_studies()
 
     def _arrange(self) -> None:
-        stacked = self.width() < STACKED_BELOW or self.sessions.is_empty
+        stacked = self.width() < _STACKED_BELOW or self.sessions.is_empty
         self.below.shares = not self.sessions.is_empty
         self._page.setStretch(self._page.count() - 1, 0 if self.sessions.is_empty else BELOW_SHARE)
         down, right = QBoxLayout.Direction.TopToBottom, QBoxLayout.Direction.LeftToRight
@@ -381,8 +381,8 @@ class HomePlace(Place):
         for at, stretch in enumerate((stacked, stacked, not stacked)):  # two cards share a row
             self._beside.setStretch(at, int(stretch))
         for card in (self.device, self.lab):
-            card.setMinimumWidth(0 if stacked else COLUMN_PX)
-            card.setMaximumWidth(QWIDGETSIZE_MAX if stacked else COLUMN_PX)
+            card.setMinimumWidth(0 if stacked else _COLUMN_PX)
+            card.setMaximumWidth(QWIDGETSIZE_MAX if stacked else _COLUMN_PX)
         self.grid.arrange(self.width() - 2 * MARGIN)
         self._share_height()
 
@@ -394,10 +394,10 @@ class HomePlace(Place):
         """
         if (whole := self.grid.whole_height) <= 0:  # cards that came just now have no height yet
             return
-        for low, beyond in ((False, NEXT_ROW_PX), (True, NEXT_ROW_PX), (True, 0)):
+        for low, beyond in ((False, _NEXT_ROW_PX), (True, _NEXT_ROW_PX), (True, 0)):
             self.lab.setVisible(not low or self.sessions.is_empty)
             if not self.sessions.is_empty:
-                self.sessions.setMinimumHeight(LOW_PX if low else LEAST_HEIGHT)
+                self.sessions.setMinimumHeight(_LOW_PX if low else LEAST_HEIGHT)
             self._forget_heights()
             others = self._page.totalMinimumSize().height() - self.cards_area.minimumHeight()
             least = min(whole, self.grid.row_height + beyond)

@@ -38,7 +38,7 @@ class Command:
     @property
     def key_labels(self) -> tuple[str, ...]:
         """Its keys as printed on a keyboard: "Ctrl+Enter", "hold Esc"."""
-        return tuple(f"{'hold ' * self.held}{key_label(keys)}" for keys in self.keys)
+        return tuple(f"{'hold ' * self.held}{_key_label(keys)}" for keys in self.keys)
 
     def action(self, place: QWidget, run: Callable[[], object]) -> QAction:
         """Add its action to a widget and return it: the keys act anywhere in the window while the widget is shown."""
@@ -49,7 +49,7 @@ class Command:
         return made
 
 
-LISTS: Final = "outline, lists"
+_LISTS: Final = "outline, lists"
 COMMANDS: Final = (
     Command("outline", "Outline", ("Ctrl+1",), run=lambda place: place.parts.focus_outline()),
     Command("form", "Form", ("Ctrl+2",), run=lambda place: place.parts.focus_form()),
@@ -70,7 +70,7 @@ COMMANDS: Final = (
     Command("duplicate", "Duplicate", ("Ctrl+D",), run=lambda place: place.duplicate()),
     Command("series", "Copies that differ in one number", ("Ctrl+Shift+D",), run=lambda place: place.make_series()),
     Command("rename", "Rename", ("F2",), run=lambda place: place.rename()),
-    Command("delete", "Delete", ("Delete",), within=LISTS, run=lambda place: place.delete()),
+    Command("delete", "Delete", ("Delete",), within=_LISTS, run=lambda place: place.delete()),
     Command("up", "Move up", ("Alt+Up",), run=lambda place: place.move_by(-1)),
     Command("down", "Move down", ("Alt+Down",), run=lambda place: place.move_by(1)),
     Command("new", "New study …", ("Ctrl+N",), run=lambda place: place.begin_new()),
@@ -117,7 +117,7 @@ def keys_of(action: str) -> tuple[str, ...]:
     return _OF[action].keys
 
 
-def key_label(keys: str) -> str:
+def _key_label(keys: str) -> str:
     """Return keys as printed on a keyboard: "Ctrl+Enter"."""
     return "+".join(_NAMES.get(key, key) for key in keys.split("+"))
 

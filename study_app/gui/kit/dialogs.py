@@ -16,7 +16,7 @@ from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.workspace import workspace
 
-NOTHING: Final[Mapping[str, str]] = MappingProxyType({})
+_NOTHING: Final[Mapping[str, str]] = MappingProxyType({})
 STEPS: Final = 1000  # of a bar
 REASON: Final = "Please enter a reason; it is recorded."
 
@@ -54,7 +54,7 @@ class Question(QDialog):
         back: str = "Cancel",
         other: ActionButton | None = None,
         fields: Iterable[Field] = (),
-        needs: Mapping[str, str] = NOTHING,
+        needs: Mapping[str, str] = _NOTHING,
         warning: str = "",
         inside: QWidget | None = None,
         width: int = 0,

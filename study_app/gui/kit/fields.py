@@ -18,7 +18,7 @@ from study_app.number_text import readings_of, unclear_number
 from study_app.session.start import MAX_SEED
 
 LEAST_WORDS = 280  # narrower, wrapped text would request too much room
-UNIT_WIDTH = 28
+_UNIT_WIDTH = 28
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +91,7 @@ def typed_file(name: str, text: str) -> Path | None:
     return Path(text) if text else None
 
 
-class Radios(QWidget):
+class _Radios(QWidget):
     """Values of which one is chosen, at first the first, below each other."""
 
     def __init__(self, options: Iterable[tuple[Any, str]]) -> None:
@@ -110,7 +110,7 @@ class Radios(QWidget):
         return self._values[self.group.checkedId()]
 
 
-class Line(QLineEdit):
+class _Line(QLineEdit):
     """A line that is shown as it was at Esc; ``restored`` asks for it."""
 
     restored = Signal()
@@ -154,7 +154,7 @@ class Editor(QWidget):
             button.clicked.connect(self._choose_path)
         if field.unit:
             unit = label(field.unit, "label", "text2")
-            unit.setFixedWidth(UNIT_WIDTH)
+            unit.setFixedWidth(_UNIT_WIDTH)
             rows = [hbox((named, 1), self.control, unit, spacing=8)]
         else:
             beside = () if button is None else (button,)
@@ -165,7 +165,7 @@ class Editor(QWidget):
     def _make_control(self) -> QWidget:
         match self.field.kind:
             case "radio":
-                return Radios(self.field.options)
+                return _Radios(self.field.options)
             case "count":
                 lowest, highest = self.field.limits
                 count = Number(lowest, highest, lowest)
@@ -183,7 +183,7 @@ class Editor(QWidget):
                 mark.toggled.connect(lambda _on: self.edited.emit(self.field.name))
                 mark.clicked.connect(lambda on: self.changed.emit(self.field.name, on))
                 return mark
-        line = Line()
+        line = _Line()
         line.setMaxLength(self.field.longest)
         line.setPlaceholderText(self.field.placeholder)
         if self.field.unit:
@@ -199,7 +199,7 @@ class Editor(QWidget):
     def value(self) -> Any:
         """The value of the control; raises ValueError if it is not permitted."""
         match self.control:
-            case Radios():
+            case _Radios():
                 return self.control.value
             case QAbstractButton():
                 return self.control.isChecked()

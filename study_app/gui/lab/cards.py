@@ -22,17 +22,17 @@ from study_app.gui.widgets.live_plots import MINUS, Plot, draw_quickly, pen, tic
 from study_app.lab.live import LimiterCount
 from study_app.number_text import grouped
 
-POINTS = 240  # points of a curve, one for one to two pixels; painting time grows with them
-STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+_POINTS = 240  # points of a curve, one for one to two pixels; painting time grows with them
+_STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 MOST_TICKS, TICK_PX = 5, 22
 LEGEND_LINE, LEGEND_GAP, STROKE_WIDTH = 20, 16.0, 24.0
-LABEL_PX = 9.0  # half of a tick's number
-SHRINKS_BELOW = 0.45  # share of the height: a plot that follows every peak never rests
-DASH: dict[str, tuple[float, float] | None] = {"solid": None, "long": (6.0, 3.0), "short": (3.0, 2.0)}
+_LABEL_PX = 9.0  # half of a tick's number
+_SHRINKS_BELOW = 0.45  # share of the height: a plot that follows every peak never rests
+_DASH: dict[str, tuple[float, float] | None] = {"solid": None, "long": (6.0, 3.0), "short": (3.0, 2.0)}
 
 
 @dataclass(frozen=True, slots=True)
-class CurveStyle:
+class _CurveStyle:
     """A curve: its name, how its colour is found in a theme, and its stroke."""
 
     name: str
@@ -41,22 +41,22 @@ class CurveStyle:
     width: float = 2.0
 
 
-A = CurveStyle("A", lambda theme: theme.trace_x, "solid", 2.2)
-B = CurveStyle("B", lambda theme: theme.trace_y, "long")
-BODY = CurveStyle("body", lambda theme: theme.text3, "short", 1.6)
-LIMIT = CurveStyle("limit", lambda theme: theme.bad, "short", 1.6)
+A = _CurveStyle("A", lambda theme: theme.trace_x, "solid", 2.2)
+B = _CurveStyle("B", lambda theme: theme.trace_y, "long")
+_BODY = _CurveStyle("body", lambda theme: theme.text3, "short", 1.6)
+_LIMIT = _CurveStyle("limit", lambda theme: theme.bad, "short", 1.6)
 
 
-class Legend(Themed, QWidget):
+class _Legend(Themed, QWidget):
     """Names of curves, each behind a piece of its stroke."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._entries: tuple[tuple[CurveStyle, str], ...] = ()
+        self._entries: tuple[tuple[_CurveStyle, str], ...] = ()
         self._font = font("small", weight=500, tabular=True)
         self.setFixedHeight(LEGEND_LINE)
 
-    def show_entries(self, entries: tuple[tuple[CurveStyle, str], ...]) -> None:
+    def show_entries(self, entries: tuple[tuple[_CurveStyle, str], ...]) -> None:
         if entries != self._entries:
             self._entries = entries
             self.setAccessibleName(", ".join(text for _, text in entries))
@@ -87,16 +87,16 @@ class Legend(Themed, QWidget):
         painter.setFont(self._font)
         for (style, text), place in zip(self._entries, self._entry_places(), strict=True):
             ink = style.colour(self.theme)
-            painter.setPen(pen(ink, style.width * self.devicePixelRatioF(), DASH[style.stroke]))
+            painter.setPen(pen(ink, style.width * self.devicePixelRatioF(), _DASH[style.stroke]))
             painter.drawLine(place, place + QPointF(STROKE_WIDTH, 0))
-            painter.setPen(QColor(ink if style is LIMIT else self.theme.text2))
+            painter.setPen(QColor(ink if style is _LIMIT else self.theme.text2))
             painter.drawText(place + QPointF(STROKE_WIDTH + 6, 4.5), text)
 
 
-class CurvePlot(Plot):
+class _CurvePlot(Plot):
     """Curves from 0 upwards over the last 2.5 s; the height grows at once, and shrinks only by half."""
 
-    def __init__(self, styles: tuple[CurveStyle, ...], least: float) -> None:
+    def __init__(self, styles: tuple[_CurveStyle, ...], least: float) -> None:
         super().__init__()
         self._styles, self._least, self._top, self._peak = styles, least, 0.0, least
         self.curves = [pg.PlotCurveItem(antialias=True) for _ in styles]
@@ -123,7 +123,7 @@ class CurvePlot(Plot):
         peak = max((float(np.nanmax(it)) for it in values if len(it)), default=0.0)
         self._show_top(max(peak, limit or 0.0, self._least))
         for curve, it in zip(self.curves, values, strict=True):
-            curve.setData(*thinned(t_s, it))
+            curve.setData(*_thinned(t_s, it))
         self.limit.setVisible(limit is not None)
         if limit is not None:
             self.limit.setPos(limit)
@@ -131,11 +131,11 @@ class CurvePlot(Plot):
     def apply_theme(self, theme: Theme) -> None:
         super().apply_theme(theme)
         for curve, style in zip(self.curves, self._styles, strict=True):
-            curve.setPen(self.stroke(style.colour(theme), style.width, DASH[style.stroke]))
-        self.limit.setPen(self.stroke(theme.bad, 1.5, DASH["short"]))
+            curve.setPen(self.stroke(style.colour(theme), style.width, _DASH[style.stroke]))
+        self.limit.setPen(self.stroke(theme.bad, 1.5, _DASH["short"]))
 
     def _show_top(self, peak: float) -> None:
-        if SHRINKS_BELOW * self._top <= peak <= self._top:
+        if _SHRINKS_BELOW * self._top <= peak <= self._top:
             return
         self._peak = peak
         self._lay_ticks()
@@ -143,7 +143,7 @@ class CurvePlot(Plot):
     def _lay_ticks(self) -> None:
         """Choose grid lines up to the peak, as many as fit."""
         ticks = max(2, min(MOST_TICKS, int(self.box.height() // TICK_PX)))
-        step = next((it for it in STEPS if self._peak / it <= ticks), STEPS[-1])
+        step = next((it for it in _STEPS if self._peak / it <= ticks), _STEPS[-1])
         rows = max(1, int(np.ceil(self._peak / step - 1e-9)))
         self._top = rows * step
         self.show_ticks("left", [(k * step, tick_text(round(k * step, 6))) for k in range(rows + 1)])
@@ -151,15 +151,15 @@ class CurvePlot(Plot):
 
     def _make_room(self) -> None:
         """Keep half a number's height free above the highest grid line."""
-        share = min(LABEL_PX / max(1.0, self.box.height()), 0.3)
+        share = min(_LABEL_PX / max(1.0, self.box.height()), 0.3)
         self.box.setYRange(-0.02 * self._top, self._top / (1 - share), padding=0)
 
 
-FORCE_SENTENCE = f"Magnitude of the force of settings A and B on the same motion over the last {SPAN_S:g} s, in N."
-SPEED_SENTENCE = f"Speed of the body, and of the wake in settings A and B, over the last {SPAN_S:g} s, in m/s."
+_FORCE_SENTENCE = f"Magnitude of the force of settings A and B on the same motion over the last {SPAN_S:g} s, in N."
+_SPEED_SENTENCE = f"Speed of the body, and of the wake in settings A and B, over the last {SPAN_S:g} s, in m/s."
 
 
-class ReadingCard(Card):
+class _ReadingCard(Card):
     """A card whose content is hidden, in the same place, while the comparison is blind."""
 
     def __init__(self, title: str, aside: QLabel, why: str, *, padding: int = 15, gap: int = 6) -> None:
@@ -183,31 +183,31 @@ class ReadingCard(Card):
         return blind
 
 
-class PlotCard(ReadingCard):
+class _PlotCard(_ReadingCard):
     """A plot under its heading and its curves' names."""
 
     def __init__(self, title: str, unit: str, plot: Plot, sentence: str) -> None:
         why = "The trace would reveal the settings."
         super().__init__(title, label(unit, "small", "text2"), why, padding=14, gap=4)
-        self.plot, self.legend = plot, Legend()
+        self.plot, self.legend = plot, _Legend()
         describe_plot(plot, title, sentence)
         self.content.setSpacing(2)
         add_parts(self.content, self.legend, (plot, 1))
         self.setMinimumHeight(226)
 
 
-class ForceCard(PlotCard):
+class ForceCard(_PlotCard):
     """The force of both settings on the same motion, and the limit of the one that is felt."""
 
     def __init__(self) -> None:
-        super().__init__("Force on the hand", f"N, last {SPAN_S:g} s", CurvePlot((B, A), 1.0), FORCE_SENTENCE)
+        super().__init__("Force on the hand", f"N, last {SPAN_S:g} s", _CurvePlot((B, A), 1.0), _FORCE_SENTENCE)
 
     def show_view(self, view: LabView) -> None:
         if self.show_blind(view.workbench.blind):
             return
         limit = view.workbench.in_hand.scene.force_limit_n
         a, b = ("A, felt now", "B, same motion") if view.felt == "A" else ("A, same motion", "B, felt now")
-        self.legend.show_entries(((A, a), (B, b), (LIMIT, f"limit {limit:g} N")))
+        self.legend.show_entries(((A, a), (B, b), (_LIMIT, f"limit {limit:g} N")))
         trace = view.trace
         nothing = np.empty(0)
         t_s = nothing if trace is None else trace.t_s
@@ -217,12 +217,12 @@ class ForceCard(PlotCard):
         self.plot.show_curves(t_s, forces, limit)
 
 
-class SpeedCard(PlotCard):
+class SpeedCard(_PlotCard):
     """How fast the body is, and the wake that it meets in both settings."""
 
     def __init__(self) -> None:
-        super().__init__("Body and wake", f"m/s, last {SPAN_S:g} s", CurvePlot((BODY, B, A), 0.5), SPEED_SENTENCE)
-        self.legend.show_entries(((BODY, "body"), (A, "wake of A"), (B, "wake of B")))
+        super().__init__("Body and wake", f"m/s, last {SPAN_S:g} s", _CurvePlot((_BODY, B, A), 0.5), _SPEED_SENTENCE)
+        self.legend.show_entries(((_BODY, "body"), (A, "wake of A"), (B, "wake of B")))
 
     def show_view(self, view: LabView) -> None:
         if self.show_blind(view.workbench.blind):
@@ -238,19 +238,19 @@ def _vector_sizes(vectors: Floats) -> Floats:
     return np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
 
 
-def thinned(t_s: Floats, values: Floats) -> tuple[Floats, Floats]:
+def _thinned(t_s: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Return the newest time and the largest value of each group of samples, so that no peak is lost."""
-    step = max(1, len(t_s) // POINTS)
+    step = max(1, len(t_s) // _POINTS)
     first = len(t_s) % step
     return t_s[first:].reshape(-1, step)[:, -1], values[first:].reshape(-1, step).max(axis=1)
 
 
-NAME_WIDTH = 84
-LINE = 26
-COST_HEIGHT, ERROR_HEIGHT = 252, 3 * LINE + 6  # usual heights, kept free until the measurement
-UNKNOWN = "–"
-LEAST_NS = 1.0  # the smallest cost that a measurement next to a running servo resolves
-LimiterState = Literal["acting", "acted", "quiet"]
+_NAME_WIDTH = 84
+_LINE = 26
+COST_HEIGHT, ERROR_HEIGHT = 252, 3 * _LINE + 6  # usual heights, kept free until the measurement
+_UNKNOWN = "–"
+_LEAST_NS = 1.0  # the smallest cost that a measurement next to a running servo resolves
+_LimiterState = Literal["acting", "acted", "quiet"]
 
 
 class CostLine(QWidget):
@@ -259,25 +259,25 @@ class CostLine(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.name = Elided("label")
-        self.name.setFixedWidth(NAME_WIDTH)
+        self.name.setFixedWidth(_NAME_WIDTH)
         self.bar = Bar()
         self.ns = figures("", "label")
         self.ns.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.ns.setMinimumWidth(56)
         hbox(self.name, (self.bar, 1), self.ns, spacing=10, margins=0, parent=self)
-        self.setFixedHeight(LINE)
+        self.setFixedHeight(_LINE)
 
     def show_cost(self, cost: CostRow, most_ns: float) -> None:
         ns = cost.ns or 0.0
         self.name.show_text(cost.effect)
         self.bar.show_share(ns / most_ns if most_ns > 0 else 0.0)
-        text = f"{ns:.0f} ns" if ns >= LEAST_NS else f"< {LEAST_NS:g} ns"
+        text = f"{ns:.0f} ns" if ns >= _LEAST_NS else f"< {_LEAST_NS:g} ns"
         self.ns.setText(text)
         self.setAccessibleName(f"{cost.effect}: {text}")
 
     def show_waiting(self) -> None:
         self.bar.show_share(0.0)
-        self.ns.setText(UNKNOWN)
+        self.ns.setText(_UNKNOWN)
         self.setAccessibleName(f"{self.name.accessibleName()}: measuring")
 
 
@@ -290,14 +290,14 @@ class AbsentLine(QWidget):
         self.why = Elided("small", "text2")
         self.why.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         hbox(Icon("minus", "text3", 14), self.name, (self.why, 1), spacing=8, margins=0, parent=self)
-        self.setFixedHeight(LINE - 3)
+        self.setFixedHeight(_LINE - 3)
 
     def show_cost(self, cost: CostRow) -> None:
         self.name.setText(cost.effect)
         self.why.show_text(cost.why)
 
 
-class CostCard(ReadingCard):
+class CostCard(_ReadingCard):
     """What each effect takes of a tick."""
 
     def __init__(self) -> None:
@@ -337,7 +337,7 @@ class CostCard(ReadingCard):
         """Clear the numbers and keep the lines, so that nothing jumps while a slider is dragged."""
         for line in self.lines:
             line.show_waiting()
-        self.sum.setText(UNKNOWN)
+        self.sum.setText(_UNKNOWN)
 
 
 class ErrorLine(QWidget):
@@ -346,7 +346,7 @@ class ErrorLine(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.name, self.value = Elided("label", "text2"), figures("", "label", weight=600)
-        self.name.setFixedHeight(LINE)
+        self.name.setFixedHeight(_LINE)
         hbox((self.name, 1), self.value, margins=0, parent=self)
 
     def show_error(self, error: ErrorRow) -> None:
@@ -355,7 +355,7 @@ class ErrorLine(QWidget):
         self.value.setToolTip(error.note)
 
 
-class ErrorCard(ReadingCard):
+class ErrorCard(_ReadingCard):
     """How far the felt setting is from its reference."""
 
     def __init__(self) -> None:
@@ -371,7 +371,7 @@ class ErrorCard(ReadingCard):
             return
         rows = view.errors or (ErrorRow(measure="Not measured yet", value=""),)
         if view.measuring and not view.errors and self.lines and self.lines[0].value.text():
-            rows = tuple(ErrorRow(measure=line.name.whole, value=UNKNOWN) for line in self.lines)
+            rows = tuple(ErrorRow(measure=line.name.whole, value=_UNKNOWN) for line in self.lines)
         _match_count(self.lines, len(rows), ErrorLine, self._lines)
         for line, row in zip(self.lines, rows, strict=True):
             line.show_error(row)
@@ -382,17 +382,17 @@ class LimiterLine(Themed, QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._state: LimiterState = "quiet"
+        self._state: _LimiterState = "quiet"
         self.name = Elided("label")
         self.word = label("", "small", "warn")
         self.count = figures("0", "label", "text2")
         self.count.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.count.setMinimumWidth(40)
         hbox((self.name, 1), self.word, self.count, spacing=6, margins=(34, 0, 10, 0), parent=self)
-        self.setFixedHeight(LINE + 2)
+        self.setFixedHeight(_LINE + 2)
 
     def show_limiter(self, limiter: LimiterCount) -> None:
-        state: LimiterState = "acting" if limiter.acting else "acted" if limiter.ticks else "quiet"
+        state: _LimiterState = "acting" if limiter.acting else "acted" if limiter.ticks else "quiet"
         self.name.show_text(limiter.name)
         self.count.setText(grouped(limiter.ticks))
         if state != self._state:
@@ -420,7 +420,7 @@ class LimiterLine(Themed, QWidget):
             painter.drawChord(mark, 90 * 16, 180 * 16)
 
 
-class LimiterCard(ReadingCard):
+class LimiterCard(_ReadingCard):
     """Which limiter acts, and in how many ticks of the last ten seconds each did."""
 
     def __init__(self) -> None:

@@ -45,12 +45,12 @@ from study_app.gui.widgets.labels import Ink, label
 from study_app.lab.shadow import Tail
 from study_app.number_text import grouped
 
-SHADES = 14  # steps of age that are distinguished
+_SHADES = 14  # steps of age that are distinguished
 THICKEST_PX, THINNEST_PX = 5.0, 1.6
-RING_PX = 4.6
-HEAD_PX = 11.0
-STEP_PX = 2.5
-LEAST_FOR_HEAD_PX = 46.0  # of a segment's length on the screen
+_RING_PX = 4.6
+_HEAD_PX = 11.0
+_STEP_PX = 2.5
+_LEAST_FOR_HEAD_PX = 46.0  # of a segment's length on the screen
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,14 +66,14 @@ class TailPlaces:
     floor: tuple[QPolygonF, ...]
 
 
-def tail_places(tail: Tail, camera: Camera, box: Box) -> TailPlaces:
+def _tail_places(tail: Tail, camera: Camera, box: Box) -> TailPlaces:
     """Return the screen positions of a tail."""
     count = len(tail.positions_m)
     inside = (-box.x, box.x), (box.floor, box.water), (-box.z, box.z)
     x, y, z = (np.clip(tail.positions_m[:, k], *span) for k, span in enumerate(inside))
     pixels = _pixels(camera, x, y, z)
     floor = _pixels(camera, x, np.full(count, box.floor), z)
-    shades = np.minimum((tail.ages * SHADES).astype(int), SHADES - 1)
+    shades = np.minimum((tail.ages * _SHADES).astype(int), _SHADES - 1)
     bounds = [0, *(int(start) for start in np.flatnonzero(tail.breaks) if start), count]
     runs: list[tuple[int, QPolygonF]] = []
     shadows: list[QPolygonF] = []
@@ -91,7 +91,7 @@ def tail_places(tail: Tail, camera: Camera, box: Box) -> TailPlaces:
     return TailPlaces(tuple(runs), tuple(_points(pixels[begins])), tuple(heads), tuple(shadows))
 
 
-def paint_floor(painter: QPainter, places: TailPlaces) -> None:
+def _paint_floor(painter: QPainter, places: TailPlaces) -> None:
     """Paint the tail's shadow on the floor."""
     ink = QColor(TANK.shadow)
     ink.setAlphaF(0.44)
@@ -100,31 +100,31 @@ def paint_floor(painter: QPainter, places: TailPlaces) -> None:
         painter.drawPolyline(points)
 
 
-def paint_tail(painter: QPainter, places: TailPlaces) -> None:
+def _paint_tail(painter: QPainter, places: TailPlaces) -> None:
     """Paint the segments from oldest to newest, heads on those long enough, then the breaks."""
     painter.setBrush(Qt.BrushStyle.NoBrush)
     for shade, points in places.runs:
-        ink, width = shade_style(shade)
+        ink, width = _shade_style(shade)
         painter.setPen(QPen(ink, width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin))
         painter.drawPolyline(points)
     for place, turn, shade in places.heads:
-        ink, width = shade_style(shade)
-        draw_head(painter, place, turn, ink.lighter(112), HEAD_PX + width)
+        ink, width = _shade_style(shade)
+        draw_head(painter, place, turn, ink.lighter(112), _HEAD_PX + width)
     for place in places.breaks:
-        draw_ring(painter, place)
+        _draw_ring(painter, place)
 
 
-def draw_ring(painter: QPainter, place: QPointF) -> None:
+def _draw_ring(painter: QPainter, place: QPointF) -> None:
     """Paint the mark of a break."""
     painter.setPen(QPen(QColor(TANK.proxy_light), 2.0))
     painter.setBrush(QColor(TANK.shadow))
-    painter.drawEllipse(place, RING_PX, RING_PX)
+    painter.drawEllipse(place, _RING_PX, _RING_PX)
 
 
-@lru_cache(maxsize=SHADES)
-def shade_style(shade: int) -> tuple[QColor, float]:
+@lru_cache(maxsize=_SHADES)
+def _shade_style(shade: int) -> tuple[QColor, float]:
     """Return colour and width of a shade of age, 0 the newest."""
-    newness = 1.0 - shade / (SHADES - 1)
+    newness = 1.0 - shade / (_SHADES - 1)
     old, new, mix = QColor(TANK.tail_old), QColor(TANK.tail), newness**1.6
     red, green, blue = (
         a + (b - a) * mix
@@ -148,7 +148,7 @@ def _arrow_head(pixels: Floats) -> tuple[QPointF, float, int] | None:
     """Return midpoint, direction and row of a segment; None if it is too short."""
     steps = np.hypot(*np.diff(pixels, axis=0).T)
     length = float(steps.sum())
-    if length < LEAST_FOR_HEAD_PX:
+    if length < _LEAST_FOR_HEAD_PX:
         return None
     row = int(np.searchsorted(np.cumsum(steps), 0.55 * length))
     right, down = pixels[min(len(pixels) - 1, row + 1)] - pixels[max(0, row - 1)]
@@ -158,7 +158,7 @@ def _arrow_head(pixels: Floats) -> tuple[QPointF, float, int] | None:
 def _drawn_rows(pixels: Floats) -> NDArray[np.int_]:
     """Return the rows that are drawn: both ends, and one every few px between."""
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pixels, axis=0).T))])
-    kept = np.flatnonzero(np.diff(np.floor(arc / STEP_PX), prepend=-1.0))
+    kept = np.flatnonzero(np.diff(np.floor(arc / _STEP_PX), prepend=-1.0))
     return np.unique(np.append(kept, len(pixels) - 1))
 
 
@@ -172,16 +172,16 @@ def _points(pixels: Floats) -> list[QPointF]:
     return [QPointF(across, down) for across, down in pixels.tolist()]
 
 
-WORKSPACE_M: Point = (0.1, 0.06, 0.06)
-BALL_M = 0.0034  # radius for which the glass is made: it stays while the ball's radius changes
-RING = "break"
+_WORKSPACE_M: Point = (0.1, 0.06, 0.06)
+_BALL_M = 0.0034  # radius for which the glass is made: it stays while the ball's radius changes
+_RING = "break"
 Words: TypeAlias = tuple[str, str]
 """What a plate says, and the icon before it."""
 
 MARGIN_X, MARGIN_TOP, MARGIN_BOTTOM = 36.0, 26.0, 22.0
 CHIP_HEIGHT, CHIP_EDGE = 30.0, 14.0
-WAKE_MPS = 2.0
-PITCH = math.radians(27)  # higher than the participant's eye: wakes are mostly horizontal
+_WAKE_MPS = 2.0
+_PITCH = math.radians(27)  # higher than the participant's eye: wakes are mostly horizontal
 
 
 class LabTank(Themed, QWidget):
@@ -198,8 +198,8 @@ class LabTank(Themed, QWidget):
         self.setMinimumSize(420, 260)
         self._view: LabView | None = None
         self.camera: Camera | None = None
-        self._workspace_m, self._radius_m = WORKSPACE_M, BALL_M
-        self.box = Box.around(WORKSPACE_M, BALL_M)
+        self._workspace_m, self._radius_m = _WORKSPACE_M, _BALL_M
+        self.box = Box.around(_WORKSPACE_M, _BALL_M)
         self._placer: BallPlacer | None = None
         self.still: Backdrop | None = None
         self._wanted: object = None
@@ -216,7 +216,7 @@ class LabTank(Themed, QWidget):
         self._view = view
         if view.workspace_m != self._workspace_m:
             self._workspace_m = view.workspace_m
-            self.box = Box.around(view.workspace_m, BALL_M)
+            self.box = Box.around(view.workspace_m, _BALL_M)
             self.camera = None
         if view.body_radius_m != self._radius_m:
             self._radius_m, self._placer = view.body_radius_m, None
@@ -269,7 +269,7 @@ class LabTank(Themed, QWidget):
     def _ready_camera(self) -> Camera:
         if self.camera is None:
             room = (self.width() - 2 * MARGIN_X, self.height() - MARGIN_TOP - MARGIN_BOTTOM)
-            self.camera = Camera.fitted(self.box, MARGIN_X, MARGIN_TOP, *room, pitch=PITCH)
+            self.camera = Camera.fitted(self.box, MARGIN_X, MARGIN_TOP, *room, pitch=_PITCH)
             self._placer = None
         if self._placer is None:
             self._placer = BallPlacer(self.camera, self.box, self._radius_m)
@@ -287,13 +287,13 @@ class LabTank(Themed, QWidget):
         view = self._view
         open_view = view if view is not None and not view.workbench.blind else None
         tail = open_view.tail if open_view is not None else None
-        places = tail_places(tail, camera, self.box) if tail is not None else None
+        places = _tail_places(tail, camera, self.box) if tail is not None else None
         if places is not None:
-            paint_floor(painter, places)
+            _paint_floor(painter, places)
         ball = self._ball_place()
         self._paint_ball_below(painter, ball)
         if places is not None:
-            paint_tail(painter, places)
+            _paint_tail(painter, places)
         if ball is not None:
             if open_view is not None:
                 paint_arrows(painter, camera, self._arrows(open_view))
@@ -341,7 +341,7 @@ class LabTank(Themed, QWidget):
             Arrow(word, start, (high * u / most, high * v / most, high * w / most), colour)
             for word, (u, v, w), most, colour in (
                 ("force", view.now.force_n, limit_n, TANK.proxy_light),
-                ("wake", view.now.wake_mps, WAKE_MPS, TANK.wake),
+                ("wake", view.now.wake_mps, _WAKE_MPS, TANK.wake),
             )
         ]
 
@@ -373,7 +373,7 @@ class LabTank(Themed, QWidget):
         pairs: list[tuple[Words, Words]] = [
             (
                 (self._first_note(), "lock" if bench.blind else ""),
-                (f"break: turn of more than {angle:g}°" if isinstance(angle, int | float) else "", RING),
+                (f"break: turn of more than {angle:g}°" if isinstance(angle, int | float) else "", _RING),
             ),
             (
                 (
@@ -392,11 +392,11 @@ class LabTank(Themed, QWidget):
             self._draw_note(painter, right, self.width() - CHIP_EDGE - self._note_width(right), y)
 
     def _note_width(self, note: Words) -> float:
-        return note_plate(note, self.devicePixelRatioF()).width() / self.devicePixelRatioF() if note[0] else 0.0
+        return _note_plate(note, self.devicePixelRatioF()).width() / self.devicePixelRatioF() if note[0] else 0.0
 
     def _draw_note(self, painter: QPainter, note: Words, left: float, top: float) -> None:
         if note[0]:
-            painter.drawImage(QPointF(left, top), note_plate(note, self.devicePixelRatioF()))
+            painter.drawImage(QPointF(left, top), _note_plate(note, self.devicePixelRatioF()))
 
     def _paint_corners(self, painter: QPainter) -> None:
         """Round the corners in the window's colour, and paint the focus ring."""
@@ -412,7 +412,7 @@ class LabTank(Themed, QWidget):
 
 
 @lru_cache(maxsize=64)
-def note_plate(note: Words, ratio: float) -> QImage:
+def _note_plate(note: Words, ratio: float) -> QImage:
     """Return a text with its icon on a dark plate, for a screen with pixel ratio ``ratio``."""
     text, icon = note
     face = font("label", weight=600, tabular=True)
@@ -427,8 +427,8 @@ def note_plate(note: Words, ratio: float) -> QImage:
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(ground)
     painter.drawRoundedRect(QRectF(0, 0, wide, CHIP_HEIGHT), 7, 7)
-    if icon == RING:
-        draw_ring(painter, QPointF(18, CHIP_HEIGHT / 2))
+    if icon == _RING:
+        _draw_ring(painter, QPointF(18, CHIP_HEIGHT / 2))
     elif icon:
         draw_icon(painter, icon, QRectF(10, 7, 16, 16), PARTICIPANT.text, 2.0)
     painter.setPen(QColor(PARTICIPANT.text))
@@ -439,7 +439,7 @@ def note_plate(note: Words, ratio: float) -> QImage:
     return image
 
 
-SHOWN_AFTER_MS = 300
+_SHOWN_AFTER_MS = 300
 WIDTH, WIDEST, HIGH = 380, 640, 110
 EDGE, FOOT = 16, 56
 
@@ -464,7 +464,7 @@ class TankNote(Card):
         row = hbox(self.sign, (self.words, 1), self.cancel, self.diagnose, self.fade_in, self.dismiss, spacing=10)
         add_parts(self.column, row, self.bar)
         self.dismiss.clicked.connect(self._dismiss)
-        self._wait = QTimer(self, singleShot=True, interval=SHOWN_AFTER_MS)
+        self._wait = QTimer(self, singleShot=True, interval=_SHOWN_AFTER_MS)
         self._wait.timeout.connect(self._show_note)
         parent.installEventFilter(self)
         self.hide()

@@ -21,35 +21,35 @@ from study_app.lab.ab_comparison import Setting, Side, other_side
 from study_app.lab.parameters import OFF, ON, Section, sections
 from study_app.number_text import readings_of, unclear_number
 
-SWITCH_HEIGHT = 44
-WIDEST = 190
-BADGE = 20
+_SWITCH_HEIGHT = 44
+_WIDEST = 190
+_BADGE = 20
 KEY = "X"
 
 
-def side_colour(theme: Theme, side: Side) -> str:
+def _side_colour(theme: Theme, side: Side) -> str:
     """Return the colour of a side in the switch, the plots and the tank's texts."""
     return theme.trace_x if side == "A" else theme.trace_y
 
 
-def draw_badge(painter: QPainter, middle: QPointF, theme: Theme, side: Side, letter: str) -> None:
+def _draw_badge(painter: QPainter, middle: QPointF, theme: Theme, side: Side, letter: str) -> None:
     """Paint a side's letter on a disc of its colour."""
     painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(side_colour(theme, side)))
-    painter.drawEllipse(middle, BADGE / 2, BADGE / 2)
+    painter.setBrush(QColor(_side_colour(theme, side)))
+    painter.drawEllipse(middle, _BADGE / 2, _BADGE / 2)
     painter.setPen(QColor(theme.on_accent))
     painter.setFont(font("key"))
-    half = BADGE / 2
-    painter.drawText(QRectF(middle.x() - half, middle.y() - half, BADGE, BADGE), Qt.AlignmentFlag.AlignCenter, letter)
+    half = _BADGE / 2
+    painter.drawText(QRectF(middle.x() - half, middle.y() - half, _BADGE, _BADGE), Qt.AlignmentFlag.AlignCenter, letter)
 
 
-class Badge(Themed, QWidget):
+class _Badge(Themed, QWidget):
     """The letter of a side on its own."""
 
     def __init__(self) -> None:
         super().__init__()
         self._side: Side = "A"
-        self.setFixedSize(BADGE + 2, BADGE + 2)
+        self.setFixedSize(_BADGE + 2, _BADGE + 2)
 
     def show_side(self, side: Side) -> None:
         if side != self._side:
@@ -58,29 +58,29 @@ class Badge(Themed, QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = smooth_painter(self)
-        draw_badge(painter, QRectF(self.rect()).center(), self.theme, self._side, self._side)
+        _draw_badge(painter, QRectF(self.rect()).center(), self.theme, self._side, self._side)
 
 
-class Segment(Themed, QPushButton):
+class _Segment(Themed, QPushButton):
     """One side: its letter and its name; the felt one is raised, with an accent edge."""
 
     def __init__(self) -> None:
         super().__init__()
         self._shown: tuple[object, ...] = ()
         self.setCheckable(True)
-        self.setIconSize(QSize(BADGE + 6, BADGE))  # with the gap to the name
+        self.setIconSize(QSize(_BADGE + 6, _BADGE))  # with the gap to the name
         self.setProperty("role", "segment")
         self.setFont(font("strong", scale=0.94))
-        self.setFixedHeight(SWITCH_HEIGHT - 8)
+        self.setFixedHeight(_SWITCH_HEIGHT - 8)
         self.setMinimumWidth(110)
-        self.setMaximumWidth(WIDEST)
+        self.setMaximumWidth(_WIDEST)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
     def show_name(self, name: str, letter: str) -> None:
         if (shown := (name, letter, self.theme)) == self._shown:
             return
         self._shown = shown
-        text = self.fontMetrics().elidedText(name, Qt.TextElideMode.ElideRight, WIDEST - BADGE - 30)
+        text = self.fontMetrics().elidedText(name, Qt.TextElideMode.ElideRight, _WIDEST - _BADGE - 30)
         self.setText(button_text(text))
         self.setToolTip(plain_tip(name))
         picture = QPixmap((QSizeF(self.iconSize()) * self.devicePixelRatioF()).toSize())
@@ -88,7 +88,7 @@ class Segment(Themed, QPushButton):
         picture.fill(Qt.GlobalColor.transparent)
         painter = QPainter(picture)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        draw_badge(painter, QPointF(BADGE / 2, BADGE / 2), self.theme, "A" if letter in {"A", "1"} else "B", letter)
+        _draw_badge(painter, QPointF(_BADGE / 2, _BADGE / 2), self.theme, "A" if letter in {"A", "1"} else "B", letter)
         painter.end()
         self.setIcon(QIcon(picture))
 
@@ -96,7 +96,7 @@ class Segment(Themed, QPushButton):
         """Leave the choice of the felt side to the view."""
 
 
-class SideSwitch(QWidget):
+class _SideSwitch(QWidget):
     """Both sides in a track; ``switched`` when the other one is to be felt. The X key does the same."""
 
     switched = Signal()
@@ -104,8 +104,8 @@ class SideSwitch(QWidget):
     def __init__(self) -> None:
         super().__init__()
         give_ground(self, "segments")
-        self.setFixedHeight(SWITCH_HEIGHT)
-        self.segments = {side: Segment() for side in SIDES}
+        self.setFixedHeight(_SWITCH_HEIGHT)
+        self.segments = {side: _Segment() for side in SIDES}
         for segment in self.segments.values():
             segment.clicked.connect(lambda _on, it=segment: None if it.isChecked() else self.switched.emit())
         hbox(*self.segments.values(), 4, Cap(KEY), spacing=2, margins=(4, 4, 8, 4), parent=self)
@@ -122,12 +122,12 @@ class SideSwitch(QWidget):
             segment.setAccessibleName(f"{'' if bench.blind else side + ': '}{bench.shown_name(side)}{felt}")
 
 
-BUTTON = 44
-FREE = "Free motion"
-LETTERS = 13  # of a choice before it is cut
+_BUTTON = 44
+_FREE = "Free motion"
+_LETTERS = 13  # of a choice before it is cut
 
 
-class Picker(Choice):
+class _Picker(Choice):
     """A list with an icon before the word it is at."""
 
     def __init__(self, icon: str, name: str) -> None:
@@ -136,9 +136,9 @@ class Picker(Choice):
         self._choices: Choices = ()
         self.setFont(font("label"))
         self.setAccessibleName(name)
-        self.setFixedHeight(BUTTON)
+        self.setFixedHeight(_BUTTON)
         self.setStyleSheet("QComboBox { padding-left: 40px; }")
-        self.setMinimumContentsLength(LETTERS)
+        self.setMinimumContentsLength(_LETTERS)
         self.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
 
     def show_choices(self, choices: Choices, chosen: str) -> None:
@@ -170,17 +170,17 @@ class LabHeader(QWidget):
         super().__init__()
         give_ground(self, "header")
         self.title = label("Liquid lab", "title_dense")
-        self.sides = SideSwitch()
+        self.sides = _SideSwitch()
         self.blind = Toggle("Blind A/B")
         self.blind.setFont(font("label"))
         self.blind.setToolTip("Hide which setting is which")
-        self.device = Picker("mouse", "Device")
-        self.path = Picker("route", "Motion")
+        self.device = _Picker("mouse", "Device")
+        self.path = _Picker("route", "Motion")
         self.undo = IconButton("undo", "Undo", "Undo (Ctrl+Z)")
         self.redo = IconButton("redo", "Redo", "Redo (Ctrl+Shift+Z)")
         self.stop = CompactStop()
-        self.save = ActionButton("save", "Save preset …", role="primary", height=BUTTON)
-        self.save.setFixedHeight(BUTTON)
+        self.save = ActionButton("save", "Save preset …", role="primary", height=_BUTTON)
+        self.save.setFixedHeight(_BUTTON)
         self._narrow: bool | None = None
         self._lay_out()
         self.arrange(narrow=False)
@@ -227,7 +227,7 @@ class LabHeader(QWidget):
         self.blind.setChecked(view.workbench.blind)
         self.device.show_choices(view.device.choices, view.device.chosen)
         self.device.setAccessibleDescription(view.device.state)
-        self.path.show_choices((("", FREE), *view.paths), view.path or "")
+        self.path.show_choices((("", _FREE), *view.paths), view.path or "")
         self.undo.setEnabled(view.workbench.may_undo)
         self.redo.setEnabled(view.workbench.may_redo)
         self.save.setEnabled(not view.workbench.blind)
@@ -243,13 +243,13 @@ def _row() -> QHBoxLayout:
 
 
 LABEL_WIDTH, FIELD_WIDTH, UNIT_WIDTH = 108, 86, 44
-GAP = 8
+_GAP = 8
 HEIGHT = 36
-SWITCHED = {OFF, ON}
+_SWITCHED = {OFF, ON}
 
 
 @dataclass(frozen=True, slots=True)
-class FormRow:
+class _FormRow:
     """A parameter as it is, and as it was when the liquid was chosen."""
 
     parameter: Parameter
@@ -270,7 +270,7 @@ class ParameterRow(QWidget):
         super().__init__()
         self.parameter = parameter
         self._refused = ""
-        self.line = hbox(spacing=GAP, margins=0)
+        self.line = hbox(spacing=_GAP, margins=0)
         self.sign = Icon("warning", "bad", 14)
         self.why = label("", "small", "bad", wraps=True)
         self._below = QWidget()
@@ -288,7 +288,7 @@ class ParameterRow(QWidget):
     def refused(self) -> str:
         return self._refused
 
-    def show_row(self, row: FormRow) -> None:
+    def show_row(self, row: _FormRow) -> None:
         raise NotImplementedError
 
     def show_refused(self, why: str) -> None:
@@ -305,12 +305,12 @@ class ParameterRow(QWidget):
         raise NotImplementedError
 
 
-class NumberRow(ParameterRow):
+class _NumberRow(ParameterRow):
     """A number: slider and field, the unit behind them, the preset's value a tick on the slider."""
 
     def __init__(self, parameter: Parameter) -> None:
         super().__init__(parameter)
-        self._row: FormRow | None = None
+        self._row: _FormRow | None = None
         self.name = _name_label(parameter.label)
         self.slider = Slider()
         self.field = NumberField()
@@ -327,7 +327,7 @@ class NumberRow(ParameterRow):
         self.field.abandoned.connect(self._restore_number)
         self.field.stepped.connect(self.slider.step)
 
-    def show_row(self, row: FormRow) -> None:
+    def show_row(self, row: _FormRow) -> None:
         """Show the number unless it is being dragged or typed; changed numbers are bold."""
         if self._row is not None and row.value != self._row.value:
             self.show_refused("")
@@ -401,7 +401,7 @@ class NumberRow(ParameterRow):
             self.field.restore_text()
 
 
-class ChoiceRow(ParameterRow):
+class _ChoiceRow(ParameterRow):
     """One of a few words."""
 
     def __init__(self, parameter: Parameter) -> None:
@@ -417,7 +417,7 @@ class ChoiceRow(ParameterRow):
         self.choice.activated.connect(self._ask_for_choice)
         add_parts(self.line, self.name, (self.choice, 1))
 
-    def show_row(self, row: FormRow) -> None:
+    def show_row(self, row: _FormRow) -> None:
         if row.value != self._value:
             self.show_refused("")
         self._value = row.value
@@ -436,7 +436,7 @@ class ChoiceRow(ParameterRow):
         self.changed.emit(self.parameter.name, self.choice.itemData(index), False)
 
 
-class SwitchRow(ParameterRow):
+class _SwitchRow(ParameterRow):
     """On or off."""
 
     def __init__(self, parameter: Parameter) -> None:
@@ -446,7 +446,7 @@ class SwitchRow(ParameterRow):
         self.toggle.clicked.connect(self._ask_to_switch)
         add_parts(self.line, self.toggle, STRETCH)
 
-    def show_row(self, row: FormRow) -> None:
+    def show_row(self, row: _FormRow) -> None:
         if (row.value == ON) != self.toggle.isChecked():
             self.show_refused("")
         self.toggle.setChecked(row.value == ON)
@@ -462,11 +462,11 @@ class SwitchRow(ParameterRow):
         self.changed.emit(self.parameter.name, ON if on else OFF, False)
 
 
-def row_for(parameter: Parameter) -> ParameterRow:
+def _row_for(parameter: Parameter) -> ParameterRow:
     """Return the row that edits a parameter."""
     if not parameter.choices:
-        return NumberRow(parameter)
-    return (SwitchRow if {value for value, _ in parameter.choices} == SWITCHED else ChoiceRow)(parameter)
+        return _NumberRow(parameter)
+    return (_SwitchRow if {value for value, _ in parameter.choices} == _SWITCHED else _ChoiceRow)(parameter)
 
 
 def _name_label(text: str) -> QLabel:
@@ -485,14 +485,14 @@ class SectionBlock(QWidget):
 
     def __init__(self, section: Section) -> None:
         super().__init__()
-        self.rows = {it.name: row_for(it) for it in section.parameters}
+        self.rows = {it.name: _row_for(it) for it in section.parameters}
         self.count = label("", "small", "text2")
         head = hbox(label(section.title, "strong", heading=True), STRETCH, self.count)
         cells = grid(8, 2, margins=0)
         vbox(head, cells, spacing=4, margins=(0, 8, 0, 8), parent=self)
         line, column = 0, 0
         for row in self.rows.values():
-            if isinstance(row, SwitchRow):
+            if isinstance(row, _SwitchRow):
                 cells.addWidget(row, line, column)
                 line, column = (line + 1, 0) if column else (line, 1)
                 continue
@@ -501,7 +501,7 @@ class SectionBlock(QWidget):
             line += 1
 
     def show_section(self, section: Section, setting: Setting) -> None:
-        rows = [FormRow(it, setting.value(it.name), setting.chosen_value(it.name)) for it in section.parameters]
+        rows = [_FormRow(it, setting.value(it.name), setting.chosen_value(it.name)) for it in section.parameters]
         for row in rows:
             self.rows[row.parameter.name].show_row(row)
         changed = sum(row.changed for row in rows)
@@ -522,7 +522,7 @@ class FormPanel(Card):
         self._refused: tuple[str, str] | None = None
         self.blocks: dict[str, SectionBlock] = {}
         self.rows: dict[str, ParameterRow] = {}
-        self.badge = Badge()
+        self.badge = _Badge()
         self.liquid = Choice()
         self.liquid.setProperty("dense", "true")
         self.liquid.setFont(font("label"))

@@ -23,11 +23,11 @@ from study_app.lab.ab_comparison import Setting
 from study_app.workspace import workspace
 
 FORM_WIDTH, FORM_WIDTH_NARROW, SIDE_WIDTH = 404, 388, 300
-PLOTS_STRETCH = 39
-LEAST = QSize(928, 560)
+_PLOTS_STRETCH = 39
+_LEAST = QSize(928, 560)
 WIDE, ONE_ROW = 1240, 1460
-GAP = 14
-SUFFIX = ".toml"
+_GAP = 14
+_SUFFIX = ".toml"
 
 
 class LabPlace(Place):
@@ -48,7 +48,7 @@ class LabPlace(Place):
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.setAccessibleName("Liquid lab")
-        self.setMinimumSize(LEAST)
+        self.setMinimumSize(_LEAST)
         self._view: LabView | None = None
         self._wide: bool | None = None
         self.dialog: QFileDialog | None = None
@@ -67,8 +67,8 @@ class LabPlace(Place):
         self._arrange(wide=True)
 
     def _lay_out(self) -> None:
-        self._side = grid(GAP, GAP, margins=0)
-        self._middle = grid(GAP, GAP, margins=0)
+        self._side = grid(_GAP, _GAP, margins=0)
+        self._middle = grid(_GAP, _GAP, margins=0)
         self._middle.setColumnStretch(0, 1)
         self._middle.setColumnStretch(1, 1)
         framed = vbox(self.tank, margins=(SHADOW, SHADOW - 1, SHADOW, SHADOW))  # as the neighbouring cards
@@ -77,11 +77,11 @@ class LabPlace(Place):
         self._middle.addWidget(self.speed, 1, 1)
         add_layout(self._middle, self._side, 2, 0, 1, 2)
         self._middle.setRowStretch(0, 61)
-        self._middle.setRowStretch(1, PLOTS_STRETCH)
+        self._middle.setRowStretch(1, _PLOTS_STRETCH)
         self.area = scrolled(self._middle)
         self._column = QGridLayout()
         self._side_area = scrolled(self._column)
-        self._body = grid(GAP, GAP, margins=(SPACE[4] - 3, GAP, SPACE[4] - 3, GAP))
+        self._body = grid(_GAP, _GAP, margins=(SPACE[4] - 3, _GAP, SPACE[4] - 3, _GAP))
         self._body.addWidget(self.form, 0, 0)
         self._body.addWidget(self.area, 0, 1)
         self._body.addWidget(self._side_area, 0, 2)
@@ -94,7 +94,7 @@ class LabPlace(Place):
             return
         self._wide = wide
         cards = (self.cost, self.error, self.limiters)
-        self._column.setSpacing(GAP)
+        self._column.setSpacing(_GAP)
         self._column.setContentsMargins(0, 0, 0, 0)
         for number, card in enumerate(cards):
             if wide:
@@ -156,8 +156,8 @@ class LabPlace(Place):
         """Ask for the preset's file; the dialog is not modal, so that the force can be stopped."""
         if (setting := self._setting_unless_asking()) is not None:
             dialog = self._ask_for_file(f"Save preset: {setting.title}", "Presets", "save", setting, saves=True)
-            dialog.setDefaultSuffix(SUFFIX[1:])
-            dialog.selectFile(f"{preset_name(setting.title)}{SUFFIX}")
+            dialog.setDefaultSuffix(_SUFFIX[1:])
+            dialog.selectFile(f"{_preset_name(setting.title)}{_SUFFIX}")
 
     def ask_which_to_open(self) -> None:
         if self._setting_unless_asking() is not None:
@@ -175,7 +175,7 @@ class LabPlace(Place):
 
     def _ask_for_file(self, title: str, files: str, what: str, *details: Any, saves: bool = False) -> QFileDialog:
         """Ask for a file, starting in the workspace's protocols, then emit the request."""
-        dialog = self.dialog = QFileDialog(self, title, str(workspace().protocols), f"{files} (*{SUFFIX})")
+        dialog = self.dialog = QFileDialog(self, title, str(workspace().protocols), f"{files} (*{_SUFFIX})")
         if saves:
             dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         else:
@@ -219,7 +219,7 @@ class LabPlace(Place):
         self.form.setFixedWidth(FORM_WIDTH if self.width() >= ONE_ROW else FORM_WIDTH_NARROW)
 
 
-def preset_name(title: str) -> str:
+def _preset_name(title: str) -> str:
     """Return a file name for a setting's title: "Water, edited" becomes "water-edited"."""
     parts = "".join(sign if sign.isalnum() else " " for sign in title.lower()).split()
     return "-".join(parts) or "preset"

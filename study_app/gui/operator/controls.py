@@ -88,7 +88,7 @@ def _hint_text(view: OperatorView) -> str:
     return "You will be asked for a reason; both recordings are kept." if view.may_repeat else ""
 
 
-class NoteField(QPlainTextEdit):
+class _NoteField(QPlainTextEdit):
     """Where a note is written; Enter keeps it, Shift+Enter begins a line."""
 
     entered = Signal()
@@ -129,7 +129,7 @@ class NotesCard(Card):
         self.none = label("No notes yet.", "label", "text2")
         self._list = QWidget()
         vbox(self.none, *self.lines, STRETCH, spacing=6, margins=0, parent=self._list)
-        self.field = NoteField()
+        self.field = _NoteField()
         self.hint = label("Press Enter to store it with the time", "small", "text3")
         self.add = ActionButton("pen", "Add note", key="N")
         self.mark = ActionButton("flag", "Mark", key="M")
@@ -194,7 +194,7 @@ class _NoteRow(QWidget):
 LEAST_WIDTH, LEAST_HEIGHT = 320, 160
 
 
-class StopButton(Themed, QPushButton):
+class _StopButton(Themed, QPushButton):
     """STOP FORCE, and the other ways to stop it; it acts when pressed, not when released."""
 
     def __init__(self, device_button: str) -> None:
@@ -239,7 +239,7 @@ class StopPanel(Card):
         self.sign = Icon("check", "ok", 18)
         self.word = label("", "strong")
         self.fade_in = ActionButton("", "Fade in again", height=36)
-        self.stop = StopButton(device_button)
+        self.stop = _StopButton(device_button)
         row = hbox(self.sign, self.word, STRETCH, self.fade_in, spacing=10, margins=(6, 0, 0, 0))
         keep = self.fade_in.sizePolicy()
         keep.setRetainSizeWhenHidden(True)

@@ -25,7 +25,7 @@ from study_app.store.missing_trials import REASONS
 from study_app.store.progress import Progress, TrialAnswer
 
 State = Literal["preparing", "running", "paused", "force off", "trouble", "ended"]
-StepState = Literal["done", "now", "open"]
+_StepState = Literal["done", "now", "open"]
 
 NOTES_SHOWN = 3
 
@@ -35,7 +35,7 @@ class StepRow:
     """A row of the rail; ``note`` is its duration, "now" or how far it is."""
 
     label: str
-    state: StepState
+    state: _StepState
     note: str
 
 
@@ -116,7 +116,7 @@ class OperatorView:
 
 
 # A block of more trials than this is one row of the rail ("Delay settings 1 to 7"), so that a day's study fits it.
-ROWS_PER_BLOCK = 4
+_ROWS_PER_BLOCK = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -432,15 +432,15 @@ def _same_block(trial: Trial, other: Step) -> bool:
 
 def _block_rows(protocol: Protocol, schedule: Schedule, first: int, last: int, language: str) -> list[Stage]:
     trials = [step for step in schedule.steps[first : last + 1] if isinstance(step, Trial)]
-    if len(trials) <= ROWS_PER_BLOCK:
+    if len(trials) <= _ROWS_PER_BLOCK:
         return [Stage(trial.label(protocol, language), first + i, first + i) for i, trial in enumerate(trials)]
     label = protocol.text(protocol.blocks[trials[0].block].setting_label, language)
     return [Stage(f"{label} {trials[0].index} to {trials[-1].index}", first, last)]
 
 
-LONG_RUN: Final = 8
+_LONG_RUN: Final = 8
 """So many equal answers in a row are marked."""
-FAST_S: Final = 0.3
+_FAST_S: Final = 0.3
 """A median time to answer below this is marked [s]."""
 
 
@@ -467,9 +467,9 @@ def _answer_lines(answers: Sequence[TrialAnswer], choices: Mapping[str, str]) ->
     given = [str(answer.value) for answer in answers]
     shares = ", ".join(f"{label} {100 * given.count(choice) / len(given):.0f} %" for choice, label in choices.items())
     run = max(len(list(same)) for _, same in groupby(given))
-    lines = [*([shares] if shares else []), f"longest run {run}" + (": check" if run >= LONG_RUN else "")]
+    lines = [*([shares] if shares else []), f"longest run {run}" + (": check" if run >= _LONG_RUN else "")]
     seconds = [answer.seconds for answer in answers if answer.seconds is not None]
     if seconds:
         middle = median(seconds)
-        lines.append(f"median answer time {middle:.2f} s" + (": check" if middle < FAST_S else ""))
+        lines.append(f"median answer time {middle:.2f} s" + (": check" if middle < _FAST_S else ""))
     return lines

@@ -23,14 +23,14 @@ from study_app.gui.widgets.live_plots import (
     tick_text,
 )
 
-FIELD = QSize(320, 210)
+_FIELD = QSize(320, 210)
 """What the card asks for, whether it shows the force or hides it."""
-LEAST_SHARE = 1 / 16  # share of the limit: a smaller range would show noise as large as force
-NARROWS_BELOW = 0.8  # hysteresis of the range, so that a force at its edge does not toggle the scale
-FILL_ALPHA = 46
+_LEAST_SHARE = 1 / 16  # share of the limit: a smaller range would show noise as large as force
+_NARROWS_BELOW = 0.8  # hysteresis of the range, so that a force at its edge does not toggle the scale
+_FILL_ALPHA = 46
 
 
-class ForcePlot(TracePlot):
+class _ForcePlot(TracePlot):
     """Force on the hand along x, y, z, its size as a field behind them, and the limit.
 
     The scale follows the force of the last ten seconds, up to the limit: most liquids stay far below it.
@@ -43,7 +43,7 @@ class ForcePlot(TracePlot):
     def __init__(self, limit_n: float) -> None:
         super().__init__(TRACE_WINDOW_S, limit_n, (*NAMES, "size"))
         self.limit_n = limit_n
-        self._least = limit_n * LEAST_SHARE
+        self._least = limit_n * _LEAST_SHARE
         self.size_field = pg.PlotCurveItem(fillLevel=0.0)  # the last curve's field, without its line
         self.size_field.setZValue(-5)
         self.limits = tuple(pg.InfiniteLine(sign * limit_n, angle=0) for sign in (1, -1))
@@ -61,8 +61,8 @@ class ForcePlot(TracePlot):
         """Draw forces (n, 4: x, y, z, size) [N]."""
         peak = float(forces_n[:, 3].max(initial=0.0))
         wanted = min(max(peak, self._least), self.limit_n)
-        if wanted < NARROWS_BELOW * self.reach:
-            self.show_reach(wanted / NARROWS_BELOW if wanted < self.limit_n else self.limit_n)
+        if wanted < _NARROWS_BELOW * self.reach:
+            self.show_reach(wanted / _NARROWS_BELOW if wanted < self.limit_n else self.limit_n)
         self.show_traces(times_s, forces_n)
         if self.size_field is not None:
             self.size_field.setData(times_s, forces_n[:, 3])
@@ -85,7 +85,7 @@ class ForcePlot(TracePlot):
             self.limit_name.setColor(QColor(theme.bad))
         if self.size_field is not None:
             field = QColor(theme.text3)
-            field.setAlpha(FILL_ALPHA)
+            field.setAlpha(_FILL_ALPHA)
             self.size_field.setPen(NOTHING)
             self.size_field.setBrush(field)
 
@@ -96,7 +96,7 @@ class ForceCard(Card):
     def __init__(self, limit_n: float) -> None:
         aside = label(f"last {TRACE_WINDOW_S:.0f} s, N; limit {limit_n:g}", "small", "text2")
         super().__init__("Force", aside, padding=16, gap=2)
-        self.plot = ForcePlot(limit_n)
+        self.plot = _ForcePlot(limit_n)
         self.plot.setMinimumHeight(48)
         self.column.addWidget(self.plot, 1)
         span = f"over the last {TRACE_WINDOW_S:.0f} s"
@@ -109,10 +109,10 @@ class ForceCard(Card):
         self.plot.paint_now()
 
     def sizeHint(self) -> QSize:
-        return FIELD
+        return _FIELD
 
     def minimumSizeHint(self) -> QSize:
-        return FIELD
+        return _FIELD
 
 
 class LatenessCard(Card):
@@ -160,20 +160,20 @@ class HiddenForceCard(Card):
         self.column.addWidget(MaskedPanel(self.TITLE, self.WHY), 1)
 
     def sizeHint(self) -> QSize:
-        return FIELD
+        return _FIELD
 
     def minimumSizeHint(self) -> QSize:
-        return FIELD
+        return _FIELD
 
 
-VERDICTS: dict[Verdict, tuple[str, Ink]] = {
+_VERDICTS: dict[Verdict, tuple[str, Ink]] = {
     "ok": ("check", "ok"),
     "late": ("warning", "warn"),
     "open": ("ring", "text3"),
 }
 
 
-class TileCard(Card):
+class _TileCard(Card):
     """One number."""
 
     def __init__(self) -> None:
@@ -194,7 +194,7 @@ class TileCard(Card):
         self.value.setText(tile.value)
         self.unit.setText(tile.unit)
         self.line.show_text(tile.line)
-        self.sign.show_icon(*VERDICTS[tile.verdict])
+        self.sign.show_icon(*_VERDICTS[tile.verdict])
         states = {"ok": "within limits", "late": "outside limits", "open": "not measured yet"}
         value = f"{tile.value} {tile.unit}".strip()
         self.setAccessibleName(f"{tile.title}: {value}, {states[tile.verdict]}, {tile.line}")
@@ -206,7 +206,7 @@ class Tiles(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self._grid = grid(10, 10, margins=0, parent=self)
-        self.cards = [TileCard() for _ in range(4)]
+        self.cards = [_TileCard() for _ in range(4)]
         self.set_narrow(False)
 
     def set_narrow(self, yes: bool) -> None:

@@ -13,10 +13,10 @@ from study_app.protocol.model import Protocol
 Floats = NDArray[np.float64]
 Verdict = Literal["ok", "late", "open"]
 
-LATENESS_WINDOW_S = 60
-RATE_WINDOW_TICKS = 2000
+_LATENESS_WINDOW_S = 60
+_RATE_WINDOW_TICKS = 2000
 TRACE_WINDOW_S = 10.0
-TRACE_STEP_S = 0.02
+_TRACE_STEP_S = 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,9 +58,9 @@ class ServoHealth:
     def __init__(self, rate_hz: float, refresh_hz: float = 60.0) -> None:
         self.rate_hz = rate_hz
         self.refresh_hz = refresh_hz
-        self.lateness_ns = np.zeros(int(LATENESS_WINDOW_S * rate_hz), np.int64)
+        self.lateness_ns = np.zeros(int(_LATENESS_WINDOW_S * rate_hz), np.int64)
         self._latenesses = 0
-        self._recent = np.zeros((RATE_WINDOW_TICKS, 2), np.int64)  # tick, time [ns]
+        self._recent = np.zeros((_RATE_WINDOW_TICKS, 2), np.int64)  # tick, time [ns]
         self._ticks = 0
         self.overruns = 0
         self._delay_ticks = self._first_delay_ticks = 0
@@ -69,7 +69,7 @@ class ServoHealth:
         self._frames = 0
         self._refreshes = 0
         self._missed = 0
-        rows = round(TRACE_WINDOW_S / TRACE_STEP_S) + 2
+        rows = round(TRACE_WINDOW_S / _TRACE_STEP_S) + 2
         self._path = np.full((rows, 4), np.nan)  # t [s], x, y, z [m]
         self._path_rows = 0
 
@@ -88,7 +88,7 @@ class ServoHealth:
 
     def add_hand_position(self, at_s: float, position_m: Any) -> None:
         """Add the hand's position [m, hand frame]; positions more frequent than the trace's resolution are ignored."""
-        if self._path_rows and at_s < self._path[(self._path_rows - 1) % len(self._path), 0] + TRACE_STEP_S:
+        if self._path_rows and at_s < self._path[(self._path_rows - 1) % len(self._path), 0] + _TRACE_STEP_S:
             return
         self._path[self._path_rows % len(self._path)] = (at_s, *position_m)
         self._path_rows += 1
@@ -202,9 +202,9 @@ def _verdict(within: bool) -> Verdict:
     return "ok" if within else "late"
 
 
-STEP_NS = round(TRACE_STEP_S * 1e9)
-ROWS = round(TRACE_WINDOW_S / TRACE_STEP_S) + 2
-LIMITERS = tuple(limiter for limiter in ALL_LIMITERS if not limiter.expected)
+_STEP_NS = round(_TRACE_STEP_S * 1e9)
+_ROWS = round(TRACE_WINDOW_S / _TRACE_STEP_S) + 2
+_LIMITERS = tuple(limiter for limiter in ALL_LIMITERS if not limiter.expected)
 """Limiters that are counted: fading in and the stop are no sign of anything, and are said elsewhere."""
 FORCE, SIZE = slice(0, 3), 3
 
@@ -243,12 +243,12 @@ class Forces:
 
     def __init__(self, limit_n: float) -> None:
         self.limit_n = limit_n
-        self._steps = np.full(ROWS, -1, np.int64)  # which 20 ms, on the servo's clock
-        self._rows = np.zeros((ROWS, 4))  # x, y, z, size [N]
+        self._steps = np.full(_ROWS, -1, np.int64)  # which 20 ms, on the servo's clock
+        self._rows = np.zeros((_ROWS, 4))  # x, y, z, size [N]
         self._written = 0
         self._scene = 0
         self._now_n = self._most_n = 0.0
-        self._limited = np.zeros(len(LIMITERS), np.int64)
+        self._limited = np.zeros(len(_LIMITERS), np.int64)
         self._sums_n = np.zeros(2)  # permitted, withheld
 
     def add_samples(self, samples: Any) -> None:
@@ -258,20 +258,22 @@ class Forces:
         rows = np.empty((len(samples), 4))
         rows[:, FORCE] = samples["device_force_n"]
         rows[:, SIZE] = np.sqrt(np.einsum("ij,ij->i", rows[:, FORCE], rows[:, FORCE]))
-        self._keep_rows(samples["time_ns"] // STEP_NS, rows)
+        self._keep_rows(samples["time_ns"] // _STEP_NS, rows)
         self._count_samples(samples, rows[:, SIZE])
 
     def trace(self, now_ns: int) -> tuple[Floats, Floats]:
         """Return times before now [s] (n,), oldest first, and forces [N] (n, 4: x, y, z, size)."""
-        kept = min(self._written, ROWS)
-        order = np.arange(self._written - kept, self._written) % ROWS
-        times_s: Floats = (self._steps[order] * STEP_NS - now_ns).astype(np.float64) * 1e-9
+        kept = min(self._written, _ROWS)
+        order = np.arange(self._written - kept, self._written) % _ROWS
+        times_s: Floats = (self._steps[order] * _STEP_NS - now_ns).astype(np.float64) * 1e-9
         recent = times_s >= -TRACE_WINDOW_S
         return times_s[recent], self._rows[order][recent]
 
     def figures(self) -> ForceFigures:
         counted = tuple(
-            (limiter.label.lower(), int(count)) for limiter, count in zip(LIMITERS, self._limited, strict=True) if count
+            (limiter.label.lower(), int(count))
+            for limiter, count in zip(_LIMITERS, self._limited, strict=True)
+            if count
         )
         permitted_n, withheld_n = self._sums_n
         withheld = float(withheld_n / permitted_n) if permitted_n > 0 else 0.0
@@ -283,9 +285,9 @@ class Forces:
         firsts = np.concatenate(([0], np.flatnonzero(np.diff(steps)) + 1))
         for first, end in zip(firsts, (*firsts[1:], len(steps)), strict=True):
             strongest = rows[first + int(np.argmax(rows[first:end, SIZE]))]
-            newest = (self._written - 1) % ROWS
+            newest = (self._written - 1) % _ROWS
             if self._written == 0 or self._steps[newest] != steps[first]:
-                newest = self._written % ROWS
+                newest = self._written % _ROWS
                 self._steps[newest], self._rows[newest] = steps[first], strongest
                 self._written += 1
             elif strongest[SIZE] > self._rows[newest, SIZE]:
@@ -307,4 +309,4 @@ class Forces:
         self._sums_n += samples["permitted_n"][here].sum(), samples["withheld_n"][here].sum()
         acted = samples["limiters"][here]
         if acted.any():
-            self._limited += np.count_nonzero(acted[:, None] & np.array([it.bit for it in LIMITERS]), axis=0)
+            self._limited += np.count_nonzero(acted[:, None] & np.array([it.bit for it in _LIMITERS]), axis=0)

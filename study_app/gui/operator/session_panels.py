@@ -16,7 +16,7 @@ from study_app.gui.widgets.controls import ActionButton, CompactStop, IconButton
 from study_app.gui.widgets.labels import Elided, figures, label, set_ink
 from study_app.number_text import minutes
 
-STATES: dict[State, tuple[Tone, str]] = {
+_STATES: dict[State, tuple[Tone, str]] = {
     "preparing": ("neutral", "clock"),
     "running": ("accent", "play"),
     "paused": ("warn", "pause"),
@@ -24,21 +24,21 @@ STATES: dict[State, tuple[Tone, str]] = {
     "trouble": ("bad", "warning"),
     "ended": ("ok", "check"),
 }
-OTHER_WINDOW = "F6"  # not every desktop has a key for this, above all in full screen
-BLINDINGS = {"double": ("lock", "Double-blind"), "single": ("eye", "Single-blind")}
-SAVED_RECENTLY_S = 2.0
-TRIALS_PX = 120
+_OTHER_WINDOW = "F6"  # not every desktop has a key for this, above all in full screen
+_BLINDINGS = {"double": ("lock", "Double-blind"), "single": ("eye", "Single-blind")}
+_SAVED_RECENTLY_S = 2.0
+_TRIALS_PX = 120
 
 
-def shown_state(view: OperatorView) -> tuple[Tone, str, str]:
+def _shown_state(view: OperatorView) -> tuple[Tone, str, str]:
     """Return tone, icon and word of a session's state."""
-    tone, icon = STATES[view.state]
+    tone, icon = _STATES[view.state]
     if view.state == "ended" and view.state_word != "Complete":
         tone, icon = "neutral", "cross"
     return tone, icon, view.state_word
 
 
-class ThemeButton(IconButton):
+class _ThemeButton(IconButton):
     """Changes between light and dark; a moon in light, a sun in dark."""
 
     def __init__(self) -> None:
@@ -67,10 +67,10 @@ class Header(QWidget):
         self.expected = figures("", "small", "text2")
         self.expected.setAlignment(Qt.AlignmentFlag.AlignRight)
         self.bar = Bar()
-        self.bar.setFixedWidth(TRIALS_PX)
+        self.bar.setFixedWidth(_TRIALS_PX)
         self.trials = figures("", "small", "text2")
-        self.theme_button = ThemeButton()
-        self.page = ActionButton("", "Participant's window", key=OTHER_WINDOW, height=40)
+        self.theme_button = _ThemeButton()
+        self.page = ActionButton("", "Participant's window", key=_OTHER_WINDOW, height=40)
         self.page.hide()
         self._lay_out()
 
@@ -84,11 +84,11 @@ class Header(QWidget):
     def show_view(self, view: OperatorView) -> None:
         self.study.show_text(view.study)
         self.who.show_text(view.who)
-        self.blind.show_state("neutral", *BLINDINGS[view.blinding])
-        self.state.show_state(*shown_state(view))
+        self.blind.show_state("neutral", *_BLINDINGS[view.blinding])
+        self.state.show_state(*_shown_state(view))
         if view.saved_ago_s is None:
             self.saved.show_state("neutral", "ring", "Nothing to save yet")
-        elif view.over or view.saved_ago_s > SAVED_RECENTLY_S:
+        elif view.over or view.saved_ago_s > _SAVED_RECENTLY_S:
             self.saved.show_state("ok", "check", "All saved to disk")
         else:
             self.saved.show_state("ok", "check", "Saved to disk now")
@@ -103,18 +103,18 @@ def _column(*widgets: QWidget) -> QVBoxLayout:
     return vbox(STRETCH, *widgets, STRETCH, spacing=2)
 
 
-WHAT_TO_DO = (
+_WHAT_TO_DO = (
     "The force is off and every answer so far is on disk. End the session, fix the cause, then start a new one."
 )
-RECONNECT = (
+_RECONNECT = (
     "The force is off and every answer so far is on disk. Plug in the device, then reconnect it. The session stays "
     "paused until you resume it; an interrupted trial starts again."
 )
-WAITS = (
+_WAITS = (
     "The force is off and nothing is lost. Free disk space or reconnect the drive; the session then continues, paused."
 )
-AFTERWARDS = "The session is closed and the force is off. Everything in the journal is safe."
-WAITS_AT_END = (
+_AFTERWARDS = "The session is closed and the force is off. Everything in the journal is safe."
+_WAITS_AT_END = (
     "The force is off and the journal is complete. Free disk space, and leave this window open until the session's "
     "other files are written."
 )
@@ -127,7 +127,7 @@ class Banner(QWidget):
         super().__init__()
         give_ground(self, "bad tint")
         self.what = label("", "strong", "bad", wraps=True)
-        self.then = label(WHAT_TO_DO, "label", "text", wraps=True)
+        self.then = label(_WHAT_TO_DO, "label", "text", wraps=True)
         text = vbox(self.what, self.then, spacing=4)
         sign = Icon("warning", "bad", 24), 0, Qt.AlignmentFlag.AlignTop
         self.reconnect = ActionButton("repeat", "Reconnect", key="C", role="primary")
@@ -140,8 +140,8 @@ class Banner(QWidget):
         if view.trouble != self.what.text():
             self.what.setText(view.trouble[:1].upper() + view.trouble[1:])
         offered = view.may_reconnect and not view.over
-        advice = RECONNECT if offered else WAITS if view.waits else WHAT_TO_DO
-        afterwards = WAITS_AT_END if view.waits else AFTERWARDS
+        advice = _RECONNECT if offered else _WAITS if view.waits else _WHAT_TO_DO
+        afterwards = _WAITS_AT_END if view.waits else _AFTERWARDS
         self.then.setText(afterwards if view.over else view.reconnection or advice)
         self.reconnect.setVisible(offered)
         self.reconnect.setEnabled(not view.reconnects)
@@ -163,7 +163,7 @@ class Strip(QWidget):
         self.setFixedHeight(HEIGHT)
         self.state = Chip("neutral", "clock", "Preparing")
         self.where = Elided("label", "text2")
-        self.operator = ActionButton("", "Operator's window", key=OTHER_WINDOW, height=40)
+        self.operator = ActionButton("", "Operator's window", key=_OTHER_WINDOW, height=40)
         self.stop = CompactStop("Stop playing", key_cap("stop")) if played else CompactStop()
         row = hbox(self.state, (self.where, 1), spacing=12, margins=(16, 4, 8, 4), parent=self)
         for button in (self.operator, self.stop):
@@ -172,14 +172,14 @@ class Strip(QWidget):
         self.operator.setHidden(played)
 
     def show_view(self, view: OperatorView) -> None:
-        self.state.show_state(*shown_state(view))
+        self.state.show_state(*_shown_state(view))
         self.where.show_text(view.heading)
 
 
-HEADINGS: tuple[TypeRole, ...] = ("display", "title", "title_dense", "card")
+_HEADINGS: tuple[TypeRole, ...] = ("display", "title", "title_dense", "card")
 
 
-class Now(QWidget):
+class _Now(QWidget):
     """Part, trial, what is done in it, and for how long."""
 
     def __init__(self) -> None:
@@ -232,7 +232,7 @@ class Now(QWidget):
         self._fit_heading()
 
     def _fit_heading(self) -> None:
-        for role in HEADINGS:
+        for role in _HEADINGS:
             self.heading.setFont(font(role, tabular=True))
             if self.heading.fontMetrics().horizontalAdvance(self.heading.text()) <= self._words.width():
                 break
@@ -284,9 +284,9 @@ class Tally(QWidget):
 
 
 WIDTH, NARROW, SLIM = 318, 248, 72
-ROW_HEIGHT = 44
-LEAST_ROW_HEIGHT = 26
-DOT = 11
+_ROW_HEIGHT = 44
+_LEAST_ROW_HEIGHT = 26
+_DOT = 11
 
 
 class StepLine(Themed, QWidget):
@@ -300,12 +300,12 @@ class StepLine(Themed, QWidget):
         self.note = figures("", "label", "text2")
         layout = hbox((self.name, 1), self.note, margins=(37, 0, 0, 0), parent=self)
         self._layout = layout
-        self.setMinimumHeight(LEAST_ROW_HEIGHT)
+        self.setMinimumHeight(_LEAST_ROW_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
 
     def sizeHint(self) -> QSize:
         """Return the room that a row likes; where there are many, each takes less."""
-        return QSize(super().sizeHint().width(), ROW_HEIGHT)
+        return QSize(super().sizeHint().width(), _ROW_HEIGHT)
 
     def set_slim(self, yes: bool) -> None:
         """Show the dot alone; its text is in the tip."""
@@ -334,19 +334,19 @@ class StepLine(Themed, QWidget):
         reached = self.row.state != "open"
         if not self.first:
             painter.setPen(QPen(QColor(t.ok if reached else t.border), 1.6))
-            painter.drawLine(QPointF(12, 0), QPointF(12, middle.y() - DOT))
+            painter.drawLine(QPointF(12, 0), QPointF(12, middle.y() - _DOT))
         if not self.last:
             painter.setPen(QPen(QColor(t.ok if self.row.state == "done" else t.border), 1.6))
-            painter.drawLine(QPointF(12, middle.y() + DOT), QPointF(12, self.height()))
+            painter.drawLine(QPointF(12, middle.y() + _DOT), QPointF(12, self.height()))
         if self.row.state == "done":
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(QColor(t.ok_bg))
-            painter.drawEllipse(middle, DOT, DOT)
+            painter.drawEllipse(middle, _DOT, _DOT)
             draw_icon(painter, "check", QRectF(5, middle.y() - 7, 14, 14), t.ok, 2.6)
         elif self.row.state == "now":
             painter.setPen(QPen(QColor(t.accent), 1.8))
             painter.setBrush(QColor(t.selected))
-            painter.drawEllipse(middle, DOT, DOT)
+            painter.drawEllipse(middle, _DOT, _DOT)
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(QColor(t.accent))
             painter.drawEllipse(middle, 4.5, 4.5)
@@ -361,7 +361,7 @@ class Rail(Card):
 
     def __init__(self) -> None:
         super().__init__(gap=10)
-        self.now, self.tally = Now(), Tally()
+        self.now, self.tally = _Now(), Tally()
         self.heading = self.now.heading
         self.lines: list[StepLine] = []
         self._slim = False
@@ -411,10 +411,10 @@ class Rail(Card):
             arrived = row.state == "now" != line.row.state
             line.show_row(row, first=index == 0, last=index == len(rows) - 1)
             if arrived:
-                self.steps_area.ensureWidgetVisible(line, 0, 2 * LEAST_ROW_HEIGHT)
+                self.steps_area.ensureWidgetVisible(line, 0, 2 * _LEAST_ROW_HEIGHT)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         for line in self.lines:
             if line.row.state == "now":
-                self.steps_area.ensureWidgetVisible(line, 0, LEAST_ROW_HEIGHT)
+                self.steps_area.ensureWidgetVisible(line, 0, _LEAST_ROW_HEIGHT)

@@ -27,25 +27,25 @@ from study_app.gui.widgets.cards import Card, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.main_view import EscapeKey
 
-Width = Literal["wide", "narrow", "slim"]
-Height = Literal["high", "low", "lower", "least"]
+_Width = Literal["wide", "narrow", "slim"]
+_Height = Literal["high", "low", "lower", "least"]
 
-SIDE = 350
-MARGINS: dict[Width, int] = {"wide": 21, "narrow": 18, "slim": 9}
-GAPS: dict[Width, int] = {"wide": 18, "narrow": 14, "slim": 9}
-RAILS: dict[Width, int] = {"wide": WIDTH, "narrow": NARROW, "slim": SLIM}
+_SIDE = 350
+_MARGINS: dict[_Width, int] = {"wide": 21, "narrow": 18, "slim": 9}
+_GAPS: dict[_Width, int] = {"wide": 18, "narrow": 14, "slim": 9}
+_RAILS: dict[_Width, int] = {"wide": WIDTH, "narrow": NARROW, "slim": SLIM}
 NARROW_BELOW, SLIM_BELOW = 1500, 1320
 LOW_BELOW, LOWER_BELOW, LEAST_BELOW = 870, 750, 705
-STOPS: dict[Height, int] = {"high": 250, "low": 236, "lower": 236, "least": 236}
-NOTES: dict[Height, int] = {"high": NOTES_SHOWN, "low": 2, "lower": 1, "least": 0}
-DEVICE_ROWS: dict[Height, int] = {"high": ALL_ROWS, "low": 3, "lower": 2, "least": 2}
-ACROSS_FROM = 640  # minimum width for four tiles, and two plots, side by side
-SIGNS_FROM = 690  # minimum width of the buttons with icons
-GAP = 10
-ENDS: Final = (("aborted", "Another reason"), ("withdrawn", "The participant withdrew"))
+_STOPS: dict[_Height, int] = {"high": 250, "low": 236, "lower": 236, "least": 236}
+_NOTES: dict[_Height, int] = {"high": NOTES_SHOWN, "low": 2, "lower": 1, "least": 0}
+_DEVICE_ROWS: dict[_Height, int] = {"high": ALL_ROWS, "low": 3, "lower": 2, "least": 2}
+_ACROSS_FROM = 640  # minimum width for four tiles, and two plots, side by side
+_SIGNS_FROM = 690  # minimum width of the buttons with icons
+_GAP = 10
+_ENDS: Final = (("aborted", "Another reason"), ("withdrawn", "The participant withdrew"))
 
 
-class Arrangement(QWidget):
+class _Arrangement(QWidget):
     """The window's whole content: header, rail, middle and side."""
 
     def __init__(self, window: "OperatorWindow") -> None:
@@ -56,15 +56,15 @@ class Arrangement(QWidget):
         self._parts = p = window
         self._arranged: tuple[object, ...] = ()
         self.now = Card(padding=14, gap=10)
-        self._middle = grid(GAP, GAP, margins=0)
+        self._middle = grid(_GAP, _GAP, margins=0)
         for column in (0, 1):
             self._middle.setColumnStretch(column, 1)
-        side = vbox(p.device, (p.notes, 1), spacing=GAP, margins=0)
+        side = vbox(p.device, (p.notes, 1), spacing=_GAP, margins=0)
         self.middle_area = scrolled(self._middle)
         self.side_area = scrolled(side)
-        self.side_area.setFixedWidth(SIDE)
-        right = vbox((self.side_area, 1), p.stop, spacing=GAP)
-        self._body = grid(down=GAP)
+        self.side_area.setFixedWidth(_SIDE)
+        right = vbox((self.side_area, 1), p.stop, spacing=_GAP)
+        self._body = grid(down=_GAP)
         add_layout(self._body, right, 0, 2, 2, 1)
         self._body.setColumnStretch(1, 1)
         self._body.setRowStretch(0, 1)
@@ -76,25 +76,25 @@ class Arrangement(QWidget):
         self._arrange(event.size())
 
     def _arrange(self, size: QSize) -> None:
-        width: Width = "wide" if size.width() >= NARROW_BELOW else "narrow" if size.width() >= SLIM_BELOW else "slim"
-        steps: tuple[tuple[int, Height], ...] = ((LOW_BELOW, "high"), (LOWER_BELOW, "low"), (LEAST_BELOW, "lower"))
-        height: Height = next((name for from_, name in steps if size.height() >= from_), "least")
-        row = size.width() - 2 * MARGINS[width] - GAPS[width] - SIDE
-        middle = row - RAILS[width] - GAPS[width]
-        signs = (row if width == "slim" else middle) >= SIGNS_FROM
-        across = middle >= ACROSS_FROM
+        width: _Width = "wide" if size.width() >= NARROW_BELOW else "narrow" if size.width() >= SLIM_BELOW else "slim"
+        steps: tuple[tuple[int, _Height], ...] = ((LOW_BELOW, "high"), (LOWER_BELOW, "low"), (LEAST_BELOW, "lower"))
+        height: _Height = next((name for from_, name in steps if size.height() >= from_), "least")
+        row = size.width() - 2 * _MARGINS[width] - _GAPS[width] - _SIDE
+        middle = row - _RAILS[width] - _GAPS[width]
+        signs = (row if width == "slim" else middle) >= _SIGNS_FROM
+        across = middle >= _ACROSS_FROM
         if (width, height, across, signs) == self._arranged:
             return
         self._arranged = (width, height, across, signs)
         self._set_width(width)
-        self._parts.stop.setFixedSize(SIDE, STOPS[height])
-        self._parts.notes.show_lines(NOTES[height])
-        self._parts.device.show_rows(DEVICE_ROWS[height])
+        self._parts.stop.setFixedSize(_SIDE, _STOPS[height])
+        self._parts.notes.show_lines(_NOTES[height])
+        self._parts.device.show_rows(_DEVICE_ROWS[height])
         self._parts.buttons.set_narrow(not signs)
         self._parts.buttons.hint.setVisible(width == "wide")
         self._fill_middle(across=across)
 
-    def _set_width(self, width: Width) -> None:
+    def _set_width(self, width: _Width) -> None:
         header, rail, slim = self._parts.header, self._parts.rail, width == "slim"
         for part in (header.bar, header.trials):  # "Now" says them, too
             part.setHidden(slim)
@@ -106,9 +106,9 @@ class Arrangement(QWidget):
             rail.take_back_panels()
         self.now.setVisible(slim)
         rail.set_narrow(width != "wide")
-        margin = MARGINS[width]
+        margin = _MARGINS[width]
         self._body.setContentsMargins(margin, margin, margin, margin - 4)
-        self._body.setHorizontalSpacing(GAPS[width])
+        self._body.setHorizontalSpacing(_GAPS[width])
         self._body.addWidget(rail, 0, 0, 1 if slim else 2, 1)
         self._body.addWidget(self.middle_area, 0, 1)
         self._body.addWidget(self._parts.buttons, 1, 0 if slim else 1, 1, 2 if slim else 1)
@@ -128,10 +128,10 @@ class Arrangement(QWidget):
             self._middle.setRowStretch(row, stretch)
 
 
-FULL = QSize(1600, 900)
-LEAST = QSize(1024, 640)
+_FULL = QSize(1600, 900)
+_LEAST = QSize(1024, 640)
 
-PASSED_ON: Final = re.compile(r"^(Error calling Python override of [\w:]+\(\): )+")
+_PASSED_ON: Final = re.compile(r"^(Error calling Python override of [\w:]+\(\): )+")
 """What PySide 6.10 and newer write before the words of an exception that one of Qt's calls passes on."""
 
 
@@ -163,7 +163,7 @@ class OperatorWindow(Themed, QMainWindow):
     ) -> None:
         super().__init__()
         self.setWindowTitle(f"{study} – operator")
-        self.setMinimumSize(LEAST)
+        self.setMinimumSize(_LEAST)
         self.may_close = False
         self._view: OperatorView | None = None
         self.header = Header()
@@ -181,11 +181,11 @@ class OperatorWindow(Themed, QMainWindow):
         self._asks_about = ""  # the setting of the open question
         self._failures: set[str] = set()
         self.escape = EscapeKey(self, anywhere=True)
-        self.arrangement = Arrangement(self)
+        self.arrangement = _Arrangement(self)
         self.setCentralWidget(self.arrangement)
         self.arrangement.setFocus()
         self._connect()
-        self.resize(FULL)
+        self.resize(_FULL)
         apply_theme(self, theme)
 
     def _connect(self) -> None:
@@ -225,7 +225,7 @@ class OperatorWindow(Themed, QMainWindow):
     def report_failure(self, error: BaseException) -> None:
         """Report once that a part of the window failed."""
         clear_frames(error.__traceback__)  # frames may hold a painter, and Qt would then paint no window
-        if (what := f"{type(error).__name__}: {PASSED_ON.sub('', str(error))}") not in self._failures:
+        if (what := f"{type(error).__name__}: {_PASSED_ON.sub('', str(error))}") not in self._failures:
             self._failures.add(what)
             self.show_message("A part of this window failed", f"{what}. The session continues.")
             self.ask("failed", what, error)
@@ -279,7 +279,7 @@ class OperatorWindow(Themed, QMainWindow):
                 ActionButton("cross", "End session", role="danger"),
                 back="Continue the session",
                 fields=(
-                    Field("status", "What happened", "radio", ENDS),
+                    Field("status", "What happened", "radio", _ENDS),
                     Field("reason", "Reason", placeholder="Optional"),
                 ),
             )

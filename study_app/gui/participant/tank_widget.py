@@ -50,15 +50,15 @@ from study_app.session.pages import TaskPage
 from study_app.session.tasks import TankView, new_tracker
 
 # Where the tank lies in the window, in shares of it.
-AREA = (0.075, 0.122, 0.85, 0.712)
-NEAR_RADII = 2.0  # in target radii: distance within which the ball is before or behind a target
-ALWAYS = QRegion(0, 0, 1, 1)  # a frame without motion counts, too
+_AREA = (0.075, 0.122, 0.85, 0.712)
+_NEAR_RADII = 2.0  # in target radii: distance within which the ball is before or behind a target
+_ALWAYS = QRegion(0, 0, 1, 1)  # a frame without motion counts, too
 
 
-def tank_and_camera(page: TaskPage, captions: Captions, width: int, height: int) -> tuple[Box, Camera]:
+def _tank_and_camera(page: TaskPage, captions: Captions, width: int, height: int) -> tuple[Box, Camera]:
     """Return the tank of a page and the camera for a window of ``width`` × ``height`` [px]."""
     box = Box.around(page.workspace_m, page.body_radius_m)
-    left, top, wide, high = AREA
+    left, top, wide, high = _AREA
     top = max(top, captions.height_above(width, height) / height)
     room = (1 - top) * height - captions.height_below(width, height)
     return box, Camera.fitted(box, left * width, top * height, wide * width, min(high * height, room))
@@ -67,7 +67,7 @@ def tank_and_camera(page: TaskPage, captions: Captions, width: int, height: int)
 def paint_ahead(page: TaskPage, wording: Words, text_scale: float, size: QSize, ratio: float) -> Thread:
     """Paint the still images of a coming page in a thread of their own, so that it appears at once."""
     width, height = size.width(), size.height()
-    box, camera = tank_and_camera(page, Captions(page, wording, text_scale), width, height)
+    box, camera = _tank_and_camera(page, Captions(page, wording, text_scale), width, height)
     painting = Thread(target=paint_backdrop, args=((width, height), ratio, box, camera), name="backdrop")
     painting.start()
     return painting
@@ -183,7 +183,7 @@ class TankWidget(QWidget):
         self.video.show_frame(view.video)
         self._still_images()
         things = self._frame_parts()
-        changed = changed_region(self.things, things) + ALWAYS
+        changed = changed_region(self.things, things) + _ALWAYS
         self.things = things
         if self._pane is None:
             self._drawn_ns, self._showing = None, True
@@ -264,7 +264,7 @@ class TankWidget(QWidget):
         if target is None:
             return ""
         x, y, z = (goal - float(here) for goal, here in zip(target, view.position_m, strict=True))
-        if self._by_mouse and math.hypot(x, y) <= NEAR_RADII * todo.radius_m and abs(z) > todo.radius_m:
+        if self._by_mouse and math.hypot(x, y) <= _NEAR_RADII * todo.radius_m and abs(z) > todo.radius_m:
             return wording.nearer if z > 0 else wording.further_away
         return wording.back_to_target if self.resting and math.hypot(x, y, z) > todo.radius_m else ""
 
@@ -278,7 +278,7 @@ class TankWidget(QWidget):
 
     def _lay_out(self, ratio: float) -> None:
         width, height = self.width(), self.height()
-        self._box, self.camera = tank_and_camera(self._page, self._captions, width, height)
+        self._box, self.camera = _tank_and_camera(self._page, self._captions, width, height)
         self._captions.lay_out(width, height, self.camera.point((0, self._box.floor, self._box.z))[1])
         if self.controls is not None:
             self.controls.place_at_foot(self._captions.small_scale, self._captions.controls_middle)

@@ -54,9 +54,9 @@ from study_app.session.transitions.events import Continue, ForceStopped, PauseRe
 
 SHARE_OF_SCREEN = 0.6  # of the screen's height that moves the hand through the height of the workspace
 NOTCHES = 24  # of the wheel through the depth of the workspace
-NOTCH = 120  # eighths of a degree
-WITHOUT_GRAB = ("offscreen", "minimal")  # there is no other window that could take the pointer
-BUTTONS = {Qt.MouseButton.LeftButton: 1 << 0, Qt.MouseButton.RightButton: 1 << 1}
+_NOTCH = 120  # eighths of a degree
+_WITHOUT_GRAB = ("offscreen", "minimal")  # there is no other window that could take the pointer
+_BUTTONS = {Qt.MouseButton.LeftButton: 1 << 0, Qt.MouseButton.RightButton: 1 << 1}
 
 
 class PointerCapture(QObject):
@@ -93,7 +93,7 @@ class PointerCapture(QObject):
         widget.setCursor(Qt.CursorShape.BlankCursor)
         widget.setMouseTracking(True)
         widget.installEventFilter(self)
-        if QGuiApplication.platformName() not in WITHOUT_GRAB:
+        if QGuiApplication.platformName() not in _WITHOUT_GRAB:
             widget.grabMouse()
         self._last = self._middle_of_widget()
         self._returning = False
@@ -117,13 +117,13 @@ class PointerCapture(QObject):
         if watched is not self._widget:
             return False
         if isinstance(event, QWheelEvent):
-            self._move_hand(0.0, 0.0, -2 * self._half[2] * event.angleDelta().y() / NOTCH / NOTCHES)
+            self._move_hand(0.0, 0.0, -2 * self._half[2] * event.angleDelta().y() / _NOTCH / NOTCHES)
             return True
         if isinstance(event, QMouseEvent):
             if event.type() == QEvent.Type.MouseMove:
                 self._follow_pointer(event.globalPosition().toPoint(), event.modifiers())
             else:
-                bit = BUTTONS.get(event.button(), 0)
+                bit = _BUTTONS.get(event.button(), 0)
                 bits = self._bits & ~bit if event.type() == QEvent.Type.MouseButtonRelease else self._bits | bit
                 if bits != self._bits:
                     self._bits = bits
@@ -176,7 +176,7 @@ def _distance_px(first: QPoint, other: QPoint) -> int:
     return (first - other).manhattanLength()
 
 
-WIDGETS: Final[dict[type[Page], Callable[[Any, PageContext], PageWidget]]] = {
+_WIDGETS: Final[dict[type[Page], Callable[[Any, PageContext], PageWidget]]] = {
     ChoicePage: ChoiceWidget,
     NumberPage: NumberWidget,
     FeedbackPage: FeedbackWidget,
@@ -185,12 +185,12 @@ WIDGETS: Final[dict[type[Page], Callable[[Any, PageContext], PageWidget]]] = {
     EndPage: NoticeWidget,
 }
 LEAST_SIZE = QSize(1024, 640)
-WINDOWED_SIZE = QSize(1366, 768)
-PILOT_FRAME = 10
-WAITING_MS = 15
-TIME_UP_MS = 1500  # "Time is up" is shown for so long before the questions
-AHEAD_MS = 100  # delay after a page before painting the next one ahead
-SETTLING_MS = 100  # longest time without a focused window when the focus moves between the program's windows
+_WINDOWED_SIZE = QSize(1366, 768)
+_PILOT_FRAME = 10
+_WAITING_MS = 15
+_TIME_UP_MS = 1500  # "Time is up" is shown for so long before the questions
+_AHEAD_MS = 100  # delay after a page before painting the next one ahead
+_SETTLING_MS = 100  # longest time without a focused window when the focus moves between the program's windows
 
 
 class ParticipantWindow(QWidget):
@@ -247,20 +247,20 @@ class ParticipantWindow(QWidget):
         self._captures = captures_pointer
         self.may_close = False
         self.painting: Thread | None = None
-        self.frame_px = PILOT_FRAME if pilot else 0
+        self.frame_px = _PILOT_FRAME if pilot else 0
         self._page: Page | None = None
         self._presses = key_presses()
         self._widget: PageWidget | TankWidget = self._wait_page(said.preparing)
         self._capture = PointerCapture(self)
         self._capture.moved.connect(self.pointer)
         self._capture.pressed.connect(self._take_click)
-        self.settling = QTimer(self, interval=SETTLING_MS)
+        self.settling = QTimer(self, interval=_SETTLING_MS)
         self.settling.timeout.connect(self._pause_if_left)
-        self.waiting = QTimer(self, interval=WAITING_MS)
+        self.waiting = QTimer(self, interval=_WAITING_MS)
         self.waiting.timeout.connect(self._show_if_painted)
-        self.time_up = QTimer(self, singleShot=True, interval=TIME_UP_MS)
+        self.time_up = QTimer(self, singleShot=True, interval=_TIME_UP_MS)
         self.time_up.timeout.connect(self._show_questions)
-        self._ahead = QTimer(self, singleShot=True, interval=AHEAD_MS)
+        self._ahead = QTimer(self, singleShot=True, interval=_AHEAD_MS)
         self._ahead.timeout.connect(self._paint_ahead)
         self._escape = EscapeKey(self)
         self._escape.held.connect(self._stop_force)
@@ -298,7 +298,7 @@ class ParticipantWindow(QWidget):
             self.setScreen(screen)
             self.move(screen.geometry().topLeft())
         if self._windowed:
-            self.resize(WINDOWED_SIZE)
+            self.resize(_WINDOWED_SIZE)
             place_window(self, self.screen(), corner=False)
             self.show()
         else:
@@ -467,7 +467,7 @@ class ParticipantWindow(QWidget):
         elif isinstance(page, QuestionnairePage):
             made = (QuestionnaireWidget if page.labels else FormWidget)(page, context)
         else:
-            made = WIDGETS[type(page)](page, context)
+            made = _WIDGETS[type(page)](page, context)
         made.event_made.connect(self.event)
         return made
 
@@ -496,7 +496,7 @@ class ParticipantWindow(QWidget):
         """Handle a click of the mouse that is the device: as Space to continue, else as a device button."""
         if bits and ignores_clicks(self._widget):
             return
-        if bits & BUTTONS[Qt.MouseButton.LeftButton] and self._may_leave_tank():
+        if bits & _BUTTONS[Qt.MouseButton.LeftButton] and self._may_leave_tank():
             self.event.emit(Continue(self._clock()))
         else:
             self.buttons.emit(bits)

@@ -41,7 +41,7 @@ from study_app.session.resume import resume_at
 from study_app.store.journals.journal_events import Event
 from study_app.store.progress import progress_of
 
-WAITING = "measuring …"
+_WAITING = "measuring …"
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,7 @@ def planned_rows(
     """
     extent = extent_of(protocol)
     ends = now + timedelta(seconds=max(extent.expected_s))
-    error = WAITING if error_n is None else "< 0.01 N" if error_n < 0.01 else f"{error_n:.2f} N"
+    error = _WAITING if error_n is None else "< 0.01 N" if error_n < 0.01 else f"{error_n:.2f} N"
     return (
         ("Parts", number_range(extent.parts)),
         (f"{extent.setting.capitalize()}s", number_range(extent.settings)),
@@ -127,7 +127,7 @@ def planned_rows(
 OF_THE_COMPUTER: Final = ("Servo rate", "Servo lateness", "Priority", "Screen", "Results folder", "Free space")
 """The checks before a session that say nothing of the study or its device."""
 
-RECOMPILES: Final = (
+_RECOMPILES: Final = (
     "Every start compiles the model again, for up to a minute: set NUMBA_CACHE_DIR to a writable folder."
 )
 
@@ -158,17 +158,17 @@ def _device_check(devices: Sequence[Backend]) -> Check:
 
 def _compiled_check(cache: Path | None, compiled: int) -> Check:
     if cache is None:
-        return Check("Compiled code", "warning", "not stored", about="no folder is writable", advice=RECOMPILES)
+        return Check("Compiled code", "warning", "not stored", about="no folder is writable", advice=_RECOMPILES)
     value = f"{compiled} functions compiled" if compiled else "stored"
     return Check("Compiled code", "ok", value, about=f"the force model for this processor, in {cache}")
 
 
-ROW_HEIGHT = 42
-DOT = 13.0
+_ROW_HEIGHT = 42
+_DOT = 13.0
 LEFT = 70
 NAME, BAR = 148, 160
-LEAST_WORDS = 160  # narrower, wrapped text would request too much room
-LOOKS: dict[str, tuple[str, Ink, str]] = {
+_LEAST_WORDS = 160  # narrower, wrapped text would request too much room
+_LOOKS: dict[str, tuple[str, Ink, str]] = {
     "ok": ("check", "ok", "passed"),
     "warning": ("warning", "warn", "warning"),
     "failure": ("cross", "bad", "cannot start"),
@@ -181,12 +181,12 @@ class CheckRow(Themed, QWidget):
     def __init__(self, check: Check, *, last: bool) -> None:
         super().__init__()
         self.check, self._last = check, last
-        _, ink, word = LOOKS[check.verdict]
+        _, ink, word = _LOOKS[check.verdict]
         name = label(check.name, "body")
         name.setFont(font("body", weight=600, scale=0.97))
         name.setFixedWidth(NAME)
         about = label(check.about, "label", "text2", wraps=True, weight=400, tabular=True)
-        about.setMinimumWidth(LEAST_WORDS)
+        about.setMinimumWidth(_LEAST_WORDS)
         value = figures(check.value, "body", "text" if check.verdict == "ok" else ink)
         value.setFont(font("body", weight=600, tabular=True, scale=0.97))
         value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
@@ -198,7 +198,7 @@ class CheckRow(Themed, QWidget):
             said.addWidget(share, 0, Qt.AlignmentFlag.AlignLeft)
         said.addStretch()
         self._head = holder = QWidget()
-        holder.setMinimumHeight(ROW_HEIGHT)
+        holder.setMinimumHeight(_ROW_HEIGHT)
         hbox(name, (said, 1), value, spacing=14, margins=(0, 4, 0, 4), parent=holder)
         column = vbox(holder, spacing=0, margins=(LEFT, 0, 24, 0 if check.verdict == "ok" else 14), parent=self)
         if check.advice:
@@ -208,7 +208,7 @@ class CheckRow(Themed, QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
-        icon, ink, _ = LOOKS[self.check.verdict]
+        icon, ink, _ = _LOOKS[self.check.verdict]
         painter = smooth_painter(self)
         tint = QColor(getattr(t, f"{ink}_bg"))
         if self.check.verdict != "ok":
@@ -216,7 +216,7 @@ class CheckRow(Themed, QWidget):
         middle = QPointF(40, self._head.geometry().center().y() + 0.5)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(tint if self.check.verdict == "ok" else QColor(t.surface))
-        painter.drawEllipse(middle, DOT, DOT)
+        painter.drawEllipse(middle, _DOT, _DOT)
         draw_icon(painter, icon, QRectF(middle.x() - 8, middle.y() - 8, 16, 16), getattr(t, ink), 2.4)
         if self._last:
             return
@@ -224,7 +224,7 @@ class CheckRow(Themed, QWidget):
         painter.drawLine(24, self.height() - 1, self.width() - 24, self.height() - 1)
 
 
-def check_rows(checks: Sequence[Check], before: list[CheckRow], column: QBoxLayout) -> list[CheckRow]:
+def _check_rows(checks: Sequence[Check], before: list[CheckRow], column: QBoxLayout) -> list[CheckRow]:
     """Return the rows of checks, placed in a column in place of ``before``."""
     for row in before:
         remove_widget(row)
@@ -235,12 +235,12 @@ def check_rows(checks: Sequence[Check], before: list[CheckRow], column: QBoxLayo
 
 
 FULL, LEAST = QSize(1200, 800), QSize(1024, 640)
-ASIDE = 352
-PAGES = {
+_ASIDE = 352
+_PAGES = {
     Qt.Key.Key_PageDown: QAbstractSlider.SliderAction.SliderPageStepAdd,
     Qt.Key.Key_PageUp: QAbstractSlider.SliderAction.SliderPageStepSub,
 }
-NOTHING_YET = "Nothing is created until you start."
+_NOTHING_YET = "Nothing is created until you start."
 
 
 class PreflightWindow(QWidget):
@@ -265,7 +265,7 @@ class PreflightWindow(QWidget):
         self.chip = Chip("ok", "check", "")
         self.checks = Card(padding=10, gap=0)
         self.rows: list[CheckRow] = []
-        self.masking = MaskingQuestion() if asks_masking else None
+        self.masking = _MaskingQuestion() if asks_masking else None
         self.plot = LatenessPlot(limit_us)
         describe_plot(self.plot, "Tick lateness", "Histogram of how late the ticks of two seconds began, in µs.")
         self.cancel = ActionButton("", "Cancel", height=46)
@@ -292,7 +292,7 @@ class PreflightWindow(QWidget):
         area = self._area = scrolled(inside)
         middle = hbox((area, 1), self._column_beside(), spacing=20)
         foot = hbox(self.cancel, self.again, spacing=16)
-        self.note = label(NOTHING_YET, "label", "text2")
+        self.note = label(_NOTHING_YET, "label", "text2")
         add_parts(foot, self.note, STRETCH, self.start)
         vbox(head, (middle, 1), Rule(), foot, spacing=16, margins=(32, 22, 32, 20), parent=self)
 
@@ -308,7 +308,7 @@ class PreflightWindow(QWidget):
         if self.masking is not None:
             self.runs.column.addWidget(self.masking)
         side = scrolled(vbox((lateness, 1), self.runs, spacing=12, margins=0))
-        side.setFixedWidth(ASIDE)
+        side.setFixedWidth(_ASIDE)
         return side
 
     def show_view(self, view: PreflightView) -> None:
@@ -321,7 +321,7 @@ class PreflightWindow(QWidget):
             self.start.setFocus()  # the pressed button lost the focus to Cancel meanwhile
         self._busy = view.busy
         if [row.check for row in self.rows] != list(view.checks):
-            self.rows = check_rows(view.checks, self.rows, self.checks.column)
+            self.rows = _check_rows(view.checks, self.rows, self.checks.column)
         self._show_rows(view)
         late_us = view.facts.lateness_ns / 1e3
         p99_us = float(np.percentile(late_us, 99)) if len(late_us) else None
@@ -329,7 +329,7 @@ class PreflightWindow(QWidget):
 
     def _show_chip(self, view: PreflightView) -> None:
         if view.busy:
-            self.chip.show_state("neutral", "clock", WAITING.capitalize())
+            self.chip.show_state("neutral", "clock", _WAITING.capitalize())
         elif view.failures:
             self.chip.show_state("bad", "cross", view.passed_words)
         elif view.warnings:
@@ -367,8 +367,8 @@ class PreflightWindow(QWidget):
         elif event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             chosen = next((button for button in (self.cancel, self.again) if button.hasFocus()), self.start)
             chosen.click()
-        elif event.key() in PAGES:
-            self._area.verticalScrollBar().triggerAction(PAGES[Qt.Key(event.key())])
+        elif event.key() in _PAGES:
+            self._area.verticalScrollBar().triggerAction(_PAGES[Qt.Key(event.key())])
         else:
             super().keyPressEvent(event)
 
@@ -379,7 +379,7 @@ class PreflightWindow(QWidget):
             self.cancelled.emit()
 
 
-class MaskingQuestion(QWidget):
+class _MaskingQuestion(QWidget):
     """A choice, and for noise its level in dB."""
 
     def __init__(self) -> None:
@@ -404,12 +404,12 @@ class MaskingQuestion(QWidget):
         return Masking(self.means.currentData(), self.noise_db.value() if self._is_noise else None)
 
 
-SIZE = (860, 620)
-ABOUT = (
+_SIZE = (860, 620)
+_ABOUT = (
     "Measured for two seconds with the simulated hand. A session measures again, with its own device and limits. "
     "This page is also available under This machine."
 )
-MEASURING = "Measuring … The force model is compiled at the first use, which may take a minute."
+_MEASURING = "Measuring … The force model is compiled at the first use, which may take a minute."
 
 
 class ComputerWindow(Question):
@@ -419,7 +419,7 @@ class ComputerWindow(Question):
 
     def __init__(self, parent: QWidget, theme: Theme) -> None:
         self.rows: list[CheckRow] = []
-        self.state = label(MEASURING, "body", "text2", wraps=True)
+        self.state = label(_MEASURING, "body", "text2", wraps=True)
         self.bar = QProgressBar(textVisible=False)
         self.bar.setFixedHeight(8)
         self._rows = vbox(STRETCH, spacing=0, margins=0)
@@ -428,14 +428,14 @@ class ComputerWindow(Question):
         area.setAccessibleName("Checks")
         inside, close = QWidget(), ActionButton("", "Close", role="primary")
         vbox(self.state, self.bar, (area, 1), spacing=12, margins=0, parent=inside)
-        super().__init__(parent, theme, "Check of this computer", ABOUT, close, back="Check again", inside=inside)
+        super().__init__(parent, theme, "Check of this computer", _ABOUT, close, back="Check again", inside=inside)
         self.setModal(True)
         self.back.clicked.disconnect(self.reject)
         self.back.clicked.connect(self.asked)
-        self.resize(*SIZE)
+        self.resize(*_SIZE)
 
     def show_measuring(self) -> None:
-        self.state.setText(MEASURING)
+        self.state.setText(_MEASURING)
         self.back.setEnabled(False)
         self.bar.setRange(0, 0)
         self.bar.show()
@@ -445,7 +445,7 @@ class ComputerWindow(Question):
         self.bar.setValue(round(100 * share))
 
     def show_checks(self, checks: tuple[Check, ...]) -> None:
-        self.rows = check_rows(checks, self.rows, self._rows)
+        self.rows = _check_rows(checks, self.rows, self._rows)
         passed = sum(check.verdict == "ok" for check in checks)
         self.show_sentence(f"{passed} of {len(checks)} passed.")
 

@@ -37,13 +37,13 @@ from study_app.number_text import counted
 from study_app.store.atomic import write_file
 from study_app.store.exclusions import Exclusion
 
-NAMED: int = 5
+_NAMED: int = 5
 """Of so many sessions that are not in the figures each is named."""
 
-Remedy: TypeAlias = Literal["again", "home", "read", "stop"]
+_Remedy: TypeAlias = Literal["again", "home", "read", "stop"]
 """What the button of a sentence does: look again, go home, go on reading, stop."""
 
-NOTHING: Mapping[tuple[str, int], tuple[tuple[int, str], ...]] = MappingProxyType({})
+_NOTHING: Mapping[tuple[str, int], tuple[tuple[int, str], ...]] = MappingProxyType({})
 
 
 Kind: TypeAlias = Literal["", "simulated", "pilot"]
@@ -82,7 +82,7 @@ class Trouble:
     title: str
     sentence: str
     button: str
-    remedy: Remedy
+    remedy: _Remedy
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,7 +105,7 @@ class ResultsView:
     left_out: tuple[Exclusion, ...] = ()
     proposed: tuple[Exclusion, ...] = ()
     exclusions_file: Path | None = None
-    trials: Mapping[tuple[str, int], tuple[tuple[int, str], ...]] = field(default_factory=lambda: NOTHING)
+    trials: Mapping[tuple[str, int], tuple[tuple[int, str], ...]] = field(default_factory=lambda: _NOTHING)
     doubts: tuple[str, ...] = ()
     figures: tuple[FigureDrawn, ...] = ()
     colours: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
@@ -146,15 +146,15 @@ def _names_with_verb(names: Sequence[str], what: str) -> str:
     """Return "P007 is excluded", "P007, P009 and 12 others are excluded"; empty without names."""
     if not names:
         return ""
-    if len(names) > NAMED:
-        return f"{', '.join(names[: NAMED - 1])} and {len(names) - NAMED + 1} others are {what}"
+    if len(names) > _NAMED:
+        return f"{', '.join(names[: _NAMED - 1])} and {len(names) - _NAMED + 1} others are {what}"
     return f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} {what}"
 
 
-LETTERS = re.compile(rb"(<text.*?</text>)", re.DOTALL)
-FAMILY = re.compile(rb"font-family: [^;\"]*")
-SIZE = re.compile(rb'viewBox="0 0 ([0-9.]+) ([0-9.]+)"')
-WHITE = b"#ffffff"
+_LETTERS = re.compile(rb"(<text.*?</text>)", re.DOTALL)
+_FAMILY = re.compile(rb"font-family: [^;\"]*")
+_SIZE = re.compile(rb'viewBox="0 0 ([0-9.]+) ([0-9.]+)"')
+_WHITE = b"#ffffff"
 BAND_LIGHT, BAND_DARK = 0.22, 0.34
 
 
@@ -166,12 +166,12 @@ def themed_svg(svg: bytes, colours: Mapping[str, str], theme: Theme) -> bytes:
     """
     letters = {colour.lower().encode(): _ink(theme, role).encode() for role, colour in colours.items()}
     edge = theme.ctl if theme.dark else theme.surface
-    paper = {**letters, b"stroke: " + WHITE: f"stroke: {edge}".encode(), WHITE: theme.surface.encode()}
+    paper = {**letters, b"stroke: " + _WHITE: f"stroke: {edge}".encode(), _WHITE: theme.surface.encode()}
     family = b"font-family: " + FAMILIES[0].encode()
-    parts = LETTERS.split(svg)  # every second part is a text
+    parts = _LETTERS.split(svg)  # every second part is a text
     accent = colours.get("accent", "#").lower().encode()
     parts[::2] = [_with_colours(part, paper, accent) for part in parts[::2]]
-    parts[1::2] = [FAMILY.sub(family, _with_colours(part, letters, accent)) for part in parts[1::2]]
+    parts[1::2] = [_FAMILY.sub(family, _with_colours(part, letters, accent)) for part in parts[1::2]]
     return b"".join(parts)
 
 
@@ -204,7 +204,7 @@ def drawn_svg(svg: bytes, size: QSize, ratio: float) -> QImage:
     return image
 
 
-class FigureView(Coloured, QWidget):
+class _FigureView(Coloured, QWidget):
     """One figure as wide as it is given room, with its true proportions."""
 
     def __init__(self, figure: FigureDrawn, colours: Mapping[str, str]) -> None:
@@ -226,7 +226,7 @@ class FigureView(Coloured, QWidget):
     def show_figure(self, figure: FigureDrawn, colours: Mapping[str, str]) -> None:
         """Draw another figure; the previous one stays visible until then."""
         self._figure, self._colours = figure, colours
-        size = SIZE.search(figure.svg)
+        size = _SIZE.search(figure.svg)
         self.width_pt = float(size[1]) if size else 516.0
         self._proportion = float(size[2]) / float(size[1]) if size else 0.5
         self.setAccessibleName(figure.title)
@@ -277,23 +277,23 @@ class FigureView(Coloured, QWidget):
         painter.drawImage(QRectF(self.rect()), self._image)
 
 
-GAP = 12
-PADDING = 14
-AROUND = 2 * (PADDING + SHADOW)
-AT_ONCE = 2
+_GAP = 12
+_PADDING = 14
+_AROUND = 2 * (_PADDING + SHADOW)
+_AT_ONCE = 2
 """So many figures are to be seen without scrolling, where they can be and still be read."""
 LEAST_WIDTH, MOST_WIDTH = 830, 1240
 
 
-VERDICTS: Mapping[str, str] = {"shown": "ok", "equivalent": "ok", "suggested": "warn"}
-FORMS = "PDF (*.pdf);;SVG (*.svg);;PNG (*.png)"
-MOST_SCALE = 2.5
+_VERDICTS: Mapping[str, str] = {"shown": "ok", "equivalent": "ok", "suggested": "warn"}
+_FORMS = "PDF (*.pdf);;SVG (*.svg);;PNG (*.png)"
+_MOST_SCALE = 2.5
 """Pixels of the window for a point of a figure at most."""
-PNG_SCALE = 300 / 72
+_PNG_SCALE = 300 / 72
 """Pixels of a PNG for a point of a figure."""
 
 
-def save_figure(figure: FigureDrawn, path: Path) -> None:
+def _save_figure(figure: FigureDrawn, path: Path) -> None:
     """Write a figure as PDF, SVG or PNG, by the ending of ``path``; StoreError if it cannot be written."""
     renderer = QSvgRenderer(figure.svg)
     size = renderer.defaultSize()
@@ -311,7 +311,7 @@ def save_figure(figure: FigureDrawn, path: Path) -> None:
             renderer.render(painter)
             painter.end()
         else:
-            QImageWriter(held, QByteArray(b"png")).write(drawn_svg(figure.svg, size, PNG_SCALE))
+            QImageWriter(held, QByteArray(b"png")).write(drawn_svg(figure.svg, size, _PNG_SCALE))
         content = bytes(held.data().data())
     write_file(path, content)
 
@@ -326,9 +326,9 @@ class FigureCard(Card):
     failed = Signal(str)
 
     def __init__(self, figure: FigureDrawn, colours: Mapping[str, str]) -> None:
-        super().__init__(padding=PADDING, gap=8)
+        super().__init__(padding=_PADDING, gap=8)
         self.figure = figure
-        self.drawing: FigureView | None = None
+        self.drawing: _FigureView | None = None
         self.question = label("", "card", wraps=True)
         self.answer = label("", "body", wraps=True)
         self.answer.setTextInteractionFlags(
@@ -384,14 +384,14 @@ class FigureCard(Card):
             remove_widget(self.drawing)
             self.drawing = None
         elif has_figure:
-            self.drawing = FigureView(figure, colours)
+            self.drawing = _FigureView(figure, colours)
             self._place.addWidget(self.drawing, 0, Qt.AlignmentFlag.AlignHCenter)
             self.more.raise_()
 
     def fit_width(self, width: int) -> None:
         """Make the figure so wide, a narrow one less."""
         if self.drawing is not None:
-            width = min(width, round(MOST_SCALE * self.drawing.width_pt))
+            width = min(width, round(_MOST_SCALE * self.drawing.width_pt))
         size = QSize(width, 0 if self.drawing is None else self.drawing.heightForWidth(width))
         if self.drawing is not None and self.drawing.maximumSize() != size:
             self.drawing.setFixedSize(size)
@@ -401,16 +401,16 @@ class FigureCard(Card):
             remove_widget(self._chip)
             self._chip = None
         if verdict:
-            self._chip = Chip(VERDICTS.get(verdict, "neutral"), "info", verdict)  # type: ignore[arg-type]
+            self._chip = Chip(_VERDICTS.get(verdict, "neutral"), "info", verdict)  # type: ignore[arg-type]
             self._verdict.addWidget(self._chip)
 
     def _copy_figure(self) -> None:
         """Copy the figure as a picture."""
         size = QSvgRenderer(self.figure.svg).defaultSize()
-        QGuiApplication.clipboard().setImage(drawn_svg(self.figure.svg, size, PNG_SCALE))
+        QGuiApplication.clipboard().setImage(drawn_svg(self.figure.svg, size, _PNG_SCALE))
 
     def _ask_where(self) -> None:
-        self.dialog = dialog = QFileDialog(self, f"Save {self.figure.title}", self.figure.name, FORMS)
+        self.dialog = dialog = QFileDialog(self, f"Save {self.figure.title}", self.figure.name, _FORMS)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.selectFile(self.figure.name)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -422,12 +422,12 @@ class FigureCard(Card):
         if path.suffix.lower() not in (".pdf", ".svg", ".png"):
             path = path.with_name(f"{path.name}.{form[:3].lower()}")
         try:
-            save_figure(self.figure, path)
+            _save_figure(self.figure, path)
         except StoreError as error:
             self.failed.emit(f"{error}.")
 
 
-class WorkLine(Card):
+class _WorkLine(Card):
     """What is being done and how far it is, with a way to stop it."""
 
     def __init__(self) -> None:
@@ -454,14 +454,14 @@ class WorkLine(Card):
             )
 
 
-class TroubleCard(Card):
+class _TroubleCard(Card):
     """Why there is nothing to show: one sentence and one button; ``asked`` carries what the button does."""
 
     asked = Signal(str)
 
     def __init__(self) -> None:
         super().__init__(padding=28, gap=12)
-        self._remedy: Remedy = "again"
+        self._remedy: _Remedy = "again"
         self.title = label("", "card")
         self.sentence = label("", "body", "text2", wraps=True)
         self.sentence.setMaximumWidth(640)
@@ -502,13 +502,13 @@ class FiguresPanel(QScrollArea):
     def __init__(self) -> None:
         super().__init__()
         self.cards: list[FigureCard] = []
-        self.trouble = TroubleCard()
-        self.work = WorkLine()
+        self.trouble = _TroubleCard()
+        self.work = _WorkLine()
         self.trouble.asked.connect(self.asked)
         self.work.stop.clicked.connect(lambda: self.asked.emit("stop"))
         self.work.again.clicked.connect(lambda: self.asked.emit("read"))
         self._inside = QWidget()
-        self._column = vbox(self.trouble, self.work, STRETCH, spacing=GAP - 2 * SHADOW, margins=0, parent=self._inside)
+        self._column = vbox(self.trouble, self.work, STRETCH, spacing=_GAP - 2 * SHADOW, margins=0, parent=self._inside)
         self.trouble.hide()
         self.work.hide()
         self.setWidgetResizable(True)
@@ -557,11 +557,11 @@ class FiguresPanel(QScrollArea):
     def fit_width(self) -> None:
         """Set the figures' width; smaller if two of them fit side by side then."""
         bar = 0 if self._whole else self.verticalScrollBar().sizeHint().width()  # reserved: figures would flicker
-        width = min(self.width() - bar - AROUND, MOST_WIDTH)
-        first = [card.drawing for card in self.cards if card.drawing is not None][:AT_ONCE]
+        width = min(self.width() - bar - _AROUND, MOST_WIDTH)
+        first = [card.drawing for card in self.cards if card.drawing is not None][:_AT_ONCE]
         if first and not self._whole:
             heights = sum(drawing.heightForWidth(1000) for drawing in first) / 1000
-            frames = len(first) * (AROUND - 4) + (len(first) - 1) * self._column.spacing()
+            frames = len(first) * (_AROUND - 4) + (len(first) - 1) * self._column.spacing()
             width = min(width, max(int((self.height() - frames) / heights), LEAST_WIDTH))
         for card in self.cards:
             card.fit_width(max(width, 320))

@@ -72,11 +72,11 @@ from study_app.store.merged import FOLDER, folders_of
 from study_app.workers.server import Crashed, Refused
 
 WIDTH, QUESTION_PX = 600, 560
-WARNED = 3
+_WARNED = 3
 """Of so many files that are not as recorded each is named."""
 
 
-class Extra(NamedTuple):
+class _Extra(NamedTuple):
     """Something that is written where it is asked for: its name in the command, its words, and why it cannot be."""
 
     name: str
@@ -95,7 +95,7 @@ class WriteDialog(Work):
     """
 
     def __init__(
-        self, *arguments: Any, go_on: str, to: Path, extras: Sequence[Extra] = (), opens_file: bool = False
+        self, *arguments: Any, go_on: str, to: Path, extras: Sequence[_Extra] = (), opens_file: bool = False
     ) -> None:
         checks = (Field(extra.name, extra.words, "check", hint=extra.why_not) for extra in extras)
         folder = Field("to", "Folder", "folder", hint="Existing files will be overwritten.")
@@ -121,16 +121,16 @@ class WriteDialog(Work):
 
     def show_written(self, files: Sequence[Path], warnings: Sequence[str]) -> None:
         self.result_path = files[0] if self._opens_file else self.asked[0]
-        more = f" {len(warnings) - WARNED} more." if len(warnings) > WARNED else ""
+        more = f" {len(warnings) - _WARNED} more." if len(warnings) > _WARNED else ""
         opens = "Open the report" if self._opens_file else "Open the folder"
-        warned = "".join(f"\n{line}" for line in warnings[:WARNED])
+        warned = "".join(f"\n{line}" for line in warnings[:_WARNED])
         self.show_done(f"{counted(len(files), 'file')} in {files[0].parent}.{warned}{more}", opens)
 
 
-NEEDS: Final = {"by": "Please enter a name; it is recorded.", "reason": REASON}
+_NEEDS: Final = {"by": "Please enter a name; it is recorded.", "reason": REASON}
 
 
-def decision_fields(by: str, who: str, example: str) -> tuple[Field, Field]:
+def _decision_fields(by: str, who: str, example: str) -> tuple[Field, Field]:
     """Return the fields for name and reason of a decision."""
     return Field("by", by, placeholder=who), Field("reason", "Reason", placeholder=f"For example: {example}")
 
@@ -167,9 +167,9 @@ class LeaveOutDialog(Question):
                     "session", "Session", {(facts.participant, facts.session): facts.name for facts in sessions}
                 ),
                 choice_field("trial", "Scope", {}),
-                *decision_fields("By", "Your initials, or the rule's name", "fell asleep"),
+                *_decision_fields("By", "Your initials, or the rule's name", "fell asleep"),
             ),
-            needs=NEEDS,
+            needs=_NEEDS,
             width=QUESTION_PX,
         )
         self._trials = trials
@@ -201,10 +201,10 @@ COLUMNS = (
     Column("validity", "Validity", 110, 114),
     Column("version", "Version", 60, 60),
 )
-EVERY = "All states"
+_EVERY = "All states"
 
 
-class SessionsCard(Card):
+class _SessionsCard(Card):
     """The study's sessions; below, how many are in the figures and why the others are not."""
 
     def __init__(self) -> None:
@@ -216,7 +216,7 @@ class SessionsCard(Card):
         self.state = Choice()
         self.state.setAccessibleName("State")
         self.state.setFont(font("body"))
-        self.state.addItem(EVERY, "")
+        self.state.addItem(_EVERY, "")
         self._none = ""
         self.rows = SessionsTable(COLUMNS, "")
         self.head = label("", "label", weight=600, tabular=True)
@@ -247,7 +247,7 @@ class SessionsCard(Card):
         chosen = self.state.currentData()
         with QSignalBlocker(self.state):
             self.state.clear()
-            self.state.addItem(EVERY, "")
+            self.state.addItem(_EVERY, "")
             for state, text in occurring_states(sessions):
                 self.state.addItem(text, state)
             self.state.setCurrentIndex(max(0, self.state.findData(chosen)))
@@ -264,7 +264,7 @@ class SessionsCard(Card):
         self.rows.show_matching(session_filter(self.search.text(), state))
 
 
-class ExclusionsCard(Card):
+class _ExclusionsCard(Card):
     """What is left out, each with its reason.
 
     ``take_back_asked`` carries the `Exclusion` that is to count again, or that is proposed and is not to be made;
@@ -331,37 +331,37 @@ class ExclusionsCard(Card):
         return made
 
 
-def exclusions_at(study: Path) -> Path:
+def _exclusions_at(study: Path) -> Path:
     """Return the file of exclusions; for a merged study the folder of its sites, each with its own file."""
     folders = folders_of(study)
     return StudyFolder(study).exclusions if "" in folders else study / FOLDER
 
 
-STACKED_BELOW = 1160
+_STACKED_BELOW = 1160
 PANEL_PX, PANEL_WIDE_PX, WIDE_FROM = 400, 430, 1700
 STACKED_HEIGHT, EXCLUSIONS = 330, 360
-REASON_SIGNS = 40
-EXTRAS: Final = (
-    Extra("wide", "Wide table: one row per participant"),
-    Extra("parquet", "Every table also as Parquet"),
-    Extra("sav", "Answers for SPSS, jamovi and JASP (.sav)"),
-    Extra("psych-ds", "A Psych-DS folder of all tables, to share"),
+_REASON_SIGNS = 40
+_EXTRAS: Final = (
+    _Extra("wide", "Wide table: one row per participant"),
+    _Extra("parquet", "Every table also as Parquet"),
+    _Extra("sav", "Answers for SPSS, jamovi and JASP (.sav)"),
+    _Extra("psych-ds", "A Psych-DS folder of all tables, to share"),
 )
 
 
-LISTEN_MS: Final = 40
+_LISTEN_MS: Final = 40
 PATIENCE_S: Final = 0.3
 """What takes longer than this says that it goes on."""
 NO_SAV: Final = "Files for SPSS need the package pyreadstat: pip install 'liquid-study[analysis]'"
-MISTAKE: Final = Trouble(
+_MISTAKE: Final = Trouble(
     title="A bug in the program stopped the evaluation",
     sentence="The terminal shows the details.",
     button="Refresh",
     remedy="again",
 )
 
-Decided: TypeAlias = LeaveOut | TakeBack | OpenKey
-REFUSALS: Final = {
+_Decided: TypeAlias = LeaveOut | TakeBack | OpenKey
+_REFUSALS: Final = {
     LeaveOut: "It was not excluded",
     TakeBack: "It is still excluded",
     OpenKey: "The study is still blinded",
@@ -401,7 +401,7 @@ class ResultsPlace(Place):
         self._going: Progress | None = None
         self._redrawn: set[str] = set()
         self._blocks = 0
-        self._listening = QTimer(self, interval=LISTEN_MS)
+        self._listening = QTimer(self, interval=_LISTEN_MS)
         self._listening.timeout.connect(self._read_answers)
         self.study = Choice()
         self.study.setAccessibleName("Study")
@@ -412,8 +412,8 @@ class ResultsPlace(Place):
         self.unblind = ActionButton("eye", "Unblind …", height=44)
         self.export = ActionButton("download", "Export …", height=44)
         self.report = ActionButton("file", "Report …", role="primary", height=44)
-        self.sessions = SessionsCard()
-        self.exclusions = ExclusionsCard()
+        self.sessions = _SessionsCard()
+        self.exclusions = _ExclusionsCard()
         self.figures = FiguresPanel()
         self._lay_out()
         self._connect()
@@ -505,7 +505,7 @@ class ResultsPlace(Place):
         if self.view.sealed:
             chips.append(("neutral", "lock", "Blinded: shown by code", "The names of the conditions are sealed"))
         if self.view.opened:
-            opened, most = self.view.opened, 2 * REASON_SIGNS
+            opened, most = self.view.opened, 2 * _REASON_SIGNS
             text = opened if len(opened) <= most else f"{opened[: most - 1].rstrip()}…"
             chips.append(("neutral", "eye", text, opened))
         if self.view.doubts:
@@ -536,8 +536,8 @@ class ResultsPlace(Place):
             "table, figure and report. This cannot be undone. Your name, the reason and the time are stored "
             "with the data.",
             ActionButton("eye", "Unblind", role="danger"),
-            fields=decision_fields("Name", "Your name or initials, such as AK", "collection closed"),
-            needs=NEEDS,
+            fields=_decision_fields("Name", "Your name or initials, such as AK", "collection closed"),
+            needs=_NEEDS,
             warning=later,
             width=QUESTION_PX,
         )
@@ -577,8 +577,8 @@ class ResultsPlace(Place):
             f"{done}: {exclusion_text(exclusion)}",
             f"{why} Your name, the reason and the time are stored in exclusions_reversed.jsonl.",
             ActionButton("undo", done, role="primary"),
-            fields=decision_fields("By", "Your name or initials, such as AK", "wrong participant"),
-            needs=NEEDS,
+            fields=_decision_fields("By", "Your name or initials, such as AK", "wrong participant"),
+            needs=_NEEDS,
             width=QUESTION_PX,
         )
         which = {"participant": exclusion.participant, "session": exclusion.session, "trial": exclusion.trial}
@@ -589,7 +589,7 @@ class ResultsPlace(Place):
 
     def _ask_tables(self) -> None:
         no_sav = "" if importlib.util.find_spec("pyreadstat") else NO_SAV
-        extras = [extra._replace(why_not=no_sav) if extra.name == "sav" else extra for extra in EXTRAS]
+        extras = [extra._replace(why_not=no_sav) if extra.name == "sav" else extra for extra in _EXTRAS]
         dialog = WriteDialog(
             self,
             self.theme,
@@ -695,11 +695,11 @@ class ResultsPlace(Place):
                 self._finish_order(order, newest=newest)
             case Refused():
                 del self._orders[number]
-                if newest or isinstance(order, Decided):
+                if newest or isinstance(order, _Decided):
                     self._show_refusal(order, answer)
             case Crashed():
                 self._orders = {}
-                self._update_view(trouble=MISTAKE, figures=(), drawing=None, testing=None)
+                self._update_view(trouble=_MISTAKE, figures=(), drawing=None, testing=None)
             case Progress() if newest:
                 self._going = answer
             case StudiesFound() if newest:
@@ -770,13 +770,13 @@ class ResultsPlace(Place):
             listed=True,
             left_out=answer.exclusions,
             proposed=(),
-            exclusions_file=exclusions_at(answer.folder),
+            exclusions_file=_exclusions_at(answer.folder),
             sealed=reveal is None,
             opened="" if reveal is None else unblinding_text(reveal),
         )
 
     def _finish_order(self, order: Order, *, newest: bool) -> None:
-        if isinstance(order, Decided):
+        if isinstance(order, _Decided):
             self._read_study(order.folder)
         elif isinstance(order, ReadStudy) and newest:
             kept = tuple(figure for figure in self.view.figures if figure.name in self._redrawn)
@@ -784,8 +784,8 @@ class ResultsPlace(Place):
 
     def _show_refusal(self, order: Order, refused: Refused) -> None:
         sentence = f"{refused.sentence}."
-        if isinstance(order, Decided):
-            self.message.emit(REFUSALS[type(order)], sentence)
+        if isinstance(order, _Decided):
+            self.message.emit(_REFUSALS[type(order)], sentence)
             self._read_study(order.folder)  # it may have changed meanwhile, and its reading was cancelled
         elif refused.stopped:
             all_drawn = self._blocks and len(self._redrawn) >= self._blocks
@@ -829,7 +829,7 @@ class ResultsPlace(Place):
             self._update_view(trouble=None)
             self.read_studies()
 
-    def _order_decision(self, what: str, order: Callable[..., Decided], **details: Any) -> None:
+    def _order_decision(self, what: str, order: Callable[..., _Decided], **details: Any) -> None:
         if self.view.chosen is not None:
             self._send_order(order(folder=self.view.chosen, **details), what)
 
@@ -871,7 +871,7 @@ class ResultsPlace(Place):
 
     def _arrange(self) -> None:
         """Put the figures below the sessions in a narrow window, and the chips below the heading if necessary."""
-        stacked = self.width() < STACKED_BELOW
+        stacked = self.width() < _STACKED_BELOW
         down, right = QBoxLayout.Direction.TopToBottom, QBoxLayout.Direction.LeftToRight
         self._row.setDirection(down if stacked else right)
         self._left.setDirection(right if stacked else down)

@@ -182,11 +182,11 @@ def start_time_text(started: datetime, now: datetime) -> str:
     return f"{day}{year} {started:%H:%M}"
 
 
-Name: TypeAlias = Literal["participant", "study", "started", "status", "validity", "answers", "version"]
-Chipped: TypeAlias = tuple[Tone, str, str]
+_Name: TypeAlias = Literal["participant", "study", "started", "status", "validity", "answers", "version"]
+_Chipped: TypeAlias = tuple[Tone, str, str]
 """Tone, icon and word of a chip."""
 
-STATUS: dict[str, Chipped] = {
+_STATUS: dict[str, _Chipped] = {
     "completed": ("ok", "check", "Complete"),
     "incomplete": ("warn", "warning", "Incomplete"),
     "running": ("accent", "play", "Running"),
@@ -196,13 +196,13 @@ STATUS: dict[str, Chipped] = {
     "broken": ("bad", "warning", "Fault"),
     "damaged": ("bad", "warning", "Damaged"),
 }
-VALIDITY: dict[str | None, Chipped] = {
+VALIDITY: dict[str | None, _Chipped] = {
     "valid": ("ok", "check", "Valid"),
     "invalid": ("warn", "warning", "Out of limits"),
     None: ("neutral", "ring", "Open"),
 }
-LOST: Chipped = ("warn", "warning", "Recording lost")
-MISSING: Chipped = ("warn", "warning", "Trials missing")
+LOST: _Chipped = ("warn", "warning", "Recording lost")
+_MISSING: _Chipped = ("warn", "warning", "Trials missing")
 
 
 LIMIT_WORDS: Mapping[str, tuple[str, str]] = {
@@ -226,23 +226,23 @@ def broken_limit_text(measure: str, value: float, limit: float) -> str:
 class Column(NamedTuple):
     """What a column holds, its heading, and its share of the width; at least ``least`` px of it."""
 
-    name: Name
+    name: _Name
     heading: str
     width: int
     least: int
 
 
-def status_chip(facts: SessionFacts) -> Chipped:
+def status_chip(facts: SessionFacts) -> _Chipped:
     """Return the chip about a session's end."""
-    return STATUS.get(facts.status, ("neutral", "ring", facts.status.capitalize()))
+    return _STATUS.get(facts.status, ("neutral", "ring", facts.status.capitalize()))
 
 
-def validity_chip(facts: SessionFacts) -> Chipped:
+def validity_chip(facts: SessionFacts) -> _Chipped:
     """Return the chip about a session's limits and recordings, or that the session is excluded."""
     if facts.excluded is not None:
         return "neutral", "cross", "Excluded"
     if facts.validity != "invalid" and (facts.missing or facts.lost):
-        return MISSING if facts.missing else LOST
+        return _MISSING if facts.missing else LOST
     return VALIDITY[None if facts.needs_care or facts.status == "running" else facts.validity]
 
 
@@ -262,7 +262,7 @@ def answers_text(facts: SessionFacts) -> str:
 def session_filter(text: str, status: str) -> Callable[[SessionFacts], bool]:
     """Return a predicate: the participant contains ``text`` and the state is ``status`` ("" for any).
 
-    ``status`` is one of `STATUS`, "excluded", "invalid" or "lost".
+    ``status`` is one of `_STATUS`, "excluded", "invalid" or "lost".
     """
     wanted = text.strip().lower()
 
@@ -279,10 +279,12 @@ def session_filter(text: str, status: str) -> Callable[[SessionFacts], bool]:
 
 
 def occurring_states(sessions: Iterable[SessionFacts]) -> list[tuple[str, str]]:
-    """Return the states that occur among sessions with their labels, in the order of `STATUS`."""
+    """Return the states that occur among sessions with their labels, in the order of `_STATUS`."""
     listed = list(sessions)
     states = [
-        (status, word) for status, (_, _, word) in STATUS.items() if any(session.status == status for session in listed)
+        (status, word)
+        for status, (_, _, word) in _STATUS.items()
+        if any(session.status == status for session in listed)
     ]
     if any(session.validity == "invalid" for session in listed):
         states.append(("invalid", VALIDITY["invalid"][2]))
@@ -301,11 +303,11 @@ def operator_language(protocol: Protocol) -> str:
 def step_title(protocol: Protocol, step: PageStep | FormStep, language: str) -> str:
     """Return the title of a page or form."""
     if isinstance(step, FormStep):
-        return form_title(protocol, step.form, language)
+        return _form_title(protocol, step.form, language)
     return protocol.text(protocol.pages[step.page_id].title, language)
 
 
-def form_title(protocol: Protocol, form: str, language: str) -> str:
+def _form_title(protocol: Protocol, form: str, language: str) -> str:
     """Return the title of a form, or its id as words."""
     title = protocol.questionnaires[form].title
     return form.replace("_", " ").capitalize() if title is None else protocol.text(title, language)

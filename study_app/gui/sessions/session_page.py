@@ -99,7 +99,7 @@ def read_record(folder: Path) -> SessionRecord:
     return SessionRecord(
         facts=facts,
         about=_about_text(lines, incidents_text(facts)),
-        limits=limits_sentence(
+        limits=_limits_sentence(
             trials,
             progress_of(lines).missing_trials,
             excluded=facts.excluded is not None,
@@ -116,11 +116,11 @@ def read_record(folder: Path) -> SessionRecord:
     )
 
 
-def limits_sentence(
+def _limits_sentence(
     trials: Sequence[TrialRecord], missing: MissingTrials, *, excluded: bool = False, sealed: bool
 ) -> str:
     """Return sentences on undelivered trials and on trials within the study's limits."""
-    lost = f"{missing_sentence(missing, excluded=excluded)} " if missing.count else ""
+    lost = f"{_missing_sentence(missing, excluded=excluded)} " if missing.count else ""
     repeated = sum(trial.outcome == UNDELIVERED for trial in trials)
     again = (
         f"{counted(repeated, 'presentation')} exceeded a limit and were not followed by a question. "
@@ -132,7 +132,7 @@ def limits_sentence(
     )
 
 
-def missing_sentence(missing: MissingTrials, *, excluded: bool) -> str:
+def _missing_sentence(missing: MissingTrials, *, excluded: bool) -> str:
     """Return sentences on undelivered trials, with reasons, and whether the session is included."""
     permitted = missing.limits.get(MISSING_PERCENT)
     states = f" The study permits {permitted:g} % of the trials to be missing." if permitted is not None else ""
@@ -232,14 +232,14 @@ def _note_texts(lines: Sequence[Event]) -> list[str]:
     return notes
 
 
-HEADINGS = ("Trial", "Presented", "Ended", "Limits", "Answers", "Notes")
-WIDTHS = ((20, 56), (120, 130), (60, 90), (60, 134), (30, 70), (160, 120))
-SIZE = (1040, 700)
+_HEADINGS = ("Trial", "Presented", "Ended", "Limits", "Answers", "Notes")
+_WIDTHS = ((20, 56), (120, 130), (60, 90), (60, 134), (30, 70), (160, 120))
+_SIZE = (1040, 700)
 
 
-def trial_cell(trial: TrialRecord, heading: str) -> dict[int, Any]:
+def _trial_cell(trial: TrialRecord, heading: str) -> dict[int, Any]:
     """Return the values of a trial's cell under a heading, by their roles."""
-    chip = trial_chip(trial)
+    chip = _trial_chip(trial)
     text = {
         "Trial": str(trial.number),
         "Presented": trial.words,
@@ -251,19 +251,19 @@ def trial_cell(trial: TrialRecord, heading: str) -> dict[int, Any]:
     return {
         Qt.ItemDataRole.DisplayRole: text,
         Qt.ItemDataRole.AccessibleTextRole: text,
-        Qt.ItemDataRole.ToolTipRole: trial_limits_text(trial),
+        Qt.ItemDataRole.ToolTipRole: _trial_limits_text(trial),
         CHIP_ROLE: chip if heading == "Limits" else None,
     }
 
 
-def trial_chip(trial: TrialRecord) -> Any:
+def _trial_chip(trial: TrialRecord) -> Any:
     """Return the chip about a trial's limits, or that it is excluded."""
     if trial.excluded is not None:
         return "neutral", "cross", "Excluded"
     return VALIDITY[None if trial.valid is None else "valid" if trial.valid else "invalid"]
 
 
-def trial_limits_text(trial: TrialRecord) -> str:
+def _trial_limits_text(trial: TrialRecord) -> str:
     """Return a line about a trial's limits."""
     said = f"Trial {trial.number}: "
     if trial.excluded is not None:
@@ -296,8 +296,8 @@ class SessionPage(Themed, QDialog):
         tone, icon, word = validity_chip(facts)
         self.validity = Chip(tone, icon, word)
         self.about, self.limits = label("", "body", "text2", wraps=True), label("", "body", wraps=True)
-        self.model = Rows({heading: heading for heading in HEADINGS}, trial_cell)
-        self.trials = Table(self.model, WIDTHS, "Trials")
+        self.model = Rows({heading: heading for heading in _HEADINGS}, _trial_cell)
+        self.trials = Table(self.model, _WIDTHS, "Trials")
         self.trial = label("", "label", "text2", wraps=True)
         self.out, self.notes, self.files = (label("", "label", "text2", wraps=True) for _ in range(3))
         self.watch = ActionButton("play", "Watch again", height=36)
@@ -314,7 +314,7 @@ class SessionPage(Themed, QDialog):
         self.watch.setEnabled(False)
         apply_theme(self, theme)
         available = self.screen().availableSize()
-        self.resize(min(SIZE[0], available.width() - 40), min(SIZE[1], available.height() - 60))
+        self.resize(min(_SIZE[0], available.width() - 40), min(_SIZE[1], available.height() - 60))
         self.trials.setFocus()
         self.read_folder()
 
@@ -382,7 +382,7 @@ class SessionPage(Themed, QDialog):
         if trial is None or self.record is None:
             self.trial.setText("No trials yet.")
             return
-        self.trial.setText(trial_limits_text(trial))
+        self.trial.setText(_trial_limits_text(trial))
         set_ink(self.trial, "warn" if trial.broken else "text2")
 
     def _open_watch_window(self) -> None:

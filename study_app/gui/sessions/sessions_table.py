@@ -21,10 +21,10 @@ from study_app.gui.widgets.boxes import vbox
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.row_table import BELOW_ROLE, CARE_ROLE, CHIP_ROLE, MARGIN, Index, Rows, Table
 
-ROLE = Qt.ItemDataRole
+_ROLE = Qt.ItemDataRole
 
 
-def session_cell(facts: SessionFacts, name: str, now: datetime) -> dict[int, Any]:
+def _session_cell(facts: SessionFacts, name: str, now: datetime) -> dict[int, Any]:
     """Return the values of a session's cell in the column of a name, by their roles."""
     chip = {"status": status_chip, "validity": validity_chip}.get(name)
     incident = "device reconnected" if facts.reconnected else "outlet failed" if facts.outlets_lost else ""
@@ -50,10 +50,10 @@ def session_cell(facts: SessionFacts, name: str, now: datetime) -> dict[int, Any
     if name == "validity" and facts.excluded is not None:
         tip = f"Excluded from the analysis: {facts.excluded}"
     return {
-        ROLE.DisplayRole: text,
-        ROLE.AccessibleTextRole: ", ".join(filter(None, (text, below))),
-        ROLE.ToolTipRole: tip,
-        ROLE.FontRole: face,
+        _ROLE.DisplayRole: text,
+        _ROLE.AccessibleTextRole: ", ".join(filter(None, (text, below))),
+        _ROLE.ToolTipRole: tip,
+        _ROLE.FontRole: face,
         CHIP_ROLE: None if chip is None else chip(facts),
         BELOW_ROLE: below,
         CARE_ROLE: facts.needs_care,
@@ -82,7 +82,7 @@ class SessionsTable(QWidget):
         self._matches: Callable[[SessionFacts], bool] = lambda _facts: True
         self._now = datetime.now().astimezone()
         headings: dict[str, str] = {column.name: column.heading for column in columns}
-        self.model = Rows(headings, lambda facts, name: session_cell(facts, name, self._now))
+        self.model = Rows(headings, lambda facts, name: _session_cell(facts, name, self._now))
         self.table = Table(self.model, [(column.width, column.least) for column in columns], "Sessions")
         self.none = label(none, "body", "text2", wraps=True)
         self.none.setContentsMargins(MARGIN, MARGIN, MARGIN, MARGIN)

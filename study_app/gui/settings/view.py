@@ -59,9 +59,9 @@ from study_app.store.workstation import (
 )  # fmt: skip
 from study_app.video.sources import USUAL
 
-LEAST_S: Final = 2.0
-KEPT_S: Final = 10.0
-LATE: Final = 1.5  # gap in refreshes from which at least one was missed
+_LEAST_S: Final = 2.0
+_KEPT_S: Final = 10.0
+_LATE: Final = 1.5  # gap in refreshes from which at least one was missed
 
 
 class FrameTimes:
@@ -73,7 +73,7 @@ class FrameTimes:
     least_s : so long frames are taken before anything is said of them
     """
 
-    def __init__(self, refresh_hz: float, least_s: float = LEAST_S) -> None:
+    def __init__(self, refresh_hz: float, least_s: float = _LEAST_S) -> None:
         self.refresh_hz = refresh_hz if refresh_hz > 0 else 60.0
         self._least_ns = round(1e9 * least_s)
         self._times: deque[int] = deque()
@@ -81,35 +81,35 @@ class FrameTimes:
     def add_frame(self, time_ns: int) -> None:
         """Add a frame's time [ns]; times older than ten seconds are dropped."""
         self._times.append(time_ns)
-        while time_ns - self._times[0] > 1e9 * KEPT_S:
+        while time_ns - self._times[0] > 1e9 * _KEPT_S:
             self._times.popleft()
 
     def figure_texts(self) -> tuple[str, ...]:
         """Return rate, median gap, 99th percentile of the gaps and missed refreshes; dashes until there are enough."""
         times = list(self._times)
         if len(times) < 3 or times[-1] - times[0] < self._least_ns:
-            return ("–",) * len(NAMES)
+            return ("–",) * len(_NAMES)
         gaps_ms = sorted((late - early) / 1e6 for early, late in pairwise(times))
         refresh_ms = 1000 / self.refresh_hz
         return (
             f"{1e9 * (len(times) - 1) / (times[-1] - times[0]):.1f} of {self.refresh_hz:.1f} Hz",
             f"{gaps_ms[len(gaps_ms) // 2]:.2f} ms",
             f"{gaps_ms[min(len(gaps_ms) - 1, int(0.99 * len(gaps_ms)))]:.2f} ms",
-            str(sum(round(gap / refresh_ms) - 1 for gap in gaps_ms if gap > LATE * refresh_ms)),
+            str(sum(round(gap / refresh_ms) - 1 for gap in gaps_ms if gap > _LATE * refresh_ms)),
         )
 
 
-REPORT_MS = 500
-INTERVAL_MS = (50.0, 5000.0)
-FIRST_MS = 500.0
-FORM_PX = 320
-NAMES = ("Frames painted", "Median gap", "99 % of gaps within", "Missed in 10 s")
-LEAST = QSize(960, 600)
-HOWS = ("photodiode", "high-speed camera", "data sheet")
-DECIMALS = 2
+_REPORT_MS = 500
+_INTERVAL_MS = (50.0, 5000.0)
+_FIRST_MS = 500.0
+_FORM_PX = 320
+_NAMES = ("Frames painted", "Median gap", "99 % of gaps within", "Missed in 10 s")
+_LEAST = QSize(960, 600)
+_HOWS = ("photodiode", "high-speed camera", "data sheet")
+_DECIMALS = 2
 
 
-class OffsetForm(QWidget):
+class _OffsetForm(QWidget):
     """Two numbers and a way; ``kept(mean [ms], spread [ms], how)``, and ``forgotten``."""
 
     kept = Signal(float, float, str)
@@ -118,9 +118,9 @@ class OffsetForm(QWidget):
     def __init__(self) -> None:
         super().__init__()
         fields = (
-            number_field("mean", "Mean", "ms", OFFSET_MS, DECIMALS, may_miss=False),
-            number_field("spread", "Spread", "ms", SPREAD_MS, DECIMALS),
-            choice_field("how", "Measured by", {way: way.capitalize() for way in HOWS}),
+            number_field("mean", "Mean", "ms", OFFSET_MS, _DECIMALS, may_miss=False),
+            number_field("spread", "Spread", "ms", SPREAD_MS, _DECIMALS),
+            choice_field("how", "Measured by", {way: way.capitalize() for way in _HOWS}),
         )
         self.editors = {field.name: Editor(field) for field in fields}
         self.said = label("", "label", "text2", wraps=True, weight=400, tabular=True)
@@ -135,7 +135,7 @@ class OffsetForm(QWidget):
     def show_offset(self, offset: DisplayOffset | None, screen: str) -> None:
         """Show the measured offset, and whether it was measured on another screen than ``screen``."""
         self.forget.setEnabled(offset is not None)
-        self.said.setText(offset_sentence(offset, screen))
+        self.said.setText(_offset_sentence(offset, screen))
         if offset is not None:
             for name, value in (("mean", offset.mean_ms), ("spread", offset.spread_ms), ("how", offset.how)):
                 self.editors[name].show_value(value)
@@ -153,14 +153,14 @@ class OffsetForm(QWidget):
         self.kept.emit(mean_ms, spread_ms or 0.0, how)
 
 
-def offset_sentence(offset: DisplayOffset | None, screen: str) -> str:
+def _offset_sentence(offset: DisplayOffset | None, screen: str) -> str:
     """Return a sentence on the offset of a screen."""
     if offset is None:
         return (
             "Not measured. The screen shows each frame slightly later; the delay is recorded as “not measured” in "
             "every receipt."
         )
-    text = f"{write_number(offset.mean_ms, DECIMALS)} ± {write_number(offset.spread_ms, DECIMALS)} ms"
+    text = f"{write_number(offset.mean_ms, _DECIMALS)} ± {write_number(offset.spread_ms, _DECIMALS)} ms"
     when = f", {offset.measured}" if offset.measured else ""
     where = "" if offset.screen == screen else f" for another screen ({offset.screen}): not used here"
     return f"{text} by {offset.how}{when}{where}."
@@ -184,22 +184,22 @@ class DisplayTest(QWidget):
         refresh_hz: float,
         *,
         now_ns: Callable[[], int] = time.perf_counter_ns,
-        least_s: float = LEAST_S,
+        least_s: float = _LEAST_S,
     ) -> None:
         super().__init__()
         self.setWindowTitle("Display test")
-        self.setMinimumSize(LEAST)
+        self.setMinimumSize(_LEAST)
         self._now_ns = now_ns
         self.times = FrameTimes(refresh_hz, least_s)
         self.lit = False
         self.toggles = 0
         self._toggled_ns = now_ns()
-        self.interval_ms = FIRST_MS
+        self.interval_ms = _FIRST_MS
         self._unpainted = False
-        self.interval = Editor(number_field("interval", "Interval", "ms", INTERVAL_MS))
-        self.interval.setFixedWidth(FORM_PX)
-        self.interval.show_value(FIRST_MS)
-        self.values: list[QLabel] = [figures("–", "number") for _ in NAMES]
+        self.interval = Editor(number_field("interval", "Interval", "ms", _INTERVAL_MS))
+        self.interval.setFixedWidth(_FORM_PX)
+        self.interval.show_value(_FIRST_MS)
+        self.values: list[QLabel] = [figures("–", "number") for _ in _NAMES]
         self.leave = ActionButton("", "Leave (Esc)", height=40)
         self._lay_out(screen_words)
         self.leave.clicked.connect(self.close)
@@ -207,18 +207,18 @@ class DisplayTest(QWidget):
         apply_theme(self, PARTICIPANT)
         self.frames = Frames(self.times.refresh_hz, now_ns=now_ns, parent=self)
         self.frames.due.connect(self.draw_frame)
-        self.report_timer = QTimer(self, interval=REPORT_MS)
+        self.report_timer = QTimer(self, interval=_REPORT_MS)
         self.report_timer.timeout.connect(self.show_figures)
 
     def _lay_out(self, screen_words: str) -> None:
         titles = vbox(label("Display test", "title"), label(screen_words, "body", "text2"), spacing=2)
         head = hbox(titles, STRETCH, (self.leave, 0, Qt.AlignmentFlag.AlignTop))
         cells = grid(40, 2)
-        for place, (name, value) in enumerate(zip(NAMES, self.values, strict=True)):
+        for place, (name, value) in enumerate(zip(_NAMES, self.values, strict=True)):
             value.setAccessibleName(name)
             cells.addWidget(label(name, "label", "text2"), 0, place)
             cells.addWidget(value, 1, place)
-        cells.setColumnStretch(len(NAMES), 1)
+        cells.setColumnStretch(len(_NAMES), 1)
         toggling = vbox(label("Photodiode's patch", "card"), self.interval, spacing=6)
         foot = hbox(toggling, STRETCH)
         vbox(head, cells, foot, STRETCH, spacing=14, margins=(40, 20, 40, 20), parent=self)
@@ -253,7 +253,7 @@ class DisplayTest(QWidget):
         return patch_place(self.width(), self.height()).toAlignedRect()
 
     def _set_interval(self, value: float | None) -> None:
-        self.interval_ms = value or FIRST_MS
+        self.interval_ms = value or _FIRST_MS
         self.interval.show_value(self.interval_ms)
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -278,22 +278,22 @@ class DisplayTest(QWidget):
         self.left.emit()
 
 
-STACKED_BELOW = 1000
-SAMPLE = "I think this feels like interacting with a liquid."
-MOST_SAMPLE = 2.4
-STAMPS = "For example https://freetsa.org/tsr. Leave empty to disable."
-PORTS = "One byte per event: serial:/dev/ttyUSB0, serial:COM3 or parallel:/dev/parport0. Leave empty to disable."
+_STACKED_BELOW = 1000
+_SAMPLE = "I think this feels like interacting with a liquid."
+_MOST_SAMPLE = 2.4
+_STAMPS = "For example https://freetsa.org/tsr. Leave empty to disable."
+_PORTS = "One byte per event: serial:/dev/ttyUSB0, serial:COM3 or parallel:/dev/parport0. Leave empty to disable."
 
 
 def _check_port(text: str) -> str:
     if text and not is_port(text):
-        raise ValueError(f"This is not the address of a port. {PORTS}")
+        raise ValueError(f"This is not the address of a port. {_PORTS}")
     return text
 
 
 def _check_server(text: str) -> str:
     if not re.fullmatch(r"(https?://\S+)?", text):
-        raise ValueError(f"This is not the address of a server. {STAMPS}")
+        raise ValueError(f"This is not the address of a server. {_STAMPS}")
     return text
 
 
@@ -307,7 +307,7 @@ def _text_or_empty(value: str | None) -> str:
     return value or ""
 
 
-SAMPLES = {
+_SAMPLES = {
     "off": "Off",
     "single-blind": "On, but off in double-blind studies",
     "always": "On, also in double-blind studies",
@@ -316,8 +316,8 @@ FIELDS = (
     number_field("viewing_distance_mm", "Viewing distance, eye to screen", "mm", DISTANCE_MM),
     number_field("screen_width_mm", "Width of the picture on the screen", "mm", WIDTH_MM),
     Field("lsl_markers", "Markers over the Lab Streaming Layer (LSL)", "switch"),
-    choice_field("lsl_samples", "Samples of position and force over LSL", SAMPLES),
-    Field("triggers", "Trigger port", hint=PORTS, parse=_check_port),
+    choice_field("lsl_samples", "Samples of position and force over LSL", _SAMPLES),
+    Field("triggers", "Trigger port", hint=_PORTS, parse=_check_port),
     Field("photodiode", "Square for a photodiode in the tank's corner", "switch"),
     choice_field("device", "Device", {name: title_of(name) for name in list_devices()}),
     Field("camera", "Camera for conditions that show a camera picture", longest=CAMERA_LENGTH, placeholder=USUAL),
@@ -326,13 +326,13 @@ FIELDS = (
         hint="A folder that people who can change results cannot change. Leave empty to disable.",
         parse=_check_path, write=_text_or_empty,
     ),
-    Field("stamps", "Time-stamp server for proofs (RFC 3161)", hint=STAMPS, parse=_check_server),
+    Field("stamps", "Time-stamp server for proofs (RFC 3161)", hint=_STAMPS, parse=_check_server),
     Field(
         "stamp_root", "Root certificate of the server (PEM), to verify its stamps", "file",
         file_filter="Certificates (*.pem *.crt *.cer)", parse=_check_path, write=_text_or_empty,
     ),
 )  # fmt: skip
-OF_PROGRAM = tuple(  # the fields of `MachineSettings` with a title: a choice or a switch
+_OF_PROGRAM = tuple(  # the fields of `MachineSettings` with a title: a choice or a switch
     choice_field(name, setting.title, {word: word.capitalize() for word in words})
     if (words := get_args(setting.annotation))
     else Field(name, setting.title, "switch")
@@ -341,7 +341,7 @@ OF_PROGRAM = tuple(  # the fields of `MachineSettings` with a title: a choice or
 )
 
 
-class ScreensCard(Card):
+class _ScreensCard(Card):
     """Every screen, and which is the participant's; ``chosen`` carries it."""
 
     chosen = Signal(object)
@@ -408,13 +408,13 @@ class MachinePlace(Place):
         self.change = ActionButton("", "Change …", height=40)
         self.editors = {
             field.name: Editor(field, self.devices if field.name == "device" else None)
-            for field in (*FIELDS, *OF_PROGRAM)
+            for field in (*FIELDS, *_OF_PROGRAM)
         }
         for editor in self.editors.values():
             editor.changed.connect(lambda name, value: self.changed.emit({name: value}))
-        self.screens, self.offset = ScreensCard(), OffsetForm()
-        self.sample = label(SAMPLE, "statement", wraps=True)
-        self.sample.setAccessibleName(f"A statement at the size that participants see: {SAMPLE}")
+        self.screens, self.offset = _ScreensCard(), _OffsetForm()
+        self.sample = label(_SAMPLE, "statement", wraps=True)
+        self.sample.setAccessibleName(f"A statement at the size that participants see: {_SAMPLE}")
         self.sample.setFixedHeight(112)
         self.sample.setIndent(0)
         self.sample.setStyleSheet(
@@ -457,7 +457,7 @@ class MachinePlace(Place):
             (
                 card("Display offset", self.offset, Rule(), "photodiode"),
                 card("New sessions", "device", folder, "camera"),
-                card("This program", *(field.name for field in OF_PROGRAM)),
+                card("This program", *(field.name for field in _OF_PROGRAM)),
             ),
         )
         self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
@@ -498,12 +498,12 @@ class MachinePlace(Place):
         settings, screen = self.settings, self.participants
         for name, editor in self.editors.items():
             editor.show_value(settings.device.partition(":")[0] if name == "device" else getattr(settings, name))
-        self.editors["screen_width_mm"].show_value(settings.screen_width_mm, width_sentence(settings, screen))
+        self.editors["screen_width_mm"].show_value(settings.screen_width_mm, _width_sentence(settings, screen))
         missing = settings.screen if settings.screen not in {"", *(screen.name for screen in self._screens)} else ""
         self.screens.show_screens(self._screens, screen.number, missing)
         scale = settings.text_scale(screen.width_px, screen.width_mm)
-        self.sample.setFont(font("statement", scale=min(scale, MOST_SAMPLE)))
-        self.said.setText(text_size_sentence(settings, screen, scale))
+        self.sample.setFont(font("statement", scale=min(scale, _MOST_SAMPLE)))
+        self.said.setText(_text_size_sentence(settings, screen, scale))
         self.offset.show_offset(settings.display_offset, screen.name)
 
     def _choose_folder(self) -> None:
@@ -529,17 +529,17 @@ class MachinePlace(Place):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        stacked = self.width() < STACKED_BELOW
+        stacked = self.width() < _STACKED_BELOW
         self._body.setDirection(QBoxLayout.Direction.TopToBottom if stacked else QBoxLayout.Direction.LeftToRight)
 
 
-def width_sentence(settings: MachineSettings, screen: ScreenShown) -> str:
+def _width_sentence(settings: MachineSettings, screen: ScreenShown) -> str:
     """Return a sentence on the screen width that the system reports."""
     known = f"The system reports {screen.width_mm:.0f} mm." if screen.width_mm > 0 else "The system does not report it."
     return known if settings.screen_width_mm is None else f"{known} The measured value is used."
 
 
-def text_size_sentence(settings: MachineSettings, screen: ScreenShown, scale: float) -> str:
+def _text_size_sentence(settings: MachineSettings, screen: ScreenShown, scale: float) -> str:
     """Return a sentence on the text size for the viewing distance."""
     seen, least = settings.x_height_deg(screen.width_px, screen.width_mm), f"{LEAST_X_HEIGHT_DEG:g}°"
     if seen is None:

@@ -11,8 +11,8 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QIcon, QPainter, QPainterPath, QPen, QPixmap
 
 GRID = 24.0
-STROKE = 1.75
-RATIOS = (1.0, 1.25, 1.5, 1.75, 2.0, 3.0)
+_STROKE = 1.75
+_RATIOS = (1.0, 1.25, 1.5, 1.75, 2.0, 3.0)
 
 PATHS = {
     "drop": "M 12 3 C 12 3 6 9.4 6 14.3 C 6 17.7 8.7 20.5 12 20.5 C 15.3 20.5 18 17.7 18 14.3 C 18 9.4 12 3 12 3 Z",
@@ -125,7 +125,7 @@ def _icon_paths(name: str) -> tuple[QPainterPath, QPainterPath]:
     return stroked, filled
 
 
-def draw_icon(painter: QPainter, name: str, rect: QRectF, colour: str | QColor, stroke: float = STROKE) -> None:
+def draw_icon(painter: QPainter, name: str, rect: QRectF, colour: str | QColor, stroke: float = _STROKE) -> None:
     """Paint an icon in the central square of ``rect``; ``stroke`` is its line width on the grid of 24."""
     stroked, filled = _icon_paths(name)
     side = min(rect.width(), rect.height())
@@ -143,7 +143,7 @@ def draw_icon(painter: QPainter, name: str, rect: QRectF, colour: str | QColor, 
     painter.restore()
 
 
-def icon_pixmap(name: str, colour: str, size: int = 20, ratio: float = 1.0, stroke: float = STROKE) -> QPixmap:
+def icon_pixmap(name: str, colour: str, size: int = 20, ratio: float = 1.0, stroke: float = _STROKE) -> QPixmap:
     """Return an icon of ``size`` logical px as a pixmap for a screen of device pixel ratio ``ratio``."""
     side = round(size * ratio)
     pixmap = QPixmap(side, side)
@@ -158,7 +158,7 @@ def icon_pixmap(name: str, colour: str, size: int = 20, ratio: float = 1.0, stro
 def icon(name: str, colour: str, size: int = 20) -> QIcon:
     """Return an icon for buttons and menus, sharp at every scaling from 100 to 300 %."""
     made = QIcon()
-    for ratio in RATIOS:
+    for ratio in _RATIOS:
         made.addPixmap(icon_pixmap(name, colour, size, ratio))
     return made
 

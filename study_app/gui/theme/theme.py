@@ -13,7 +13,7 @@ from typing import Literal, TypeAlias
 from PySide6.QtGui import QFont, QFontDatabase
 
 FAMILIES = ["Inter", "Noto Sans", "DejaVu Sans"]
-FILES = ("Inter-Regular.otf", "Inter-Medium.otf", "Inter-SemiBold.otf", "Inter-Bold.otf")
+_FILES = ("Inter-Regular.otf", "Inter-Medium.otf", "Inter-SemiBold.otf", "Inter-Bold.otf")
 
 TypeRole: TypeAlias = Literal[
     "display", "title", "title_dense", "number", "card", "body", "strong", "label", "small", "key",
@@ -53,7 +53,7 @@ TYPE: dict[TypeRole, Type] = {
 def load_fonts() -> tuple[str, ...]:
     """Register the package's fonts with Qt, once; return their families (a QApplication must exist)."""
     families: list[str] = []
-    for name in FILES:
+    for name in _FILES:
         content = resources.files("study_app.gui").joinpath("assets", "fonts", name).read_bytes()
         number = QFontDatabase.addApplicationFontFromData(content)
         families += QFontDatabase.applicationFontFamilies(number)

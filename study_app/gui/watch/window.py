@@ -39,13 +39,13 @@ from study_app.store.atomic import write_file
 from study_app.video.encoding import VideoWriter
 
 LEAST_N, LEAST_MPS = 0.05, 0.01  # lower peaks are not drawn larger
-MOST_POINTS: Final = 800  # of a curve
-AXIS_PX: Final = 60  # of the plot's numbers
-FORCES_HIDDEN: Final = "Hidden while the study is blinded"
-SHOWS_FORCES: Final = "liquid-study unblind RESULTS shows forces."
+_MOST_POINTS: Final = 800  # of a curve
+_AXIS_PX: Final = 60  # of the plot's numbers
+_FORCES_HIDDEN: Final = "Hidden while the study is blinded"
+_SHOWS_FORCES: Final = "liquid-study unblind RESULTS shows forces."
 
 
-class WatchedTank(TankWidget):
+class _WatchedTank(TankWidget):
     """The participant's tank with arrows of force and velocity, which participants never see."""
 
     arrows: tuple[Arrow, ...] = ()
@@ -76,15 +76,15 @@ class WatchedTank(TankWidget):
         super()._paint_things(painter, region)
 
 
-class ForcePlot(Plot):
+class _ForcePlot(Plot):
     """The force sent as a line and the force requested as an area behind it [N] over the time [s], with a cursor."""
 
     def __init__(self, shown: Watched) -> None:
         super().__init__()
         sizes = [np.linalg.norm(np.nan_to_num(shown.samples[name]), axis=1) for name in ("force_n", "device_force_n")]
-        times_s, (low, high) = thin_out(shown.times_s, sizes[0])
+        times_s, (low, high) = _thin_out(shown.times_s, sizes[0])
         self.requested = pg.PlotCurveItem(times_s, high, fillLevel=0.0, antialias=True)
-        times_s, (low, high) = thin_out(shown.times_s, sizes[1])
+        times_s, (low, high) = _thin_out(shown.times_s, sizes[1])
         self.sent = pg.PlotCurveItem(np.repeat(times_s, 2), np.column_stack([low, high]).ravel(), antialias=True)
         draw_quickly(self.sent, solid=True)
         self.cursor = pg.InfiniteLine(angle=90)
@@ -111,13 +111,13 @@ class ForcePlot(Plot):
         self.cursor.setPen(self.stroke(theme.text, 1.4))
 
 
-def thin_out(times_s: Floats, values: Floats) -> tuple[Floats, tuple[Floats, Floats]]:
-    """Return times (k,) and the least and greatest values (k,) between them, at most `MOST_POINTS`."""
-    starts = np.arange(0, len(values), max(1, len(values) // MOST_POINTS))
+def _thin_out(times_s: Floats, values: Floats) -> tuple[Floats, tuple[Floats, Floats]]:
+    """Return times (k,) and the least and greatest values (k,) between them, at most `_MOST_POINTS`."""
+    starts = np.arange(0, len(values), max(1, len(values) // _MOST_POINTS))
     return times_s[starts], (np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts))
 
 
-class TimeLine(Slider):
+class _TimeLine(Slider):
     """The time of a trial with its marks: targets as triangles, answers as diamonds, events as lines."""
 
     def __init__(self, shown: Watched) -> None:
@@ -151,16 +151,16 @@ class Stage(QWidget):
     def __init__(self, shown: Watched) -> None:
         super().__init__()
         self.shown, self.at_s, self.as_seen = shown, shown.begins_s, False
-        self.tank, self.line = WatchedTank(shown), TimeLine(shown)
-        self.forces = None if shown.blinded else ForcePlot(shown)
+        self.tank, self.line = _WatchedTank(shown), _TimeLine(shown)
+        self.forces = None if shown.blinded else _ForcePlot(shown)
         self.numbers, self.happened = figures("", "label"), Elided("label", "text2")
-        plot = self.forces or MaskedPanel(FORCES_HIDDEN, SHOWS_FORCES)
+        plot = self.forces or MaskedPanel(_FORCES_HIDDEN, _SHOWS_FORCES)
         plot.setMinimumHeight(88)
         plot.setMaximumHeight(190)
         key = label("" if shown.blinded else "N: line sent, area requested", "small", "text2")
         above = hbox(self.numbers, (self.happened, 1), key, spacing=16, margins=(0, 4, int(MARGIN), 0))
         along = hbox((plot, 1), margins=(0, 0, int(MARGIN), 0))
-        timed = hbox((self.line, 1), margins=(AXIS_PX - int(MARGIN), 0, 0, 0))
+        timed = hbox((self.line, 1), margins=(_AXIS_PX - int(MARGIN), 0, 0, 0))
         vbox((self.tank, 3), above, (along, 1), timed, spacing=4, margins=0, parent=self)
         self._peaks = {
             name: max(least, float(np.linalg.norm(np.nan_to_num(shown.samples[name]), axis=1).max()))
@@ -199,19 +199,19 @@ class Stage(QWidget):
         )
 
 
-SIZE: Final = (1180, 800)
-PAINT_MS: Final = 15
-VIDEO_HZ: Final = 30
-SPEEDS: Final = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
-PLAY: Final = Command("play again", "Play, pause", ("Space",))
-STEPS: Final = (
+_SIZE: Final = (1180, 800)
+_PAINT_MS: Final = 15
+_VIDEO_HZ: Final = 30
+_SPEEDS: Final = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
+_PLAY: Final = Command("play again", "Play, pause", ("Space",))
+_STEPS: Final = (
     (Command("sample before", "Previous sample", (",",)), "sample", -1),
     (Command("frame before", "Previous frame", ("Left",)), "frame", -1),
     (Command("frame after", "Next frame", ("Right",)), "frame", 1),
     (Command("sample after", "Next sample", (".",)), "sample", 1),
 )
 """Each with what it steps by, and which way."""
-CAPS: Final = {"Left": "←", "Right": "→"}
+_CAPS: Final = {"Left": "←", "Right": "→"}
 
 
 class WatchWindow(Themed, QDialog):
@@ -234,7 +234,7 @@ class WatchWindow(Themed, QDialog):
         self._reader = Background(self)
         self._reader.done.connect(self._show_recording)
         self._reader.failed.connect(self._show_recording)
-        self._timer = QTimer(self, interval=PAINT_MS, timerType=Qt.TimerType.PreciseTimer)
+        self._timer = QTimer(self, interval=_PAINT_MS, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._show_next_moment)
         self._since = (0.0, 0.0)
         self._writing = QTimer(self, interval=0)
@@ -254,21 +254,21 @@ class WatchWindow(Themed, QDialog):
         self.play = ActionButton("play", "Play", cap="Space", height=40)
         self.speed = Choice()
         self.speed.setAccessibleName("Speed")
-        for speed in SPEEDS:
+        for speed in _SPEEDS:
             self.speed.addItem(f"{speed:g}×", speed)
-        self.speed.setCurrentIndex(SPEEDS.index(1.0))
+        self.speed.setCurrentIndex(_SPEEDS.index(1.0))
         self.steps = {
-            command.id: ActionButton("", kind.capitalize(), cap=CAPS.get(command.keys[0], command.keys[0]), height=40)
-            for command, kind, _ in STEPS
+            command.id: ActionButton("", kind.capitalize(), cap=_CAPS.get(command.keys[0], command.keys[0]), height=40)
+            for command, kind, _ in _STEPS
         }
-        for command, *_ in STEPS:
+        for command, *_ in _STEPS:
             self.steps[command.id].setAccessibleName(command.words)
         self.close_button = ActionButton("", "Close", height=40)
         self._lay_out(f"Trial {trial}  ·  {presented}")
         self._connect()
         apply_theme(self, theme)
         available = self.screen().availableSize()
-        self.resize(min(SIZE[0], available.width() - 40), min(SIZE[1], available.height() - 60))
+        self.resize(min(_SIZE[0], available.width() - 40), min(_SIZE[1], available.height() - 60))
         self._read_interval(1)
 
     def _lay_out(self, heading: str) -> None:
@@ -286,13 +286,13 @@ class WatchWindow(Themed, QDialog):
         self._set_enabled(False)
 
     def _connect(self) -> None:
-        actions = {PLAY.id: PLAY.action(self.room, self.toggle)}
-        for command, kind, way in STEPS:
+        actions = {_PLAY.id: _PLAY.action(self.room, self.toggle)}
+        for command, kind, way in _STEPS:
             actions[command.id] = command.action(self.room, partial(self.step, kind, way))  # type: ignore[arg-type]
-        actions[PLAY.id].setShortcutContext(
+        actions[_PLAY.id].setShortcutContext(
             Qt.ShortcutContext.WidgetWithChildrenShortcut
         )  # else the key presses the button
-        for name, button in {PLAY.id: self.play, **self.steps}.items():
+        for name, button in {_PLAY.id: self.play, **self.steps}.items():
             connect_button(button, actions[name])
         self.interval.activated.connect(lambda at: self._read_interval(at + 1))
         self.seen.toggled.connect(self._show_as_seen)
@@ -447,8 +447,8 @@ class WatchWindow(Themed, QDialog):
         stage = self.stage
         assert stage is not None  # noqa: S101 - the button is off without one
         back, size = stage.at_s, stage.grab().size()
-        writer = VideoWriter(size.toTuple(), VIDEO_HZ)  # type: ignore[arg-type]  # a pair of int
-        times_s = np.arange(stage.shown.begins_s, stage.shown.ends_s, self.speed.currentData() / VIDEO_HZ)
+        writer = VideoWriter(size.toTuple(), _VIDEO_HZ)  # type: ignore[arg-type]  # a pair of int
+        times_s = np.arange(stage.shown.begins_s, stage.shown.ends_s, self.speed.currentData() / _VIDEO_HZ)
         for count, at_s in enumerate(times_s):
             stage.show_moment(float(at_s))
             writer.add(_stage_pixels(stage, size))

@@ -9,28 +9,28 @@ STRETCH: Final = "stretch"
 """A gap that takes the room that is left; in a tuple with its stretch."""
 Part: TypeAlias = QWidget | QLayout | int | str | tuple[Any, ...]
 """A widget or layout, or a tuple with its stretch, and with its alignment; a gap [px]; or `STRETCH`."""
-Margins: TypeAlias = int | tuple[int, int, int, int] | None
+_Margins: TypeAlias = int | tuple[int, int, int, int] | None
 """The same on all sides [px], or left, top, right and bottom; None: the style's."""
 
 B = TypeVar("B", bound=QBoxLayout)
 
 
 def hbox(
-    *parts: Part, spacing: int | None = None, margins: Margins = None, parent: QWidget | None = None
+    *parts: Part, spacing: int | None = None, margins: _Margins = None, parent: QWidget | None = None
 ) -> QHBoxLayout:
     """Return a row of parts, as the layout of ``parent`` if given."""
     return _box(QHBoxLayout(), parts, spacing, margins, parent)
 
 
 def vbox(
-    *parts: Part, spacing: int | None = None, margins: Margins = None, parent: QWidget | None = None
+    *parts: Part, spacing: int | None = None, margins: _Margins = None, parent: QWidget | None = None
 ) -> QVBoxLayout:
     """Return a column of parts, as the layout of ``parent`` if given."""
     return _box(QVBoxLayout(), parts, spacing, margins, parent)
 
 
 def grid(
-    across: int | None = None, down: int | None = None, *, margins: Margins = None, parent: QWidget | None = None
+    across: int | None = None, down: int | None = None, *, margins: _Margins = None, parent: QWidget | None = None
 ) -> QGridLayout:
     """Return a grid with its gaps across and down [px], as the layout of ``parent`` if given."""
     made = QGridLayout(parent) if parent is not None else QGridLayout()
@@ -43,7 +43,7 @@ def grid(
     return made
 
 
-def _box(box: B, parts: tuple[Part, ...], spacing: int | None, margins: Margins, parent: QWidget | None) -> B:
+def _box(box: B, parts: tuple[Part, ...], spacing: int | None, margins: _Margins, parent: QWidget | None) -> B:
     if parent is not None:
         parent.setLayout(box)
     if margins is not None:

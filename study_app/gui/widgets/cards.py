@@ -14,7 +14,7 @@ from study_app.gui.widgets.labels import Ink, label
 
 QWIDGETSIZE_MAX = (1 << 24) - 1
 """Of Qt; PySide does not offer it."""
-SHADOW_ALPHAS = (5, 5, 4)
+_SHADOW_ALPHAS = (5, 5, 4)
 
 
 class Card(Themed, QWidget):
@@ -39,7 +39,7 @@ class Card(Themed, QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if not self.theme.dark:
             painter.setPen(Qt.PenStyle.NoPen)
-            for spread, alpha in enumerate(SHADOW_ALPHAS, start=1):
+            for spread, alpha in enumerate(_SHADOW_ALPHAS, start=1):
                 painter.setBrush(QColor(0, 0, 0, alpha))
                 grown = body.adjusted(-spread, -spread + 1, spread, spread + 1)
                 painter.drawRoundedRect(grown, RADIUS_CARD + spread, RADIUS_CARD + spread)

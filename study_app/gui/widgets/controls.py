@@ -35,7 +35,7 @@ from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.accessible import PlainLabel, plain_tip
 from study_app.gui.widgets.cards import smooth_painter
 
-STOP_HEIGHT = 44
+_STOP_HEIGHT = 44
 
 
 class PressedByEnter(QPushButton):
@@ -57,21 +57,21 @@ class Cap(Themed, QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
 
     def sizeHint(self) -> QSize:
-        return cap_size(self.words)
+        return _cap_size(self.words)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = smooth_painter(self)
-        paint_cap(painter, QPointF(), self.words, self.theme.text, self.theme.ctl)
+        _paint_cap(painter, QPointF(), self.words, self.theme.text, self.theme.ctl)
 
 
-def cap_size(text: str) -> QSize:
+def _cap_size(text: str) -> QSize:
     """Return the size of a key cap; none without keys."""
     return QSize(max(20, round(QFontMetricsF(font("key")).horizontalAdvance(text)) + 10) if text else 0, 20)
 
 
-def paint_cap(painter: QPainter, at: QPointF, text: str, ink: str, edge: str) -> None:
+def _paint_cap(painter: QPainter, at: QPointF, text: str, ink: str, edge: str) -> None:
     """Paint a key cap with its upper left corner at ``at``."""
-    body = QRectF(at, cap_size(text).toSizeF())
+    body = QRectF(at, _cap_size(text).toSizeF())
     painter.setPen(QPen(QColor(edge), 1))
     painter.setBrush(Qt.BrushStyle.NoBrush)
     painter.drawRoundedRect(body.adjusted(0.5, 0.5, -0.5, -0.5), 5, 5)
@@ -127,7 +127,7 @@ class ActionButton(Themed, PressedByEnter):
     def _content_width(self) -> float:
         width = QFontMetricsF(self.font()).horizontalAdvance(self.text())
         icon = (28 if self.text() or self.cap else 20) if self._icon else 0
-        return width + icon + (12 + cap_size(self.cap).width() if self.cap else 0)
+        return width + icon + (12 + _cap_size(self.cap).width() if self.cap else 0)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QStylePainter(self)
@@ -148,7 +148,7 @@ class ActionButton(Themed, PressedByEnter):
         painter.drawText(QRectF(x, 0, text_width + 2, self.height()), Qt.AlignmentFlag.AlignVCenter, self.text())
         if self.cap:
             edge = self._ink() if self._role == "primary" else self.theme.ctl
-            paint_cap(painter, QPointF(x + text_width + 11, middle - 10), self.cap, self._ink(), edge)
+            _paint_cap(painter, QPointF(x + text_width + 11, middle - 10), self.cap, self._ink(), edge)
 
     def _ink(self) -> str:
         if not self.isEnabled():
@@ -170,14 +170,14 @@ class CompactStop(Themed, QPushButton):
         self.setProperty("role", "stop")
         self.setAccessibleName(f"{text}. Holding Esc does the same.")
         self.setToolTip(f"{text} (or hold Esc)")
-        self.setFixedHeight(STOP_HEIGHT)
+        self.setFixedHeight(_STOP_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self._font = font("strong", scale=0.96)
 
     def sizeHint(self) -> QSize:
-        keys = cap_size(self.cap).width() + 10 if self.cap else 0
-        return QSize(round(QFontMetricsF(self._font).horizontalAdvance(self.words)) + 62 + keys, STOP_HEIGHT)
+        keys = _cap_size(self.cap).width() + 10 if self.cap else 0
+        return QSize(round(QFontMetricsF(self._font).horizontalAdvance(self.words)) + 62 + keys, _STOP_HEIGHT)
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
@@ -194,8 +194,8 @@ class CompactStop(Themed, QPushButton):
         painter.setFont(self._font)
         painter.drawText(QRectF(46, 0, self.width() - 46, self.height()), Qt.AlignmentFlag.AlignVCenter, self.words)
         if self.cap:
-            at = QPointF(self.width() - 16 - cap_size(self.cap).width(), self.height() / 2 - 10)
-            paint_cap(painter, at, self.cap, self.theme.on_stop, self.theme.on_stop)
+            at = QPointF(self.width() - 16 - _cap_size(self.cap).width(), self.height() / 2 - 10)
+            _paint_cap(painter, at, self.cap, self.theme.on_stop, self.theme.on_stop)
 
 
 class IconButton(Themed, PressedByEnter):

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 from study_app.gui.theme.theme import TypeRole, font
 from study_app.gui.widgets.accessible import HeadingLabel, PlainLabel, give_role, plain_tip
 
-HEADINGS: frozenset[TypeRole] = frozenset({"display", "title", "title_dense", "card"})
+_HEADINGS: frozenset[TypeRole] = frozenset({"display", "title", "title_dense", "card"})
 """The type roles of headings, for people who see them and for screen readers."""
 Ink: TypeAlias = Literal["text", "text2", "text3", "ok", "warn", "bad", "accent"]
 
@@ -28,7 +28,7 @@ def label(
 
     ``tabular`` figures share one width.
     """
-    made = HeadingLabel(text) if (role in HEADINGS if heading is None else heading) else PlainLabel(text)
+    made = HeadingLabel(text) if (role in _HEADINGS if heading is None else heading) else PlainLabel(text)
     made.setFont(font(role, weight=weight, tabular=tabular))
     made.setProperty("role", ink)
     made.setWordWrap(wraps)
@@ -53,7 +53,7 @@ class Elided(QLabel):
         self.setFont(font(role))
         self.setProperty("role", ink)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        if role in HEADINGS:
+        if role in _HEADINGS:
             give_role(self, QAccessible.Role.Heading)
         self.whole = ""
 
@@ -101,7 +101,7 @@ class Clamped(QLabel):
         self.setAccessibleName(text)
         self.whole, self._most, self._steady = text, lines, steady
         self.setFixedHeight(lines * self.fontMetrics().lineSpacing() + 2)
-        if role in HEADINGS:
+        if role in _HEADINGS:
             give_role(self, QAccessible.Role.Heading)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -115,14 +115,14 @@ class Clamped(QLabel):
             self._show_clamped()
 
     def _show_clamped(self) -> None:
-        lines = clamped(self.whole, self._most, self.font(), self.width())
+        lines = _clamped(self.whole, self._most, self.font(), self.width())
         self.setText("\n".join(lines))
         if not self._steady:
             self.setFixedHeight(max(1, len(lines)) * self.fontMetrics().lineSpacing() + 2)
         self.setToolTip(plain_tip(self.whole if lines and lines[-1].endswith("…") else ""))
 
 
-def clamped(text: str, most: int, font: QFont, width: int) -> list[str]:
+def _clamped(text: str, most: int, font: QFont, width: int) -> list[str]:
     """Return a text in lines that fit into ``width``; the last one ends in "…" where there would be too many."""
     layout = QTextLayout(text, font)
     layout.beginLayout()

@@ -19,26 +19,26 @@ from study_app.gui.theme.themed import Coloured
 Floats = NDArray[np.float64]
 
 MINUS = "\u2212"
-THIN_SPACE = "\u2009"
+_THIN_SPACE = "\u2009"
 STROKE = 2.0
 NOTHING = QPen(QColor(0, 0, 0, 0))
 # Dash and gap in stroke widths: x solid, y long dashes, z dots.
-DASHES: tuple[tuple[float, float] | None, ...] = (None, (6.0, 3.0), (1.0, 1.6))
-LINE_PX = 16.0  # a line of the plots' texts
+_DASHES: tuple[tuple[float, float] | None, ...] = (None, (6.0, 3.0), (1.0, 1.6))
+_LINE_PX = 16.0  # a line of the plots' texts
 NAME_MARGIN = 1.0  # around names [px]
-NAMES_AFTER_PX = 6.0  # from a curve's end to its name
-HALF_TICK_PX = 24.0  # half of "10 000" under the end of an axis
-DIGIT_PX = 8.5  # a digit of the longest number along an axis, with its share of the gap to the next
-MOST_FOR_NAMES = 0.5  # of that plot's height
-P99_ABOVE = 0.1  # the highest the 99th percentile's line ends above the top grid line [decades]
-BINS_PER_DECADE = 14
+_NAMES_AFTER_PX = 6.0  # from a curve's end to its name
+_HALF_TICK_PX = 24.0  # half of "10 000" under the end of an axis
+_DIGIT_PX = 8.5  # a digit of the longest number along an axis, with its share of the gap to the next
+_MOST_FOR_NAMES = 0.5  # of that plot's height
+_P99_ABOVE = 0.1  # the highest the 99th percentile's line ends above the top grid line [decades]
+_BINS_PER_DECADE = 14
 LOWEST_US, LEAST_HIGHEST_US = 1.0, 1000.0
 NAMES = ("x right", "y up", "z near")
 
 
 def tick_text(value: float) -> str:
     """Return a tick's number with a real minus and thin groups: "−20", "10 000"."""
-    text = f"{abs(value):,.6g}".replace(",", THIN_SPACE)
+    text = f"{abs(value):,.6g}".replace(",", _THIN_SPACE)
     return f"{MINUS}{text}" if value < 0 else text
 
 
@@ -53,7 +53,7 @@ def pen(colour: str, width: float = STROKE, dash: tuple[float, float] | None = N
     return made
 
 
-class Axis(pg.AxisItem):
+class _Axis(pg.AxisItem):
     """An axis without a label; laying out the empty label took a quarter of the time to make a plot."""
 
     def _updateLabel(self) -> None:
@@ -74,7 +74,7 @@ class Plot(Coloured, pg.GraphicsView):
             part.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.box = pg.ViewBox(enableMenu=False, enableMouse=False, defaultPadding=0)
-        self.axes = {side: Axis(side) for side in ("left", "bottom")}
+        self.axes = {side: _Axis(side) for side in ("left", "bottom")}
         self.ticks: dict[str, list[tuple[float, str]]] = {}
         whole = pg.GraphicsLayout()
         whole.setContentsMargins(0, 0, 0, 0)
@@ -151,7 +151,7 @@ class TracePlot(Plot):
         self._name_height = self._names_after_s = 0.0
         self._newest: list[float] = []
         self.curves = [pg.PlotCurveItem(antialias=True) for _ in names]
-        for curve, dash in zip(self.curves, (*DASHES, None), strict=False):
+        for curve, dash in zip(self.curves, (*_DASHES, None), strict=False):
             draw_quickly(curve, solid=dash is None)
         self.ends = [pg.TextItem(name, anchor=(0, 0.5)) for name in names]
         for item in (*self.curves, *self.ends):
@@ -161,7 +161,7 @@ class TracePlot(Plot):
             end.textItem.document().setDocumentMargin(NAME_MARGIN)
             end.setVisible(False)
         self.box.sigResized.connect(self._make_room)
-        self.show_ticks("bottom", time_ticks(span_s))
+        self.show_ticks("bottom", _time_ticks(span_s))
         self._make_room()
         self.apply_theme(LIGHT)
 
@@ -178,12 +178,12 @@ class TracePlot(Plot):
         step = tick_step(self._asked, most)
         rows = max(1, int(np.ceil(self._asked / step - 1e-9)))
         self.reach = rows * step
-        self._name_height = 2 * self.reach * (LINE_PX + 1) / (height - LINE_PX)
-        beyond = self.reach * height / (height - LINE_PX)
+        self._name_height = 2 * self.reach * (_LINE_PX + 1) / (height - _LINE_PX)
+        beyond = self.reach * height / (height - _LINE_PX)
         self.box.setYRange(-beyond, beyond, padding=0)
-        named = max(end.textItem.boundingRect().width() for end in self.ends) + NAMES_AFTER_PX + 2
+        named = max(end.textItem.boundingRect().width() for end in self.ends) + _NAMES_AFTER_PX + 2
         share = min(0.4, named / width)
-        self._names_after_s = 1.02 * self._span_s / (1 - share) * NAMES_AFTER_PX / width
+        self._names_after_s = 1.02 * self._span_s / (1 - share) * _NAMES_AFTER_PX / width
         self.box.setXRange(-1.02 * self._span_s, 1.02 * self._span_s * share / (1 - share), padding=0)
         if (rows, step) != self._rows_and_step:
             self._rows_and_step = (rows, step)
@@ -205,13 +205,13 @@ class TracePlot(Plot):
         """Put every name at its curve's newest end, or as near as the others and the plot's edges permit."""
         if not self._newest:
             return
-        for end, height in zip(self.ends, spread_apart(self._newest, self._name_height, self.reach), strict=True):
+        for end, height in zip(self.ends, _spread_apart(self._newest, self._name_height, self.reach), strict=True):
             end.setPos(QPointF(self._names_after_s, height))
 
     def apply_theme(self, theme: Theme) -> None:
         super().apply_theme(theme)
         colours = (theme.trace_x, theme.trace_y, theme.trace_z)
-        for curve, end, colour, dash in zip(self.curves, self.ends, colours, DASHES, strict=False):
+        for curve, end, colour, dash in zip(self.curves, self.ends, colours, _DASHES, strict=False):
             curve.setPen(self.stroke(colour, STROKE, dash))
             end.setColor(QColor(colour))
 
@@ -247,14 +247,14 @@ class LatenessPlot(Plot):
     def _make_room(self) -> None:
         """Keep two lines of text above the bars: the limit's name is above that of the 99th percentile."""
         across, up = self._decades
-        share = min(0.2, HALF_TICK_PX / max(1.0, self.box.width()))  # half of the last tick's text
+        share = min(0.2, _HALF_TICK_PX / max(1.0, self.box.width()))  # half of the last tick's text
         last = across * (1 + share / (1 - share))
         self.box.setXRange(-0.02 * across, last, padding=0)
-        apart = 1 if self.box.width() >= DIGIT_PX * (across + 1) * (last + 0.02 * across) else 2
+        apart = 1 if self.box.width() >= _DIGIT_PX * (across + 1) * (last + 0.02 * across) else 2
         self.show_ticks("bottom", [(k, tick_text(10.0**k)) for k in range(0, across + 1, apart)])
         line = self.limit_name.textItem.boundingRect().height() + NAME_MARGIN
-        share = min(2 * line / max(1.0, self.box.height()), MOST_FOR_NAMES)
-        top = (up + P99_ABOVE + 0.3 * share) / (1 - share)
+        share = min(2 * line / max(1.0, self.box.height()), _MOST_FOR_NAMES)
+        top = (up + _P99_ABOVE + 0.3 * share) / (1 - share)
         self.box.setYRange(-0.3, top, padding=0)
         self.limit_name.setPos(self._limit - 0.01 * across, top)
 
@@ -272,7 +272,7 @@ class LatenessPlot(Plot):
         if p99_us is not None:
             at = float(np.log10(max(p99_us, 1.0)))
             near = counts[np.abs((edges[:-1] + edges[1:]) / 2 - at) < 0.12 * self._decades[0]]
-            top = min(up + P99_ABOVE, float(np.log10(max(1, int(near.max(initial=1))))) + 0.3)
+            top = min(up + _P99_ABOVE, float(np.log10(max(1, int(near.max(initial=1))))) + 0.3)
             self.p99_line.setData([at, at], [-0.3, top])
             self.p99_name.setPos(at, top)
             self.p99_name.setText(f"p99 {tick_text(round(p99_us))}")
@@ -290,7 +290,7 @@ def lateness_histogram(lateness_us: Floats) -> tuple[Floats, NDArray[np.int64]]:
     """Return bin edges [µs] (bins + 1,), evenly spaced logarithms, and counts (bins,); below 1 µs counts as 1 µs."""
     micros = np.maximum(lateness_us, LOWEST_US)
     decades = int(np.ceil(np.log10(max(LEAST_HIGHEST_US, float(micros.max(initial=0.0)))) - 1e-9))
-    edges = np.logspace(0, decades, decades * BINS_PER_DECADE + 1)
+    edges = np.logspace(0, decades, decades * _BINS_PER_DECADE + 1)
     counts, _ = np.histogram(np.log10(micros), np.log10(edges))
     return edges, counts
 
@@ -307,12 +307,12 @@ def tick_step(reach: float, most: int) -> float:
     return float(next(power * step for step in (1, 2, 5, 10) if power * step >= least))
 
 
-def time_ticks(span_s: float) -> list[tuple[float, str]]:
+def _time_ticks(span_s: float) -> list[tuple[float, str]]:
     """Return a tick every two seconds before now."""
     return [(-t, "0 s" if t == 0 else f"{MINUS}{t} s") for t in range(0, int(span_s) + 1, 2)]
 
 
-def spread_apart(places: Sequence[float], least: float, reach: float) -> list[float]:
+def _spread_apart(places: Sequence[float], least: float, reach: float) -> list[float]:
     """Return ``places`` moved as little as possible, in order, so that names there do not touch, within ±reach."""
     order = np.argsort(places, kind="stable")
     moved = np.asarray(places, float)[order]

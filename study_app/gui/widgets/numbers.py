@@ -13,7 +13,7 @@ from study_app.gui.widgets.cards import smooth_painter
 from study_app.gui.widgets.labels import set_property
 from study_app.number_text import MINUS, number_of
 
-NUMERALS = set("0123456789.,+-eE' \u00a0\u2009\u202f" + MINUS)
+_NUMERALS = set("0123456789.,+-eE' \u00a0\u2009\u202f" + MINUS)
 
 
 def read_number(text: str, decimal_sign: str = ".") -> float | None:
@@ -111,7 +111,7 @@ class NumberField(QLineEdit):
 
     @staticmethod
     def _is_numeric(text: str) -> bool:
-        return bool(text) and set(text) <= NUMERALS
+        return bool(text) and set(text) <= _NUMERALS
 
     def _take_typed(self) -> None:
         """Take the typed text; retry a refused number, since the obstacle may be gone."""
@@ -131,12 +131,12 @@ class NumberField(QLineEdit):
         self.entered.emit(value)
 
 
-STEPS = 200
-PAGE = 20
-FIGURES = 3  # significant digits of a slider's number: more would be false precision
-KNOB = 7.5
-TRACK = 4.0
-MARGIN = KNOB + 4  # room for knob and focus ring at both ends
+_STEPS = 200
+_PAGE = 20
+_FIGURES = 3  # significant digits of a slider's number: more would be false precision
+_KNOB = 7.5
+_TRACK = 4.0
+MARGIN = _KNOB + 4  # room for knob and focus ring at both ends
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,8 +151,8 @@ class Range:
     @property
     def steps(self) -> int:
         if self.whole and not self.logarithmic:
-            return max(1, min(STEPS, round(self.most - self.least)))
-        return STEPS
+            return max(1, min(_STEPS, round(self.most - self.least)))
+        return _STEPS
 
     def fraction_of_range(self, value: float) -> float:
         """Return the position of a number on the track, 0 to 1; numbers beyond the ends are at the end."""
@@ -171,10 +171,10 @@ class Range:
             return self.most
         if self._by_decades:
             number = self.least * (self.most / self.least) ** share
-            digits = FIGURES - 1 - math.floor(math.log10(abs(number)))
+            digits = _FIGURES - 1 - math.floor(math.log10(abs(number)))
         else:
             number = self.least + share * (self.most - self.least)
-            digits = FIGURES - math.floor(math.log10(self.most - self.least))
+            digits = _FIGURES - math.floor(math.log10(self.most - self.least))
         number = round(number) if self.whole else round(number, digits)
         return min(max(float(number), self.least), self.most)
 
@@ -240,7 +240,7 @@ class Slider(Themed, QSlider):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         keys = Qt.Key
-        page = max(1, self._span.steps // (STEPS // PAGE))
+        page = max(1, self._span.steps // (_STEPS // _PAGE))
         steps = {
             keys.Key_Left: -1, keys.Key_Down: -1, keys.Key_Right: 1, keys.Key_Up: 1,
             keys.Key_PageDown: -page, keys.Key_PageUp: page,
@@ -283,20 +283,20 @@ class Slider(Themed, QSlider):
         painter = smooth_painter(self)
         middle, x = self.height() / 2, self._position_of(self._value)
         painter.setPen(Qt.PenStyle.NoPen)
-        for colour, end in ((t.border, self.width() - MARGIN + KNOB), (t.accent if self.isEnabled() else t.ctl, x)):
+        for colour, end in ((t.border, self.width() - MARGIN + _KNOB), (t.accent if self.isEnabled() else t.ctl, x)):
             painter.setBrush(QColor(colour))
-            track = QRectF(MARGIN - KNOB, middle - TRACK / 2, end - MARGIN + KNOB, TRACK)
-            painter.drawRoundedRect(track, TRACK / 2, TRACK / 2)
+            track = QRectF(MARGIN - _KNOB, middle - _TRACK / 2, end - MARGIN + _KNOB, _TRACK)
+            painter.drawRoundedRect(track, _TRACK / 2, _TRACK / 2)
         if self._tick is not None:
             at = self._position_of(self._tick)
             painter.setPen(QPen(QColor(t.text3), 1.6))
             painter.drawLine(QPointF(at, middle - 8), QPointF(at, middle + 8))
         painter.setPen(QPen(QColor(t.accent if self.isEnabled() else t.ctl), 2))
         painter.setBrush(QColor(t.selected if self._dragged else t.surface))
-        painter.drawEllipse(QPointF(x, middle), KNOB - 1, KNOB - 1)
+        painter.drawEllipse(QPointF(x, middle), _KNOB - 1, _KNOB - 1)
         if self.hasFocus():
             painter.setBrush(Qt.BrushStyle.NoBrush)
-            painter.drawEllipse(QPointF(x, middle), KNOB + 2.5, KNOB + 2.5)
+            painter.drawEllipse(QPointF(x, middle), _KNOB + 2.5, _KNOB + 2.5)
 
     def _position_of(self, value: float) -> float:
         return MARGIN + self._span.fraction_of_range(value) * (self.width() - 2 * MARGIN)

@@ -21,9 +21,9 @@ from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.cards import chip_size, fill_rounded, paint_chip
 
-ROW_HEIGHT = 43
+_ROW_HEIGHT = 43
 MARGIN = 12
-GAP = 4
+_GAP = 4
 Index = QModelIndex | QPersistentModelIndex
 CHIP_ROLE = Qt.ItemDataRole.UserRole + 1
 """Tone, icon and word of a chip, in place of the text."""
@@ -81,7 +81,7 @@ class _Cells(QStyledItemDelegate):
         table = self.parent()
         assert isinstance(table, Table)  # noqa: S101 - made by it
         theme = table.theme
-        place = QRectF(option.rect).adjusted(MARGIN if index.column() == 0 else GAP, 0, -GAP, 0)  # type: ignore[attr-defined]
+        place = QRectF(option.rect).adjusted(MARGIN if index.column() == 0 else _GAP, 0, -_GAP, 0)  # type: ignore[attr-defined]
         chip, below = index.data(CHIP_ROLE), index.data(BELOW_ROLE)
         painter.save()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -92,7 +92,7 @@ class _Cells(QStyledItemDelegate):
             paint_chip(painter, body, theme, *chip, small=True)
             if below:
                 lower = QRectF(
-                    place.left() + GAP, body.bottom(), place.width() - GAP, place.bottom() - 4 - body.bottom()
+                    place.left() + _GAP, body.bottom(), place.width() - _GAP, place.bottom() - 4 - body.bottom()
                 )
                 _write_text(painter, lower, font("small"), theme.text2, below)
             painter.restore()
@@ -140,7 +140,7 @@ class Table(Themed, QTableView):
         self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
         self.verticalHeader().hide()
         self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
-        self.verticalHeader().setDefaultSectionSize(ROW_HEIGHT)
+        self.verticalHeader().setDefaultSectionSize(_ROW_HEIGHT)
         head = self.horizontalHeader()
         head.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         head.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
@@ -157,7 +157,7 @@ class Table(Themed, QTableView):
         return chosen[0].row() if chosen else None
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(sum(least for _, least in self._widths), 26 + ROW_HEIGHT)
+        return QSize(sum(least for _, least in self._widths), 26 + _ROW_HEIGHT)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and self.currentIndex().isValid():
@@ -198,4 +198,4 @@ class Table(Themed, QTableView):
 
     def _row_rectangle(self, row: int) -> QRectF:
         top = self.rowViewportPosition(row)
-        return QRectF(0, top + 1, self.viewport().width(), ROW_HEIGHT - 3)
+        return QRectF(0, top + 1, self.viewport().width(), _ROW_HEIGHT - 3)

@@ -39,12 +39,12 @@ log = logging.getLogger(__name__)
 _PACKAGE = Path(__file__).resolve().parents[2]
 KERNEL_FOLDERS = ("haptics", "devices", "evidence")
 """Compiled functions, and all constants that they read, are in these; `tests.haptics.kernels.test_compiled` checks."""
-SHIPPED_CACHE = _PACKAGE / "compiled"
+_SHIPPED_CACHE = _PACKAGE / "compiled"
 """Caches that came with the program; only the bundle has them."""
 
-KEPT_FOLDERS = 8  # caches kept at any age
-UNUSED_S = 86_400.0  # a program that started less than a day ago keeps its cache
-SWEPT_AT_ONCE = 8  # removals per start, which they delay
+_KEPT_FOLDERS = 8  # caches kept at any age
+_UNUSED_S = 86_400.0  # a program that started less than a day ago keeps its cache
+_SWEPT_AT_ONCE = 8  # removals per start, which they delay
 _COMPILES = (b"compiled import", b"import compiled", b"import numba")
 _IMPORTS = re.compile(r"from study_app\.([\w.]+) import \(?((?<=\()[^)]*|[^\n]*)")
 _DIGEST = re.compile(r"[0-9a-f]{16}")
@@ -100,12 +100,12 @@ def _use_own_cache() -> Path | None:
     ]
     digest = digest_of(SOURCES)
     for place in wanted:
-        copy_shipped(place / digest)
+        _copy_shipped(place / digest)
         if _writable(place / digest):
             if place is not wanted[0]:
                 log.warning("%s cannot be written: compiled code is stored in %s", wanted[0], place)
             vars(numba.config)["CACHE_DIR"] = str(place / digest)
-            sweep_caches(place / digest)
+            _sweep_caches(place / digest)
             return place / digest
     places = " and ".join(map(str, wanted))
     log.warning(
@@ -114,9 +114,9 @@ def _use_own_cache() -> Path | None:
     return None
 
 
-def copy_shipped(own: Path) -> None:
+def _copy_shipped(own: Path) -> None:
     """Copy the shipped cache of the same sources, if there is one, to ``own`` unless that exists."""
-    shipped = SHIPPED_CACHE / own.name
+    shipped = _SHIPPED_CACHE / own.name
     if own.exists() or not shipped.is_dir():
         return
     making = own.with_name(f".{own.name}.{secrets.token_hex(4)}.gone")  # swept later if the program is killed here
@@ -138,7 +138,7 @@ def _writable(folder: Path) -> bool:
     return os.access(folder, os.W_OK)
 
 
-def sweep_caches(own: Path) -> None:
+def _sweep_caches(own: Path) -> None:
     """Remove the caches next to ``own`` that no program used for a day, except the newest.
 
     The modification time of a cache is the last start of a program that uses it. A cache is renamed before it is
@@ -150,12 +150,12 @@ def sweep_caches(own: Path) -> None:
         for left in (path for path in others if _HALF_REMOVED.fullmatch(path.name)):
             shutil.rmtree(left, ignore_errors=True)
         caches = sorted((path.stat().st_mtime, path) for path in others if _DIGEST.fullmatch(path.name))
-        for used_at, path in caches[: max(0, len(caches) + 1 - KEPT_FOLDERS)][:SWEPT_AT_ONCE]:
-            if time.time() - used_at > UNUSED_S:
-                remove_cache(path, used_at)
+        for used_at, path in caches[: max(0, len(caches) + 1 - _KEPT_FOLDERS)][:_SWEPT_AT_ONCE]:
+            if time.time() - used_at > _UNUSED_S:
+                _remove_cache(path, used_at)
 
 
-def remove_cache(path: Path, used_at: float) -> None:
+def _remove_cache(path: Path, used_at: float) -> None:
     """Remove a cache, unless a program has started with it since ``used_at`` [s since 1970]."""
     gone = path.with_name(f".{path.name}.{secrets.token_hex(4)}.gone")
     with contextlib.suppress(OSError):

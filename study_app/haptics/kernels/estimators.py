@@ -49,9 +49,9 @@ REPEATED: Final = 9.0
 """Innovation² / its variance above which an unchanged position counts as a repeated sample."""
 TROUBLE_S: Final = 20e-3
 """Time over which that mean is taken [s]."""
-QUIET_S: Final = 1.0
-CARRIED_S: Final = 10e-3
-NOTHING: Final = 1e-30
+_QUIET_S: Final = 1.0
+_CARRIED_S: Final = 10e-3
+_NOTHING: Final = 1e-30
 """Smaller values become 0, since denormal numbers would slow arithmetic down [SI units]."""
 
 
@@ -92,7 +92,7 @@ def _ewma(parameters: Record, state: Record, velocity_mps: Any, interval_s: floa
     for axis in range(3):
         difference_mps = (state.position_m[axis] - state.previous_m[axis]) * per_s
         estimate_mps = velocity_mps[axis] + weight * (difference_mps - velocity_mps[axis])
-        velocity_mps[axis] = estimate_mps if abs(estimate_mps) > NOTHING else 0.0
+        velocity_mps[axis] = estimate_mps if abs(estimate_mps) > _NOTHING else 0.0
 
 
 @part
@@ -157,7 +157,7 @@ def filter_velocity(parameters: Record, state: Record, interval_s: float) -> Non
     _filter_force(filtered, interval_s)
     ratio = _correct(parameters, state, filtered, interval_s)
     on_ewma = _needs_ewma(filtered, ratio, interval_s)
-    share = interval_s / CARRIED_S
+    share = interval_s / _CARRIED_S
     kept = 1.0 - share / (1.0 + share * (0.5 + share / 12.0))
     for axis in range(3):
         source_mps = filtered.smoothed_mps[axis] if on_ewma else parameters.scale * filtered.estimate_mps[axis]
@@ -269,9 +269,9 @@ def _needs_ewma(filtered: Record, ratio: float, interval_s: float) -> int:
         filtered.quiet_s = 0.0
         filtered.delay_ticks = filtered.assumed_ticks
         return 1
-    return 1 if filtered.on_ewma and filtered.quiet_s < QUIET_S else 0
+    return 1 if filtered.on_ewma and filtered.quiet_s < _QUIET_S else 0
 
 
 @part
 def _or_zero(value: float) -> float:
-    return value if abs(value) > NOTHING else 0.0
+    return value if abs(value) > _NOTHING else 0.0

@@ -137,22 +137,22 @@ def filter_storage(model: Any, passivity: layout.Record) -> float:
     return float(passivity.gain * share * lag_s * power_w / parameters.scale)
 
 
-ALLOWANCE_J = 1e-3
-SPENDING_S = 20e-3
+_ALLOWANCE_J = 1e-3
+_SPENDING_S = 20e-3
 HALVING_J = 0.125e-3
-FORGIVEN_W = 1e-3
-SMOOTHING_S = 2e-3
+_FORGIVEN_W = 1e-3
+_SMOOTHING_S = 2e-3
 SURE_MPS = 0.04
-BRAKE = 0.5
-RECOVERY_PER_S = 0.5
-INDEBTED_S = 0.1
-HAND_S = 16e-3
-FAST_MPS = 0.2
-FAST_J = 2e-3
-QUIET_MPS = 0.06
-PUSHED_S = 0.2
-LEAST_PUSH_S = 0.015
-REGAINED_S = 0.3
+_BRAKE = 0.5
+_RECOVERY_PER_S = 0.5
+_INDEBTED_S = 0.1
+_HAND_S = 16e-3
+_FAST_MPS = 0.2
+_FAST_J = 2e-3
+_QUIET_MPS = 0.06
+_PUSHED_S = 0.2
+_LEAST_PUSH_S = 0.015
+_REGAINED_S = 0.3
 DELIVERY_STEPS_PER_N = 2.0**14
 
 
@@ -215,7 +215,7 @@ def update_observer(model: Any, safety: layout.Record, interval_s: float) -> Non
             passivity.impulse_ns[axis] = sent_n[axis]
             passivity.late_impulse_ns[axis] = late_n[axis]
             passivity.later_impulse_ns[axis] = later_n[axis]
-    share = interval_s / SMOOTHING_S
+    share = interval_s / _SMOOTHING_S
     weight = share / (1.0 + share * (0.5 + share / 12.0))  # 1 - exp(-share), to 1 % over four milliseconds
     per_scale, per_s = 1.0 / parameters.scale, 1.0 / interval_s
     work_j = late_work_j = later_work_j = square_m2 = 0.0
@@ -234,7 +234,7 @@ def update_observer(model: Any, safety: layout.Record, interval_s: float) -> Non
     if square_m2 > passivity.longest_m * passivity.longest_m:
         passivity.longest_m = math.sqrt(square_m2)
     stored_j = filter_storage(model, passivity)
-    forgiven_j = FORGIVEN_W * interval_s if parameters.link.acts == 0 else 0.0
+    forgiven_j = _FORGIVEN_W * interval_s if parameters.link.acts == 0 else 0.0
     passivity.stored_j[passivity.row] = stored_j
     late_j = max(stored_j, passivity.stored_j[_row_before(passivity, delay_ticks)])
     later_j = max(late_j, passivity.stored_j[_row_before(passivity, delay_ticks + 1)])
@@ -263,15 +263,15 @@ def _watch_motion(parameters: layout.Record, passivity: layout.Record, interval_
     handle has more kinetic energy than the force can have given to it without a debt; a handle that was let go is so
     for a shorter time than one that is pushed.
     """
-    share = interval_s / HAND_S
+    share = interval_s / _HAND_S
     weight = share / (1.0 + share * (0.5 + share / 12.0))
     for axis in range(3):
         passivity.slow_mps[axis] += weight * (passivity.velocity_mps[axis] - passivity.slow_mps[axis])
     square_m2ps2 = square_distance(passivity.velocity_mps, passivity.slow_mps)
-    fast_m2ps2 = max(FAST_MPS * FAST_MPS, 2.0 * FAST_J / parameters.mass_kg)
+    fast_m2ps2 = max(_FAST_MPS * _FAST_MPS, 2.0 * _FAST_J / parameters.mass_kg)
     lasted_s = interval_s if square_m2ps2 > fast_m2ps2 else 0.0
-    passivity.fast_s = (passivity.fast_s + lasted_s) / (1.0 + interval_s / PUSHED_S)
-    passivity.quiet_s = 0.0 if square_m2ps2 > QUIET_MPS * QUIET_MPS else passivity.quiet_s + interval_s
+    passivity.fast_s = (passivity.fast_s + lasted_s) / (1.0 + interval_s / _PUSHED_S)
+    passivity.quiet_s = 0.0 if square_m2ps2 > _QUIET_MPS * _QUIET_MPS else passivity.quiet_s + interval_s
     passivity.gap_s = 0.0 if is_gap(parameters, interval_s) else passivity.gap_s + interval_s
 
 
@@ -304,12 +304,12 @@ def _least_favourable(
 @part
 def _left_j(passivity: layout.Record) -> float:
     """Return the distance of the lowest balance from the allowed debt [J]; below 0 it is a debt."""
-    return float(ALLOWANCE_J + min(passivity.balance_j, passivity.late_balance_j, passivity.later_balance_j))
+    return float(_ALLOWANCE_J + min(passivity.balance_j, passivity.late_balance_j, passivity.later_balance_j))
 
 
 @part
 def _forgive(balance_j: float, forgiven_j: float) -> float:
-    return min(balance_j + forgiven_j, -ALLOWANCE_J) if balance_j < -ALLOWANCE_J else balance_j
+    return min(balance_j + forgiven_j, -_ALLOWANCE_J) if balance_j < -_ALLOWANCE_J else balance_j
 
 
 @part
@@ -318,11 +318,11 @@ def reduce_gain(parameters: layout.Record, passivity: layout.Record, sample: lay
     left_j = min(_left_j(passivity), INCREMENTAL_ALLOWANCE_J + passivity.fast.balance_j)
     left_j = _judge_debt(parameters, passivity, left_j)
     if passivity.debt == layout.DEBT_FORGIVEN:
-        passivity.gain = min(passivity.gain + parameters.period_s / REGAINED_S, 1.0)
+        passivity.gain = min(passivity.gain + parameters.period_s / _REGAINED_S, 1.0)
     elif parameters.link.acts == 0:
-        passivity.gain = min(passivity.gain * (1.0 + RECOVERY_PER_S * parameters.period_s), 1.0)
+        passivity.gain = min(passivity.gain * (1.0 + _RECOVERY_PER_S * parameters.period_s), 1.0)
     elif left_j < 0.0:
-        passivity.gain *= max(1.0 - parameters.period_s / INDEBTED_S, 0.0)
+        passivity.gain *= max(1.0 - parameters.period_s / _INDEBTED_S, 0.0)
     if left_j < 0.0:
         passivity.gain = min(passivity.gain, HALVING_J / (HALVING_J - left_j))
     if passivity.gain < 1.0:
@@ -336,7 +336,7 @@ def reduce_gain(parameters: layout.Record, passivity: layout.Record, sample: lay
 def _judge_debt(parameters: layout.Record, passivity: layout.Record, left_j: float) -> float:
     """Classify the cause of a debt; forgive one caused by a push once the hand is quiet. Return the energy left [J]."""
     if left_j < 0.0 and passivity.debt in (layout.DEBT_NONE, layout.DEBT_FORGIVEN):
-        pushed = passivity.fast_s > LEAST_PUSH_S and passivity.gap_s > PUSHED_S
+        pushed = passivity.fast_s > _LEAST_PUSH_S and passivity.gap_s > _PUSHED_S
         passivity.debt = layout.DEBT_PUSHED if pushed else layout.DEBT_OWN
     elif left_j >= 0.0 and passivity.gain >= 1.0:
         passivity.debt = layout.DEBT_NONE
@@ -347,7 +347,7 @@ def _judge_debt(parameters: layout.Record, passivity: layout.Record, left_j: flo
         passivity.late_balance_j = max(passivity.late_balance_j, 0.0)
         passivity.later_balance_j = max(passivity.later_balance_j, 0.0)
         passivity.fast.balance_j = 0.0
-        return ALLOWANCE_J
+        return _ALLOWANCE_J
     return left_j
 
 
@@ -392,15 +392,15 @@ def _limit_power(parameters: layout.Record, safety: layout.Record, left_j: float
     power_w = 0.0
     for axis in range(3):
         power_w += (force_n[axis] - lift_n[axis]) * v_mps[axis]
-    if left_j >= 0.0 and power_w * SPENDING_S <= left_j:
+    if left_j >= 0.0 and power_w * _SPENDING_S <= left_j:
         return False
     speed_mps = math.sqrt(square_mps2)
     along_n = power_w / speed_mps
     if left_j >= 0.0:
-        wanted_n = left_j / (SPENDING_S * speed_mps)
+        wanted_n = left_j / (_SPENDING_S * speed_mps)
     else:
         limit_nspm = parameters.slope_limit_nspm[safety.delay_ticks] * parameters.scale
-        brake_n = BRAKE * passivity.gain * limit_nspm * speed_mps
+        brake_n = _BRAKE * passivity.gain * limit_nspm * speed_mps
         wanted_n = -min(-left_j / (parameters.period_s * speed_mps), brake_n)
     if along_n <= wanted_n:
         return False

@@ -29,7 +29,7 @@ from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.model.device_dynamics import MOST_DELAY
 from study_app.haptics.model.layout import records
 
-PACE = np.dtype(
+_PACE = np.dtype(
     [
         ("period_s", np.float64),
         ("jitter_s", np.float64),  # greatest lateness of a tick
@@ -43,7 +43,7 @@ PACE = np.dtype(
 
 def new_schedule(period_s: float, *, jitter_s: float = 0.0, missed: float = 0.0, seed: int = 1) -> Any:
     """Return the record of a servo's schedule; ``jitter_s`` must be below the period, ``missed`` below 1."""
-    pace = records(PACE, 1)
+    pace = records(_PACE, 1)
     pace.period_s = period_s
     pace.jitter_s = jitter_s
     pace.missed = missed
@@ -97,7 +97,7 @@ HANDLE = np.dtype(
     align=True,
 )
 
-SUB_STEP_S = 50e-6
+_SUB_STEP_S = 50e-6
 
 
 def new_handle(
@@ -138,7 +138,7 @@ def move(handle: Any, from_m: Any, to_m: Any, duration_s: float) -> None:
     """Integrate over ``duration_s`` while the hand moves straight from ``from_m`` to ``to_m`` (each (3,) [m])."""
     if duration_s <= 0.0:
         return
-    steps = math.ceil(duration_s / SUB_STEP_S)
+    steps = math.ceil(duration_s / _SUB_STEP_S)
     step = duration_s / steps
     for k in range(steps):
         _sub_step(handle, from_m, to_m, duration_s, (k + 1.0) / steps, step)

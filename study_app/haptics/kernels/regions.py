@@ -10,8 +10,8 @@ from study_app.haptics.kernels.effects.surface import submerge
 from study_app.haptics.model.effects import surface
 from study_app.haptics.model.layout import REGION_BOX, REGION_EVERYWHERE, Record
 
-HYSTERESIS_M = 1e-3
-FADE_S = 20e-3
+_HYSTERESIS_M = 1e-3
+_FADE_S = 20e-3
 
 
 @part
@@ -28,7 +28,7 @@ def update_volume_fractions(model: Any, interval_s: float) -> None:
         surfaced = liquid.effects & surface.BIT
         local.inside = _contains(liquid.region, state.position_m, local.inside, surfaced)
         target = free if local.inside else 0.0
-        step = interval_s / FADE_S if state.placed else 1.0
+        step = interval_s / _FADE_S if state.placed else 1.0
         local.border += min(max(target - local.border, -step), step)
         local.share = local.border
         local.frontal = local.border
@@ -49,7 +49,7 @@ def _contains(region: Record, place_m: Any, inside: int, surfaced: int) -> int:
     """
     if region.kind == REGION_EVERYWHERE:
         return 1
-    margin_m = HYSTERESIS_M if inside else 0.0
+    margin_m = _HYSTERESIS_M if inside else 0.0
     dx = abs(place_m[0] - region.centre_m[0])
     dy = region.centre_m[1] - place_m[1] if surfaced else abs(place_m[1] - region.centre_m[1])
     dz = abs(place_m[2] - region.centre_m[2])

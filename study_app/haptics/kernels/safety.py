@@ -76,8 +76,8 @@ def _mixed(value: int) -> int:
 
 
 START_FADE_S = 0.5
-LATE_S = 0.045
-LEAST_SLEW = 1.0 / 3.0
+_LATE_S = 0.045
+_LEAST_SLEW = 1.0 / 3.0
 """Share of the slew limit during a fade in, and least share after a great energy debt."""
 
 
@@ -225,7 +225,7 @@ def _fade(force_n: Any, lift_n: Any, parameters: layout.Record, safety: layout.R
         sample.limiters |= safety.withheld if safety.withheld else layout.LIMITER_STALE
         lasted_s = max(safety.late_s, safety.tick_s if safety.withheld else 0.0)
         safety.fade = max(safety.fade - lasted_s / parameters.rules.fade_out_s, 0.0)
-        if safety.late_s >= LATE_S:
+        if safety.late_s >= _LATE_S:
             safety.fade_s = START_FADE_S
     else:
         safety.fade = min(safety.fade + safety.tick_s / max(safety.fade_s, parameters.fade_s), 1.0)
@@ -245,9 +245,9 @@ def _limit_slew(
     After an energy debt the limit is reduced by the controller's gain; it is least during a fade in. A force that falls
     too slowly at a reversal would do work on the hand: its unwanted part along the motion is dropped at once.
     """
-    of_limit = max(safety.passivity.gain, LEAST_SLEW)
+    of_limit = max(safety.passivity.gain, _LEAST_SLEW)
     if safety.fade < 1.0:
-        of_limit = parameters.rules.fade_out_slew if safety.withheld else LEAST_SLEW
+        of_limit = parameters.rules.fade_out_slew if safety.withheld else _LEAST_SLEW
     most_n = parameters.slew_n * of_limit
     if square_distance(force_n, safety.slewed_n) <= most_n * most_n:
         return

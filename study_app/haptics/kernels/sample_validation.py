@@ -10,21 +10,21 @@ from study_app.haptics.kernels.vector import copy, norm, square, square_distance
 from study_app.haptics.model import layout
 from study_app.haptics.model.estimators import DEVICE
 
-SHORTEST_S = 0.2e-3
-LONGEST_S = 20e-3
-FASTEST_HAND_MPS = 10.0
-FARTHEST_HAND_M = 10.0
-REFUSALS_IN_A_ROW = 5
-COUNTS = 2.0
+_SHORTEST_S = 0.2e-3
+_LONGEST_S = 20e-3
+_FASTEST_HAND_MPS = 10.0
+_FARTHEST_HAND_M = 10.0
+_REFUSALS_IN_A_ROW = 5
+_COUNTS = 2.0
 """Encoder counts by which two steps may differ at rest."""
-STALE_NS = 5_000_000
+_STALE_NS = 5_000_000
 FAULT_NS = 50_000_000
 
 
 @part
 def clamp(interval_s: float) -> float:
     """Return the time between two samples, limited to the range of the model [s]."""
-    return min(max(interval_s, SHORTEST_S), LONGEST_S)
+    return min(max(interval_s, _SHORTEST_S), _LONGEST_S)
 
 
 @part
@@ -51,7 +51,7 @@ def accept_sample(
     if not _plausible(parameters, state, safety, sample, interval_s):
         sample.limiters |= layout.LIMITER_GLITCH
         state.rejected += 1
-        if state.rejected == REFUSALS_IN_A_ROW:
+        if state.rejected == _REFUSALS_IN_A_ROW:
             state.tracking = 0
             safety.withheld |= layout.LIMITER_GLITCH
         return 0.0
@@ -95,7 +95,7 @@ def _plausible(
     """Return whether the position is plausible for a hand, and within reach of the last accepted one."""
     hand_m = sample.position_m
     for axis in range(3):
-        if not abs(hand_m[axis]) <= FARTHEST_HAND_M:  # also rejects NaN
+        if not abs(hand_m[axis]) <= _FARTHEST_HAND_M:  # also rejects NaN
             return False
     if parameters.estimator == DEVICE and not _has_velocity(sample):
         return False
@@ -160,7 +160,7 @@ def _within_reach(
     along_m = abs(along_m2ps) / speed_mps if speed_mps > 0.0 else math.sqrt(square_m2)
     most_mps2 = parameters.rules.hand_mps2 + force_n / parameters.mass_kg
     most_m = most_mps2 * 0.5 * interval_s * (interval_s + state.step_s)
-    most_m += COUNTS * parameters.count_m * (1.0 + interval_s / state.step_s)
+    most_m += _COUNTS * parameters.count_m * (1.0 + interval_s / state.step_s)
     if late_m > 0.0:
         most_m += state.fastest_mps * interval_s
     return bool(along_m <= most_m + late_m and square_m2 - along_m * along_m <= most_m * most_m)
@@ -169,7 +169,7 @@ def _within_reach(
 @part
 def can_have_moved(from_m: Any, to_m: Any, interval_s: float) -> bool:
     """Return whether a hand can have moved so far within a time [s]; False if a position is not finite."""
-    farthest_m = FASTEST_HAND_MPS * interval_s
+    farthest_m = _FASTEST_HAND_MPS * interval_s
     return bool(square_distance(to_m, from_m) <= farthest_m * farthest_m)
 
 
@@ -177,7 +177,7 @@ def can_have_moved(from_m: Any, to_m: Any, interval_s: float) -> bool:
 def _has_velocity(sample: layout.Record) -> bool:
     """Return whether the device measured a velocity that is plausible for a hand."""
     for axis in range(3):
-        if not abs(sample.device_velocity_mps[axis]) <= FASTEST_HAND_MPS:  # also rejects NaN
+        if not abs(sample.device_velocity_mps[axis]) <= _FASTEST_HAND_MPS:  # also rejects NaN
             return False
     return bool(sample.measured & layout.MEASURED_VELOCITY)
 
@@ -194,13 +194,13 @@ def watchdog(parameters: layout.Record, safety: layout.Record, sample: layout.Re
         safety.tick_ns = sample.time_ns
         safety.usable_ns = sample.time_ns
     since_ns = sample.time_ns - safety.tick_ns
-    safety.tick_s = min(max(since_ns * 1e-9, 0.0), LONGEST_S)
+    safety.tick_s = min(max(since_ns * 1e-9, 0.0), _LONGEST_S)
     safety.tick_ns = sample.time_ns
-    safety.late_s = max(since_ns - parameters.period_s * 1e9 - STALE_NS, 0.0) * 1e-9
+    safety.late_s = max(since_ns - parameters.period_s * 1e9 - _STALE_NS, 0.0) * 1e-9
     age_ns = sample.time_ns - safety.usable_ns
     if age_ns == 0:
         safety.withheld = 0
-    elif age_ns > STALE_NS:
+    elif age_ns > _STALE_NS:
         safety.withheld |= layout.LIMITER_STALE
     if age_ns >= FAULT_NS and safety.fault == layout.STATUS_OK:
         safety.fault = layout.STATUS_STALE_FAULT

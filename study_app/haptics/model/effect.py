@@ -11,7 +11,7 @@ from dataclasses import KW_ONLY, dataclass, field
 from typing import Any, Literal, NamedTuple, TypeAlias
 
 Value: TypeAlias = "float | str | None"
-Choices: TypeAlias = tuple[tuple[str, str], ...]
+_Choices: TypeAlias = tuple[tuple[str, str], ...]
 
 Fields: TypeAlias = tuple[tuple[Any, ...], ...]
 """The fields of a record, as numpy's dtype takes them, so that descriptors need no numpy: name, type, shape if any."""
@@ -21,7 +21,7 @@ GRAVITY_MPS2 = 9.80665
 TAIL_RATE_HZ = 1000.0
 """Elements of a wake are counted at this rate."""
 
-KALMAN_SMOOTHING_S = 0.015
+_KALMAN_SMOOTHING_S = 0.015
 
 LEAST, MOST = 0.0, 1.0  # of a parameter without a range: then the range in its model counts
 
@@ -43,7 +43,7 @@ class Parameter:
     default: Value = None
     logarithmic: bool = False
     whole: bool = False
-    choices: Choices = ()
+    choices: _Choices = ()
     shown_unit: str = ""
     factor: float = 1.0
     decimals: int = 2
@@ -200,7 +200,7 @@ def smoothing_s(velocity: Any, given_s: float | None, usual_s: float) -> float:
         return 0.0
     if given_s is not None:
         return given_s
-    return KALMAN_SMOOTHING_S if velocity.kind == "kalman" else usual_s
+    return _KALMAN_SMOOTHING_S if velocity.kind == "kalman" else usual_s
 
 
 def rate_per_s(time_s: float) -> float:

@@ -12,11 +12,11 @@ from typing import Any, Final, Literal
 from study_app.haptics.model.effect import FLOAT, INT, Fields
 from study_app.haptics.model.ranges import Alpha, Frozen
 
-NOMINAL_S: Final = 1e-3
+_NOMINAL_S: Final = 1e-3
 """Weights of EWMA apply to differences over this time."""
 EWMA, GIVEN, RAW, KALMAN, DEVICE = 0, 1, 4, 5, 7
 """Codes of estimators in compiled code."""
-KALMAN_LAG_S: Final = 2e-3
+_KALMAN_LAG_S: Final = 2e-3
 """Lag of the filter at abrupt changes of motion; in smooth motion it is less."""
 LINES: Final[tuple[float, ...]] = (2, 3, 5, 8, 11, 15, 16)
 """Least-squares lines through so many positions have rows in the table of slope limits, for `DeviceVelocity`."""
@@ -93,7 +93,7 @@ class DeviceVelocity(Frozen):
         return int(min(max(samples, LINES[0]), LINES[-1]))
 
 
-KALMAN_STATE: Fields = (
+_KALMAN_STATE: Fields = (
     ("force_n", FLOAT, (3,)),  # mean force since the last sample, without buoyancy and weight
     ("before_n", FLOAT, (3,)),  # the same at the sample before
     ("passed_n", FLOAT, (3,)),  # output of the first high-pass filter
@@ -120,7 +120,7 @@ KALMAN_STATE: Fields = (
 
 
 @dataclass(frozen=True, slots=True)
-class EstimatorKind:
+class _EstimatorKind:
     """The properties of one velocity estimator.
 
     Parameters
@@ -158,20 +158,20 @@ class EstimatorKind:
 
 def ewma_response(alpha: float, period_s: float, omega_per_s: float) -> complex:
     """Return V/(jωX) of EWMA in a steady oscillation."""
-    keep = math.pow(1 - alpha, period_s / NOMINAL_S)
+    keep = math.pow(1 - alpha, period_s / _NOMINAL_S)
     back = cmath.exp(-1j * omega_per_s * period_s)
     return (1 - keep) * (1 - back) / period_s / (1 - keep * back) / (1j * omega_per_s)
 
 
 def _fill_ewma(record: Any, velocity: Ewma) -> None:
     keep = 1 - velocity.alpha
-    record.log_keep_per_s = math.log(keep) / NOMINAL_S if keep > 0 else -math.inf
-    record.filter_lag_s = record.fallback_lag_s = keep / velocity.alpha * NOMINAL_S
+    record.log_keep_per_s = math.log(keep) / _NOMINAL_S if keep > 0 else -math.inf
+    record.filter_lag_s = record.fallback_lag_s = keep / velocity.alpha * _NOMINAL_S
 
 
 def _fill_kalman(record: Any, _velocity: Kalman) -> None:
     _fill_ewma(record, Ewma())
-    record.filter_lag_s = KALMAN_LAG_S
+    record.filter_lag_s = _KALMAN_LAG_S
 
 
 def _difference_share(_velocity: Raw, period_s: float, omega_per_s: float) -> float:
@@ -186,7 +186,7 @@ def _mean_share(velocity: DeviceVelocity, _period_s: float, omega_per_s: float) 
 
 
 ESTIMATORS: Final = (
-    EstimatorKind(
+    _EstimatorKind(
         "ewma",
         "EWMA (thesis)",
         EWMA,
@@ -195,18 +195,18 @@ ESTIMATORS: Final = (
         fill=_fill_ewma,
         measured=(0.005, 0.02, 0.05, 0.1, 0.12, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0),
     ),
-    EstimatorKind("given", "Given", GIVEN, Given, lambda _velocity, _period_s, _omega_per_s: 1.0, of_device=False),
-    EstimatorKind("raw", "Raw difference", RAW, Raw, _difference_share),
-    EstimatorKind(
+    _EstimatorKind("given", "Given", GIVEN, Given, lambda _velocity, _period_s, _omega_per_s: 1.0, of_device=False),
+    _EstimatorKind("raw", "Raw difference", RAW, Raw, _difference_share),
+    _EstimatorKind(
         "kalman",
         "Kalman",
         KALMAN,
         Kalman,
-        lambda _velocity, _period_s, omega_per_s: math.cos(omega_per_s * KALMAN_LAG_S),
+        lambda _velocity, _period_s, omega_per_s: math.cos(omega_per_s * _KALMAN_LAG_S),
         fill=_fill_kalman,
-        state=KALMAN_STATE,
+        state=_KALMAN_STATE,
     ),
-    EstimatorKind("device", "Device", DEVICE, DeviceVelocity, _mean_share, of_device=False),
+    _EstimatorKind("device", "Device", DEVICE, DeviceVelocity, _mean_share, of_device=False),
 )
 """Every estimator, in the order of its code."""
 

@@ -185,7 +185,7 @@ def speed_after_knee_mps(speed_mps: float, knee: Knee) -> float:
     return knee.threshold_mps + (math.sqrt(1 + 2 * excess_mps) - 1 if knee.law == "sqrt" else excess_mps**2)
 
 
-NEVER_BY_ITSELF: Final = tuple(effect.name for effect in EFFECTS if not effect.automatic)
+_NEVER_BY_ITSELF: Final = tuple(effect.name for effect in EFFECTS if not effect.automatic)
 
 
 class Verdict(NamedTuple):
@@ -265,7 +265,7 @@ def _barred_effects(scene: Scene, liquid: Liquid, bound_of: Mapping[Effect, floa
         for names, why in (effect.bars(Extremes(scene, liquid)),)
         for name in names
     }
-    return barred | dict.fromkeys(NEVER_BY_ITSELF, "not determined by density and viscosity: list it to use it")
+    return barred | dict.fromkeys(_NEVER_BY_ITSELF, "not determined by density and viscosity: list it to use it")
 
 
 def _named_verdicts(liquid: Liquid, bound_of: Mapping[Effect, float]) -> dict[Effect, tuple[bool, str]]:

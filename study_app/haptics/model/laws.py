@@ -89,13 +89,13 @@ def drag_n(
     return 3 * math.pi * viscosity_pa_s * diameter_m * speed_mps * LAWS[law](reynolds)
 
 
-YIELD: Final = 1.157
+_YIELD: Final = 1.157
 """Yield drag over 3π D² τ_y, fitted to this project's fluid solver; 1.166 from Beris et al. 1985."""
-PLASTIC: Final = 1.7
+_PLASTIC: Final = 1.7
 """Factor of the plastic boundary layer, likewise: 3π D² · 1.7 n^1.5 √(τ_v τ_y)."""
 CARREAU_RATE: Final = 0.275
 """Mean shear rate of a Carreau liquid around a sphere, over 2|w|/D."""
-THICKENED_WITHIN: Final = 2.0
+_THICKENED_WITHIN: Final = 2.0
 """Shear thickening is complete at this multiple of the shear rate of its onset."""
 RESOLVED_S: Final = 0.01
 """A shorter relaxation is below what the velocity estimator resolves: the liquid counts as Newtonian."""
@@ -103,13 +103,13 @@ RESOLVED_S: Final = 0.01
 _INDICES: Final = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 _SHAPES: Final = (1.354, 1.413, 1.458, 1.442, 1.420, 1.382, 1.320, 1.240, 1.140, 1.0)
 
-StressPa: TypeAlias = Annotated[
+_StressPa: TypeAlias = Annotated[
     float, within(0, 5000, "materials with more are solids; toothpaste has 50 to 200 Pa", what="Yield stress τ_y [Pa].")
 ]
-ConsistencyPaSn: TypeAlias = Annotated[
+_ConsistencyPaSn: TypeAlias = Annotated[
     float, within(1e-4, 1e5, "water has 0.001 Pa·s, ketchup 10 Pa·sⁿ", what="Consistency K [Pa·sⁿ].")
 ]
-FlowIndex: TypeAlias = Annotated[
+_FlowIndex: TypeAlias = Annotated[
     float,
     within(
         0.1,
@@ -118,17 +118,17 @@ FlowIndex: TypeAlias = Annotated[
         what="Flow index n; 1: no shear thinning.",
     ),
 ]
-TimeS: TypeAlias = Annotated[float, within(1e-4, 1000, "below this a liquid is Newtonian; above this it is a solid")]
-ShearRate: TypeAlias = Annotated[float, within(0.01, 1e5, "a hand shears a liquid at 0.1 to 100 per second")]
+_TimeS: TypeAlias = Annotated[float, within(1e-4, 1000, "below this a liquid is Newtonian; above this it is a solid")]
+_ShearRate: TypeAlias = Annotated[float, within(0.01, 1e5, "a hand shears a liquid at 0.1 to 100 per second")]
 
 
 class HerschelBulkley(Frozen):
     """Flow curve τ = τ_y + K γ̇^n: yield stress, consistency, flow index. Bingham: n = 1; power law: τ_y = 0."""
 
     kind: Literal["herschel-bulkley"] = "herschel-bulkley"
-    yield_stress_pa: StressPa = 0.0
-    consistency_pa_sn: ConsistencyPaSn
-    flow_index: FlowIndex = 1.0
+    yield_stress_pa: _StressPa = 0.0
+    consistency_pa_sn: _ConsistencyPaSn
+    flow_index: _FlowIndex = 1.0
 
 
 class Carreau(Frozen):
@@ -136,8 +136,8 @@ class Carreau(Frozen):
 
     kind: Literal["carreau"] = "carreau"
     zero_shear_viscosity_pa_s: ViscosityPaS = Field(description="Viscosity η₀ at low shear rates [Pa·s].")
-    time_constant_s: TimeS = Field(description="Time constant λ: shear thinning begins at the rate 1/λ [s].")
-    flow_index: FlowIndex
+    time_constant_s: _TimeS = Field(description="Time constant λ: shear thinning begins at the rate 1/λ [s].")
+    flow_index: _FlowIndex
 
 
 class Maxwell(Frozen):
@@ -145,7 +145,7 @@ class Maxwell(Frozen):
 
     kind: Literal["maxwell"] = "maxwell"
     zero_shear_viscosity_pa_s: ViscosityPaS = Field(description="Viscosity η in steady flow [Pa·s].")
-    relaxation_time_s: TimeS = Field(description="Relaxation time λ [s].")
+    relaxation_time_s: _TimeS = Field(description="Relaxation time λ [s].")
 
 
 class ShearThickening(Frozen):
@@ -154,7 +154,7 @@ class ShearThickening(Frozen):
     kind: Literal["shear-thickening"] = "shear-thickening"
     zero_shear_viscosity_pa_s: ViscosityPaS = Field(description="Viscosity η₀ at low shear rates [Pa·s].")
     thickened_viscosity_pa_s: ViscosityPaS = Field(description="Viscosity at high shear rates [Pa·s].")
-    onset_shear_rate_per_s: ShearRate = Field(description="Shear rate at which thickening begins [1/s].")
+    onset_shear_rate_per_s: _ShearRate = Field(description="Shear rate at which thickening begins [1/s].")
 
     @model_validator(mode="after")
     def _thickens(self) -> Self:
@@ -198,7 +198,7 @@ def shear_thickening(value: float, slope: float, thickened: float, onset: float,
 
     The ramp ends at twice the onset, or rises by ``steepest`` where that is less.
     """
-    rising = max(min((THICKENED_WITHIN * thickened - slope) / (THICKENED_WITHIN - 1.0), steepest), slope)
+    rising = max(min((_THICKENED_WITHIN * thickened - slope) / (_THICKENED_WITHIN - 1.0), steepest), slope)
     return min(max(slope * value, slope * onset + rising * (value - onset)), thickened * value)
 
 
@@ -223,14 +223,14 @@ def stress_pa(rheology: Any, shear_rate_per_s: float) -> float:
 
 def yield_n(rheology: Any, diameter_m: float) -> float:
     """Return the force [N] that a sphere at rest bears before the liquid flows: 3π D² · 1.157 τ_y."""
-    return 3 * math.pi * diameter_m**2 * YIELD * getattr(rheology, "yield_stress_pa", 0.0)
+    return 3 * math.pi * diameter_m**2 * _YIELD * getattr(rheology, "yield_stress_pa", 0.0)
 
 
 def viscous_factors(rheology: HerschelBulkley, diameter_m: float) -> tuple[float, float]:
     """Return a and b of `herschel_bulkley`: 3πD² X K D^−n and 3πD² · 1.7 n^1.5 √(K D^−n τ_y)."""
     index, area_m2 = rheology.flow_index, 3 * math.pi * diameter_m**2
     stress = rheology.consistency_pa_sn * diameter_m**-index
-    plastic = PLASTIC * index**1.5 * math.sqrt(stress * rheology.yield_stress_pa)
+    plastic = _PLASTIC * index**1.5 * math.sqrt(stress * rheology.yield_stress_pa)
     return area_m2 * shape_factor(index) * stress, area_m2 * plastic
 
 
@@ -256,7 +256,7 @@ def creeping_n(
     return 0.0, shear_thickening(speed_mps, stokes_nspm, thickened_nspm, onset_mps, steepest_nspm)
 
 
-def inertial_factor(force_n: float, speed_mps: float, inertia_kg_m: float) -> float:
+def _inertial_factor(force_n: float, speed_mps: float, inertia_kg_m: float) -> float:
     """Return the factor φ(Re) on the force of creeping flow: Re = ρ|w|D/η with the effective viscosity η = F/(3πD|w|).
 
     ``inertia_kg_m`` is 3πρD².
@@ -269,6 +269,6 @@ def steady_force_n(
 ) -> tuple[float, float]:
     """Return the force [N] on a sphere in uniform motion: that of the yield stress, and the viscous part."""
     held_n, viscous_n = creeping_n(rheology, diameter_m, speed_mps)
-    ratio = inertial_factor(held_n + viscous_n, speed_mps, 3 * math.pi * density_kg_m3 * diameter_m**2)
+    ratio = _inertial_factor(held_n + viscous_n, speed_mps, 3 * math.pi * density_kg_m3 * diameter_m**2)
     limited_n = creeping_n(rheology, diameter_m, speed_mps, steepest_nspm)[1]
     return held_n, ratio * limited_n + (ratio - 1.0) * held_n

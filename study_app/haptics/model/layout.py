@@ -39,7 +39,7 @@ LIMITER_ESTIMATOR = 1 << 9  # the velocity is EWMA's: the Kalman filter had a fa
 LIMITER_SATURATED = 1 << 10  # the device's motors saturated: its force was between 0 and ``device_force_n``
 
 
-class Limiter(NamedTuple):
+class _Limiter(NamedTuple):
     """A limiter: its bit, the ending of its column, its name in windows, and what its column counts ticks of.
 
     Sessions of the first releases lack the column of a ``later`` one; an ``expected`` one does not concern an operator.
@@ -54,30 +54,32 @@ class Limiter(NamedTuple):
 
 
 LIMITERS: Final = (
-    Limiter(bit=LIMITER_SLEW, name="slew", label="Slew", meaning="the slew limit slowed the change of force"),
-    Limiter(bit=LIMITER_FADE, name="fade", label="Fade", meaning="the force was fading in or out", expected=True),
-    Limiter(
+    _Limiter(bit=LIMITER_SLEW, name="slew", label="Slew", meaning="the slew limit slowed the change of force"),
+    _Limiter(bit=LIMITER_FADE, name="fade", label="Fade", meaning="the force was fading in or out", expected=True),
+    _Limiter(
         bit=LIMITER_SLOPE, name="slope", label="Slope", meaning="the slope limit reduced the change of force with speed"
     ),
-    Limiter(bit=LIMITER_NORM, name="norm", label="Force", meaning="the force was cut to the force limit"),
-    Limiter(
+    _Limiter(bit=LIMITER_NORM, name="norm", label="Force", meaning="the force was cut to the force limit"),
+    _Limiter(
         bit=LIMITER_ENERGY,
         name="energy",
         label="Passivity controller",
         meaning="the passivity controller changed the force",
     ),
-    Limiter(
+    _Limiter(
         bit=LIMITER_STALE, name="stale", label="Stale sample", meaning="the device did not provide a new sample in time"
     ),
-    Limiter(bit=LIMITER_GLITCH, name="glitch", label="Rejected sample", meaning="a sample was rejected as implausible"),
-    Limiter(
+    _Limiter(
+        bit=LIMITER_GLITCH, name="glitch", label="Rejected sample", meaning="a sample was rejected as implausible"
+    ),
+    _Limiter(
         bit=LIMITER_NON_FINITE,
         name="non_finite",
         label="Non-finite force",
         meaning="a force that was not finite was replaced by zero",
     ),
-    Limiter(bit=LIMITER_STOP, name="stop", label="Force stopped", meaning="the force was stopped", expected=True),
-    Limiter(
+    _Limiter(bit=LIMITER_STOP, name="stop", label="Force stopped", meaning="the force was stopped", expected=True),
+    _Limiter(
         bit=LIMITER_ESTIMATOR,
         name="estimator",
         label="Velocity filter",
@@ -86,7 +88,7 @@ LIMITERS: Final = (
         ),
         later=True,
     ),
-    Limiter(
+    _Limiter(
         bit=LIMITER_SATURATED,
         name="saturated",
         label="Saturated motors",
@@ -110,7 +112,7 @@ BUTTON_STOP = 1 << 3
 
 FORCE_STEP_N = 2.0**-14
 """Resolution of forces in recordings [N]; checks round forces to it, both live and afterwards."""
-SPEED_STEP_MPS = 2.0**-12
+_SPEED_STEP_MPS = 2.0**-12
 """Resolution of computed velocities in recordings [m/s]."""
 
 # What a device may measure besides position and buttons, as bits of Reading.measured.
@@ -169,7 +171,7 @@ class SampleField:
 
 
 _VECTOR: Final = partial(SampleField, kind=np.float64, parts=_AXES, stored=np.float32)
-_SPEED: Final = partial(_VECTOR, unit="m/s", step=SPEED_STEP_MPS)
+_SPEED: Final = partial(_VECTOR, unit="m/s", step=_SPEED_STEP_MPS)
 _FORCE: Final = partial(_VECTOR, unit="N", step=FORCE_STEP_N)
 _CODE: Final = partial(SampleField, stored=np.int32)
 
@@ -335,7 +337,7 @@ COMPRESSION_SQRT = 1
 COMPRESSION_SQUARE = 2
 
 # The force link (haptics.kernels.safety).
-LINK = np.dtype(
+_LINK = np.dtype(
     [
         ("acts", np.int64),  # 0: the force of a tick is sent in that tick
         ("delay_ticks", np.int64),
@@ -346,7 +348,7 @@ LINK = np.dtype(
     align=True,
 )
 
-LINK_STATE = np.dtype(
+_LINK_STATE = np.dtype(
     [
         ("ticks", np.int64),  # since the scene began
         ("arrived", np.int64),  # tick of the force sent last, counted from 1; 0: none has arrived yet
@@ -355,7 +357,7 @@ LINK_STATE = np.dtype(
     align=True,
 )
 
-RULES = np.dtype([(name, np.float64) for name in ForceRules._fields])
+_RULES = np.dtype([(name, np.float64) for name in ForceRules._fields])
 
 PARAMETERS = np.dtype(
     [
@@ -379,13 +381,13 @@ PARAMETERS = np.dtype(
         ("count_m", np.float64),  # one encoder count of the device, hand frame
         ("mass_kg", np.float64),  # the device's least effective mass
         ("smoothing_lead", np.float64),  # share of the lag of smoothed dw/dt that is compensated
-        ("link", LINK),
-        ("rules", RULES),
+        ("link", _LINK),
+        ("rules", _RULES),
     ],
     align=True,
 )
 
-REGION = np.dtype(
+_REGION = np.dtype(
     [
         ("kind", np.int64),  # REGION_*
         ("centre_m", np.float64, (3,)),
@@ -399,7 +401,7 @@ LIQUID = np.dtype(
         ("effects", np.int64),  # bits of the effects it selects
         ("inertia_share", np.float64, (MOST_DELAY + 1,)),  # stable share of inertial forces, by the delay
         ("smoothing_rate", np.float64, (MOST_DELAY + 1,)),  # factor of the rates at which dw/dt is smoothed, likewise
-        ("region", REGION),
+        ("region", _REGION),
         *((effect.name, record_type(effect.parameters)) for effect in EFFECTS if effect.parameters is not None),
     ],
     align=True,
@@ -430,12 +432,12 @@ STATE = np.dtype(
         ("lift_n", np.float64, (3,)),  # buoyancy and weight within it
         ("returnable_j", np.float64),  # the greatest energy that effects can return, times the scale
         ("growth", np.int64),  # GROWS_* of the force that depends least on the speed
-        ("link", LINK_STATE),
+        ("link", _LINK_STATE),
     ],
     align=True,
 )
 
-MOST_INERTIAL = max(sum(effect.damping_nspm is not None for effect in EFFECTS), 1)
+_MOST_INERTIAL = max(sum(effect.damping_nspm is not None for effect in EFFECTS), 1)
 
 LIQUID_STATE = np.dtype(
     [
@@ -453,14 +455,14 @@ LIQUID_STATE = np.dtype(
         ("late_mps", np.float64),  # the speed for its limit; 0: no delayed drag
         ("prompt_nspm", np.float64),  # the slope of the drag that acts at once
         ("inertial", np.int64),  # number of reduced inertial forces
-        ("inertia_n", np.float64, (MOST_INERTIAL, 3)),  # these forces, in the order of their effects
+        ("inertia_n", np.float64, (_MOST_INERTIAL, 3)),  # these forces, in the order of their effects
         *((effect.name, record_type(effect.state)) for effect in EFFECTS if effect.state is not None),
     ],
     align=True,
 )
 
 # The fast part of force and motion, and its work, at the hand (haptics.kernels.passivity).
-INCREMENTAL = np.dtype(
+_INCREMENTAL = np.dtype(
     [
         ("force_n", np.float64, (3,)),  # mean force since the last sample
         ("force_once_n", np.float64, (3,)),  # the same after one high-pass filter
@@ -490,7 +492,7 @@ PASSIVITY = np.dtype(
         ("late_impulse_ns", np.float64, (3,)),  # the same of late forces
         ("later_impulse_ns", np.float64, (3,)),  # the same of forces another tick later
         ("impulse_s", np.float64),  # the time since then
-        ("fast", INCREMENTAL),
+        ("fast", _INCREMENTAL),
         ("velocity_mps", np.float64, (3,)),  # the hand's in the frame of the current, smoothed over 2 ms
         ("slow_mps", np.float64, (3,)),  # the same, smoothed again
         ("fast_s", np.float64),  # for how long the hand moved fast of late

@@ -20,9 +20,9 @@ Floats: TypeAlias = NDArray[np.floating[Any]]
 
 PLACES = ("t_s", "x_m", "y_m", "z_m")
 VELOCITIES = ("vx_mps", "vy_mps", "vz_mps")
-MOST_PROBLEMS = 20
+_MOST_PROBLEMS = 20
 
-HEADER = "t_s,x_m,y_m,z_m, one row per tick"
+_HEADER = "t_s,x_m,y_m,z_m, one row per tick"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,9 +70,9 @@ def read_motion(path: Path) -> Motion:
         refuse_device(path)
         table = split(decoded(path.read_bytes()), PLACES + VELOCITIES)
     except OSError as error:
-        raise StudyError(f"cannot read the motion {path}: {error.strerror}; give a CSV file with {HEADER}") from error
+        raise StudyError(f"cannot read the motion {path}: {error.strerror}; give a CSV file with {_HEADER}") from error
     except ValueError as error:
-        raise StudyError(f"cannot read the motion {path}: {error}; give a CSV file with {HEADER}") from error
+        raise StudyError(f"cannot read the motion {path}: {error}; give a CSV file with {_HEADER}") from error
     header = table.names
     if header not in {PLACES, PLACES + VELOCITIES}:
         permitted = f"the first line must be {','.join(PLACES)}, optionally followed by {','.join(VELOCITIES)}"
@@ -120,15 +120,15 @@ def _numbers(path: Path, lines: tuple[Line, ...], columns: int) -> Floats:
                 before, now = rows[-2][0], rows[-1][0]
                 message = f"t_s must increase, but {now!r} follows {before!r}"
                 problems.append(Problem(f"row {number}", message, line=line))
-    if len(problems) > MOST_PROBLEMS:
-        more = len(problems) - MOST_PROBLEMS
-        problems = [*problems[:MOST_PROBLEMS], Problem("rows", f"{more} more such errors")]
+    if len(problems) > _MOST_PROBLEMS:
+        more = len(problems) - _MOST_PROBLEMS
+        problems = [*problems[:_MOST_PROBLEMS], Problem("rows", f"{more} more such errors")]
     if problems:
         raise ProtocolError(str(path), tuple(problems))
     return np.array(rows)
 
 
-SPEED_MPS = 1.0
+_SPEED_MPS = 1.0
 RADIUS_M = 0.265  # three circles at 1 m/s take 5 s: 5000 elements at 1 kHz, the tail of the thesis' figures
 
 
@@ -150,7 +150,7 @@ def programmed_motion(name: str, *, rate_hz: float = 1000.0, **parameters: float
 def circle(
     rate_hz: float,
     *,
-    speed_mps: float = SPEED_MPS,
+    speed_mps: float = _SPEED_MPS,
     radius_m: float = RADIUS_M,
     revolutions: float = 3.0,
     rest_s: float = 6.0,
@@ -164,7 +164,7 @@ def circle(
 def reverse(
     rate_hz: float,
     *,
-    speed_mps: float = SPEED_MPS,
+    speed_mps: float = _SPEED_MPS,
     radius_m: float = RADIUS_M,
     revolutions: float = 3.0,
     against_s: float = 2.0,
@@ -178,19 +178,19 @@ def reverse(
     return _on_circle(t_s, (forth - back) * speed_mps, sign * speed_mps, radius_m)
 
 
-def line(rate_hz: float, *, speed_mps: float = SPEED_MPS, moving_s: float = 6.0) -> Motion:
+def line(rate_hz: float, *, speed_mps: float = _SPEED_MPS, moving_s: float = 6.0) -> Motion:
     """Straight along x, without a stop (Rek 2024, Figs 7 and 8)."""
     t_s = _times(moving_s, rate_hz)
     return _horizontal(t_s, x=t_s * speed_mps, vx=np.full_like(t_s, speed_mps))
 
 
-def stop(rate_hz: float, *, speed_mps: float = SPEED_MPS, moving_s: float = 3.0, rest_s: float = 6.0) -> Motion:
+def stop(rate_hz: float, *, speed_mps: float = _SPEED_MPS, moving_s: float = 3.0, rest_s: float = 6.0) -> Motion:
     """Straight along x, then a stop."""
     t_s = _times(moving_s + rest_s, rate_hz)
     return _horizontal(t_s, x=np.minimum(t_s, moving_s) * speed_mps, vx=(t_s < moving_s) * speed_mps)
 
 
-def zigzag(rate_hz: float, *, speed_mps: float = SPEED_MPS, leg_s: float = 0.5, legs: float = 12) -> Motion:
+def zigzag(rate_hz: float, *, speed_mps: float = _SPEED_MPS, leg_s: float = 0.5, legs: float = 12) -> Motion:
     """Toward −z in legs that alternate by 90°, 45° to either side (Rek 2024, Fig. 6)."""
     t_s = _times(leg_s * legs, rate_hz)
     leg = _count(t_s, leg_s, legs)

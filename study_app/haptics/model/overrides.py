@@ -13,7 +13,7 @@ from study_app.haptics.model.scene import Scene
 
 Tables: TypeAlias = "dict[str, list[dict[str, Any]]]"
 
-SHOWN = 200  # characters of a bad value shown in messages
+_SHOWN = 200  # characters of a bad value shown in messages
 
 # The tables a parameter may be in, in the order in which a plain name is looked up.
 _OF_A_LIQUID = ("region", *(it.name for it in EFFECTS if it.model is not None and not it.with_liquid))
@@ -77,7 +77,7 @@ def number_names(scene: Scene) -> tuple[str, ...]:
 
 def _shown(value: object) -> str:
     text = str(value)
-    return text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
 
 
 def _reason(place: tuple[int | str, ...], message: str) -> str:

@@ -177,9 +177,9 @@ RateHz: TypeAlias = Annotated[
 ]
 SceneScale: TypeAlias = Annotated[float, within(0.01, 100, "a stroke of 60 mm is then 0.6 mm to 6 m in the scene")]
 FADE_S = 0.05
-HAND_SPEED_MPS = 0.3
-HAND_ACCELERATION_MPS2 = 3.0  # 0.3 m/s at 1.6 Hz
-HAND_REACH_M = 0.04
+_HAND_SPEED_MPS = 0.3
+_HAND_ACCELERATION_MPS2 = 3.0  # 0.3 m/s at 1.6 Hz
+_HAND_REACH_M = 0.04
 Estimator: TypeAlias = Annotated[Ewma | Kalman | Raw | SkipJsonSchema[Withdrawn], Field(discriminator="kind")]
 Velocity: TypeAlias = Annotated[Ewma | Kalman | Raw | SkipJsonSchema[Withdrawn] | Given, Field(discriminator="kind")]
 
@@ -343,10 +343,10 @@ class Scene(Frozen):
         if depth_m is None and not isinstance(liquid.region, Everywhere):
             region = liquid.region
             top_m = region.centre_m[1] + (region.size_m[1] if isinstance(region, Box) else region.height_m) / 2
-            middle_m, reach_m = top_m - self.origin_m[1], self.scale * HAND_REACH_M
+            middle_m, reach_m = top_m - self.origin_m[1], self.scale * _HAND_REACH_M
             depth_m = (middle_m - reach_m, middle_m + reach_m)
         return MotionBox(
-            speed_mps=self.motion.speed_mps or self.scale * HAND_SPEED_MPS,
-            acceleration_mps2=self.motion.acceleration_mps2 or self.scale * HAND_ACCELERATION_MPS2,
+            speed_mps=self.motion.speed_mps or self.scale * _HAND_SPEED_MPS,
+            acceleration_mps2=self.motion.acceleration_mps2 or self.scale * _HAND_ACCELERATION_MPS2,
             depth_m=depth_m,
         )

@@ -193,7 +193,7 @@ def _table(t_s: Any, samples: Any) -> Table:
     return table
 
 
-PLACE = np.dtype(
+_PLACE = np.dtype(
     [
         ("hand_m", np.float64, (3,)),  # place of the hand, hand frame
         ("segment", np.int64),  # number of the wake's segment
@@ -202,7 +202,7 @@ PLACE = np.dtype(
     align=True,
 )
 
-TRAIL = np.dtype(
+_TRAIL = np.dtype(
     [
         ("left", np.int64),  # elements stored since the wake was empty; number q is in row q % (rows of the ring)
         ("held", np.int64),  # elements still in the wake
@@ -214,8 +214,8 @@ TRAIL = np.dtype(
 
 
 def new_wake_places(elements: int) -> tuple[Any, Any]:
-    """Return an empty trail, (1,) ``TRAIL``, and the ring of its places, (elements,) ``PLACE``."""
-    return records(TRAIL, 1), records(PLACE, elements)
+    """Return an empty trail, (1,) ``_TRAIL``, and the ring of its places, (elements,) ``_PLACE``."""
+    return records(_TRAIL, 1), records(_PLACE, elements)
 
 
 @part

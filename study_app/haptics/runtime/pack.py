@@ -37,27 +37,27 @@ KINDS: Final[tuple[Rows, ...]] = tuple(rows for effect in EFFECTS for rows in ef
 _ARRAYS: Final = tuple(name for kind in KINDS for name in kind.arrays)
 EffectRows: Final[Any] = namedtuple("EffectRows", _ARRAYS)  # type: ignore[misc]
 EffectRows.__doc__ = "The arrays of a model that effects own, by name."
-Counts: TypeAlias = Mapping[str, int]
+_Counts: TypeAlias = Mapping[str, int]
 """A number of rows for each of these arrays."""
-RESOLUTION = 1e-6
+_RESOLUTION = 1e-6
 """Resolution of the factor of smoothing rates."""
 _COMPRESSIONS = {"none": layout.COMPRESSION_NONE, "sqrt": layout.COMPRESSION_SQRT, "square": layout.COMPRESSION_SQUARE}
 
 
-def rows_needed(scene: Scene) -> Counts:
+def _rows_needed(scene: Scene) -> _Counts:
     """Return the rows that the effects of a scene's liquids own."""
-    rows = no_rows()
+    rows = _no_rows()
     for liquid in scene.liquids:
-        rows = rows_after(rows, liquid, scene.rate_hz)
+        rows = _rows_after(rows, liquid, scene.rate_hz)
     return rows
 
 
-def no_rows() -> Counts:
+def _no_rows() -> _Counts:
     """Return a count of 0 for every array."""
     return dict.fromkeys(_ARRAYS, 0)
 
 
-def rows_after(rows: Counts, liquid: Liquid, rate_hz: float) -> Counts:
+def _rows_after(rows: _Counts, liquid: Liquid, rate_hz: float) -> _Counts:
     """Return the rows plus those that a liquid's effects own."""
     added = {
         name: kind.needed(liquid, rate_hz)
@@ -69,19 +69,19 @@ def rows_after(rows: Counts, liquid: Liquid, rate_hz: float) -> Counts:
     return {name: count + added.get(name, 0) for name, count in rows.items()}
 
 
-def most_rows(liquids: int, capacity: int, rate_hz: float) -> Counts:
+def _most_rows(liquids: int, capacity: int, rate_hz: float) -> _Counts:
     """Return the rows for any ``liquids``; ``capacity`` where only the caller knows their number."""
     return {
         name: capacity if kind.most is None else liquids * kind.most(rate_hz) for kind in KINDS for name in kind.arrays
     }
 
 
-def count_open_ended(rows: Counts) -> int:
+def _count_open_ended(rows: _Counts) -> int:
     """Return the greatest number of the rows that only the caller that packs scenes knows."""
     return max((rows[name] for kind in KINDS if kind.most is None for name in kind.arrays), default=0)
 
 
-def fill(record: layout.Record, liquid: Liquid, scene: Scene, first: Counts) -> None:
+def fill(record: layout.Record, liquid: Liquid, scene: Scene, first: _Counts) -> None:
     """Write only the parameters of a liquid's effects, for rows from ``first`` on."""
     _fill_region(record.region, liquid.region)
     for effect in EFFECTS:
@@ -122,7 +122,7 @@ class Model(NamedTuple):
 
 def elements_needed(scene: Scene) -> int:
     """Return the number of wake rows of the scene: 0 if no liquid has a wake."""
-    return count_open_ended(rows_needed(resolve(scene)))
+    return _count_open_ended(_rows_needed(resolve(scene)))
 
 
 def pack(
@@ -141,9 +141,9 @@ def pack(
     those of the device, ``rules`` those of the version that computes the force.
     """
     scene = _for_device(scene, dynamics)
-    rows = rows_needed(scene)
+    rows = _rows_needed(scene)
     if capacity is not None:
-        rows = most_rows(MAX_LIQUIDS, max(count_open_ended(rows), capacity), scene.rate_hz)
+        rows = _most_rows(MAX_LIQUIDS, max(_count_open_ended(rows), capacity), scene.rate_hz)
     liquids = len(scene.liquids) if capacity is None else MAX_LIQUIDS
     model = Model(
         parameters=layout.records(layout.PARAMETERS, 1),
@@ -184,7 +184,7 @@ def pack_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> No
         raise StudyError(
             "the scene delays its force; the model was packed without room for that: pack it with a capacity"
         )
-    rows = rows_needed(scene)
+    rows = _rows_needed(scene)
     for kind in KINDS:
         for name in kind.arrays:
             if rows[name] > len(getattr(model.rows, name)):
@@ -301,12 +301,12 @@ def _fill_constants(
     parameters.link.delay_ticks, parameters.link.jitter_ticks = scene.link.ticks(scene.rate_hz)
     parameters.link.loss, parameters.link.seed = scene.link.loss, scene.link.seed
     parameters.rules = tuple(rules)
-    first = no_rows()
+    first = _no_rows()
     for record, liquid in zip(model.liquids, scene.liquids, strict=False):
         fill(record, liquid, scene, first)
         fits = [_inertia_fit(record, limit, scene, rules) for limit in limits]
         record.smoothing_rate, record.inertia_share = zip(*fits, strict=True)
-        first = rows_after(first, liquid, scene.rate_hz)
+        first = _rows_after(first, liquid, scene.rate_hz)
         parameters.effects |= record.effects
 
 
@@ -331,7 +331,7 @@ def _inertia_fit(record: layout.Record, limits: DampingLimits, scene: Scene, rul
     if isinstance(scene.velocity, Kalman):
         smoothed_nspm = whole_nspm * (limits.inertia_nspm / whole_nspm) ** rules.smoothed_excess
         rate = 1.0 / rules.longest_smoothing
-        while high - rate > RESOLUTION and damping_nspm(rate) < smoothed_nspm:
+        while high - rate > _RESOLUTION and damping_nspm(rate) < smoothed_nspm:
             middle = 0.5 * (rate + high)
             rate, high = (middle, high) if damping_nspm(middle) < smoothed_nspm else (rate, middle)
     least_nspm = min(limits.inertia_nspm, rules.cut_inertia_share * limits.drag_nspm)

@@ -17,7 +17,7 @@ from study_app.haptics.runtime.pack import elements_needed, is_built_alike, take
 from study_app.haptics.runtime.telemetry import Telemetry
 from study_app.haptics.runtime.thread import LoopThread
 
-ELEMENTS = 10_000
+_ELEMENTS = 10_000
 
 _FAULTS = {
     STATUS_DEVICE_LOST: "stopped responding or lost its guard; turn it off if it pushes, and reconnect it",
@@ -55,7 +55,7 @@ class Servo:
         *,
         clock: Clock | None = None,
         rate_hz: float = 1000.0,
-        elements: int = ELEMENTS,
+        elements: int = _ELEMENTS,
         real_time: bool = True,
     ) -> None:
         self.rate_hz = rate_hz

@@ -20,7 +20,7 @@ from study_app.lab.identify.parameters import NO_LESS_THAN, Parameter
 from study_app.lab.identify.search import Problem, coordinate, solve, u_range
 
 CONFIDENCE: Final = 0.95
-VAGUE: Final = 2.0
+_VAGUE: Final = 2.0
 _NO_EFFECT: Final = 1e-9
 _SINGULAR: Final = 1e-9
 
@@ -159,7 +159,7 @@ def _parameter_warnings(
                 "value may lie beyond, and the intervals ignore the edge"
             )
         elif k not in paired and half[k] > (
-            math.log(VAGUE) if coordinate(it).relative is False else abs(problem.u(z)[k]) / VAGUE
+            math.log(_VAGUE) if coordinate(it).relative is False else abs(problem.u(z)[k]) / _VAGUE
         ):
             yield f"{it.name} is poorly determined by {problem.varied}: see its interval"
 

@@ -13,28 +13,28 @@ from study_app.haptics.model.laws import stress_pa
 from study_app.haptics.model.motion import Floats
 from study_app.lab.identify.fit import CURVE_TABLE, CurveFit, Fit
 
-MEASURED: Final = "#b4bec7"
-TOP_PT: Final = 40.0
-FORCE_PT: Final = 120.0
-RESIDUAL_PT: Final = 92.0
-GAP_PT: Final = 36.0
-FOOT_PT: Final = 34.0
-LINE_PT: Final = 11.0
-SIDE_PT: Final = 34.0
-RIGHT_PT: Final = 14.0
-SPEED_PT: Final = 128.0
-CAPTION_LETTERS: Final = 118
-BINS: Final = 12
-LEAST_IN_BIN: Final = 20
+_MEASURED: Final = "#b4bec7"
+_TOP_PT: Final = 40.0
+_FORCE_PT: Final = 120.0
+_RESIDUAL_PT: Final = 92.0
+_GAP_PT: Final = 36.0
+_FOOT_PT: Final = 34.0
+_LINE_PT: Final = 11.0
+_SIDE_PT: Final = 34.0
+_RIGHT_PT: Final = 14.0
+_SPEED_PT: Final = 128.0
+_CAPTION_LETTERS: Final = 118
+_BINS: Final = 12
+_LEAST_IN_BIN: Final = 20
 
 
 @style.own_settings(style.PLOT_SETTINGS)
 def draw_force(fit: Fit) -> Figure:
     """Draw the force, measured and fitted, over time; below it the residual over time, and along the motion."""
-    caption = textwrap.wrap(_caption(fit), CAPTION_LETTERS)
-    height_pt = TOP_PT + FORCE_PT + GAP_PT + RESIDUAL_PT + FOOT_PT + LINE_PT * len(caption)
+    caption = textwrap.wrap(_caption(fit), _CAPTION_LETTERS)
+    height_pt = _TOP_PT + _FORCE_PT + _GAP_PT + _RESIDUAL_PT + _FOOT_PT + _LINE_PT * len(caption)
     figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, height_pt / 72), facecolor="white")
-    time_pt = style.PAGE_WIDTH_PT - SIDE_PT - RIGHT_PT - SPEED_PT - GAP_PT
+    time_pt = style.PAGE_WIDTH_PT - _SIDE_PT - _RIGHT_PT - _SPEED_PT - _GAP_PT
 
     def place(left_pt: float, down_pt: float, width_pt: float, tall_pt: float) -> Axes:
         bottom = 1 - (down_pt + tall_pt) / height_pt
@@ -44,18 +44,18 @@ def draw_force(fit: Fit) -> Figure:
     def write(left_pt: float, down_pt: float, text: str, **look: Any) -> None:
         figure.text(left_pt / style.PAGE_WIDTH_PT, 1 - down_pt / height_pt, text, va="top", **look)
 
-    below_pt = TOP_PT + FORCE_PT + GAP_PT
-    right_pt = SIDE_PT + time_pt + GAP_PT
-    write(SIDE_PT, 6, f"{fit.liquid_id}: measured and fitted force", fontsize=9, fontweight="bold")
-    _force(place(SIDE_PT, TOP_PT, time_pt, FORCE_PT), fit)
-    _residual(place(SIDE_PT, below_pt, time_pt, RESIDUAL_PT), fit)
-    _along(place(right_pt, below_pt, SPEED_PT, RESIDUAL_PT), fit)
+    below_pt = _TOP_PT + _FORCE_PT + _GAP_PT
+    right_pt = _SIDE_PT + time_pt + _GAP_PT
+    write(_SIDE_PT, 6, f"{fit.liquid_id}: measured and fitted force", fontsize=9, fontweight="bold")
+    _force(place(_SIDE_PT, _TOP_PT, time_pt, _FORCE_PT), fit)
+    _residual(place(_SIDE_PT, below_pt, time_pt, _RESIDUAL_PT), fit)
+    _along(place(right_pt, below_pt, _SPEED_PT, _RESIDUAL_PT), fit)
     limit_n = 1.05 * float(np.abs(fit.residual_n).max()) or 1.0
     for axes in figure.axes[1:]:
         axes.set_ylim(-limit_n, limit_n)
-    write(right_pt, TOP_PT - 13, "Fitted, with 95 % intervals", color=style.TEXT_SOFT)
-    write(right_pt, TOP_PT + 3, "\n".join(_values(fit)), linespacing=1.45)
-    write(SIDE_PT, below_pt + RESIDUAL_PT + FOOT_PT - 8, "\n".join(caption), color=style.TEXT_SOFT, linespacing=1.25)
+    write(right_pt, _TOP_PT - 13, "Fitted, with 95 % intervals", color=style.TEXT_SOFT)
+    write(right_pt, _TOP_PT + 3, "\n".join(_values(fit)), linespacing=1.45)
+    write(_SIDE_PT, below_pt + _RESIDUAL_PT + _FOOT_PT - 8, "\n".join(caption), color=style.TEXT_SOFT, linespacing=1.25)
     return figure
 
 
@@ -91,7 +91,7 @@ def _force(axes: Axes, fit: Fit) -> None:
     _time_axis(axes, fit)
     axes.set_title("Force on the ball [N]", pad=6)
     for axis, _ in _axes(fit):
-        axes.plot(t_s, fit.measured_n[:, axis], color=MEASURED, linewidth=2.4, rasterized=True)
+        axes.plot(t_s, fit.measured_n[:, axis], color=_MEASURED, linewidth=2.4, rasterized=True)
     for axis, name in _axes(fit):
         axes.plot(t_s, fit.fitted_n[:, axis], **style.AXES[name], label=name)
     _name_curves(axes, len(fit.axes))
@@ -129,9 +129,9 @@ def _medians(speed_mps: Floats, along_n: Floats) -> Floats:
     """Return middle speed and median residual, (k, 2), of equal intervals of speed with enough rows."""
     if len(speed_mps) == 0:
         return np.empty((0, 2))
-    edges = np.linspace(speed_mps.min(), speed_mps.max(), BINS + 1)
-    bins = np.clip(np.digitize(speed_mps, edges) - 1, 0, BINS - 1)
-    held = [bins == k for k in range(BINS) if np.count_nonzero(bins == k) >= LEAST_IN_BIN]
+    edges = np.linspace(speed_mps.min(), speed_mps.max(), _BINS + 1)
+    bins = np.clip(np.digitize(speed_mps, edges) - 1, 0, _BINS - 1)
+    held = [bins == k for k in range(_BINS) if np.count_nonzero(bins == k) >= _LEAST_IN_BIN]
     return np.array([(np.median(speed_mps[it]), np.median(along_n[it])) for it in held]).reshape(-1, 2)
 
 
@@ -165,8 +165,8 @@ def _name_curves(axes: Axes, columns: int) -> None:
     )
 
 
-MARGIN: Final = 1.3
-CURVE_LETTERS: Final = 96
+_MARGIN: Final = 1.3
+_CURVE_LETTERS: Final = 96
 
 
 @style.own_settings(style.PLOT_SETTINGS)
@@ -177,7 +177,7 @@ def draw_curve(fit: CurveFit) -> Figure:
     figure.suptitle(f"{fit.liquid_id}: measured and fitted flow curve", fontsize=9, fontweight="bold")
     rates = fit.curve.rate_per_s
     (liquid,) = (it for it in fit.scene.liquids if it.id == fit.liquid_id)
-    fine = np.geomspace(rates.min() / MARGIN, rates.max() * MARGIN, 200)
+    fine = np.geomspace(rates.min() / _MARGIN, rates.max() * _MARGIN, 200)
     look = {"color": style.AXES["x"]["color"]}
     above.loglog(
         fine, [stress_pa(getattr(liquid, CURVE_TABLE), rate) for rate in fine.tolist()], **look, label="fitted"
@@ -198,7 +198,7 @@ def draw_curve(fit: CurveFit) -> Figure:
     _curve_residual(below, fit)
     caption = "Least-squares fit of the relative residual, with 95 % intervals."
     caption += "".join(f" Warning: {warning}." for warning in fit.warnings)
-    below.set_xlabel("Shear rate [1/s]\n" + "\n".join(textwrap.wrap(caption, CURVE_LETTERS)))
+    below.set_xlabel("Shear rate [1/s]\n" + "\n".join(textwrap.wrap(caption, _CURVE_LETTERS)))
     return figure
 
 

@@ -23,8 +23,8 @@ from study_app.lab.identify.measured_force import FlowCurve, Measured, vectors_x
 from study_app.lab.identify.parameters import Parameter, find_parameters
 from study_app.lab.identify.search import ForceProblem, Problem
 
-FOLLOWING: Final = 0.1
-CHANCE: Final = 5.0
+_FOLLOWING: Final = 0.1
+_CHANCE: Final = 5.0
 """Number of standard deviations of noise above which residuals count as correlated."""
 
 
@@ -86,7 +86,7 @@ def fit(scene: Scene, liquid_id: str, names: Sequence[str], motion: Motion, forc
 
 def _residual_warnings(residual_n: Floats, rho: float, force_n: Floats) -> Iterator[str]:
     """Yield warnings of correlated residuals, which speak against the model: noise is uncorrelated."""
-    if rho > max(FOLLOWING, CHANCE / math.sqrt(residual_n.size)):
+    if rho > max(_FOLLOWING, _CHANCE / math.sqrt(residual_n.size)):
         share = _rms(residual_n) / _rms(force_n)
         yield (
             f"residuals, {100 * share:.1f} % of the force, are autocorrelated (correlation {rho:.3f} from row "
@@ -100,10 +100,10 @@ def _rms(vectors_n: Floats) -> float:
 
 
 CURVE_TABLE: Final = "non_newtonian"
-LEAST_OF_A_BRANCH: Final = 6
-APART: Final = 5.0
+_LEAST_OF_A_BRANCH: Final = 6
+_APART: Final = 5.0
 """Smallest ratio of the gap between branches to its noise. [choice] See `test_noise_makes_no_branches`."""
-LEAST_GAP: Final = 0.01
+_LEAST_GAP: Final = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -157,11 +157,11 @@ def _branch_warnings(curve: FlowCurve) -> Iterator[str]:
     common = (rate_per_s >= other_per_s[0]) & (rate_per_s <= other_per_s[-1])
     log_rate = np.log(rate_per_s[common])
     gap = np.log(stress_pa[common]) - np.interp(log_rate, np.log(other_per_s), np.log(other_pa))
-    if len(gap) < LEAST_OF_A_BRANCH:
+    if len(gap) < _LEAST_OF_A_BRANCH:
         return
     noise = math.sqrt(float(np.mean(np.diff(gap, 2) ** 2)) / 6)
     size = math.sqrt(float(np.mean(gap**2)))
-    if size > APART * noise and size > LEAST_GAP:
+    if size > _APART * noise and size > _LEAST_GAP:
         yield (
             f"{branches.description} differ by {100 * math.expm1(size):.0f} % of the stress, more than noise "
             "explains (thixotropy or hysteresis); the fit lies between them, and the intervals do not cover "

@@ -13,14 +13,14 @@ from study_app.errors import StudyError
 from study_app.haptics.model.motion import PLACES, VELOCITIES, Floats, Motion, refuse_device
 from study_app.text_tables import decoded, rows_of, split
 
-FORCES: Final = ("fx_n", "fy_n", "fz_n")
-ALONG_A_LINE: Final = ("t_s", "velocity_mps", "force_n")
+_FORCES: Final = ("fx_n", "fy_n", "fz_n")
+_ALONG_A_LINE: Final = ("t_s", "velocity_mps", "force_n")
 FLOW_CURVE: Final = ("shear_rate_per_s", "shear_stress_pa")
-_COLUMNS: Final = (PLACES + FORCES, ALONG_A_LINE, FLOW_CURVE)
-LONGEST_S: Final = 0.05
-SMOOTHED_S: Final = 0.025
-HEADER: Final = (
-    f"{','.join(PLACES + FORCES)}, with {','.join(VELOCITIES)} if they are known, or {','.join(ALONG_A_LINE)} "
+_COLUMNS: Final = (PLACES + _FORCES, _ALONG_A_LINE, FLOW_CURVE)
+_LONGEST_S: Final = 0.05
+_SMOOTHED_S: Final = 0.025
+_HEADER: Final = (
+    f"{','.join(PLACES + _FORCES)}, with {','.join(VELOCITIES)} if they are known, or {','.join(_ALONG_A_LINE)} "
     f"for a motion along one line, or {','.join(FLOW_CURVE)} from a rheometer"
 )
 
@@ -89,7 +89,7 @@ class Branches:
 
 
 def read(path: Path) -> Measured | FlowCurve:
-    """Read a table (`text_tables`) with one of the headers in `HEADER`, its columns in any order; others are not read.
+    """Read a table (`text_tables`) with one of the headers in `_HEADER`, its columns in any order; others are not read.
 
     Lines that begin with # are left out. Along a line, the motion is along x and places are summed from velocities.
 
@@ -102,14 +102,14 @@ def read(path: Path) -> Measured | FlowCurve:
         refuse_device(path)
         table = split(decoded(path.read_bytes()), {name for names in _COLUMNS for name in names}, comment="#")
     except OSError as error:
-        raise StudyError(f"cannot read {path}: {error.strerror}; give a CSV file with {HEADER}") from error
+        raise StudyError(f"cannot read {path}: {error.strerror}; give a CSV file with {_HEADER}") from error
     except ValueError as error:
-        raise StudyError(f"cannot read {path}: {error}; give a CSV file with {HEADER}") from error
+        raise StudyError(f"cannot read {path}: {error}; give a CSV file with {_HEADER}") from error
     names = max(_COLUMNS, key=lambda names: len({*names} & {*table.names}) / len(names))
-    if names == PLACES + FORCES and {*VELOCITIES} <= {*table.names}:
+    if names == PLACES + _FORCES and {*VELOCITIES} <= {*table.names}:
         names += VELOCITIES
     if lacking := [name for name in names if name not in table.names]:
-        raise StudyError(f"{path} does not have the column {', '.join(lacking)}: the first line must contain {HEADER}")
+        raise StudyError(f"{path} does not have the column {', '.join(lacking)}: the first line must contain {_HEADER}")
     if twice := [name for name in names if table.names.count(name) > 1]:
         raise StudyError(f"{path} has two columns {twice[0]}: remove one of them")
     if not table.lines:
@@ -127,9 +127,9 @@ def read(path: Path) -> Measured | FlowCurve:
 def _measured(rows: Floats, names: tuple[str, ...]) -> Measured | FlowCurve:
     if names == FLOW_CURVE:
         return FlowCurve(rows[:, 0], rows[:, 1])
-    if names == ALONG_A_LINE:
+    if names == _ALONG_A_LINE:
         return along_a_line(rows[:, 0], rows[:, 1], rows[:, 2])
-    velocity_mps = rows[:, 7:] if len(names) > len(PLACES + FORCES) else None
+    velocity_mps = rows[:, 7:] if len(names) > len(PLACES + _FORCES) else None
     return Measured(Motion(rows[:, 0], rows[:, 1:4], velocity_mps=velocity_mps), rows[:, 4:7])
 
 
@@ -158,11 +158,11 @@ def with_centred_velocity(motion: Motion) -> Motion:
     """
     if motion.velocity_mps is not None:
         return motion
-    step_s = float(np.median(np.diff(motion.t_s))) if len(motion.t_s) > 1 else LONGEST_S
+    step_s = float(np.median(np.diff(motion.t_s))) if len(motion.t_s) > 1 else _LONGEST_S
     even = at_rate(motion, 1 / step_s)
-    rows = 2 * max(math.floor(SMOOTHED_S / 2 / step_s), 1) + 1
+    rows = 2 * max(math.floor(_SMOOTHED_S / 2 / step_s), 1) + 1
     if len(even.t_s) < rows:
-        raise StudyError(f"{len(motion.t_s)} rows are too few to estimate velocities: measure for {SMOOTHED_S:g} s")
+        raise StudyError(f"{len(motion.t_s)} rows are too few to estimate velocities: measure for {_SMOOTHED_S:g} s")
     slopes = savgol_filter(even.position_m, rows, 2, deriv=1, delta=step_s, axis=0)
     velocity_mps = np.column_stack([np.interp(motion.t_s, even.t_s, column) for column in slopes.T])
     return Motion(motion.t_s, motion.position_m, velocity_mps=velocity_mps)
@@ -181,9 +181,9 @@ def at_rate(motion: Motion, rate_hz: float) -> Motion:
     step_s = np.diff(motion.t_s)
     if len(step_s) == 0:
         raise StudyError("one row is not enough: measure at least 20 rows per second")
-    if step_s.max() > LONGEST_S:
+    if step_s.max() > _LONGEST_S:
         row, gap_s = int(step_s.argmax()) + 2, float(step_s.max())
-        raise StudyError(f"row {row} comes {gap_s:.3g} s after the previous row; at most {LONGEST_S:g} s is permitted")
+        raise StudyError(f"row {row} comes {gap_s:.3g} s after the previous row; at most {_LONGEST_S:g} s is permitted")
     tick_s = 1 / rate_hz
     if abs(step_s.mean() / tick_s - 1) < 0.01 and (np.abs(step_s / tick_s - 1) < 0.5).all():
         return motion

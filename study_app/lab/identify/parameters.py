@@ -14,7 +14,7 @@ from study_app.haptics.model.effect import Effect
 from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.scene import Liquid, Scene
 
-THRESHOLDS: Final = tuple(name for effect in EFFECTS for name in effect.thresholds)
+_THRESHOLDS: Final = tuple(name for effect in EFFECTS for name in effect.thresholds)
 """Thresholds, which cannot be fitted: the force does not change with them, or jumps."""
 NO_LESS_THAN: Final = {"scaling": "length", "thickened_viscosity_pa_s": "zero_shear_viscosity_pa_s"}
 """Fields that must not be less than another of the same table."""
@@ -112,7 +112,7 @@ def _fill_open_values(scene: Scene, effect: Effect, table: BaseModel) -> BaseMod
 
 def _parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:
     place, _, field = name.rpartition(".")
-    if field in THRESHOLDS:
+    if field in _THRESHOLDS:
         raise StudyError(
             f"{name} cannot be fitted: it is a threshold, so the force jumps or does not depend on it; set it "
             "with --set and compare the residuals"
@@ -136,7 +136,7 @@ def _parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:
                 above=above,
                 whole=whole,
             )
-    known = sorted({field for fields in numbers.values() for field in fields} - set(THRESHOLDS))
+    known = sorted({field for fields in numbers.values() for field in fields} - set(_THRESHOLDS))
     near = difflib.get_close_matches(field, known, n=1)
     meant = f"did you mean {near[0]!r}? " if near else ""
     raise StudyError(f"unknown parameter {name!r}: {meant}this liquid and its effects have {', '.join(known)}")

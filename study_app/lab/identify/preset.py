@@ -16,7 +16,7 @@ from study_app.store.csv_files import csv_text_of
 from study_app.store.output_files import write_files
 
 COLUMNS: Final = ("t_s", *(f"{kind}_{axis}_n" for kind in ("measured", "fitted", "residual") for axis in "xyz"))
-CURVE_COLUMNS: Final[tuple[str, ...]] = (*FLOW_CURVE, "fitted_pa", "residual_pa")
+_CURVE_COLUMNS: Final[tuple[str, ...]] = (*FLOW_CURVE, "fitted_pa", "residual_pa")
 
 
 def report_text(estimates: Estimates) -> str:
@@ -49,7 +49,7 @@ def write_fit(fit: Fit | CurveFit, to: Path, source: Path) -> tuple[Path, ...]:
     if isinstance(fit, CurveFit):
         residual_pa = fit.curve.stress_pa - fit.fitted_pa
         values = [fit.curve.rate_per_s, fit.curve.stress_pa, fit.fitted_pa, residual_pa]
-        columns, figure, what = CURVE_COLUMNS, figures.draw_curve(fit), "flow curve"
+        columns, figure, what = _CURVE_COLUMNS, figures.draw_curve(fit), "flow curve"
     else:
         values = [fit.motion.t_s, *fit.measured_n.T, *fit.fitted_n.T, *fit.residual_n.T]
         columns, figure, what = COLUMNS, figures.draw_force(fit), "force"

@@ -42,9 +42,9 @@ from study_app.protocol.trials.tasks import AnyTask, Stroke
 
 LEAST_N: Final = 0.01
 """Less is not felt: a tenth of the force that a hand at rest notices. [choice]"""
-DIGITS = 6
+_DIGITS = 6
 """Conditions whose delays differ by less than a nanosecond present the same."""
-VARIED = {"liquids": "liquid_ids", "delays": "delay_ms", "views": "seen"}
+_VARIED = {"liquids": "liquid_ids", "delays": "delay_ms", "views": "seen"}
 """What a block compares, and the attribute of its conditions that then varies."""
 
 _TABLES = ("liquids", "conditions", "tasks", "pages", "blocks")
@@ -79,7 +79,7 @@ class Draft(BaseModel):
         return scene_with(self.scene, self.device, liquids, self.format)
 
 
-def sound_draft(document: Mapping[str, Any], broken: Iterable[Path], valid: Protocol | None) -> Draft:
+def _sound_draft(document: Mapping[str, Any], broken: Iterable[Path], valid: Protocol | None) -> Draft:
     """Return the valid entries of ``document``; ``broken`` are the paths of the problems already found."""
     differ = bool(document.keys() & {"groups", "sequences"})
     if valid is not None:
@@ -117,21 +117,21 @@ def check(document: Mapping[str, Any], broken: Iterable[Path], valid: Protocol |
         *of_items,
     ):
         yield from of_names(document)
-    parts = sound_draft(document, broken, valid)
+    parts = _sound_draft(document, broken, valid)
     for of_tables in (
-        check_targets,
-        check_liquids,
-        check_forces,
-        check_liquids_differ,
-        check_conditions_differ,
-        check_comparisons,
-        check_blocks,
-        check_parts,
+        _check_targets,
+        _check_liquids,
+        _check_forces,
+        _check_liquids_differ,
+        _check_conditions_differ,
+        _check_comparisons,
+        _check_blocks,
+        _check_parts,
     ):
         yield from of_tables(parts)
 
 
-def check_targets(parts: Draft) -> Iterator[Fault]:
+def _check_targets(parts: Draft) -> Iterator[Fault]:
     """Check that every target lies inside the tank with its whole radius."""
     if parts.device is None:
         return
@@ -155,7 +155,7 @@ def check_targets(parts: Draft) -> Iterator[Fault]:
                     )
 
 
-def check_liquids(parts: Draft) -> Iterator[Fault]:
+def _check_liquids(parts: Draft) -> Iterator[Fault]:
     """Check that a condition's liquids fit into a scene and have one ball, which meets each somewhere in the tank."""
     for name, condition in parts.conditions.items():
         place, known = (
@@ -170,12 +170,12 @@ def check_liquids(parts: Draft) -> Iterator[Fault]:
         for liquid in known:
             if parts.device is None or parts.scene is None:
                 continue
-            if not is_within_tank(parts.liquids[liquid], parts.scene, parts.device):
+            if not _is_within_tank(parts.liquids[liquid], parts.scene, parts.device):
                 message = f'the region of "{liquid}" lies outside the tank, so the hand cannot reach it'
                 yield Fault(place[:2], message, "move or enlarge the region, or scene.origin_m")
 
 
-def check_forces(parts: Draft) -> Iterator[Fault]:
+def _check_forces(parts: Draft) -> Iterator[Fault]:
     """Check that every condition exerts a force in the fastest stroke of its block's task."""
     for name, block in parts.blocks.items():
         task = parts.tasks.get(block.task)
@@ -193,7 +193,7 @@ def check_forces(parts: Draft) -> Iterator[Fault]:
                 )
 
 
-def check_liquids_differ(parts: Draft) -> Iterator[Fault]:
+def _check_liquids_differ(parts: Draft) -> Iterator[Fault]:
     """Check that no two liquids have the same numbers."""
     first: dict[str, str] = {}
     for name, liquid in parts.liquids.items():
@@ -203,7 +203,7 @@ def check_liquids_differ(parts: Draft) -> Iterator[Fault]:
             )
 
 
-def check_conditions_differ(parts: Draft) -> Iterator[Fault]:
+def _check_conditions_differ(parts: Draft) -> Iterator[Fault]:
     """Check that the conditions of a block differ, unless the block says that some are replicates."""
     for name, block in parts.blocks.items():
         presented = {
@@ -216,7 +216,7 @@ def check_conditions_differ(parts: Draft) -> Iterator[Fault]:
         for index, condition in enumerate(() if delays and block.replicates else block.conditions):
             if (settings := presented.get(condition)) is None:
                 continue
-            numbers_of = (round(getattr(settings, key), DIGITS) for key in OF_CONDITION)
+            numbers_of = (round(getattr(settings, key), _DIGITS) for key in OF_CONDITION)
             presents = (settings.liquid_ids, settings.ball, settings.view, settings.overlay, *numbers_of)
             earlier = first.setdefault(presents, condition)
             if earlier != condition:
@@ -225,7 +225,7 @@ def check_conditions_differ(parts: Draft) -> Iterator[Fault]:
                 yield Fault(("blocks", name, "conditions", index), message, hint)
 
 
-def check_comparisons(parts: Draft) -> Iterator[Fault]:
+def _check_comparisons(parts: Draft) -> Iterator[Fault]:
     """Check that a main block's conditions differ in one thing, the one that the block states.
 
     Where it says views, delays may differ as well: those that make the views equally late.
@@ -236,7 +236,7 @@ def check_comparisons(parts: Draft) -> Iterator[Fault]:
         ]
         if block.phase != "main" or block.design is not None or len(presented) < len(block.conditions):
             continue
-        varied = [of for of, key in VARIED.items() if len({getattr(condition, key) for condition in presented}) > 1]
+        varied = [of for of, key in _VARIED.items() if len({getattr(condition, key) for condition in presented}) > 1]
         if block.compares == "views" and {"views", "delays"} <= {*varied}:
             varied.remove("delays")
         if len(varied) > 1:
@@ -248,7 +248,7 @@ def check_comparisons(parts: Draft) -> Iterator[Fault]:
             yield Fault(("blocks", name, "compares"), message, "correct it, or omit it")
 
 
-def check_blocks(parts: Draft) -> Iterator[Fault]:
+def _check_blocks(parts: Draft) -> Iterator[Fault]:
     """Check that the codes of different blocks differ, and that a break is a page of that kind."""
     owners: dict[str, str] = {}
     for name, block in parts.blocks.items():
@@ -261,7 +261,7 @@ def check_blocks(parts: Draft) -> Iterator[Fault]:
             yield Fault(("blocks", name, "break_page"), message, 'a break needs a page with kind = "break"')
 
 
-def check_parts(parts: Draft) -> Iterator[Fault]:
+def _check_parts(parts: Draft) -> Iterator[Fault]:
     """Check that parts count 1, 2, … in the order of the sequence, and that at least one block is analysed.
 
     Where sessions differ each numbers its parts anew (`own_protocol`).
@@ -301,7 +301,7 @@ def _clamped(value: float) -> float:
     return min(max(value, 1e-3), 1000.0)
 
 
-def is_within_tank(liquid: Liquid, scene: SceneDefaults, device: DeviceNeeds) -> bool:
+def _is_within_tank(liquid: Liquid, scene: SceneDefaults, device: DeviceNeeds) -> bool:
     """Return whether the ball's centre meets the liquid somewhere in the tank."""
     region = liquid.region
     if isinstance(region, Everywhere):

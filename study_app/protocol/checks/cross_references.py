@@ -17,7 +17,7 @@ from study_app.protocol.source.document import Path, entries, names, value_at
 from study_app.protocol.source.problems import Fault, did_you_mean, unknown_name
 from study_app.protocol.wording.languages import LANGUAGES, REFUSED, missing_text
 
-REFERENCES = {
+_REFERENCES = {
     "conditions.*.liquid": "liquids",
     "conditions.*.liquids.*": "liquids",
     "questionnaires.*.scale": "scales",
@@ -36,7 +36,7 @@ REFERENCES = {
 }
 
 CHOICES = {
-    **{pattern: (section,) for pattern, section in REFERENCES.items()},
+    **{pattern: (section,) for pattern, section in _REFERENCES.items()},
     **{f"{pattern}.*": ("pages", "blocks", "questionnaires") for pattern in SEQUENCES},
     "blocks.*.design": ("designs",),
     "blocks.*.method": ("methods",),
@@ -79,8 +79,8 @@ TEXTS = (
     "blocks.*.setting_label",
 )
 
-WITHOUT_REPEATS = ("study.languages", "conditions.*.liquids", "blocks.*.conditions")
-DECIDED_LISTS = ("primary", "names", "rising", "falling")
+_WITHOUT_REPEATS = ("study.languages", "conditions.*.liquids", "blocks.*.conditions")
+_DECIDED_LISTS = ("primary", "names", "rising", "falling")
 
 Document = Mapping[str, Any]
 T = TypeVar("T")
@@ -99,7 +99,7 @@ def _repeated_names(listed: Sequence[tuple[Path, Any]]) -> Iterator[Fault]:
 
 def check_references(document: Document) -> Iterator[Fault]:
     """Check that every reference to a table names an existing one."""
-    for pattern, section in REFERENCES.items():
+    for pattern, section in _REFERENCES.items():
         known, kind = names(document, section), "stimulus" if section == "stimuli" else section.removesuffix("s")
         for path, name in entries(document, pattern):
             yield from _unknown_name(path, name, kind, known)
@@ -145,7 +145,7 @@ def check_sequences(document: Document) -> Iterator[Fault]:
 
 def check_repeats(document: Document) -> Iterator[Fault]:
     """Check that no list contains a name twice."""
-    for pattern in WITHOUT_REPEATS:
+    for pattern in _WITHOUT_REPEATS:
         for path, listed in entries(document, pattern):
             yield from _repeated_names([((*path, *at), entry) for at, entry in entries(listed, "*")])
 
@@ -193,14 +193,14 @@ def _repeated_texts(located_texts: list[tuple[Path, Any]], kind: str) -> Iterato
         seen |= read
 
 
-LOOKALIKES = str.maketrans("аеіјорсухѕһοαρνικ", "aeijopcyxshoapvik")
+_LOOKALIKES = str.maketrans("аеіјорсухѕһοαρνικ", "aeijopcyxshoapvik")
 """Small letters of the Cyrillic and the Greek alphabet, and the Latin ones that look the same."""
 
 
 def visible_text(text: str) -> str:
     """Return the visible content of a text: without marks of format, case, width and alphabet."""
     visible = "".join(letter for letter in text if unicodedata.category(letter) != "Cf")
-    return " ".join(unicodedata.normalize("NFKC", visible).casefold().translate(LOOKALIKES).split())
+    return " ".join(unicodedata.normalize("NFKC", visible).casefold().translate(_LOOKALIKES).split())
 
 
 def check_languages(document: Document) -> Iterator[Fault]:
@@ -259,7 +259,7 @@ def check_decisions(document: Document) -> Iterator[Fault]:
     """Check that decisions name existing statements, each once, and that such items name the liquids."""
     questions = (item for _, item in entries(document, "questionnaires.*.items.*") if isinstance(item, Mapping))
     items = {item["id"] for item in questions if isinstance(item.get("id"), str) and "kind" not in item}
-    decided = {key: list(entries(document, f"analysis.{key}.*")) for key in DECIDED_LISTS}
+    decided = {key: list(entries(document, f"analysis.{key}.*")) for key in _DECIDED_LISTS}
     for places in (*decided.values(), list(entries(document, "analysis.noticed"))):
         for path, name in places:
             yield from _unknown_name(path, name, "item", items)

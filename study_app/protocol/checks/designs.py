@@ -33,9 +33,9 @@ from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
 from study_app.protocol.trials.methods import KINDS as METHOD_KINDS
 from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulated, Stimulus, rises
 
-LEAST_MS: Final = 1e-3
+_LEAST_MS: Final = 1e-3
 """The least difference between two times that is presented [ms]: a thousandth of a tick. [choice]"""
-LEAST_SHARE: Final = 1e-6
+_LEAST_SHARE: Final = 1e-6
 """The least difference between two other numbers, as a share of the standard. [choice]"""
 
 
@@ -114,7 +114,7 @@ def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
     if block.break_every is not None and not (order := order_of(protocol, block)).breaks:
         message = f"is {block.break_every}, but the block has {order.trials} trials: there would be no break"
         yield Fault((*place, "break_every"), message)
-    if fault := next(check_design_and_method(protocol, block), None):
+    if fault := next(_check_design_and_method(protocol, block), None):
         yield fault
         return
     if block.stimulus is None:
@@ -258,7 +258,7 @@ def _check_levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
                 what = f"standard {standard:g} at level {level:g} gives" if standard is not None else "the level"
                 yield Fault(("stimuli", str(block.stimulus), "levels"), f"{what} {value:g}: {why}")
                 return
-    yield from check_adjustment(protocol, block)
+    yield from _check_adjustment(protocol, block)
 
 
 def _standard_fault(
@@ -271,7 +271,7 @@ def _standard_fault(
         return Fault((*place, "standards"), f"{standard:g} is not possible for {stimulus.vary}", permitted)
     if (why := _presentation_problem(protocol, stimulus, standard)) is not None:
         return Fault((*place, "standards"), f"{standard:g}: {why}")
-    least = LEAST_MS if stimulus.vary.endswith("_ms") else LEAST_SHARE * (abs(standard) or 1.0)
+    least = _LEAST_MS if stimulus.vary.endswith("_ms") else _LEAST_SHARE * (abs(standard) or 1.0)
     if level == 0 or stimulus.level_kind == "value" or abs(stimulus.comparison(standard, level) - standard) >= least:
         return None
     message = f"{level:g} equals the standard of {standard:g}, so the intervals do not differ"
@@ -303,7 +303,7 @@ def _presentation_problem(protocol: Protocol, stimulus: Stimulus, value: float) 
     return None
 
 
-def check_design_and_method(protocol: Protocol, block: Block) -> Iterator[Fault]:
+def _check_design_and_method(protocol: Protocol, block: Block) -> Iterator[Fault]:
     """Yield faults for a design without a method or a method without a design."""
     design, place = design_of(protocol, block), ("blocks", block.id)
     if block.stimulus is None:
@@ -319,7 +319,7 @@ def check_design_and_method(protocol: Protocol, block: Block) -> Iterator[Fault]
         yield Fault((*place, "method"), message, 'design = "adjustment", or method = "constant"')
 
 
-def check_adjustment(protocol: Protocol, block: Block) -> Iterator[Fault]:
+def _check_adjustment(protocol: Protocol, block: Block) -> Iterator[Fault]:
     """Yield why a number cannot be adjusted while it is presented, or a standard not be matched."""
     design, stimulus = design_of(protocol, block), stimulus_of(protocol, block)
     if not design.adjusts:

@@ -39,11 +39,11 @@ from study_app.protocol.tracks import condition_of, standards_of, stimulus_of
 from study_app.protocol.trials.stimuli import OF_LINK, Stimulated, Stimulus
 from study_app.protocol.trials.tasks import Stroke
 
-LEAST_SHARE: Final = 0.99
+_LEAST_SHARE: Final = 0.99
 """Of a damper, that the velocity estimator must pass."""
 LIMIT_J: Final = 0.5e-3
 """A force that returns no more is delivered; measured in docs/late-force.md."""
-MOST_NAMED: Final = 4
+_MOST_NAMED: Final = 4
 """Of more clipped levels the first and the last of each row are named."""
 PACED: Final = 'choose a task of kind "follow"'
 _GIVES: Final = ("gives", "give")
@@ -66,7 +66,7 @@ def check_paced(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS) -> Iterato
     for block in protocol.blocks.values():
         for index, name in enumerate(block.conditions if block.stimulus is None else ()):
             place = ("blocks", block.id, "conditions", index)
-            yield from check_clipping_at_pace(protocol, block, protocol.scene_for(name), f'"{name}" is', place)
+            yield from _check_clipping_at_pace(protocol, block, protocol.scene_for(name), f'"{name}" is', place)
 
 
 def _check_estimator_lag(protocol: Protocol) -> Iterator[Fault]:
@@ -80,12 +80,12 @@ def _check_estimator_lag(protocol: Protocol) -> Iterator[Fault]:
         laws = {liquid.drag.law for scene in scenes for liquid in scene.liquids}
         if not isinstance(task, Follow) or "linear" not in laws:
             continue
-        if (share := passed_share(velocity, rate_hz, task.frequency_hz)) < LEAST_SHARE:
-            most_hz = rounded_down(fastest_hz(velocity, rate_hz, LEAST_SHARE), 1)
+        if (share := passed_share(velocity, rate_hz, task.frequency_hz)) < _LEAST_SHARE:
+            most_hz = _rounded_down(fastest_hz(velocity, rate_hz, _LEAST_SHARE), 1)
             yield Fault(
                 ("tasks", name, "frequency_hz"),
                 f"at {task.frequency_hz:g} Hz the velocity estimator passes {100 * share:.1f} % of a damper's force",
-                f"at most {most_hz:g} Hz, where it passes {100 * LEAST_SHARE:g} %",
+                f"at most {most_hz:g} Hz, where it passes {100 * _LEAST_SHARE:g} %",
             )
 
 
@@ -110,7 +110,7 @@ def slope_limit_fault(protocol: Protocol, blocks: Sequence[Block], delay_ticks: 
         return None
     if stimulus.vary in OF_LINK:
         gives = f'"{condition_of(protocol, stimulus)}" gives'
-        hint = f"damping_nspm = {rounded_down(limit_nspm, 1):g}"
+        hint = f"damping_nspm = {_rounded_down(limit_nspm, 1):g}"
     else:
         every = list(_levels_at_strongest_force(protocol, blocks))
         gives = _levels_with_verb(every, [level for level in every if level.damping_nspm > limit_nspm], _GIVES)
@@ -138,7 +138,7 @@ def check_clipping(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int
     condition = condition_of(protocol, stimulus)
     if stimulus.vary in OF_LINK:
         block, scene = max(felt, key=lambda pair: hand_mps_of(protocol, pair[0]))
-        yield from check_clipping_at_pace(protocol, block, scene, f'"{condition}" is', place)
+        yield from _check_clipping_at_pace(protocol, block, scene, f'"{condition}" is', place)
         return
     every, scene = _levels_at_strongest_force(protocol, blocks), protocol.scene_for(condition)
     limit_nspm, loop = _slope_limit(scene, delay_ticks)
@@ -155,7 +155,7 @@ def check_clipping(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int
         most = max(by_force, key=lambda level: level.asked_n or 0.0)
         strongest = override_value(scene, stimulus.vary, most.comparison)
         named = _levels_with_verb(list(every), by_force, _IS)
-        yield from check_clipping_at_pace(protocol, every[most], strongest, named, place)
+        yield from _check_clipping_at_pace(protocol, every[most], strongest, named, place)
 
 
 def _levels_at_strongest_force(protocol: Protocol, blocks: Sequence[Block]) -> dict[Level, Block]:
@@ -188,7 +188,7 @@ def unpaced_clipping_warning(protocol: Protocol, blocks: Sequence[Block]) -> str
     return f"tasks.{task}: at {UNPACED_MPS:g} m/s the force{of} is clipped {limit}: such trials are repeated; {PACED}"
 
 
-def check_clipping_at_pace(protocol: Protocol, block: Block, scene: Scene, what: str, place: Path) -> Iterator[Fault]:
+def _check_clipping_at_pace(protocol: Protocol, block: Block, scene: Scene, what: str, place: Path) -> Iterator[Fault]:
     """Yield a fault if the force limit clips a scene at a block's pace, with the share and the remedy.
 
     ``what`` is the subject of the sentence with its verb: "standard 32 at level 0.6 is".
@@ -208,12 +208,12 @@ def check_clipping_at_pace(protocol: Protocol, block: Block, scene: Scene, what:
         place,
         f"{what} {drag_n:.1f} N at {FASTER:g} times the paced {pace_mps:.3g} m/s; device.force_limit_n is "
         f"{scene.force_limit_n:g}",
-        f"amplitude_mm = {rounded_down(least * task.amplitude_mm, 1):g} or "
-        f"frequency_hz = {rounded_down(least * task.frequency_hz, 2):g}",
+        f"amplitude_mm = {_rounded_down(least * task.amplitude_mm, 1):g} or "
+        f"frequency_hz = {_rounded_down(least * task.frequency_hz, 2):g}",
     )
 
 
-def rounded_down(value: float, digits: int) -> float:
+def _rounded_down(value: float, digits: int) -> float:
     """Return a value rounded down, with a margin for rounding errors of the value itself."""
     step = math.pow(10, digits)
     return math.floor(value * step + 1e-6) / step
@@ -229,14 +229,14 @@ def _slope_limit(scene: Scene, delay_ticks: int) -> tuple[float, str]:
 def _remedy(stimulus: Stimulus, standard: float | None, level: float, limit_nspm: float) -> str:
     """Return the remedy that keeps a damping within its limit."""
     if standard is None or stimulus.level_kind == "value":
-        return f"levels to {rounded_down(limit_nspm, 1):g}"
+        return f"levels to {_rounded_down(limit_nspm, 1):g}"
     if standard >= limit_nspm:
         return f"the standard below {limit_nspm:g}"
     if stimulus.level_kind == "weber":
         most_level, most_standard = limit_nspm / standard - 1, limit_nspm / (1 + level)
     else:
         most_level, most_standard = limit_nspm - standard, limit_nspm - level
-    return f"levels to {rounded_down(most_level, 3):g}, or the standard to {rounded_down(most_standard, 1):g}"
+    return f"levels to {_rounded_down(most_level, 3):g}, or the standard to {_rounded_down(most_standard, 1):g}"
 
 
 def _highest_unclipped_level(protocol: Protocol, block: Block, standard: float | None) -> str:
@@ -245,7 +245,7 @@ def _highest_unclipped_level(protocol: Protocol, block: Block, standard: float |
     if limits is None or not limits.lowest:
         return ""
     highest = stimulus.level_between(standard, limits.lowest)
-    return f"levels to {rounded_down(highest, 3):g}" if highest >= stimulus.levels[0] else ""
+    return f"levels to {_rounded_down(highest, 3):g}" if highest >= stimulus.levels[0] else ""
 
 
 def _levels_with_verb(every: Sequence[Level], some: Sequence[Level], verbs: tuple[str, str]) -> str:
@@ -264,7 +264,7 @@ def _level_ranges(every: Sequence[Level], some: Sequence[Level]) -> str:
         for place, level in enumerate(own):
             if level not in some:
                 continue
-            if rows and own[place - 1] is rows[-1][-1] and len(some) > MOST_NAMED:
+            if rows and own[place - 1] is rows[-1][-1] and len(some) > _MOST_NAMED:
                 rows[-1].append(level)
             else:
                 rows.append([level])

@@ -22,7 +22,7 @@ from study_app.protocol.orders.schedule import blocks_in_order, codes_of
 from study_app.protocol.sequences import enrolment_number, has_even_borders, longest_run, row_count, shortest_distance
 from study_app.protocol.streams import draw_secret, group_of, stream
 
-Table: TypeAlias = tuple[tuple[int, ...], ...]
+_Table: TypeAlias = tuple[tuple[int, ...], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,8 +35,8 @@ class Evenness:
 
     codes: tuple[str, ...]
     orders: int
-    positions: Table
-    follows: Table
+    positions: _Table
+    follows: _Table
     longest_run: int
     shortest_distance: int | None
 
@@ -62,7 +62,7 @@ class Evenness:
 
 
 @dataclass(frozen=True, slots=True)
-class BlockBalance:
+class _BlockBalance:
     """A block's evenness, with what its order depends on; ``unnumbered`` are participants whose id has no number."""
 
     id: str
@@ -81,7 +81,7 @@ class Balance:
     session: str
     participants: int
     seed: int
-    blocks: tuple[BlockBalance, ...]
+    blocks: tuple[_BlockBalance, ...]
 
 
 def numbered_participants(count: int, first: str = "P001") -> tuple[str, ...]:
@@ -136,11 +136,11 @@ def balance(
             title = protocol.text(protocol.blocks[block.id].title, protocol.study.languages[0])
             shown = [codes_of(orders.study, block, who, seed, place) for who, place in placed]
             counted = evenness(block.codes, shown)
-            blocks.append(BlockBalance(block.id, title, block.order, block.repetitions, counted, unnumbered))
+            blocks.append(_BlockBalance(block.id, title, block.order, block.repetitions, counted, unnumbered))
     if orders.block_order != "fixed" and sum(block.phase == "main" for block in orders.blocks) > 1:
         order: CodeOrder = "williams" if orders.block_order == "balanced" else "shuffled"
         of_blocks = _block_evenness(orders, placed, seed)
-        blocks.append(BlockBalance("", "The main blocks", order, 1, of_blocks, unnumbered))
+        blocks.append(_BlockBalance("", "The main blocks", order, 1, of_blocks, unnumbered))
     return Balance(orders.study, session, len(participants), seed, tuple(blocks))
 
 
@@ -230,7 +230,7 @@ def describe_balance(judged: Balance) -> str:
     return "\n\n".join((head, *("\n".join(_block_lines(block)) for block in judged.blocks)))
 
 
-def _block_lines(block: BlockBalance) -> Iterator[str]:
+def _block_lines(block: _BlockBalance) -> Iterator[str]:
     counted = block.evenness
     times = "" if block.repetitions == 1 else f", each {block.repetitions} times"
     if block.id:
@@ -245,7 +245,7 @@ def _block_lines(block: BlockBalance) -> Iterator[str]:
     yield from (f"  {sentence}" for sentence in (*_verdict_lines(counted), *_advice(block)))
 
 
-def _count_lines(corner: str, names: Sequence[object], codes: Sequence[str], counts: Table) -> Iterator[str]:
+def _count_lines(corner: str, names: Sequence[object], codes: Sequence[str], counts: _Table) -> Iterator[str]:
     """Yield a table of counts with a row for each name and a column for each code."""
     width = max(len(str(cell)) for cell in (*codes, *(count for line in counts for count in line)))
     first = len("position")
@@ -270,7 +270,7 @@ def _verdict_lines(counted: Evenness) -> Iterator[str]:
         yield f"At most {counted.longest_run} presentations of a condition occur in a row; {least}."
 
 
-def _advice(block: BlockBalance) -> Iterator[str]:
+def _advice(block: _BlockBalance) -> Iterator[str]:
     """Yield what the order guarantees, and how to improve it."""
     codes, repetitions = len(block.evenness.codes), block.repetitions
     match block.order:
@@ -295,7 +295,7 @@ def _advice(block: BlockBalance) -> Iterator[str]:
                 yield 'A Latin square balances only positions; order = "williams" also balances carry-over.'
 
 
-def _round_lines(block: BlockBalance, rows: int) -> Iterator[str]:
+def _round_lines(block: _BlockBalance, rows: int) -> Iterator[str]:
     """Yield whether the participants complete rounds of rows, and how many would."""
     codes, people = len(block.evenness.codes), block.evenness.orders
     if block.unnumbered:

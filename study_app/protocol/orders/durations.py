@@ -54,8 +54,8 @@ def variants(protocol: Protocol) -> Iterator[Variant]:
             yield Variant(group, session if count is not None else None, own)
 
 
-READING_WORDS_PER_S = 3.0
-PAGE_S = 5.0
+_READING_WORDS_PER_S = 3.0
+_PAGE_S = 5.0
 ANSWER_S = 6.0
 CHOICE_S = 2.0
 """How long people take, for the expected duration [choice]: read (180 words a minute) and turn a page, answer one
@@ -88,7 +88,7 @@ def step_duration_s(
     if step in protocol.pages:
         return _reading_s(protocol, step, language)
     if step in protocol.forms:
-        return answering_s(protocol.forms[step])
+        return _answering_s(protocol.forms[step])
     return block_duration_s(protocol, protocol.blocks[step], language, of_task)
 
 
@@ -101,14 +101,14 @@ def recordings_of(protocol: Protocol) -> Iterator[tuple[int, float]]:
         yield order_of(protocol, block).trials * intervals, protocol.tasks[block.task].expected_s + longer_s
 
 
-def answering_s(questionnaire: Questionnaire) -> float:
+def _answering_s(questionnaire: Questionnaire) -> float:
     """Return the time to answer a questionnaire once [s]."""
-    return PAGE_S + ANSWER_S * len(questionnaire.items)
+    return _PAGE_S + ANSWER_S * len(questionnaire.items)
 
 
 def _reading_s(protocol: Protocol, page_id: str, language: str) -> float:
     page = protocol.pages[page_id]
-    return max(PAGE_S + len(protocol.text(page.body, language).split()) / READING_WORDS_PER_S, page.min_s or 0.0)
+    return max(_PAGE_S + len(protocol.text(page.body, language).split()) / _READING_WORDS_PER_S, page.min_s or 0.0)
 
 
 def block_duration_s(
@@ -116,7 +116,7 @@ def block_duration_s(
 ) -> float:
     """Return the duration of a block [s]; ``of_task`` gives a task's duration if it is not the expected one."""
     questionnaire = protocol.questionnaire_of(block.id)
-    answering = 0.0 if questionnaire is None else answering_s(questionnaire)
+    answering = 0.0 if questionnaire is None else _answering_s(questionnaire)
     order = order_of(protocol, block)
     resting = 0.0 if block.break_page is None else order.breaks * _reading_s(protocol, block.break_page, language)
     task = protocol.tasks[block.task]

@@ -50,7 +50,7 @@ __all__ = [
     "stream",
 ]
 
-Key: TypeAlias = dict[str, dict[str, str]]
+_Key: TypeAlias = dict[str, dict[str, str]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,13 +209,13 @@ def _shuffled(step: BlockOrder | FormOrder, seed: int, name: str) -> tuple[str, 
     return step.items if step.item_order == "fixed" else shuffle(step.items, stream(seed, f"items/{name}").random)
 
 
-def draw_key(protocol: Protocol, draw: Draw) -> Key:
+def draw_key(protocol: Protocol, draw: Draw) -> _Key:
     """Return block → code → condition or track, drawn with ``draw`` (uniform numbers in [0, 1)).
 
     A block in fixed order keeps its order, as the protocol asks, so its codes name its conditions in the order written:
     whoever reads the protocol can tell them.
     """
-    key: Key = {}
+    key: _Key = {}
     for block in protocol.blocks_in_order:
         if block.design is not None:
             presented = shuffle((track.name for track in tracks_of(protocol, block)), draw)

@@ -91,7 +91,7 @@ def arrangement_of(design: Design, text: str) -> int:
     return design.arrangements.index(tuple(letter == "C" for letter in text))
 
 
-STANDARD_ALONE: Final = 1
+_STANDARD_ALONE: Final = 1
 """The arrangement of a noise trial, in a design that has any."""
 
 
@@ -129,10 +129,10 @@ def next_level(
     design = design_of(protocol, block)
     if design.first is not None:
         if trial.index == 1:
-            return presentation_of(protocol, block, track, 0, design.first.level)
+            return _presentation_of(protocol, block, track, 0, design.first.level)
         slot -= 1
     if track.comparison is not None:  # conditions are compared
-        return presentation_of(protocol, block, track, draws.arrangement(design, slot), None)
+        return _presentation_of(protocol, block, track, draws.arrangement(design, slot), None)
     method, stimulus = method_of(protocol, block), stimulus_of(protocol, block)
     setting = TrackSetting(stimulus, design, track.number)
     answered = sorted(
@@ -143,14 +143,14 @@ def next_level(
     catch = draws.catch(track.catch)
     if slot in catch:
         arrangement = draws.arrangement(design, catch.index(slot), "catch")
-        return presentation_of(protocol, block, track, arrangement, stimulus.levels[1], catch=True)
+        return _presentation_of(protocol, block, track, arrangement, stimulus.levels[1], catch=True)
     slot -= sum(position < slot for position in catch)
     noise = draws.noise(design.noise(method.presentations(stimulus)), track.slots - len(catch))
     if slot in noise:
-        return presentation_of(protocol, block, track, STANDARD_ALONE, 0.0)
+        return _presentation_of(protocol, block, track, _STANDARD_ALONE, 0.0)
     rounds = draws.rounds(method.rounds(stimulus))
     level = method.level(setting, slot - sum(position < slot for position in noise), answered, rounds)
-    return presentation_of(protocol, block, track, draws.arrangement(design, slot), level)
+    return _presentation_of(protocol, block, track, draws.arrangement(design, slot), level)
 
 
 def is_criterion_met(block: Block, schedule: Schedule, heard: Sequence[TrialResult]) -> bool:
@@ -194,7 +194,7 @@ class _Draws:
         return [secret_stream(self.secret, f"round/{self.track}/{number}").random for number in range(count)]
 
 
-def presentation_of(
+def _presentation_of(
     protocol: Protocol, block: Block, track: Track, arrangement: int, level: float | None, *, catch: bool = False
 ) -> Presentation:
     """Return a track's presentation at a level (None: conditions are compared) in an arrangement."""
@@ -224,7 +224,7 @@ def recorded_presentation(
     block = protocol.blocks[started["block"]]
     track = track_of(protocol, block, codes[block.id][started["code"]])
     arrangement = arrangement_of(design_of(protocol, block), started["arrangement"])
-    return presentation_of(protocol, block, track, arrangement, started["level"], catch=started.get("catch", False))
+    return _presentation_of(protocol, block, track, arrangement, started["level"], catch=started.get("catch", False))
 
 
 def trial_result(

@@ -27,7 +27,7 @@ UNPACED_MPS: Final = 0.3
 """A hand that is free moves as fast. [choice]"""
 BEYOND: Final = (4.0, 2.0, 1.0)
 """So far beyond the largest value a limit is looked for, less where a liquid cannot have such a number."""
-STEPS: Final = 2**32
+_STEPS: Final = 2**32
 """Of the search for a limit."""
 
 
@@ -180,8 +180,8 @@ def _highest_within_limit(beyond: Callable[[float], bool], most: float) -> float
     high = next((factor * most for factor in BEYOND if holds(factor * most)), None)
     if high is None:
         return None
-    step = high / STEPS
-    return bisect_left(range(1, STEPS), True, key=lambda number: holds(number * step)) * step
+    step = high / _STEPS
+    return bisect_left(range(1, _STEPS), True, key=lambda number: holds(number * step)) * step
 
 
 def clipping(protocol: Protocol, block: Block, limits: LevelLimits | None = None) -> Clipping | None:

@@ -27,9 +27,9 @@ TABLE: Final = "liquid_files"
 FOOTAGE_TABLE: Final = "footage_files"
 _FOOTAGE_HEADER: Final = f"\n\n# The SHA-256 of the footage of this study.\n[{FOOTAGE_TABLE}]\n".encode()
 _HEADER: Final = f"\n\n# The liquid files of this study, as they were read.\n[{TABLE}]\n".encode()
-MOST_BYTES: Final = 1_000_000
+_MOST_BYTES: Final = 1_000_000
 """Size of a study with its liquid files [bytes]; one with 200 statements has 50,000."""
-DRAWN_OR_LIVE: Final = ("tank", "camera")
+_DRAWN_OR_LIVE: Final = ("tank", "camera")
 """Views of a condition that are no file."""
 
 
@@ -51,7 +51,7 @@ def with_liquid_files(study: bytes, folder: Path) -> bytes:
     study = without_byte_order_mark(study)
     if _HEADER in study or _FOOTAGE_HEADER in study:
         return study
-    hashes = {name: digest for name in footage_names(study) if (digest := file_hash(folder / name)) is not None}
+    hashes = {name: digest for name in _footage_names(study) if (digest := file_hash(folder / name)) is not None}
     return bundle(study, lambda name: _text_of_file(folder / name), hashes)
 
 
@@ -96,14 +96,14 @@ def liquid_file_name(liquid: Any) -> Any:
     return liquid.get("file") if isinstance(liquid, Mapping) else None
 
 
-def footage_names(study: bytes) -> list[str]:
+def _footage_names(study: bytes) -> list[str]:
     """Return the sorted names of a study's footage; empty if it is not TOML (`load.parse` reports it)."""
     return [name for name in _section_texts(study, "conditions", "view") if is_footage(name)]
 
 
 def is_footage(view: object) -> bool:
     """Return whether a condition's view is a footage file."""
-    return isinstance(view, str) and view not in DRAWN_OR_LIVE
+    return isinstance(view, str) and view not in _DRAWN_OR_LIVE
 
 
 def file_hash(path: Path) -> str | None:
@@ -224,8 +224,8 @@ def source_bytes(name_or_path: str | Path) -> bytes:
 
 def check_size(source: bytes, name: str) -> None:
     """Reject a source that is larger than any study, before it is parsed."""
-    if len(source) > MOST_BYTES:
-        size = f"has {len(source) / 1e6:.1f} MB; a study has at most {MOST_BYTES / 1e6:g} MB"
+    if len(source) > _MOST_BYTES:
+        size = f"has {len(source) / 1e6:.1f} MB; a study has at most {_MOST_BYTES / 1e6:g} MB"
         raise ProtocolError(name, (Problem("file", size, hint="check that it is a study file"),))
 
 

@@ -17,7 +17,7 @@ from study_app.protocol.source.document import Path, Places, has
 Schema = Mapping[str, Any]
 
 
-FaultKind: TypeAlias = Literal[
+_FaultKind: TypeAlias = Literal[
     "", "missing", "unknown key", "unknown name", "surplus", "other language", "one language", "alike", "not a number",
     "not in sequence", "part",
 ]  # fmt: skip
@@ -40,7 +40,7 @@ class Fault(NamedTuple):
     counts_entries: bool = False
     missing_language: str = ""
     use: tuple[Path, Any] | None = None
-    kind: FaultKind = ""
+    kind: _FaultKind = ""
     permitted: tuple[str, ...] = ()
 
     def concerns(self, language: str, first: str) -> bool:
@@ -173,7 +173,7 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
         sentence = f"is {shown_value(value)}, must be {expected} {shown_value(bound)}"
         return Fault(path, sentence, next(filter(None, hints), ""), use=(path, bound) if key in {"ge", "le"} else None)
     if kind in _KINDS:
-        number: FaultKind = "not a number" if "number" in _KINDS[kind] else ""
+        number: _FaultKind = "not a number" if "number" in _KINDS[kind] else ""
         return Fault(path, f"must be {_KINDS[kind]}, not {shown_value(value)}", kind=number)
     if kind == "string_pattern_mismatch":
         return Fault(path, f"{shown_value(value)} is not permitted: {rule_of(str(context['pattern']))}")

@@ -21,11 +21,11 @@ from study_app.protocol.wording.languages import words
 from study_app.psychophysics import detection
 from study_app.psychophysics.detection import Sensitivity
 
-Feedback: TypeAlias = Literal["never", "practice", "always"]
+_Feedback: TypeAlias = Literal["never", "practice", "always"]
 Reply: TypeAlias = Literal["choice", "rating", "number", "setting"]
-Arrangement: TypeAlias = tuple[bool, ...]
+_Arrangement: TypeAlias = tuple[bool, ...]
 """Per interval whether it presents the comparison, in the order of presentation."""
-AnswerCounts: TypeAlias = Mapping[tuple[int, str], int]
+_AnswerCounts: TypeAlias = Mapping[tuple[int, str], int]
 """How often each answer was given to each arrangement."""
 Model: TypeAlias = Literal["differencing", "independent"]
 ORDINALS: Final = ("first", "second", "third", "fourth")
@@ -73,7 +73,7 @@ class Design(Table):
     between_s: Annotated[float, within(0.0, 60, "use a break page for a minute or more")] = Field(
         default=0.8, description="Zero force between an answer and the next trial [s]."
     )
-    feedback: Feedback | None = Field(
+    feedback: _Feedback | None = Field(
         default=None,
         description="never: the participant does not see whether an answer was correct; practice: only in "
         "practice, the default; always: after every answer. If no answer can be correct, the "
@@ -84,7 +84,7 @@ class Design(Table):
     )
 
     answers: ClassVar[tuple[str, ...]] = ()
-    arrangements: ClassVar[tuple[Arrangement, ...]] = ((True,),)
+    arrangements: ClassVar[tuple[_Arrangement, ...]] = ((True,),)
     guess_rate: ClassVar[float | None] = None
     reply: ClassVar[Reply] = "choice"
     has_standard: ClassVar[bool] = True  # else there is one interval, the level itself
@@ -130,7 +130,7 @@ class Design(Table):
         correct = self.correct(arrangement)
         return None if correct is None else answer == correct
 
-    def correct_of(self, answers: AnswerCounts) -> tuple[int, int]:
+    def correct_of(self, answers: _AnswerCounts) -> tuple[int, int]:
         """Return the number of correct answers, and of all answers."""
         return sum(count for pair, count in answers.items() if self.is_correct(*pair)), sum(answers.values())
 
@@ -138,11 +138,11 @@ class Design(Table):
         """Return whether an answer is a success of the psychometric function; None if it does not count."""
         return self.is_correct(arrangement, answer)
 
-    def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
+    def sensitivity(self, answers: _AnswerCounts, *, roving: bool) -> Sensitivity | None:
         """Return d′ and bias of one observer; None if the answers do not determine them."""
         return self._sensitivity(answers, "differencing" if roving else "independent")
 
-    def _sensitivity(self, answers: AnswerCounts, model: Model) -> Sensitivity | None:
+    def _sensitivity(self, answers: _AnswerCounts, model: Model) -> Sensitivity | None:
         return detection.from_correct(self.kind, *self.correct_of(answers)) if self.has_correct_answer else None
 
     def proportion_correct(self, d_prime: float, *, roving: bool) -> float:
@@ -163,13 +163,13 @@ class Design(Table):
         return when == "always" or (when == "practice" and practice)
 
 
-def _counts(answers: AnswerCounts, arrangements: Collection[int], answer: str) -> tuple[int, int]:
+def _counts(answers: _AnswerCounts, arrangements: Collection[int], answer: str) -> tuple[int, int]:
     """Return how often an answer was given to some arrangements, and the number of their answers."""
     counts = {pair: count for pair, count in answers.items() if pair[0] in arrangements}
     return sum(count for (_, given), count in counts.items() if given == answer), sum(counts.values())
 
 
-def _one_differs(count: int, *, among: bool) -> tuple[Arrangement, ...]:
+def _one_differs(count: int, *, among: bool) -> tuple[_Arrangement, ...]:
     """Return the arrangements of ``count`` intervals in which exactly one is ``among``."""
     return tuple(tuple((at == odd) is among for at in range(count)) for odd in range(count))
 
@@ -191,7 +191,7 @@ class ForcedChoice(Design):
     def correct(self, arrangement: int) -> str:
         return ORDINALS[self.arrangements[arrangement].index(True)]
 
-    def _sensitivity(self, answers: AnswerCounts, model: Model) -> Sensitivity | None:
+    def _sensitivity(self, answers: _AnswerCounts, model: Model) -> Sensitivity | None:
         """Return d′ of the intervals, and of two intervals the criterion: above 0 the second is preferred."""
         if self.kind != "2ifc":
             return super()._sensitivity(answers, model)
@@ -221,7 +221,7 @@ class Oddity(Design):
         return self.answers[distances.index(max(distances))]
 
 
-class Abx(Design):
+class _Abx(Design):
     """Which of the first two was repeated as the third? (Munson & Gardner 1950, J. Acoust. Soc. Am. 22, 675)."""
 
     kind: Literal["abx"] = "abx"
@@ -234,7 +234,7 @@ class Abx(Design):
         first, _, third = self.arrangements[arrangement]
         return self.answers[first != third]
 
-    def _sensitivity(self, answers: AnswerCounts, model: Model) -> Sensitivity | None:
+    def _sensitivity(self, answers: _AnswerCounts, model: Model) -> Sensitivity | None:
         return detection.abx(*self.correct_of(answers), model)
 
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
@@ -242,7 +242,7 @@ class Abx(Design):
         return self.answers[abs(third - first) >= abs(third - second)]
 
 
-class SameDifferent(Design):
+class _SameDifferent(Design):
     """Were the two the same? (Macmillan & Creelman 2005, Detection Theory, chapter 9)."""
 
     kind: Literal["samedifferent"] = "samedifferent"
@@ -255,7 +255,7 @@ class SameDifferent(Design):
         first, second = self.arrangements[arrangement]
         return self.answers[first != second]
 
-    def _sensitivity(self, answers: AnswerCounts, model: Model) -> Sensitivity | None:
+    def _sensitivity(self, answers: _AnswerCounts, model: Model) -> Sensitivity | None:
         hits, false_alarms = _counts(answers, {2, 3}, "different"), _counts(answers, {0, 1}, "different")
         return detection.same_different(*hits, *false_alarms, model)
 
@@ -264,7 +264,7 @@ class SameDifferent(Design):
         return self.answers[attention.distinct(first - second, (first + second) / 2)]
 
 
-class YesNo(Design):
+class _YesNo(Design):
     """Was it there? (Green & Swets 1966): the answer "yes" to a comparison is a hit, to a standard a false alarm."""
 
     kind: Literal["yesno"] = "yesno"
@@ -287,14 +287,14 @@ class YesNo(Design):
         """Return whether the answer was yes, to any presentation."""
         return answer == "yes"
 
-    def _sensitivity(self, answers: AnswerCounts, model: Model) -> Sensitivity | None:
+    def _sensitivity(self, answers: _AnswerCounts, model: Model) -> Sensitivity | None:
         return detection.yes_no(*_counts(answers, {0}, "yes"), *_counts(answers, {1}, "yes"))
 
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
         return "yes" if perceived[0] > mean else "no"
 
 
-class JudgementDesign(Design):
+class _JudgementDesign(Design):
     """Designs whose reply is a scale point, a number or a setting."""
 
     has_standard: ClassVar = False
@@ -302,7 +302,7 @@ class JudgementDesign(Design):
     adaptive: ClassVar = False
 
 
-class Rated(JudgementDesign):
+class Rated(_JudgementDesign):
     """How much was it? One point of a scale for each level."""
 
     kind: Literal["rating"] = "rating"
@@ -311,7 +311,7 @@ class Rated(JudgementDesign):
     reply: ClassVar = "rating"
 
 
-class Estimation(JudgementDesign):
+class _Estimation(_JudgementDesign):
     """How strong was it, as a number? (Stevens 1957, Psychological Review 64, 153)."""
 
     kind: Literal["estimation"] = "estimation"
@@ -323,7 +323,7 @@ class Estimation(JudgementDesign):
     first = property(lambda self: self.modulus)
 
 
-class Adjusted(JudgementDesign):
+class Adjusted(_JudgementDesign):
     """The standard, then an interval that the participant adjusts to it (Gescheider 1997, Psychophysics, ch. 3)."""
 
     kind: Literal["adjustment"] = "adjustment"
@@ -341,7 +341,7 @@ class Adjusted(JudgementDesign):
 
 KINDS: Final[dict[str, type[Design]]] = {
     kind: design
-    for design in (Abx, Adjusted, Estimation, ForcedChoice, Oddity, Rated, SameDifferent, YesNo)
+    for design in (_Abx, Adjusted, _Estimation, ForcedChoice, Oddity, Rated, _SameDifferent, _YesNo)
     for kind in get_args(design.model_fields["kind"].annotation)
 }
 
@@ -356,7 +356,7 @@ def default_design(kind: str) -> Design:
     return KINDS[kind].model_validate({"kind": kind})
 
 
-LEAST: Final = 1e-9
+_LEAST: Final = 1e-9
 """An estimate is above 0, and no estimate is smaller."""
 
 
@@ -376,7 +376,7 @@ def _item(design: Design, text: Localised, languages: Sequence[str]) -> Question
     if design.reply == "rating":
         return Rating(**about, scale=str(getattr(design, "scale", "")))
     if design.reply == "number":
-        return Number(**about, least=LEAST)
+        return Number(**about, least=_LEAST)
     if design.reply == "setting":
         return Number(**about, whole=True, unit="steps")
     named = {

@@ -192,7 +192,7 @@ class Method(Table):
 Trials = Annotated[int, within(1, 1000, "participants do not answer more in one track")]
 
 
-class Adaptive(Method):
+class _Adaptive(Method):
     """A method that chooses each level from the answers to the levels before."""
 
     trials: Trials = Field(default=60, description="Maximum number of trials per standard, divided among its tracks.")
@@ -231,9 +231,9 @@ class Adaptive(Method):
         """Return the level after these answers."""
 
 
-STEPS: Final = 40
+_STEPS: Final = 40
 """Steps from the smallest level to the largest, by default."""
-START_SHARE: Final = 0.125
+_START_SHARE: Final = 0.125
 """A setting starts within this share of the span from an end: the same number of steps is not right every time."""
 _ROUNDING: Final = 1e-9
 
@@ -271,7 +271,7 @@ class Adjustment(Method):
         """Return the start level of setting ``number``: earlier settings do not matter."""
         low, high = track.stimulus.domain
         first_at_low = draws[0]() < 0.5
-        away = START_SHARE * (high - low) * draws[number]()
+        away = _START_SHARE * (high - low) * draws[number]()
         return track.stimulus.level_of(low + away if first_at_low is (number % 2 == 0) else high - away)
 
     def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
@@ -295,7 +295,7 @@ class Adjustment(Method):
     def step(self, stimulus: Stimulus) -> float:
         """Return the size of a step in u."""
         low, high = stimulus.domain
-        return (high - low) / STEPS if self.step_size is None else stimulus.coordinate(self.step_size)
+        return (high - low) / _STEPS if self.step_size is None else stimulus.coordinate(self.step_size)
 
 
 @dataclass(frozen=True, slots=True, repr=False, kw_only=True)
@@ -334,8 +334,8 @@ class Adjusting:
         return place
 
 
-Count = Annotated[int, Field(ge=1, le=LEVELS_MOST)]
-Listed = Annotated[tuple[float, ...], Field(min_length=1, max_length=LEVELS_MOST)]
+_Count = Annotated[int, Field(ge=1, le=LEVELS_MOST)]
+_Listed = Annotated[tuple[float, ...], Field(min_length=1, max_length=LEVELS_MOST)]
 
 
 class Constant(Method):
@@ -344,7 +344,7 @@ class Constant(Method):
     kind: Literal["constant"] = "constant"
     paper_name: ClassVar = "the method of constant stimuli"
     adaptive: ClassVar[bool] = False
-    levels: Count | Listed = Field(
+    levels: _Count | _Listed = Field(
         default=CONSTANT_LEVELS, description="The levels, or how many, evenly spaced over the stimulus' range."
     )
     repetitions: Annotated[int, Field(ge=1, le=1000)] = Field(
@@ -370,7 +370,7 @@ class Constant(Method):
         return constant_tracks(levels, self.repetitions, observers, draws)
 
 
-Positive = Annotated[float, within(1e-6, 1e6, "a psychometric function is neither a step nor flat")]
+_Positive = Annotated[float, within(1e-6, 1e6, "a psychometric function is neither a step nor flat")]
 Lapse = Annotated[float, Field(ge=0, lt=0.5)]
 
 
@@ -381,7 +381,7 @@ class Precision(Table):
     after: Trials = Field(default=30, description="Minimum number of answers.")
 
 
-class QuestPlus(Adaptive):
+class QuestPlus(_Adaptive):
     """The level after whose answer the least uncertainty about the threshold is expected."""
 
     kind: Literal["questplus"] = "questplus"
@@ -394,10 +394,10 @@ class QuestPlus(Adaptive):
         description="weibull: a Weibull function, the default for distances; normal: a cumulative normal, the default "
         "otherwise; logistic: a logistic function.",
     )
-    widths: tuple[Positive, Positive] | None = Field(
+    widths: tuple[_Positive, _Positive] | None = Field(
         default=None, description="Smallest and largest width, from 5 to 95 % [decades, or units of the level]."
     )
-    width_prior: tuple[Positive, Annotated[float, Field(gt=1, le=1e6)]] | None = Field(
+    width_prior: tuple[_Positive, Annotated[float, Field(gt=1, le=1e6)]] | None = Field(
         default=None, description="Median and factor of the width's log-normal prior."
     )
     lapses: Annotated[tuple[Lapse, ...], Field(min_length=1, max_length=10)] = Field(
@@ -491,7 +491,7 @@ class Reversals(Table):
     after: Trials = Field(default=1, description="Minimum number of answers.")
 
 
-class UpDown(Adaptive):
+class UpDown(_Adaptive):
     """A step down after successes in a row, a step up after each failure."""
 
     kind: Literal["updown"] = "updown"
@@ -597,7 +597,7 @@ def _in_u(stimulus: Stimulus, answers: Sequence[Answer]) -> list[Answer]:
     return [(stimulus.coordinate(level), success) for level, success in answers]
 
 
-class RecordedMethod(Method):
+class _RecordedMethod(Method):
     """A method of a plug-in that is not here, as a key holds it: its levels were presented, and are not computed."""
 
     model_config = ConfigDict(extra="allow")
@@ -614,7 +614,7 @@ class RecordedMethod(Method):
         return float(self.presentations(track.stimulus))
 
 
-MOST_PRESENTATIONS: Final = 10_000
+_MOST_PRESENTATIONS: Final = 10_000
 """No track of a plug-in presents more comparisons."""
 KINDS: Final = Registry[type[Method]](
     "method",
@@ -623,8 +623,8 @@ KINDS: Final = Registry[type[Method]](
     "kind",
     {
         "presentations": Returns(
-            f"a whole number from 1 to {MOST_PRESENTATIONS:,}",
-            lambda value: isinstance(value, Integral) and 1 <= int(value) <= MOST_PRESENTATIONS,
+            f"a whole number from 1 to {_MOST_PRESENTATIONS:,}",
+            lambda value: isinstance(value, Integral) and 1 <= int(value) <= _MOST_PRESENTATIONS,
         ),
         "levels_of": Returns("numbers, at least one", lambda values: are_numbers(values) and len(values) > 0),
         "level": number_between(-1e12, 1e12),
@@ -637,7 +637,7 @@ if TYPE_CHECKING:
     AnyMethod: TypeAlias = Method
 else:
     AnyMethod = Annotated[
-        reduce(or_, KINDS.own.values()), Field(discriminator="kind"), OfKinds(KINDS, Method, RecordedMethod)
+        reduce(or_, KINDS.own.values()), Field(discriminator="kind"), OfKinds(KINDS, Method, _RecordedMethod)
     ]
 
 

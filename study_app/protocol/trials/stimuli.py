@@ -23,7 +23,7 @@ from study_app.psychophysics.grid import FREE_GUESSES, Grid, Values, evenly, geo
 
 Level = TypeVar("Level", float, Floats)
 """One level or value, or an array of them."""
-LevelKind: TypeAlias = Literal["weber", "difference", "value"]
+_LevelKind: TypeAlias = Literal["weber", "difference", "value"]
 
 DELAY: Final = "delay_ms"
 FORCE_DELAY: Final = "force_delay_ms"
@@ -123,7 +123,7 @@ class Stimulus(Table):
     vary: str = Field(
         max_length=60, description=f"The parameter to vary, as in simulate --set, or {', '.join(OF_CONDITION)}."
     )
-    level: LevelKind | None = Field(
+    level: _LevelKind | None = Field(
         default=None,
         description="weber: (comparison − standard)/standard, the default; difference: comparison − standard, the "
         "default for a time (…_ms); value: the comparison itself.",
@@ -141,7 +141,7 @@ class Stimulus(Table):
     )
 
     @property
-    def level_kind(self) -> LevelKind:
+    def level_kind(self) -> _LevelKind:
         return self.level or ("difference" if self.vary.endswith("_ms") else "weber")
 
     def comparison(self, standard: float | None, level: Level) -> Level:
@@ -216,11 +216,11 @@ class Stimulated:
 
 LEVEL_RULES: Final = 2
 """Version of the rules by which levels are chosen; receipts state it. In 2 all widths are equally likely."""
-RUNNING_THRESHOLDS: Final = 41
-RUNNING_WIDTHS: Final = 9
-WIDTHS: Final = (0.5, 4.0)
+_RUNNING_THRESHOLDS: Final = 41
+_RUNNING_WIDTHS: Final = 9
+_WIDTHS: Final = (0.5, 4.0)
 """The smallest and the largest width, in decades."""
-ANALYSIS_WIDTHS: Final = (0.15, 5.6)
+_ANALYSIS_WIDTHS: Final = (0.15, 5.6)
 """Those of the analysis; people's functions are 0.2 to 2 decades wide."""
 LINEAR_WIDTH: Final = 1.4
 """Width of an observer whose d′ is proportional to the level [decades]."""
@@ -231,7 +231,7 @@ WIDTH_PRIOR: Final = (0.5, 2.0)
 discrimination; confirmed on plaid and checkerboard (``tests/benchmarks/analysis/people.py``).
 """
 LAPSES: Final = (0.0, 0.02, 0.04)
-LAPSE_PRIOR: Final = (0.4, 0.4, 0.2)
+_LAPSE_PRIOR: Final = (0.4, 0.4, 0.2)
 ANALYSIS_LAPSES: Final = (0.0, 0.01, 0.02, 0.03, 0.045, 0.065, 0.09, 0.12, 0.16)
 SESSION_SD: Final = 0.049
 """Standard deviation of a person's threshold from one session to the next [decades], with [0.034, 0.077].
@@ -239,8 +239,8 @@ SESSION_SD: Final = 0.049
 Of six observers of Jäkel & Wichmann 2006 (J. Vision 6:13) between series of 400 trials
 (``tests/benchmarks/analysis/people.py --spread``).
 """
-BEYOND_DECADES: Final = 0.4
-BEYOND_SPANS: Final = 0.25
+_BEYOND_DECADES: Final = 0.4
+_BEYOND_SPANS: Final = 0.25
 """How far beyond the ends of the levels a threshold is looked for, on log and on linear spacing."""
 
 
@@ -262,15 +262,15 @@ def assumed_for(stimulus: Stimulus, design: Design) -> Assumed:
     low, high = stimulus.domain
     log, span = stimulus.spacing == "log", high - low
     # Weibull where a distance of zero must mean chance
-    by_chance = is_distance(stimulus) and log and design.guess_rate is not None
+    by_chance = _is_distance(stimulus) and log and design.guess_rate is not None
     return Assumed(
         family="weibull" if by_chance else "normal",
-        widths=WIDTHS if log else (span / 8, 2 * span),
-        width_prior=WIDTH_PRIOR if log and is_distance(stimulus) else (span / 2, 2.0),
+        widths=_WIDTHS if log else (span / 8, 2 * span),
+        width_prior=WIDTH_PRIOR if log and _is_distance(stimulus) else (span / 2, 2.0),
     )
 
 
-def is_distance(stimulus: Stimulus) -> bool:
+def _is_distance(stimulus: Stimulus) -> bool:
     """Return whether a level is a distance from a standard."""
     return stimulus.level_kind != "value"
 
@@ -281,12 +281,12 @@ def rises(stimulus: Stimulus, design: Design) -> bool:
     It does not where a level is a value and the odd or the repeated interval is asked for: that is noticed above the
     standard and below it.
     """
-    return design.adaptive and (is_distance(stimulus) or not design.has_standard or design.asks_for_more)
+    return design.adaptive and (_is_distance(stimulus) or not design.has_standard or design.asks_for_more)
 
 
 def guesses_of(stimulus: Stimulus, design: Design) -> tuple[float, ...] | None:
     """Return the guess rates of a design; None if no answer is correct: the guess rate is the lapse rate."""
-    if design.has_standard and not is_distance(stimulus):
+    if design.has_standard and not _is_distance(stimulus):
         return None
     return FREE_GUESSES if design.guess_rate is None else (design.guess_rate,)
 
@@ -306,11 +306,11 @@ def _running_grid(
 ) -> Grid:
     return Grid(
         family=family,
-        thresholds=evenly(*domain, RUNNING_THRESHOLDS),
-        widths=geometric(*widths, RUNNING_WIDTHS),
+        thresholds=evenly(*domain, _RUNNING_THRESHOLDS),
+        widths=geometric(*widths, _RUNNING_WIDTHS),
         width_prior=None,
         lapses=lapses,
-        lapse_prior=LAPSE_PRIOR if lapses == LAPSES else (1.0 / len(lapses),) * len(lapses),
+        lapse_prior=_LAPSE_PRIOR if lapses == LAPSES else (1.0 / len(lapses),) * len(lapses),
         guesses=guesses,
     )
 
@@ -322,9 +322,9 @@ def analysis_grid(stimulus: Stimulus, design: Design, assumed: Assumed, session_
     """
     low, high = stimulus.domain
     log = stimulus.spacing == "log"
-    beyond = BEYOND_DECADES if log else BEYOND_SPANS * (high - low)
+    beyond = _BEYOND_DECADES if log else _BEYOND_SPANS * (high - low)
     least, most = assumed.widths
-    widest = ANALYSIS_WIDTHS if log else (0.3 * least, 1.4 * most)
+    widest = _ANALYSIS_WIDTHS if log else (0.3 * least, 1.4 * most)
     return Grid(
         family=assumed.family,
         thresholds=evenly(low - beyond, high + beyond, 97),

@@ -38,8 +38,8 @@ class Stroke(NamedTuple):
         return 2.0 * math.pi * self.frequency_hz * self.speed_mps
 
 
-SHAKE_HZ: Final = 5.0
-SHAKE_M: Final = 0.03
+_SHAKE_HZ: Final = 5.0
+_SHAKE_M: Final = 0.03
 """As quick and as wide as free shaking of a light handle commonly is. [choice]"""
 
 
@@ -101,7 +101,7 @@ class Task(Table):
 
     def fastest_stroke(self, workspace_m: Point) -> Stroke:
         """Return the fastest likely stroke in a tank of these extents [m, hand frame]."""
-        return Stroke(SHAKE_HZ, min(SHAKE_M, workspace_m[0] / 2))
+        return Stroke(_SHAKE_HZ, min(_SHAKE_M, workspace_m[0] / 2))
 
     def lasting(self, most_s: float) -> Self:
         """Return the task ended by time alone: after ``most_s``, or at a target's first whole swing after that [s]."""
@@ -204,13 +204,13 @@ class Follow(Task):
         return self.amplitude_m * ramp * math.sin(2 * math.pi * self.frequency_hz * t_s), 0.0, 0.0
 
 
-Millimetres: TypeAlias = Annotated[float, within(-500, 500, "the tank extends at most 500 mm to either side")]
+_Millimetres: TypeAlias = Annotated[float, within(-500, 500, "the tank extends at most 500 mm to either side")]
 
-REACH_S: Final = 0.3
+_REACH_S: Final = 0.3
 """From target to target, as fast as aimed reaches are. [choice]"""
-MOVE_S: Final = 1.5
+_MOVE_S: Final = 1.5
 """How long people take from one target to the next, for the expected duration. [choice]"""
-SHORTEST_MOVE_S: Final = 1.0
+_SHORTEST_MOVE_S: Final = 1.0
 """From target to target at least. [choice]"""
 
 
@@ -224,7 +224,7 @@ class Reach(Task):
     ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = (("count", "duration_s"),)
 
     kind: Literal["reach"]
-    targets_mm: tuple[tuple[Millimetres, Millimetres, Millimetres], ...] = Field(
+    targets_mm: tuple[tuple[_Millimetres, _Millimetres, _Millimetres], ...] = Field(
         min_length=2, max_length=100, description="Centres of the targets, hand frame [mm]."
     )
     radius_mm: Radius = Field(description="Radius of a target [mm].")
@@ -254,18 +254,18 @@ class Reach(Task):
     @property
     def expected_s(self) -> float:
         if self.count is not None:
-            return min(self.timeout_s, self.count * (self.dwell_s + MOVE_S))
+            return min(self.timeout_s, self.count * (self.dwell_s + _MOVE_S))
         return self.duration_s or 0.0
 
     @property
     def shortest_s(self) -> float:
-        return self.duration_s or (self.count or 0) * (self.dwell_s + SHORTEST_MOVE_S)
+        return self.duration_s or (self.count or 0) * (self.dwell_s + _SHORTEST_MOVE_S)
 
     def fastest_stroke(self, workspace_m: Point) -> Stroke:
         """Return the stroke between the two most distant neighbouring targets."""
         following = (*self.targets_m[1:], self.targets_m[0])
         way_m = max(math.dist(*pair) for pair in zip(self.targets_m, following, strict=True))
-        return Stroke(0.5 / REACH_S, way_m / 2)
+        return Stroke(0.5 / _REACH_S, way_m / 2)
 
     @property
     def limit_s(self) -> float:
@@ -301,7 +301,7 @@ class Reach(Task):
         return self
 
 
-class RecordedTask(Task):
+class _RecordedTask(Task):
     """A task of a plug-in that is not here, as a receipt holds it."""
 
     model_config = ConfigDict(extra="allow")
@@ -334,5 +334,5 @@ if TYPE_CHECKING:
     AnyTask: TypeAlias = Task
 else:
     AnyTask = Annotated[
-        reduce(or_, KINDS.own.values()), Field(discriminator="kind"), OfKinds(KINDS, Task, RecordedTask)
+        reduce(or_, KINDS.own.values()), Field(discriminator="kind"), OfKinds(KINDS, Task, _RecordedTask)
     ]

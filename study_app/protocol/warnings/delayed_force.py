@@ -80,7 +80,7 @@ def _table_rows(liquid: str, estimator: str, hand: str) -> list[Entry]:
 
 STIRRED: Final = Stroke(frequency_hz=1.061, amplitude_m=0.03)
 """The motion of the stored table: ±30 mm with at most 0.2 m/s."""
-SHIPPED: Final = (("rek2024", ""), ("physical2", "physical2_"))
+_SHIPPED: Final = (("rek2024", ""), ("physical2", "physical2_"))
 """The studies whose liquids the table has, and how it calls them."""
 _load: Final = cache(load)
 
@@ -142,7 +142,7 @@ def _energy_warning(protocol: Protocol, name: str, delay_ms: float) -> str | Non
 
 def _name_in_table(protocol: Protocol, liquid: str) -> str | None:
     """Return the table's name of a liquid; None if it has none with the same numbers and scale."""
-    for study, prefix in SHIPPED:
+    for study, prefix in _SHIPPED:
         shipped = _load(study)
         if shipped.scene.scale != protocol.scene.scale:
             continue

@@ -31,11 +31,11 @@ from study_app.psychophysics.families import Floats
 from study_app.psychophysics.grid import Z_95, Posterior, group_priors
 from study_app.psychophysics.people import ALONE, ASSUMED, ESTIMATE_NOISE, KINDS, Estimates, Expected, Person
 
-D_PRIME: Final = 1.0
+_D_PRIME: Final = 1.0
 """Of simulated participants. [choice]"""
-EXPONENT: Final = 0.5
+_EXPONENT: Final = 0.5
 """Of simulated participants, where no exponent was published; as the answers of rehearsals. [choice]"""
-MEAN_OBSERVERS: Final = 1000
+_MEAN_OBSERVERS: Final = 1000
 """Of a simulated d′, d_a or exponent."""
 
 
@@ -51,9 +51,9 @@ class SensitivityPlan:
     trials: int
     roving: bool
     of_each: str
-    value: ClassVar[float] = D_PRIME
+    value: ClassVar[float] = _D_PRIME
     unit: ClassVar[str] = ""
-    words: ClassVar[str] = f"at d′ = {D_PRIME:g}: "
+    words: ClassVar[str] = f"at d′ = {_D_PRIME:g}: "
     """What is assumed, in words."""
     per = property(lambda self: f" per {self.of_each}")
     """The words for what the number of trials counts for."""
@@ -111,8 +111,8 @@ class RatingPlan:
     trials: int
     per: ClassVar[str] = " per level"
     unit: ClassVar[str] = ""
-    value: ClassVar[float] = D_PRIME
-    words: ClassVar[str] = f"at d_a = {D_PRIME:g}: "
+    value: ClassVar[float] = _D_PRIME
+    words: ClassVar[str] = f"at d_a = {_D_PRIME:g}: "
 
     def with_trials(self, trials: int) -> RatingPlan:  # noqa: D102 - as above
         return replace(self, trials=trials)
@@ -152,7 +152,7 @@ def mean_plan(protocol: Protocol, block: Block) -> MeanPlan | None:
         repetitions = method.tracks * method.presentations(stimulus) // len(method.levels_of(stimulus))
         decided = () if protocol.analysis is None else protocol.analysis.published
         exponents = (one.value for one in decided if (one.block, one.measure) == (block.id, "exponent"))
-        return EstimationPlan(levels, repetitions, next(exponents, EXPONENT)) if len(levels) > 1 else None
+        return EstimationPlan(levels, repetitions, next(exponents, _EXPONENT)) if len(levels) > 1 else None
     if isinstance(design, Rated) and len(method.levels_of(stimulus)) > 1 and len(standards_of(protocol, block)) == 1:
         repetitions = method.tracks * method.presentations(stimulus) // len(method.levels_of(stimulus))
         return RatingPlan(protocol.scales[design.scale].points, repetitions)
@@ -164,7 +164,7 @@ def mean_plan(protocol: Protocol, block: Block) -> MeanPlan | None:
 
 def expected_mean(plan: MeanPlan) -> Expected:
     """Return how precise the d′, d_a or exponent of one participant, and their mean, are expected to be."""
-    found = plan.estimates(np.full(MEAN_OBSERVERS, plan.value), np.random.default_rng(SEED))
+    found = plan.estimates(np.full(_MEAN_OBSERVERS, plan.value), np.random.default_rng(SEED))
     spread = float(found.std())
     return Expected(
         spacing="linear",
@@ -181,14 +181,14 @@ OBSERVERS: Final = 200
 PEOPLE: Final = 20
 """Of a study, unless it is said how many."""
 SEED: Final = 1
-FALSE_ALARMS: Final = 0.1
+_FALSE_ALARMS: Final = 0.1
 """Of simulated observers, where the guess rate is free. [choice]"""
-MOST_WORK: Final = 700_000_000
+_MOST_WORK: Final = 700_000_000
 """Cells × levels × trials × observers of one simulation, so that a check stays fast: fewer observers beyond it."""
-FEWEST: Final = 20
-CELLS: Final = 41 * 9 * 3
+_FEWEST: Final = 20
+_CELLS: Final = 41 * 9 * 3
 """Of the grid over which levels are chosen."""
-MOST_TRIALS: Final = 200
+_MOST_TRIALS: Final = 200
 """Of a track that is simulated; beyond it the variance is taken to be inversely proportional to the trials."""
 
 
@@ -284,7 +284,7 @@ class ThresholdPlan:
         columns = np.array([(it.wrong(answers), it.width, it.change, it.criterion, it.repeats) for it in people]).T
         lapse, width, change, criterion, repeats = columns if len(people) > 1 else columns[:, 0]
         if guess is None:
-            guess = lapse if guesses_of(stimulus, design) is None else FALSE_ALARMS
+            guess = lapse if guesses_of(stimulus, design) is None else _FALSE_ALARMS
         presented = None if self.clipping is None else self.presented
         moves = np.log10(change) if stimulus.spacing == "log" else thresholds * np.log(change)
         observers = Observers(
@@ -377,12 +377,12 @@ def expected(plan: ThresholdPlan) -> Expected:
     Only thresholds below the highest level that is presented in full have estimates; where those are not the larger
     half of all, none is expected.
     """
-    cells = CELLS * (6 if plan.design.has_noise else 1) * (30 if getattr(plan.method, "learn", "") == "all" else 1)
+    cells = _CELLS * (6 if plan.design.has_noise else 1) * (30 if getattr(plan.method, "learn", "") == "all" else 1)
     per_trial = cells * plan.stimulus.steps
-    trials = min(plan.trials, MOST_TRIALS, max(10, MOST_WORK // (per_trial * FEWEST)))
+    trials = min(plan.trials, _MOST_TRIALS, max(10, _MOST_WORK // (per_trial * _FEWEST)))
     simulated = plan if trials == plan.trials else plan.with_trials(trials)
     kinds = plan.kinds
-    observers = max(FEWEST, min(OBSERVERS, MOST_WORK // (per_trial * simulated.trials))) // len(kinds)
+    observers = max(_FEWEST, min(OBSERVERS, _MOST_WORK // (per_trial * simulated.trials))) // len(kinds)
     together = min(PEOPLE, observers)
     observers = observers // together * together
     low, high = plan.stimulus.domain

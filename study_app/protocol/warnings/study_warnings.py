@@ -25,13 +25,13 @@ from study_app.protocol.warnings.expected_precision import imprecise
 from study_app.protocol.warnings.group_names import suggests_attribute
 from study_app.protocol.wording.languages import language_name
 
-TELLING = 0.39
+_TELLING = 0.39
 """Twice the difference of viscosity that people just tell, 19 % (Jones, Hunter & Lafontaine 1997): what two liquids
 need for reliable discrimination; the thesis' water and honey differ by 40 %."""
 
-FRAME_MS = 8.0
+_FRAME_MS = 8.0
 """About a frame of a screen of 120 Hz."""
-NARROW = 1.3
+_NARROW = 1.3
 """A log-normal prior with a smaller factor decides the width: 95 % of it lie within a factor of 1.7. [choice]"""
 
 
@@ -71,12 +71,12 @@ def _similar_liquids(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[st
         for liquid, other in combinations(_liquids_of(protocol, block), 2):
             pair = frozenset((liquid, other))
             smaller_n, greater_n = sorted((felt[liquid].force_n, felt[other].force_n))
-            if (greater_n > 0 and greater_n - smaller_n >= TELLING * smaller_n) or pair in seen:
+            if (greater_n > 0 and greater_n - smaller_n >= _TELLING * smaller_n) or pair in seen:
                 continue
             seen.add(pair)
             yield (
                 f"{liquid} and {other} of block {block.id} are hard to tell apart: {felt[liquid].force_n:.2f} and "
-                f"{felt[other].force_n:.2f} N at {HAND_MPS:g} m/s of the hand; they differ by less than {TELLING:.0%}"
+                f"{felt[other].force_n:.2f} N at {HAND_MPS:g} m/s of the hand; they differ by less than {_TELLING:.0%}"
             )
 
 
@@ -303,10 +303,10 @@ def _condition_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
         )
     if protocol.compared_in(block.id) == "delays":
         for delay_ms, other in pairwise(sorted({condition.delay_ms for condition in conditions})):
-            if other - delay_ms < FRAME_MS:
+            if other - delay_ms < _FRAME_MS:
                 yield (
                     f"blocks.{block.id}.conditions: delays of {delay_ms:g} and {other:g} ms differ by less than "
-                    f"a frame of {FRAME_MS:g} ms, which the screen cannot show"
+                    f"a frame of {_FRAME_MS:g} ms, which the screen cannot show"
                 )
     if block.design is not None and block.standard is not None:
         yield from _mixed_differences(protocol, block, block.standard)
@@ -349,10 +349,10 @@ def _forced_choice_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
             "distinguished from participants with a high threshold"
         )
     factor = method_of(protocol, block).assumed(stimulus, design).width_prior[1]
-    if factor < NARROW:
+    if factor < _NARROW:
         yield (
             f"methods.{block.method}.width_prior: a factor of {factor:g} lets the prior determine the slope and "
-            f"bias the thresholds of other participants; choose {NARROW:g} or more"
+            f"bias the thresholds of other participants; choose {_NARROW:g} or more"
         )
 
 

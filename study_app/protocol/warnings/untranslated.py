@@ -27,9 +27,9 @@ SAME_WORDS: Final[Mapping[str, frozenset[str]]] = {
     "nl": frozenset({"baseline", "begin", "hand"}),
 }
 """Shipped texts of another language that are right in this language, too."""
-SENTENCE_WORDS: Final = 3
+_SENTENCE_WORDS: Final = 3
 """Texts of so many words are not the same in two languages by chance."""
-PLACES_LISTED: Final = 5
+_PLACES_LISTED: Final = 5
 _PLACEHOLDER: Final = re.compile(r"new [a-z0-9 ]+")
 """What the designer writes into a new element, in English: "New question"."""
 _PARAGRAPHS: Final = re.compile(r"\n\s*\n")
@@ -76,7 +76,7 @@ def untranslated_at(
         elif parts and code != first and texts.get(code) == texts.get(first):
             yield UntranslatedText(path, code, first, ships=False)
         else:
-            sentences = [part for part in parts if len(part.split()) >= SENTENCE_WORDS]
+            sentences = [part for part in parts if len(part.split()) >= _SENTENCE_WORDS]
             if (source := _source_language(sentences, code, _workspace_texts(document))) is not None:
                 yield UntranslatedText(path, code, source, ships=False)
 
@@ -113,7 +113,7 @@ def check_translated(document: Mapping[str, Any]) -> None:
 
 def listed_places(texts: Sequence[UntranslatedText]) -> str:
     """Return the places of the first texts in the file, and the number of others."""
-    names = [".".join(map(str, text.path)) for text in texts[:PLACES_LISTED]]
+    names = [".".join(map(str, text.path)) for text in texts[:_PLACES_LISTED]]
     more = len(texts) - len(names)
     return ", ".join(names) + (f" and {more} more" if more else "")
 

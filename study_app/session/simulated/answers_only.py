@@ -58,7 +58,7 @@ from study_app.workspace import workspace
 
 DEVICE = {"name": "answers-only", "measured": False}
 SAY_EVERY_S = 5.0
-BEGINS: Final = (PageShown, FormShown, TrialStarted)
+_BEGINS: Final = (PageShown, FormShown, TrialStarted)
 """The events that begin a step."""
 
 
@@ -316,7 +316,7 @@ class _Lines:
     def append(self, event: Line, *, t_s: float | None = None) -> None:
         """Store a line unless the step has begun."""
         assert self.session is not None  # noqa: S101 - set before the session runs
-        self._begun = self._begun or (isinstance(event, BEGINS) and self.session.state.index >= self.until)
+        self._begun = self._begun or (isinstance(event, _BEGINS) and self.session.state.index >= self.until)
         if not self._begun:
             self.kept.append((event, t_s or 0.0))
 

@@ -28,25 +28,25 @@ from study_app.store.delivered import LONGEST_S
 Floats: TypeAlias = NDArray[np.float64]
 Draw: TypeAlias = Callable[[], float]
 RATE_HZ = 200.0
-PACE_MPS = (0.06, 0.22)  # slowest and fastest mean speed of a stroke [m/s]
-REST_S = (0.3, 0.9)  # a stop after each figure, in which the liquid's response is felt
+_PACE_MPS = (0.06, 0.22)  # slowest and fastest mean speed of a stroke [m/s]
+_REST_S = (0.3, 0.9)  # a stop after each figure, in which the liquid's response is felt
 _CORNERS = 128
 _TURN = complex(0.9987954562051724, 0.049067674327418015)  # angle to the next corner of the circle
-Figure: TypeAlias = Callable[[Draw, Floats, Floats], list[Floats]]
-SECONDS_PER_WORD = 0.12
-REACTION_S = (0.2, 0.35)  # reaction time from a lit target to the movement [s]
+_Figure: TypeAlias = Callable[[Draw, Floats, Floats], list[Floats]]
+_SECONDS_PER_WORD = 0.12
+_REACTION_S = (0.2, 0.35)  # reaction time from a lit target to the movement [s]
 ANSWER_S = (0.8, 2.6)
-CHANGES_MIND = 0.08
-AIM_ERROR = 0.3  # largest error of aim along each axis, as a fraction of the target's radius
-FOLLOWED_HZ = 200.0
-CORRECTION_S = 0.35  # time at rest outside the target before another attempt [s]
-LONGEST_PATH_S: Final = 60.0
+_CHANGES_MIND = 0.08
+_AIM_ERROR = 0.3  # largest error of aim along each axis, as a fraction of the target's radius
+_FOLLOWED_HZ = 200.0
+_CORRECTION_S = 0.35  # time at rest outside the target before another attempt [s]
+_LONGEST_PATH_S: Final = 60.0
 """Time after which the path repeats, unless the task ends earlier [s]."""
-BEFORE_END_S: Final = 0.1
-MOVE_S: Final = 0.8
-STAY_S: Final = 0.2
+_BEFORE_END_S: Final = 0.1
+_MOVE_S: Final = 0.8
+_STAY_S: Final = 0.2
 """Time at a target beyond the dwell time [s]."""
-RETURN_S: Final = 0.25
+_RETURN_S: Final = 0.25
 """Time of the return to the middle after a task, shorter than the shortest pause between intervals [s]."""
 _SAMPLE = np.dtype([("time_ns", np.int64), ("position_m", np.float64, 3)])
 
@@ -112,16 +112,16 @@ def exploration(draw: Draw, half_m: tuple[float, float, float], duration_s: floa
     """Return times (n,) [s] and positions (n, 3) [m] of exploring for at least ``duration_s`` within ±``half_m``."""
     reach_m = 0.7 * np.asarray(half_m)
     pieces = [np.zeros((1, 3))]
-    coming: list[Figure] = []
+    coming: list[_Figure] = []
     while sum(map(len, pieces)) < duration_s * RATE_HZ:
-        coming = coming or list(shuffle(FIGURES, draw))
+        coming = coming or list(shuffle(_FIGURES, draw))
         pieces += coming.pop()(draw, reach_m, pieces[-1][-1])
-        pieces.append(np.tile(pieces[-1][-1], (_rows(_draw_between(draw, *REST_S)), 1)))
+        pieces.append(np.tile(pieces[-1][-1], (_rows(_draw_between(draw, *_REST_S)), 1)))
     position_m = np.concatenate(pieces)
     return np.arange(len(position_m)) / RATE_HZ, position_m
 
 
-def _strokes(along: int, aside: int, sides: tuple[int, ...]) -> Figure:
+def _strokes(along: int, aside: int, sides: tuple[int, ...]) -> _Figure:
     """Return a figure that moves to and fro along one axis at random positions on another."""
 
     def figure(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
@@ -145,7 +145,7 @@ def _zigzag(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
 def _circles(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
     """Return the path of stirring: three circles about the middle, begun and ended at full speed."""
     radius_m = min(reach_m[0], reach_m[2]) * _draw_between(draw, 0.6, 1.0)
-    pace_mps = _draw_between(draw, *PACE_MPS)
+    pace_mps = _draw_between(draw, *_PACE_MPS)
     first = np.array([radius_m, 0.0, 0.0])
     corners = np.empty(_CORNERS + 1, complex)
     corners[0] = 1.0
@@ -161,7 +161,7 @@ def _circles(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
 def _path_through(draw: Draw, start_m: Floats, places_m: list[Floats]) -> list[Floats]:
     """Return the path through places, each stroke with its own speed."""
     return [
-        _stroke(begin, end, _draw_between(draw, *PACE_MPS))
+        _stroke(begin, end, _draw_between(draw, *_PACE_MPS))
         for begin, end in zip([start_m, *places_m[:-1]], places_m, strict=True)
     ]
 
@@ -175,7 +175,7 @@ def _stroke(begin_m: Floats, end_m: Floats, pace_mps: float) -> Floats:
     return np.asarray(begin_m + done[:, None] * way)
 
 
-FIGURES: tuple[Figure, ...] = (
+_FIGURES: tuple[_Figure, ...] = (
     _strokes(0, 1, (1, -1, 1, -1)),
     _circles,
     _zigzag,
@@ -194,7 +194,7 @@ def _draw_between(draw: Draw, low: float, high: float) -> float:
 
 def reading_s(page: TextPage) -> float:
     """Return the time that it takes to read a page [s]."""
-    return 1.0 + SECONDS_PER_WORD * sum(len(paragraph.split()) for paragraph in (page.title, *page.paragraphs))
+    return 1.0 + _SECONDS_PER_WORD * sum(len(paragraph.split()) for paragraph in (page.title, *page.paragraphs))
 
 
 class Explorer:
@@ -229,7 +229,7 @@ class Reacher:
             return False
         if lit != self._seen:
             self._seen = lit
-            self._move_s = now_s + _draw_between(self._draw, *REACTION_S)
+            self._move_s = now_s + _draw_between(self._draw, *_REACTION_S)
             self._outside_since_s = None
         elif self._move_s and now_s >= self._move_s:
             self._reach_for(lit)
@@ -242,13 +242,13 @@ class Reacher:
             self._outside_since_s = None
         elif self._outside_since_s is None:
             self._outside_since_s = now_s
-        elif now_s - self._outside_since_s >= CORRECTION_S:
+        elif now_s - self._outside_since_s >= _CORRECTION_S:
             self._outside_since_s = None
             self._reach_for(lit)
 
     def _reach_for(self, target: int) -> None:
         self._move_s = 0.0
-        error_m = AIM_ERROR * self._task.radius_m
+        error_m = _AIM_ERROR * self._task.radius_m
         x, y, z = (place + error_m * _draw_between(self._draw, -1, 1) for place in self._task.targets_m[target])
         self._device.reach_to(x, y, z)
 
@@ -257,8 +257,8 @@ class Follower:
     """Follow the moving target, anticipating its regular swing, with an error of aim."""
 
     def __init__(self, task: Task, device: HandOrders, draw: Draw, _now_s: float) -> None:
-        t_s = np.arange(round(task.limit_s * FOLLOWED_HZ) + 1) / FOLLOWED_HZ
-        error_m = AIM_ERROR * task.radius_m
+        t_s = np.arange(round(task.limit_s * _FOLLOWED_HZ) + 1) / _FOLLOWED_HZ
+        error_m = _AIM_ERROR * task.radius_m
         path_m = _target_path(task, t_s)
         path_m += (
             np.array([error_m * _draw_between(draw, -1, 1) for _ in range(3)]) * np.minimum(t_s, 1.0)[:, np.newaxis]
@@ -298,7 +298,7 @@ def rest_hand(task: Task, device: HandOrders, *, returns: bool) -> None:
     if task.start_m is not None:
         device.reach_to(*task.start_m)
     elif returns:
-        device.reach_to(0.0, 0.0, 0.0, RETURN_S)
+        device.reach_to(0.0, 0.0, 0.0, _RETURN_S)
     else:
         device.rest()
 
@@ -327,7 +327,7 @@ def answer_choices(
     given: list[Choice] = []
     for item in items:
         value = answers[item.id]
-        if changes_mind and draw() < CHANGES_MIND and (nearby := item.nearby(value)) != value:
+        if changes_mind and draw() < _CHANGES_MIND and (nearby := item.nearby(value)) != value:
             given.append(Choice(item.id, nearby, _draw_between(draw, *ANSWER_S)))
         given.append(Choice(item.id, value, _draw_between(draw, *ANSWER_S)))
     return given
@@ -359,7 +359,7 @@ class ProgrammedBall:
     ) -> None:
         self._task, self._hides = task, hidden_after_lead
         times_s, self._positions_m = task_path(
-            task, workspace_m, min(LONGEST_PATH_S, task.limit_s - BEFORE_END_S), seed
+            task, workspace_m, min(_LONGEST_PATH_S, task.limit_s - _BEFORE_END_S), seed
         )
         self.duration_s = float(times_s[-1])
         self._times_ns = np.round(times_s * 1e9).astype(np.int64)
@@ -393,11 +393,11 @@ def task_path(
 
 def _reaches(task: Reach, duration_s: float) -> tuple[Floats, Floats]:
     """Return minimum-jerk movements from target to target (Flash & Hogan 1985), with a stay at each."""
-    each_s = MOVE_S + task.dwell_s + STAY_S
+    each_s = _MOVE_S + task.dwell_s + _STAY_S
     count = max(1, min(int(duration_s / each_s), task.count or int(duration_s / each_s)))
     ends_m = np.array([(0.0, 0.0, 0.0), *(task.targets_m[at % len(task.targets_m)] for at in range(count))])
     times_s = np.arange(0.0, min(count * each_s, duration_s), 1 / RATE_HZ)
     at = np.minimum((times_s / each_s).astype(int), count - 1)
-    share = np.clip((times_s - at * each_s) / MOVE_S, 0.0, 1.0)
+    share = np.clip((times_s - at * each_s) / _MOVE_S, 0.0, 1.0)
     way = share**3 * (10 - 15 * share + 6 * share**2)
     return times_s, ends_m[at] + way[:, None] * (ends_m[at + 1] - ends_m[at])

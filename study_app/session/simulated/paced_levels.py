@@ -18,7 +18,7 @@ from study_app.protocol.tracks import condition_of, stimulus_of
 from study_app.protocol.trials.stimuli import OF_CONDITION, Stimulated
 from study_app.store.delivered import broken_interval_limits, delivered_values, judged_fields
 
-INERTIAL = {effect.name for effect in EFFECTS if effect.damping_nspm is not None}
+_INERTIAL = {effect.name for effect in EFFECTS if effect.damping_nspm is not None}
 
 
 def undelivered_levels(protocol: Protocol) -> Iterator[str]:
@@ -33,7 +33,7 @@ def undelivered_levels(protocol: Protocol) -> Iterator[str]:
         t_s = np.arange(round(task.limit_s * protocol.device.rate_hz)) / protocol.device.rate_hz
         hand_m, missed = np.array([task.target_m(time_s) for time_s in t_s.tolist()]), list[str]()
         for standard, level, scene in extreme_levels(protocol, block):
-            if not any(INERTIAL & set(liquid.effects) for liquid in resolve(scene).liquids):
+            if not any(_INERTIAL & set(liquid.effects) for liquid in resolve(scene).liquids):
                 continue
             presented = Stimulated(
                 condition_of(protocol, stimulus), stimulus.vary, stimulus.comparison(standard, level)

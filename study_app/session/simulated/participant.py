@@ -22,9 +22,9 @@ from study_app.session.transitions.events import Chosen, Event, ItemShown, Submi
 
 LOOK_AT_SETTING_S: Final = 0.5
 """Time that the observer judges a level before the next steps [s]: half a swing of a target at 1 Hz."""
-FAST: Final = 4
+_FAST: Final = 4
 """Size of the first steps, until the remembered strength is crossed. [choice]"""
-MOST_LOOKS: Final = 60
+_MOST_LOOKS: Final = 60
 """Number of judgements after which the observer stops: the remembered strength may lie beyond the levels."""
 
 
@@ -37,7 +37,7 @@ class AdjustingObserver:
     def __init__(self, attended: Comparison, draw: Draw) -> None:
         self._attended = attended
         self._remembered_noise, self._noise = (attended.noisy(self._neutral, draw) for _ in range(2))
-        self._hop = FAST
+        self._hop = _FAST
         self._way = 0
         self._looks = 0
 
@@ -52,7 +52,7 @@ class AdjustingObserver:
         )
         way = 1 if short > 0 else -1
         crossed = self._way not in {0, way}
-        if short == 0 or self._looks > MOST_LOOKS or (crossed and self._hop == 1):
+        if short == 0 or self._looks > _MOST_LOOKS or (crossed and self._hop == 1):
             return 0
         if crossed:
             self._hop = 1

@@ -1,6 +1,6 @@
 """How many trials would not be delivered because the safety layer withholds too much force, predicted for a delay.
 
-A simulated participant does each task `MOTIONS` times in what a trial or an interval presents. A trial of intervals is
+A simulated participant does each task `_MOTIONS` times in what a trial or an interval presents. A trial of intervals is
 missing if each of its presentations has an interval in which more is withheld than `limits.withheld_percent`; another
 trial is out of limits.
 """
@@ -27,12 +27,12 @@ from study_app.protocol.trials.tasks import AnyTask
 from study_app.session.preflight import PredictedDelivery
 from study_app.session.simulated.observers import task_path
 
-MOTIONS: Final = 5
-LONGEST_S: Final = 4.0
+_MOTIONS: Final = 5
+_LONGEST_S: Final = 4.0
 """Longest simulated part of a task [s]."""
-REST_S: Final = 1.0
+_REST_S: Final = 1.0
 """Time without force between two motions, in which the hand moves to the next start [s]."""
-READ_S: Final = 0.5
+_READ_S: Final = 0.5
 
 
 def predicted_delivery(protocol: Protocol, delay_ticks: int) -> PredictedDelivery:
@@ -40,7 +40,7 @@ def predicted_delivery(protocol: Protocol, delay_ticks: int) -> PredictedDeliver
 
     If sessions differ, for example between groups, the prediction is for the one that loses most trials.
     """
-    with late_rig(protocol, delay_ticks) as rig:
+    with _late_rig(protocol, delay_ticks) as rig:
         failing = _FailingScenes(protocol, rig)
         shares = {block.id: _lost_share(protocol, block, failing) for block in protocol.main_blocks}
     return max(
@@ -67,7 +67,7 @@ def _in_session(protocol: Protocol, shares: Mapping[str, float]) -> PredictedDel
     )
 
 
-def late_rig(protocol: Protocol, delay_ticks: int) -> Rig:
+def _late_rig(protocol: Protocol, delay_ticks: int) -> Rig:
     """Return a simulated hand with a device delay of ``delay_ticks``, and its servo on a virtual clock."""
     settings = study_settings(protocol, stream(0, "predicted/hand"))
     x_m, y_m, z_m = (size / 2 for size in settings.workspace_m)
@@ -76,15 +76,15 @@ def late_rig(protocol: Protocol, delay_ticks: int) -> Rig:
     return Rig(device, Servo(device, clock=VirtualClock(), rate_hz=settings.rate_hz, elements=settings.elements))
 
 
-def withheld_shares(
+def _withheld_shares(
     rig: Rig, scene: Scene, task: AnyTask, workspace_m: tuple[float, float, float]
 ) -> tuple[float, ...]:
-    """Return the share of a scene's force that is withheld in each of `MOTIONS` simulated motions of a task.
+    """Return the share of a scene's force that is withheld in each of `_MOTIONS` simulated motions of a task.
 
     Parameters
     ----------
     rig : Rig
-        That of `late_rig`.
+        That of `_late_rig`.
     scene : Scene
         The liquid.
     task : AnyTask
@@ -95,16 +95,16 @@ def withheld_shares(
     servo, hand = rig.servo, hand_of(rig.device)
     assert hand is not None  # noqa: S101 - a scripted device has one
     reader, shares = servo.telemetry.reader(), list[float]()
-    for seed in range(MOTIONS):
-        path_s, path_m = task_path(task, workspace_m, min(task.expected_s, LONGEST_S), seed)
+    for seed in range(_MOTIONS):
+        path_s, path_m = task_path(task, workspace_m, min(task.expected_s, _LONGEST_S), seed)
         hand.reach_to(*path_m[0].tolist())
-        servo.advance(round(REST_S * servo.rate_hz))
+        servo.advance(round(_REST_S * servo.rate_hz))
         serial = servo.load(scene)
         hand.follow(path_s, path_m)
         reader.read()
         permitted_n = withheld_n = 0.0
-        for _ in range(round(path_s[-1] / READ_S)):
-            servo.advance(round(READ_S * servo.rate_hz))
+        for _ in range(round(path_s[-1] / _READ_S)):
+            servo.advance(round(_READ_S * servo.rate_hz))
             samples = reader.read()
             felt = samples[samples["scene"] == serial]
             permitted_n += float(felt["permitted_n"].sum())
@@ -126,7 +126,7 @@ class _FailingScenes:
         if (known := self._known.get((scene, task))) is not None:
             return known
         protocol, limit = self._protocol, self._protocol.limits.withheld_percent / 100
-        shares = withheld_shares(self._rig, scene, protocol.tasks[task], protocol.device.workspace_m)
+        shares = _withheld_shares(self._rig, scene, protocol.tasks[task], protocol.device.workspace_m)
         self._known[scene, task] = mean(share > limit for share in shares)
         return self._known[scene, task]
 

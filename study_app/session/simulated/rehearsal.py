@@ -92,10 +92,10 @@ from study_app.store.tables.study_files import check_study
 from study_app.store.withdrawals import tombstones
 from study_app.workspace import workspace
 
-LOOK_S = 0.05  # interval between polls of the device during a task [s]
-IDLE_S = 0.5  # the same while reading and answering [s]
-FRAME_S = 1 / 60
-PAINT_S = (0.002, 0.006)  # time from reading the clock to the frame on the screen
+_LOOK_S = 0.05  # interval between polls of the device during a task [s]
+_IDLE_S = 0.5  # the same while reading and answering [s]
+_FRAME_S = 1 / 60
+_PAINT_S = (0.002, 0.006)  # time from reading the clock to the frame on the screen
 Where: TypeAlias = tuple[str, str]
 """A block and a condition."""
 ConditionFeatures: TypeAlias = Mapping[Where, tuple[TrialFeatures, ...]]
@@ -129,7 +129,7 @@ def _plain_answer(value: Any) -> Any:
     return tuple(_plain_answer(item) for item in value) if isinstance(value, list | tuple) else value
 
 
-class HeldSignals:
+class _HeldSignals:
     """Hold signals that end the program, such as Ctrl+C, until `obey`, which a session calls between its writes.
 
     An exception in the midst of a write could leave a line that the journal does not count. A second signal ends the
@@ -172,7 +172,7 @@ class HeldSignals:
             signal.signal(number, handler)
 
 
-class DiscardingStore:
+class _DiscardingStore:
     """A session store that discards everything."""
 
     recorder = None
@@ -239,7 +239,7 @@ class RehearsedSession(SimulatedParticipant):
     ) -> None:
         super().__init__(study, schedule, observer)
         self._answer = answer
-        self.signals = HeldSignals()
+        self.signals = _HeldSignals()
         self._known = known or {}
         self._tell_features = features
         self.rig = rig
@@ -292,7 +292,7 @@ class RehearsedSession(SimulatedParticipant):
                     if page is self.page:
                         self._post(Continue(self._now_s()))
                 case FeedbackPage() | TaskPage(interval=Interval(resting=True)):
-                    self._wait(LOOK_S)
+                    self._wait(_LOOK_S)
                 case TaskPage() as page:
                     self._perform_task(page)
                 case QuestionnairePage() | DesignPage() as page:
@@ -309,7 +309,7 @@ class RehearsedSession(SimulatedParticipant):
         end_s = self._now_s() + seconds
         page = self.page
         while self._now_s() < end_s and page is self.page:
-            self._advance(min(IDLE_S, end_s - self._now_s()))
+            self._advance(min(_IDLE_S, end_s - self._now_s()))
             self._poll()
 
     def _advance(self, seconds: float) -> None:
@@ -332,7 +332,7 @@ class RehearsedSession(SimulatedParticipant):
         setting = _Setting(self._adjusting_observer(page.trial), self._study.scene.scale) if page.adjusts else None
         self.look(senses)  # the first frame, which begins the trial, is painted at once
         while page is self.page:
-            self._advance(LOOK_S)
+            self._advance(_LOOK_S)
             view = self.look(senses)
             wants_to_go_on = view is not None and hand.act(self._now_s(), view)
             samples = np.asarray(self._touch.read())
@@ -387,11 +387,11 @@ class RehearsedSession(SimulatedParticipant):
         while self._next_frame_ns <= self.rig.servo.now_ns():
             view = self._runner.view(self._next_frame_ns)
             if view is not None:
-                low, high = PAINT_S
+                low, high = _PAINT_S
                 painted_ns = self._next_frame_ns + round(1e9 * (low + (high - low) * self._paint()))
                 self._runner.frame_shown(painted_ns, view.sample_time_ns)
                 senses.see(painted_ns, view)
-            self._next_frame_ns += round(1e9 * FRAME_S)
+            self._next_frame_ns += round(1e9 * _FRAME_S)
         return view
 
     def _answers_to(self, page: QuestionnairePage | DesignPage) -> list[Choice]:
@@ -451,7 +451,7 @@ def condition_features(
 
         with rehearsal_rig(protocol, person, seed, "scripted") as machine:
             RehearsedSession(
-                protocol, schedule, machine, DiscardingStore(machine.servo.now_ns, codes, key.secret), features=feel
+                protocol, schedule, machine, _DiscardingStore(machine.servo.now_ns, codes, key.secret), features=feel
             ).run()
         if progress is not None:
             progress(f"{number} of {people} sessions simulated")
@@ -596,7 +596,7 @@ def _run_to_end(
 ) -> None:
     """Run an opened session to its last page; ``progress`` gets a line with its responses and missing trials."""
     began = time.perf_counter()
-    with HeldSignals() as signals, opening as (rehearsal, store):
+    with _HeldSignals() as signals, opening as (rehearsal, store):
         rehearsal.signals = signals
         rehearsal.run()
     if progress is not None:
@@ -755,6 +755,6 @@ def _features_of_whole_session(
     features: dict[int, tuple[TrialFeatures, ...]] = {}
     with rehearsal_rig(study, schedule.participant, schedule.seed, device) as rig:
         RehearsedSession(
-            study, schedule, rig, DiscardingStore(rig.servo.now_ns, codes, secret), features=features.__setitem__
+            study, schedule, rig, _DiscardingStore(rig.servo.now_ns, codes, secret), features=features.__setitem__
         ).run()
     return features

@@ -58,7 +58,7 @@ from study_app.store.delivered import broken_trial_limits, delay_error_ms
 from study_app.store.journals import journal_events as journal
 from study_app.store.journals.journal_events import CAUSE_WITHHELD
 
-STOPPABLE = {Phase.READING, Phase.TASK, Phase.RESTING, Phase.ANSWERING, Phase.FEEDBACK, Phase.PAUSED}
+_STOPPABLE = {Phase.READING, Phase.TASK, Phase.RESTING, Phase.ANSWERING, Phase.FEEDBACK, Phase.PAUSED}
 
 
 def begin_session(state: SessionState, event: Begin) -> Result:
@@ -292,7 +292,7 @@ def recover_from_stall(state: SessionState, event: WriteCompleted) -> Result:
     """Return to the interrupted phase, paused at zero force."""
     stalled = _stall(state)
     back = replace(state, phase=stalled.before, stall=None)
-    if back.phase in STOPPABLE:
+    if back.phase in _STOPPABLE:
         return stop_force(back, ForceStopped(event.at_s, stalled.by))
     return back, ()
 

@@ -160,7 +160,7 @@ def _questionnaire_page(state: SessionState) -> pages.QuestionnairePage:
     trial = step if isinstance(step, Trial) else None
     form = step.form if isinstance(step, FormStep) else None
     label = (form or "").replace("_", " ").capitalize() if trial is None else _label(state, trial)
-    made = questions_page(state.plan.protocol, questionnaire, state.questions, state.context, label)
+    made = _questions_page(state.plan.protocol, questionnaire, state.questions, state.context, label)
     return replace(
         made,
         trial=None if trial is None else trial.number,
@@ -172,7 +172,7 @@ def _questionnaire_page(state: SessionState) -> pages.QuestionnairePage:
     )
 
 
-def questions_page(
+def _questions_page(
     protocol: Protocol, questionnaire: Questionnaire, questions: Sequence[Question], context: Context, label: str
 ) -> pages.QuestionnairePage:
     """Return a page of questions without answers, outside a session.

@@ -37,9 +37,9 @@ from study_app.store.journals.journal_events import UNDELIVERED, Answer, Respons
 
 Commands: TypeAlias = tuple[Command, ...]
 Result: TypeAlias = tuple[SessionState, Commands]
-END_SHOWN_S: Final = 0.1
+_END_SHOWN_S: Final = 0.1
 """Time that a closed ring is shown before the next page [s]."""
-AGAIN_S: Final = 1.5
+_AGAIN_S: Final = 1.5
 """Rest before a trial that was not delivered as requested is presented again [s]."""
 FADE_OUT_S: Final = 0.05
 """Time in which the force fades to zero, after which a rest begins [s]."""
@@ -125,7 +125,7 @@ def present_again(state: SessionState, done: Commands, at_s: float) -> Result:
     if state.invalid >= (state.plan.protocol.limits.attempts or 1):
         return enter_step(state, state.index + 1, done, at_s=at_s)
     again = replace(state, attempt=state.attempt + 1)
-    return start_trial(again, done, at_s, rest_until_s=at_s + FADE_OUT_S + AGAIN_S)
+    return start_trial(again, done, at_s, rest_until_s=at_s + FADE_OUT_S + _AGAIN_S)
 
 
 def start_interval(state: SessionState, done: Commands, at_s: float) -> Result:
@@ -147,7 +147,7 @@ def start_interval(state: SessionState, done: Commands, at_s: float) -> Result:
         task=state.task,
         presented=presented,
         delay_s=delay_s_of(protocol, presented),
-        linger_s=longest_delay_s(protocol, block) + END_SHOWN_S,
+        linger_s=longest_delay_s(protocol, block) + _END_SHOWN_S,
         interval=None if state.due is None else state.interval,
         adjusts=state.adjusts,
     )

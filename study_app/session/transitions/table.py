@@ -3,7 +3,7 @@
 Rules of this file:
 
 1. ``advance(state, event)`` is pure. It gives the next state and the commands that the runner carries out in order.
-2. Every legal pair of phase and event is a row of ``TRANSITIONS``. Any other pair raises ``SessionError`` and nothing
+2. Every legal pair of phase and event is a row of ``_TRANSITIONS``. Any other pair raises ``SessionError`` and nothing
    has changed. Nothing but an event moves the machine.
 3. A ``Write`` comes before the ``ShowPage`` it leads to, and one of an answer, a consent, a note or the reason for a
    repetition ``waits``: what a person gave is on the disk before its consequence is visible. Nothing else waits for the
@@ -59,10 +59,10 @@ from study_app.session.transitions.state import Phase, Plan, SessionState
 
 Move: TypeAlias = Callable[[SessionState, Any], tuple[SessionState, tuple[Command, ...]]]
 
-RUNNING = (Phase.READING, Phase.TASK, Phase.RESTING, Phase.ANSWERING, Phase.FEEDBACK)
-OPEN = (Phase.OPENING, *RUNNING, Phase.PAUSED, Phase.TROUBLE)
+_RUNNING = (Phase.READING, Phase.TASK, Phase.RESTING, Phase.ANSWERING, Phase.FEEDBACK)
+_OPEN = (Phase.OPENING, *_RUNNING, Phase.PAUSED, Phase.TROUBLE)
 
-TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
+_TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     # phase           event           what happens              next phase
     (Phase.OPENING, Begin): moves.begin_session,  # → reading, task; paused before a trial of a resumed session
     (Phase.READING, Continue): moves.continue_reading,  # → reading, task, answering (a form), complete
@@ -79,11 +79,11 @@ TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     (Phase.ANSWERING, Retracted): steps.retract_answer,  # stays
     (Phase.ANSWERING, Submitted): steps.submit_answers,  # → reading, task, resting, feedback, complete, ended
     # Pausing: esc, the operator, or a force stop.
-    **{(phase, PauseRequested): moves.pause_session for phase in RUNNING},  # → paused; the attempt at a trial is over
+    **{(phase, PauseRequested): moves.pause_session for phase in _RUNNING},  # → paused; the attempt at a trial is over
     (Phase.PAUSED, PauseRequested): moves.take_over_pause,  # stays
     (Phase.PAUSED, ResumeRequested): moves.resume_session,  # → reading, answering; task, again; after feedback: next
     # The force: off at once, wherever we are.
-    **{(phase, ForceStopped): moves.stop_force for phase in RUNNING},  # → paused; the attempt at a trial is over
+    **{(phase, ForceStopped): moves.stop_force for phase in _RUNNING},  # → paused; the attempt at a trial is over
     (Phase.PAUSED, ForceStopped): moves.stop_force,  # stays
     (Phase.TROUBLE, ForceStopped): moves.stop_force_again,  # stays
     (Phase.COMPLETE, ForceStopped): moves.stop_force_after_end,  # stays
@@ -91,10 +91,10 @@ TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     # The operator.
     # A repeated trial: → task, again.
     **{(phase, RepeatRequested): moves.repeat_trial for phase in (Phase.TASK, Phase.RESTING, Phase.ANSWERING)},
-    **{(phase, Note): moves.write_note for phase in (*RUNNING, Phase.PAUSED, Phase.TROUBLE)},  # stays
-    **{(phase, EndRequested): moves.end_session for phase in OPEN},  # → ended
+    **{(phase, Note): moves.write_note for phase in (*_RUNNING, Phase.PAUSED, Phase.TROUBLE)},  # stays
+    **{(phase, EndRequested): moves.end_session for phase in _OPEN},  # → ended
     # Failures.
-    **{(phase, Broke): moves.call_operator for phase in OPEN},  # → trouble
+    **{(phase, Broke): moves.call_operator for phase in _OPEN},  # → trouble
     (Phase.TROUBLE, Reconnected): moves.reconnect_device,  # → paused, without force; only after a failure of the device
     # Writing fails: all other events are rejected until it succeeds.
     **{(phase, WriteFailed): moves.stall_session for phase in Phase},  # → stalled
@@ -127,12 +127,12 @@ def initial_state(
 
 def advance(state: SessionState, event: Event) -> tuple[SessionState, tuple[Command, ...]]:
     """Return the next state and what is to be done, in order."""
-    move = TRANSITIONS.get((state.phase, type(event)))
+    move = _TRANSITIONS.get((state.phase, type(event)))
     if move is None:
         if state.stall is not None:
             waits = f"{state.stall.reason}; the session waits until then"
             raise SessionError(f"{type(event).__name__} cannot happen while {state.phase.value}: {waits}")
-        taken = ", ".join(sorted(kind.__name__ for phase, kind in TRANSITIONS if phase is state.phase))
+        taken = ", ".join(sorted(kind.__name__ for phase, kind in _TRANSITIONS if phase is state.phase))
         raise SessionError(
             f"{type(event).__name__} is not possible while {state.phase.value}; possible events: {taken}"
         )

@@ -95,7 +95,7 @@ class Entries:
     def __init__(self, study: StudyFolder) -> None:
         self._study = study
         held = claims(study)
-        self.counts_places = has_counted_places(held)
+        self.counts_places = _has_counted_places(held)
         self._by_participant: dict[str, Claim] = {}
         self._last: dict[str | None, int] = {}
         for claim in held:
@@ -249,7 +249,7 @@ def _check_replaced(
     held: Sequence[Claim], participant: str, own: Claim | None, *, group: str | None, row_of: str
 ) -> None:
     replaced = _claim_of(held, row_of)
-    if not has_counted_places(held):
+    if not _has_counted_places(held):
         if enrolment_number(row_of) is None:
             raise StudyError(
                 f"row of {row_of!r}: an earlier version began this folder, in which the number in the ID "
@@ -319,7 +319,7 @@ def claims(study: StudyFolder) -> list[Claim]:
     )
 
 
-def has_counted_places(held: Iterable[Claim]) -> bool:
+def _has_counted_places(held: Iterable[Claim]) -> bool:
     """Return whether places in groups assign rows of squares: not in folders with claims of an earlier version."""
     return all(claim.place_in_group for claim in held if claim.participant)
 

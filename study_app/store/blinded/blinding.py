@@ -44,7 +44,7 @@ from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
 
 Codes: TypeAlias = dict[str, dict[str, str]]
-NO_FILES: Final[Mapping[str, str]] = MappingProxyType({})
+_NO_FILES: Final[Mapping[str, str]] = MappingProxyType({})
 _FORMATS: Final = (1, 2)
 """Formats of keys; keys of studies with designs have format 2, with stimuli, designs and methods."""
 _OF_DESIGNS: Final = ("conditions", "standard", "stimulus", "standards", "method")
@@ -99,7 +99,7 @@ def sealed_hash(folder: Path) -> str | None:
 
 
 def open_or_draw_key(
-    folder: Path, protocol: Protocol, random: Callable[[], float] | None = None, files: Mapping[str, str] = NO_FILES
+    folder: Path, protocol: Protocol, random: Callable[[], float] | None = None, files: Mapping[str, str] = _NO_FILES
 ) -> Key:
     """Return the study's key; draw and seal a new one if there is none.
 

@@ -41,12 +41,12 @@ from study_app.store.atomic import (
 from study_app.store.journals.journal_events import EVENTS, Event, line_problem, read_event, shorten_value
 
 FORMAT = 2
-OTHER_LINE_ENDINGS = (
+_OTHER_LINE_ENDINGS = (
     "its line endings were changed to CR LF, as git does with core.autocrlf: restore it from a copy, with the line "
     "“* -text” in the repository's .gitattributes"
 )
 """Of the journal and the receipt; since 2 the lines have ``previous``."""
-BYTE_ORDER_MARK = "begins with a byte order mark, which an editor added: restore it from a copy"
+_BYTE_ORDER_MARK = "begins with a byte order mark, which an editor added: restore it from a copy"
 RETRY_S = 1.0
 """Time after which the background thread repeats a failed flush [s]."""
 
@@ -58,7 +58,7 @@ def as_written(content: bytes) -> bytes:
 
 def notation_change(content: bytes) -> str:
     """Return how the notation of a file was changed whose text is `as_written`."""
-    return OTHER_LINE_ENDINGS if b"\r\n" in content else BYTE_ORDER_MARK
+    return _OTHER_LINE_ENDINGS if b"\r\n" in content else _BYTE_ORDER_MARK
 
 
 class SessionClock:

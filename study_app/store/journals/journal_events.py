@@ -18,7 +18,7 @@ from study_app.errors import StoreError
 from study_app.store.columns import DELIVERED, TRIALS, VIDEO
 from study_app.store.folders import PARTICIPANT_ID, RECORDING_NAME, STUDY_NAME
 
-SHOWN = 200  # greatest number of characters of a bad value shown in messages
+_SHOWN = 200  # greatest number of characters of a bad value shown in messages
 
 CAUSE_WITHHELD = "the session was stopped"
 """Text of `Broke` for a failed device or video in a study with videos: the cause would reveal the condition."""
@@ -91,15 +91,15 @@ def _text_like(what: str, pattern: re.Pattern[str]) -> Kind:
 
 
 Text: TypeAlias = Annotated[str, Kind("text", lambda value: isinstance(value, str), "string")]
-StudyName: TypeAlias = Annotated[str, _text_like("study's name", STUDY_NAME)]
-ParticipantId: TypeAlias = Annotated[str, _text_like("participant's id", PARTICIPANT_ID)]
-RecordingName: TypeAlias = Annotated[str, _text_like("recording's name", RECORDING_NAME)]
-Flag: TypeAlias = Annotated[bool, Kind("flag", lambda value: isinstance(value, bool), "boolean")]
-Integer: TypeAlias = Annotated[int, Kind("integer", _is_integer, "integer")]
+_StudyName: TypeAlias = Annotated[str, _text_like("study's name", STUDY_NAME)]
+_ParticipantId: TypeAlias = Annotated[str, _text_like("participant's id", PARTICIPANT_ID)]
+_RecordingName: TypeAlias = Annotated[str, _text_like("recording's name", RECORDING_NAME)]
+_Flag: TypeAlias = Annotated[bool, Kind("flag", lambda value: isinstance(value, bool), "boolean")]
+_Integer: TypeAlias = Annotated[int, Kind("integer", _is_integer, "integer")]
 Number: TypeAlias = Annotated[float, Kind("number", _is_number, "number")]
 Time: TypeAlias = Annotated[str, Kind("time", _is_time, "string", {"format": "date-time"})]
-Described: TypeAlias = Annotated[Mapping[str, Any], Kind("object", lambda value: isinstance(value, dict), "object")]
-Checks: TypeAlias = Annotated[
+_Described: TypeAlias = Annotated[Mapping[str, Any], Kind("object", lambda value: isinstance(value, dict), "object")]
+_Checks: TypeAlias = Annotated[
     Sequence[Mapping[str, Any]],
     Kind(
         "list of objects",
@@ -118,7 +118,7 @@ Numbers: TypeAlias = Annotated[
     ),
 ]
 Texts: TypeAlias = Annotated[Sequence[str], Kind("list of texts", _are_texts, "array", {"items": {"type": "string"}})]
-NumberList: TypeAlias = Annotated[
+_NumberList: TypeAlias = Annotated[
     Sequence[float],
     Kind(
         "list of numbers",
@@ -130,7 +130,7 @@ NumberList: TypeAlias = Annotated[
 Answers: TypeAlias = Annotated[
     Sequence["Response"], Kind("list of answers", _are_answers, "array", {"items": {"$ref": "#/$defs/answer"}})
 ]
-AnyAnswer: TypeAlias = Annotated[
+_AnyAnswer: TypeAlias = Annotated[
     Any,
     Kind(
         "answer",
@@ -139,7 +139,7 @@ AnyAnswer: TypeAlias = Annotated[
         {"type": ["string", "number", "array"], "items": {"type": "string"}},
     ),
 ]
-OldAnswer: TypeAlias = Annotated[Any, Kind("integer", _is_integer, "integer")]
+_OldAnswer: TypeAlias = Annotated[Any, Kind("integer", _is_integer, "integer")]
 """Of a question without a kind, in format 1."""
 
 
@@ -158,8 +158,8 @@ class Answer:
     onset_s: Number | None = None
     first_s: Number | None = None
     last_s: Number | None = None
-    changes: Integer = 0
-    value: OldAnswer | None = None
+    changes: _Integer = 0
+    value: _OldAnswer | None = None
 
     @property
     def given(self) -> bool:
@@ -188,7 +188,7 @@ class Response(Answer):
     """A confirmed answer; ``number`` is its question's on the page, ``kind`` the kind of question, since format 2."""
 
     item: Text
-    number: Integer
+    number: _Integer
     kind: Text | None = None
 
     def fields(self) -> dict[str, Any]:
@@ -209,7 +209,7 @@ class Event:
     """Fields of which every line has one."""
     declared: ClassVar[tuple[str, ...]] = ()
     required: ClassVar[tuple[str, ...]] = ()
-    n: Integer = 0
+    n: _Integer = 0
     t_s: Number = 0.0
     at: Time = ""
     previous: Text | None = None
@@ -250,7 +250,7 @@ EVENTS: dict[str, type[Event]] = {}
 """The class of each event by its name in the journal."""
 
 
-class UnknownEvent(Event, group=True):
+class _UnknownEvent(Event, group=True):
     """An event of another version: its name and all its fields are in ``others``."""
 
     @property
@@ -262,8 +262,8 @@ class UnknownEvent(Event, group=True):
 class OfAttempt(Event, group=True):
     """An event of an attempt at a trial."""
 
-    trial: Integer
-    attempt: Integer
+    trial: _Integer
+    attempt: _Integer
 
     @property
     def which(self) -> Which:
@@ -278,7 +278,7 @@ class EndOfTask(OfAttempt, group=True):
     revealed the condition while the key was sealed.
     """
 
-    reached_s: NumberList | None = None
+    reached_s: _NumberList | None = None
 
     def fields(self) -> dict[str, Any]:
         """Return the event's own fields in the order in which they are written: measures first if interrupted."""
@@ -300,30 +300,30 @@ class SessionStarted(Event):
     `place_in_group` says that the place in the group assigns rows of squares.
     """
 
-    format: Integer | None = None
-    participant: ParticipantId
-    session: Integer
-    study: StudyName
-    seed: Integer
+    format: _Integer | None = None
+    participant: _ParticipantId
+    session: _Integer
+    study: _StudyName
+    seed: _Integer
     language: Text
     operator: Text
-    simulated: Flag
-    pilot: Flag
-    recordings: Flag
+    simulated: _Flag
+    pilot: _Flag
+    recordings: _Flag
     key_hash: Text
     protocol_hash: Text
     receipt_hash: Text | None = None
     version: Text
-    row_of: ParticipantId | None = None
+    row_of: _ParticipantId | None = None
     device: Text | None
     limits: Numbers
-    measures_sealed: Flag | None = None
-    own_codes: Flag | None = None
-    protocol_format: Integer | None = None
-    intervals: Flag | None = None
-    entry: Integer | None = None
+    measures_sealed: _Flag | None = None
+    own_codes: _Flag | None = None
+    protocol_format: _Integer | None = None
+    intervals: _Flag | None = None
+    entry: _Integer | None = None
     group: Text | None = None
-    place_in_group: Flag | None = None
+    place_in_group: _Flag | None = None
 
 
 class SessionResumed(Event):
@@ -331,7 +331,7 @@ class SessionResumed(Event):
 
     gap_s: Number | None
     operator: Text
-    torn_bytes: Integer
+    torn_bytes: _Integer
     device: Text | None
     version: Text
     receipt_hash: Text | None = None
@@ -340,7 +340,7 @@ class SessionResumed(Event):
 class Allocated(Event):
     """The participant has this entry in the allocation to groups; `sealed` holds the group. Once per participant."""
 
-    entry: Integer
+    entry: _Integer
     group: Text | None = None
     sealed: Text
 
@@ -348,7 +348,7 @@ class Allocated(Event):
 class Preflight(Event):
     """The checks before the first page, as accepted by the operator."""
 
-    checks: Checks
+    checks: _Checks
 
 
 class PageShown(Event):
@@ -383,9 +383,9 @@ class TrialStarted(OfAttempt):
 
     block: Text
     phase: Text
-    part: Integer | None
-    index: Integer
-    of: Integer
+    part: _Integer | None
+    index: _Integer
+    of: _Integer
     code: Text
     level: Number | None = None
     standard: Number | None = None
@@ -411,7 +411,7 @@ class TrialStarted(OfAttempt):
 class IntervalStarted(OfAttempt):
     """An interval of a trial was presented."""
 
-    interval: Integer
+    interval: _Integer
 
 
 class IntervalEnded(EndOfTask):
@@ -420,7 +420,7 @@ class IntervalEnded(EndOfTask):
     `invalid` names the limits that it breaks: the trial is then presented again.
     """
 
-    interval: Integer
+    interval: _Integer
     outcome: Text
     invalid: Texts | None = None
     sealed: Text | None = None
@@ -434,7 +434,7 @@ class PassedOver(Event):
     """A trial, or the break after it, was not due."""
 
     one_of = ("trial", "page")
-    trial: Integer | None = None
+    trial: _Integer | None = None
     page: Text | None = None
     reason: Text
 
@@ -445,8 +445,8 @@ class Stepped(OfAttempt):
     `scene` is the number of the presented scene from then on, n/a where no force depends on it.
     """
 
-    steps: Integer
-    scene: Integer | None
+    steps: _Integer
+    scene: _Integer | None
 
 
 class TargetReached(Event):
@@ -456,8 +456,8 @@ class TargetReached(Event):
     the task has the times in its `sealed` text, as `reached_s`.
     """
 
-    trial: Integer
-    target: Integer
+    trial: _Integer
+    target: _Integer
     t_task_s: Number | None
 
 
@@ -475,12 +475,12 @@ class Recorded(OfAttempt):
     """
 
     one_of = ("samples_recorded", "sealed")
-    interval: Integer | None = None
-    recording: RecordingName
-    recording_frames: RecordingName
-    samples_recorded: Integer | None = None
-    samples_unrecorded: Integer
-    frames_recorded: Integer | None = None
+    interval: _Integer | None = None
+    recording: _RecordingName
+    recording_frames: _RecordingName
+    samples_recorded: _Integer | None = None
+    samples_unrecorded: _Integer
+    frames_recorded: _Integer | None = None
     sha256: Text
     frames_sha256: Text
     opened_sha256: Text | None = None
@@ -491,7 +491,7 @@ class Recorded(OfAttempt):
 class RecordingLost(OfAttempt):
     """The trial's recording could not be stored."""
 
-    interval: Integer | None = None
+    interval: _Integer | None = None
     reason: Text
 
 
@@ -509,27 +509,27 @@ class FormShown(Event):
     after: Text | None = None
 
 
-class OfItem(Event, group=True):
+class _OfItem(Event, group=True):
     """An event of a question, of a trial or a form."""
 
     one_of = ("trial", "form")
-    trial: Integer | None = None
+    trial: _Integer | None = None
     form: Text | None = None
     item: Text
 
 
-class ItemShown(OfItem):
+class ItemShown(_OfItem):
     """A question was shown, of a trial or a form."""
 
 
-class Choice(OfItem):
+class Choice(_OfItem):
     """An answer was chosen; the last one counts."""
 
     kind: Text | None = None
-    value: OldAnswer | None
+    value: _OldAnswer | None
 
 
-class AnswerRemoved(OfItem):
+class AnswerRemoved(_OfItem):
     """An answer was taken back, or an earlier one hid its question."""
 
 
@@ -547,25 +547,25 @@ class FormAnswered(Event):
     items: Answers
 
 
-class OfPerson(Event, group=True):
+class _OfPerson(Event, group=True):
     """Something that a person, or the program, did."""
 
     by: Text
 
 
-class Paused(OfPerson):
+class Paused(_OfPerson):
     """The session was paused."""
 
 
-class Resumed(OfPerson):
+class Resumed(_OfPerson):
     """The pause ended."""
 
 
-class ForceStopped(OfPerson):
+class ForceStopped(_OfPerson):
     """The force was stopped."""
 
 
-class ForceRestored(OfPerson):
+class ForceRestored(_OfPerson):
     """The force was turned on again."""
 
 
@@ -579,7 +579,7 @@ class Note(Event):
 class Repeat(Event):
     """The operator repeated the trial."""
 
-    trial: Integer
+    trial: _Integer
     reason: Text
 
 
@@ -596,7 +596,7 @@ class DeviceReconnected(Event):
     """
 
     device: Text | None
-    described: Described
+    described: _Described
 
 
 class SessionEnded(Event):
@@ -607,14 +607,14 @@ class SessionEnded(Event):
 
 
 def _known_kinds() -> Iterator[tuple[str, tuple[Kind, bool]]]:
-    aliases: tuple[Any, ...] = (Text, Time, Number, Integer, Flag)
+    aliases: tuple[Any, ...] = (Text, Time, Number, _Integer, _Flag)
     of_columns = {alias.__metadata__[0].description: alias.__metadata__[0] for alias in aliases}
     yield from ((column.name, (of_columns[column.kind], True)) for column in (*TRIALS, *DELIVERED, *VIDEO))
     for owner in (Response, Event, *EVENTS.values()):
         for name, hint in get_type_hints(owner, include_extras=True).items():
             for part in (hint, *get_args(hint)):
                 yield from ((name, (kind, name in _MAY_BE_NULL)) for kind in getattr(part, "__metadata__", ()))
-    yield "answer", (AnyAnswer.__metadata__[0], True)
+    yield "answer", (_AnyAnswer.__metadata__[0], True)
 
 
 _KINDS = dict(_known_kinds())
@@ -630,7 +630,7 @@ def line_problem(line: Mapping[str, Any]) -> str | None:
     event = line.get("event")
     if not isinstance(event, str):
         return "the event is missing"
-    kind = EVENTS.get(event, UnknownEvent)
+    kind = EVENTS.get(event, _UnknownEvent)
     if lacking := [name for name in ("n", "event", "t_s", "at", *kind.required) if name not in line]:
         return f"({event}) lacks {', '.join(lacking)}"
     if kind.one_of and sum(name in line for name in kind.one_of) != 1:
@@ -680,8 +680,8 @@ def _schema_of(name: str) -> dict[str, Any]:
 
 def read_event(line: Mapping[str, Any]) -> Event:
     """Return the event of a journal line in which `line_problem` finds no error."""
-    kind, others = EVENTS.get(line["event"], UnknownEvent), dict(line)
-    if kind is not UnknownEvent:
+    kind, others = EVENTS.get(line["event"], _UnknownEvent), dict(line)
+    if kind is not _UnknownEvent:
         del others["event"]
     own = {name: others.pop(name) for name in (*_OF_ALL, *kind.declared) if name in others}
     if "items" in own:
@@ -710,12 +710,12 @@ def _kind_name(held: Mapping[str, Any], name: str) -> str:
 def shorten_value(value: object) -> str:
     """Return ``value`` as text for messages, shortened."""
     shown = repr(value)
-    return shown if len(shown) <= SHOWN else f"{shown[:SHOWN]}…"
+    return shown if len(shown) <= _SHOWN else f"{shown[:_SHOWN]}…"
 
 
 def unknown_events(lines: Sequence[Event]) -> Iterator[str]:
     """Yield the names of events that are not in the dictionary, each once."""
-    yield from {line.event: None for line in lines if isinstance(line, UnknownEvent)}
+    yield from {line.event: None for line in lines if isinstance(line, _UnknownEvent)}
 
 
 def is_valid_value(name: str, value: object) -> bool:

@@ -44,9 +44,9 @@ from study_app.store.sessions.open_session import Place, SessionStore
 from study_app.store.tables.study_files import check_study, write_description, write_participants
 from study_app.store.withdrawals import tombstones
 
-MAX_ID_LENGTH = 32
+_MAX_ID_LENGTH = 32
 MAX_SESSION = 99
-RESERVED_IDS = ("pilot", "test")
+_RESERVED_IDS = ("pilot", "test")
 _NUMBERED = re.compile(r"P([0-9]+)")
 
 
@@ -348,12 +348,12 @@ def check_participant(participant: str, *, pilot: bool = False) -> None:
     StoreError
         Names the id and the permitted characters.
     """
-    if not ID_PATTERN.fullmatch(participant) or len(participant) > MAX_ID_LENGTH:
+    if not ID_PATTERN.fullmatch(participant) or len(participant) > _MAX_ID_LENGTH:
         raise StoreError(
             f"participant ID {participant!r} cannot be used: only letters A-Z, a-z and digits 0-9 are "
-            f"permitted, at most {MAX_ID_LENGTH}, without dashes, spaces or underscores; for example P007"
+            f"permitted, at most {_MAX_ID_LENGTH}, without dashes, spaces or underscores; for example P007"
         )
-    if not pilot and participant.lower() in RESERVED_IDS:
+    if not pilot and participant.lower() in _RESERVED_IDS:
         raise StoreError(
             f"participant ID {participant!r} is reserved for pilot sessions, which are stored separately: use "
             "an ID such as P007"

@@ -46,8 +46,8 @@ from study_app.store.tables import session_tables
 from study_app.store.tables.study_files import write_description, write_participants
 
 RESTORE = "restore the journal from a copy"
-SHOWN_DIFFERENCES = 6
-MOST_GAP_S = 366 * 86400.0
+_SHOWN_DIFFERENCES = 6
+_MOST_GAP_S = 366 * 86400.0
 """Longest plausible gap [s]: beyond it the wall clock was or is wrong."""
 
 
@@ -200,7 +200,7 @@ def rebuild_session(session_folder: Path) -> Rebuilt:
     with lock_folder(folder.path):
         contents = journal.read_complete(folder.journal)
         place = Place(study_folder, folder, events.start_of(contents.lines).study)
-        refuse_truncated_journal(place, contents.lines)
+        _refuse_truncated_journal(place, contents.lines)
         swept = remove_temporary_files(folder.path) + (
             remove_temporary_files(folder.recordings) if is_there(folder.recordings) else ()
         )
@@ -220,7 +220,7 @@ def rebuild_session(session_folder: Path) -> Rebuilt:
         return Rebuilt(tuple(rewritten), swept, contents.torn_bytes)
 
 
-def refuse_truncated_journal(place: Place, lines: Sequence[events.Event]) -> None:
+def _refuse_truncated_journal(place: Place, lines: Sequence[events.Event]) -> None:
     """Raise an error if the journal has less information than the session's other files, which would be replaced."""
     for name in events.unknown_events(lines):
         raise StoreError(
@@ -297,7 +297,7 @@ def _read_interrupted(study_folder: StudyFolder, folder: SessionFolder, protocol
     first = receipt.read(folder.receipt)
     if receipt.has_other_format(first, start):
         raise StoreError(f"{folder.journal} has another format than its receipt states: restore it from a copy")
-    refuse_truncated_journal(place, contents.lines)
+    _refuse_truncated_journal(place, contents.lines)
     _same_protocol(place, first, start, protocol, source)
     draw = stream(start.seed, "blinding").random if start.simulated else None
     return _Left(place, contents, start, first, open_or_draw_key(study_folder.path, protocol, draw))
@@ -338,8 +338,8 @@ def _same_protocol(
         changes.append(CONDITIONS_DIFFER)
     if not changes:
         changes.append("only comments, order or notation")
-    listed = "; ".join(changes[:SHOWN_DIFFERENCES])
-    more = f"; and {len(changes) - SHOWN_DIFFERENCES} more" if len(changes) > SHOWN_DIFFERENCES else ""
+    listed = "; ".join(changes[:_SHOWN_DIFFERENCES])
+    more = f"; and {len(changes) - _SHOWN_DIFFERENCES} more" if len(changes) > _SHOWN_DIFFERENCES else ""
     raise StoreError(
         f"{place.folder.path} began with another protocol file and can be resumed only with that one: restore it, "
         f"or use a new session number. Differences: {listed}{more}"
@@ -352,7 +352,7 @@ def _continued_clock(
     """Return the gap since the last line [s], None if unknown, and the clock that continues after it."""
     now = now if now is not None else datetime.now().astimezone()
     gap_s = (now - datetime.fromisoformat(lines[-1].at)).total_seconds()
-    known = 0 <= gap_s <= MOST_GAP_S
+    known = 0 <= gap_s <= _MOST_GAP_S
     shown_s = progress_of(lines).t_s + (gap_s if known else 0.0)
     clock = SessionClock(now_ns, now - timedelta(seconds=shown_s), shown_s=shown_s)
     return (round(gap_s, 3) if known else None), clock

@@ -38,8 +38,8 @@ from study_app.store.merged import FOLDER, Merged, Site, merged_above, read_merg
 from study_app.store.tables.study_files import described_study
 from study_app.store.withdrawals import describe_session, tombstones
 
-MAX_SITE_LENGTH: Final = 16
-LEFT_BEHIND: Final = shutil.ignore_patterns(".open-*.json", ".*.tmp")
+_MAX_SITE_LENGTH: Final = 16
+_LEFT_BEHIND: Final = shutil.ignore_patterns(".open-*.json", ".*.tmp")
 """Files that programs leave in a folder while they have it open, or when they are killed."""
 
 
@@ -119,10 +119,10 @@ def _check_names(given: Mapping[str, Path], merged: Merged | None) -> None:
         raise StoreError("sites are missing: give each as A=DIR")
     used = {} if merged is None else {name.lower(): name for name in merged.names}
     for name in given:
-        if not ID_PATTERN.fullmatch(name) or len(name) > MAX_SITE_LENGTH:
+        if not ID_PATTERN.fullmatch(name) or len(name) > _MAX_SITE_LENGTH:
             raise StoreError(
                 f"site {name!r} cannot be used as a name: only letters A-Z, a-z and digits 0-9 are permitted, at most "
-                f"{MAX_SITE_LENGTH}; for example A or Utrecht"
+                f"{_MAX_SITE_LENGTH}; for example A or Utrecht"
             )
         if (other := used.get(name.lower())) is not None:
             held = "is merged already" if merged is not None and other in merged.names else "is given twice"
@@ -278,7 +278,7 @@ def _copy(source: _Source, to: Path, progress: ReportProgress | None) -> None:
             progress(f"copying site {source.name}", min(number / len(source.state), 1.0))
         return _copy_file(*paths)
 
-    shutil.copytree(source.path, to, symlinks=True, ignore=LEFT_BEHIND, copy_function=copy_file)
+    shutil.copytree(source.path, to, symlinks=True, ignore=_LEFT_BEHIND, copy_function=copy_file)
     for place in (to, *(path for path in paths_in(to) if path.is_dir() and not path.is_symlink())):
         sync_folder(place)
     refuse_if_open(source.path)

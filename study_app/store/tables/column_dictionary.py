@@ -16,7 +16,7 @@ from study_app.store.csv_files import Column
 from study_app.store.journals.journal_events import EVENTS
 from study_app.store.recordings import FRAMES, SAMPLES
 
-SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
+_SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
     ("Responses", "subject-…_description-responses_data.csv", "one row per response", RESPONSES),
     (
         "Responses, format 2",
@@ -53,7 +53,7 @@ SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
 
 def dictionary_markdown() -> str:
     """Return the columns of every file and the journal's events as Markdown, each with a heading and a table."""
-    return "\n".join((*(table_markdown(*section) for section in SECTIONS), _journal()))
+    return "\n".join((*(table_markdown(*section) for section in _SECTIONS), _journal()))
 
 
 def table_markdown(title: str, file: str, row: str, columns: Sequence[Column]) -> str:

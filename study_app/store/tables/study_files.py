@@ -37,7 +37,7 @@ from study_app.store.tables import session_tables
 _READ: Final[dict[Path, tuple[object, list[csv_files.Row]]]] = {}
 """Cached rows by session folder, with time and size of the journal. Reading a journal takes 5 ms, 200 take a second."""
 # Files of a study folder other than tables; patterns as in .gitignore.
-IGNORED = b"""\
+_IGNORED = b"""\
 .psychds-ignore
 .*.tmp
 .open-*.json
@@ -217,7 +217,7 @@ def write_description(
     if held != content:
         write_file(folder.description, content)
     if not is_there(folder.ignore):
-        write_file(folder.ignore, IGNORED)
+        write_file(folder.ignore, _IGNORED)
 
 
 def has_intervals(protocol: Mapping[str, Any]) -> bool:

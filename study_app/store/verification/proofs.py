@@ -25,7 +25,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.verification.time_stamps import WAITS_S, checked_stamp, optional_library, request_stamp
 from study_app.store.withdrawals import proof_of_withdrawal, tombstones
 
-STORE: Final = ("liquid-study", "signing key of the lab")
+_STORE: Final = ("liquid-study", "signing key of the lab")
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ def record_proofs(study: StudyFolder) -> Proofs:
     return (*map(proof_of_withdrawal, tombstones(study).values()), *opened, *dict.fromkeys(excluded))
 
 
-def proof_lines(study: StudyFolder) -> str:
+def _proof_lines(study: StudyFolder) -> str:
     """Return the lines that prove the current state of a study."""
     lines = [checked_line(*proof) for proof in (*read_list(study.fingerprints), *record_proofs(study))]
     if not lines:
@@ -53,7 +53,7 @@ def proof_lines(study: StudyFolder) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def sign_lines(lines: str) -> str:
+def _sign_lines(lines: str) -> str:
     """Return the signature of ``lines`` as a line, made with the lab's key, which is created if missing."""
     key = _signing_key(draws=True)
     public = base64.b64encode(key.public_key().public_bytes_raw()).decode()
@@ -109,9 +109,9 @@ def write_proof(study: StudyFolder, say: Callable[[str], object]) -> None:
 
 def proof_text(study: StudyFolder, *, server: str = "", sign: bool | None = None) -> str:
     """Return a study's proof, signed (None: if the lab has a key) and stamped if a ``server`` (URL) is given."""
-    lines, below = proof_lines(study), ""
+    lines, below = _proof_lines(study), ""
     if sign or (sign is None and _signing_key(draws=False) is not None):
-        below += sign_lines(lines)
+        below += _sign_lines(lines)
     if server:
         below += request_stamp(lines, server)
     return lines + below
@@ -123,10 +123,10 @@ def _signing_key(*, draws: bool) -> Any:
         return None
     store, ed25519 = optional_library("keyring"), optional_library("cryptography.hazmat.primitives.asymmetric.ed25519")
     try:
-        held = store.get_password(*STORE)
+        held = store.get_password(*_STORE)
         if held is None and draws:
             held = base64.b64encode(ed25519.Ed25519PrivateKey.generate().private_bytes_raw()).decode()
-            store.set_password(*STORE, held)
+            store.set_password(*_STORE, held)
     except optional_library("keyring.errors").KeyringError as error:
         if not draws:
             return None

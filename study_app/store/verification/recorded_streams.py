@@ -24,9 +24,9 @@ from study_app.store.journals import journal
 from study_app.store.merged import read_merged
 from study_app.store.verification.verify_session import Finding, Findings
 
-RESET_S: Final = 1.0
+_RESET_S: Final = 1.0
 """Smallest change of an offset between two measurements that means a clock was set rather than drifting [s]."""
-LATE: Final = 1.5
+_LATE: Final = 1.5
 """Number of periods from which the interval between successive ticks is late."""
 
 
@@ -60,7 +60,7 @@ def check_recording(file: Path, folder: Path, findings: Findings) -> list[str]:
                 if name == MARKERS
                 else _check_samples(file, stream, findings)
             )
-            said += [*of, f"clock of '{name}': {clock_drift(stream)}"]
+            said += [*of, f"clock of '{name}': {_clock_drift(stream)}"]
         except (ArithmeticError, LookupError, TypeError, ValueError) as error:
             why = f"{type(error).__name__}: {error}"
             raise StoreError(f"{file} contains a damaged stream '{name}' ({why}): restore it from a copy") from error
@@ -163,17 +163,17 @@ def _check_samples(file: Path, stream: Mapping[str, Any], findings: Findings) ->
         first_s = stamps_s[int(np.argmax(gaps))] - stamps_s[0]
         loss = f"{counted(lost, 'sample')} lost in {counted(int(gaps.sum()), 'gap')}"
         findings.errors += (Finding(file.name, f"{loss}; the first after {first_s:.3f} s of the stream"),)
-    late_s = intervals_s[(steps == 1) & (intervals_s > LATE / float(stream["info"]["nominal_srate"][0]))]
+    late_s = intervals_s[(steps == 1) & (intervals_s > _LATE / float(stream["info"]["nominal_srate"][0]))]
     worst = f", at most {1e3 * late_s.max():.3g} ms between two ticks" if len(late_s) else ""
     yield f"samples: {len(stamps_s)} recorded, {lost} lost, {len(late_s)} late{worst}"
 
 
-def clock_drift(stream: Mapping[str, Any]) -> str:
+def _clock_drift(stream: Mapping[str, Any]) -> str:
     """Return a text about the drift of a stream's clock against the recorder's, from offsets between two resets."""
     times_s, values_s = (np.asarray(stream.get(name, ()), float) for name in ("clock_times", "clock_values"))
     if len(times_s) < 2:
         return f"{counted(len(times_s), 'offset')} measured: too few for its drift"
-    resets = np.flatnonzero((np.diff(times_s) < 0) | (np.abs(np.diff(values_s)) > RESET_S)) + 1
+    resets = np.flatnonzero((np.diff(times_s) < 0) | (np.abs(np.diff(values_s)) > _RESET_S)) + 1
     parts = zip(np.split(times_s, resets), np.split(values_s, resets), strict=True)
     said = []
     for t_s, v_s in parts:

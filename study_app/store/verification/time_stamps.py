@@ -13,9 +13,9 @@ from study_app.errors import StoreError
 from study_app.store import workstation
 from study_app.store.atomic import read_regular
 
-EXTRA: Final = "needs the optional extra proofs: pip install 'liquid-study[proofs]'"
+_EXTRA: Final = "needs the optional extra proofs: pip install 'liquid-study[proofs]'"
 WAITS_S: Final = 10.0
-LONGEST: Final = 1_000_000
+_LONGEST: Final = 1_000_000
 """Greatest length of a time-stamp server's answer [bytes]."""
 _EXAMPLE: Final = "https://freetsa.org/tsr"
 
@@ -25,7 +25,7 @@ def optional_library(name: str) -> Any:
     try:
         return import_module(name)
     except ImportError as error:
-        raise StoreError(f"a proof needs {name.partition('.')[0]} {EXTRA}") from error
+        raise StoreError(f"a proof needs {name.partition('.')[0]} {_EXTRA}") from error
 
 
 def request_stamp(lines: str, server: str) -> str:
@@ -42,7 +42,7 @@ def request_stamp(lines: str, server: str) -> str:
     client = optional_library("rfc3161_client")
     request = client.TimestampRequestBuilder().data(lines.encode()).build()
     if not server.startswith(("http://", "https://")):
-        raise StoreError(f"{without_login(server)} is not a time-stamp server: give a URL such as {_EXAMPLE}")
+        raise StoreError(f"{_without_login(server)} is not a time-stamp server: give a URL such as {_EXAMPLE}")
     answers = queue.SimpleQueue[bytes | Exception]()
     threading.Thread(target=_post_request, args=(server, request.as_bytes(), answers), daemon=True).start()
     try:
@@ -56,12 +56,12 @@ def request_stamp(lines: str, server: str) -> str:
     except (client.VerificationError, ValueError, OSError) as error:
         answer = error
     if isinstance(answer, Exception):
-        reason = f"{without_login(server)} did not return a time stamp ({str(answer)[:100]!r}): try again later"
+        reason = f"{_without_login(server)} did not return a time stamp ({str(answer)[:100]!r}): try again later"
         raise StoreError(reason) from answer
     return f"stamp {base64.b64encode(answer).decode()}\n"
 
 
-def without_login(url: str) -> str:
+def _without_login(url: str) -> str:
     """Return a URL without user name and password."""
     parts = urlsplit(url)
     return parts._replace(netloc=parts.netloc.rpartition("@")[2]).geturl()
@@ -83,7 +83,7 @@ def check_granted(answer: bytes, request: Any) -> None:
 
 
 def _post_request(server: str, question: bytes, answers: queue.SimpleQueue[bytes | Exception]) -> None:
-    """Put the server's answer, truncated after `LONGEST`, or the error of the request; follow no redirect."""
+    """Put the server's answer, truncated after `_LONGEST`, or the error of the request; follow no redirect."""
     import urllib.request as network  # noqa: PLC0415 - loads the network's modules: only where a stamp is asked for
 
     try:
@@ -95,7 +95,7 @@ def _post_request(server: str, question: bytes, answers: queue.SimpleQueue[bytes
             server, question, {"Content-Type": "application/timestamp-query"}
         )
         with opener.open(request, timeout=WAITS_S) as answer:
-            answers.put(answer.read(LONGEST))
+            answers.put(answer.read(_LONGEST))
     except Exception as error:  # noqa: BLE001 - raised where the answer is waited for
         if isinstance(error, HTTPError):
             error.close()

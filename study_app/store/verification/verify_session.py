@@ -40,10 +40,10 @@ from study_app.store.tables.study_files import opened_or_none, row_from
 
 _BEGUN = "but receipt, tables, recordings or checksums show that the session began: restore it from a copy"
 _ROUNDED_S = 1.1e-6
-CHANGED = "has changed since the session ended (its checksum differs)"
-REBUILT_AFTER = "says that checksums or fingerprint were rewritten after the session ended"
+_CHANGED = "has changed since the session ended (its checksum differs)"
+_REBUILT_AFTER = "says that checksums or fingerprint were rewritten after the session ended"
 INTERRUPTED = "the unblinding was interrupted: run liquid-study unblind again"
-COMPARE = "compare it with fingerprints stored elsewhere: liquid-study verify --fingerprints FILE"
+_COMPARE = "compare it with fingerprints stored elsewhere: liquid-study verify --fingerprints FILE"
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +165,7 @@ def _check_files(
     told = lines
     with findings.reading(folder.journal):
         told = open_events(lines, key)
-    for wrong in (*wrong_responses(lines), *_unconfirmed_answers(lines)):
+    for wrong in (*_wrong_responses(lines), *_unconfirmed_answers(lines)):
         findings.error(folder.journal, wrong)
     ended = isinstance(lines[-1], events.SessionEnded)
     hashes = {}
@@ -362,7 +362,7 @@ def _unconfirmed_answers(lines: Sequence[events.Event]) -> Iterator[str]:
             form = shown
 
 
-def wrong_responses(lines: Sequence[events.Event]) -> Iterator[str]:
+def _wrong_responses(lines: Sequence[events.Event]) -> Iterator[str]:
     """Yield a sentence on each answer in ``responses`` that differs from the choices before it."""
     now = Progress()
     for line in lines:
@@ -505,7 +505,7 @@ def _check_checksums(
             else:
                 content = read_regular(path)
                 same_text = hashlib.sha256(journal.as_written(content)).hexdigest() == listed[name]
-                findings.error(path, journal.notation_change(content) if same_text else CHANGED)
+                findings.error(path, journal.notation_change(content) if same_text else _CHANGED)
 
 
 def _is_opened_table(place: Place, lines: Sequence[events.Event], path: Path, listed: str) -> bool:
@@ -605,7 +605,7 @@ def session_discrepancies(place: Place) -> tuple[Discrepancy, ...]:
     folder = place.folder
     if is_open(folder.path):
         return ()
-    discrepancies = (Discrepancy(folder.rebuilt, REBUILT_AFTER, COMPARE),) if is_there(folder.rebuilt) else ()
+    discrepancies = (Discrepancy(folder.rebuilt, _REBUILT_AFTER, _COMPARE),) if is_there(folder.rebuilt) else ()
     if _is_as_ended(place):
         return discrepancies
     told = Findings(folder.path)

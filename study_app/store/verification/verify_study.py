@@ -55,7 +55,7 @@ from study_app.store.verification.verify_session import (
 )
 from study_app.store.withdrawals import Tombstone, describe_session, proof_of_withdrawal, tombstones, unerased_files
 
-IN_FILES: Final = ("question", "task", "method")
+_IN_FILES: Final = ("question", "task", "method")
 """The kinds of plug-ins without which a session cannot be checked in full."""
 Sessions: TypeAlias = list[CheckedSession]
 
@@ -126,7 +126,7 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findi
     _check_description(study, findings)
     _check_exclusions(study, sessions, withdrawn, findings)
     _check_reveals(study, key, findings)
-    check_allocation(study, key, withdrawn, findings)
+    _check_allocation(study, key, withdrawn, findings)
     _check_blinding(study, key, findings)
     places = {place for session in study.sessions() for place in (session.path, session.path.parent)}
     for path in {*study.data.glob("sub-*"), *study.data.glob("sub-*/ses-*")} - places:
@@ -144,7 +144,7 @@ def _check_plug_ins(study: StudyFolder, findings: Findings) -> None:
     for package, names in used.items():
         asked = {name: name.partition(" ") for name in names}
         if missing := [
-            name for name, (kind, _, own) in asked.items() if kind in IN_FILES and own not in registry(kind)
+            name for name, (kind, _, own) in asked.items() if kind in _IN_FILES and own not in registry(kind)
         ]:
             what = f"sessions used {', '.join(missing)} of {package}, which is not installed"
             findings.warning(study.data, f"{what}: checks that need the plug-in were skipped")
@@ -164,7 +164,7 @@ def _check_contents(study: StudyFolder, findings: Findings) -> None:
             findings.warning(study.data, f"{what}: change study.version with each change of the file")
 
 
-def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[str], findings: Findings) -> None:
+def _check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[str], findings: Findings) -> None:
     """Check that every participant with a session has one unchanged entry, the one in the journals.
 
     Those of the participants who have ``withdrawn`` stay used.

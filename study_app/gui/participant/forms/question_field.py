@@ -39,10 +39,10 @@ if TYPE_CHECKING:
 else:
     Widget = object
 
-HIGHEST = 2000  # of wrapped words [px]
+_HIGHEST = 2000  # of wrapped words [px]
 
 
-class QuestionWords(QWidget):
+class _QuestionWords(QWidget):
     """One widget instead of four with a layout of their own: a page has nine and more of them.
 
     The number stands in a column of its own, so that the texts of all questions begin at one line. What is missing has
@@ -138,7 +138,7 @@ class QuestionWords(QWidget):
         return QRectF(QStyle.visualRect(self.layoutDirection(), self.rect(), place))
 
     def _bounds(self, face: QFont, text: str, width: int) -> QRect:
-        return QFontMetrics(face).boundingRect(0, 0, width, HIGHEST, self._flags, text)
+        return QFontMetrics(face).boundingRect(0, 0, width, _HIGHEST, self._flags, text)
 
     def _heights(self, width: int) -> tuple[int, int]:
         """Return the heights [px] of number and text, and of the note."""
@@ -161,18 +161,18 @@ class QuestionWords(QWidget):
         self.update()
 
 
-LEAST_TARGET = 44.0  # of what is hit with mouse or finger [logical px]
+_LEAST_TARGET = 44.0  # of what is hit with mouse or finger [logical px]
 
 
 def target_px(scale: float) -> float:
     """Return the minimum height and width of anything that is clicked, however small the text [logical px]."""
-    return LEAST_TARGET * max(1.0, scale)
+    return _LEAST_TARGET * max(1.0, scale)
 
 
 WORDS_SHARE, ANSWER_SHARE = 5, 6
 MARGIN = 16.0
-NUMBER_WIDTH = 32.0
-NOTE_GAP = 5.0
+_NUMBER_WIDTH = 32.0
+_NOTE_GAP = 5.0
 
 
 class QuestionField(QWidget):
@@ -204,7 +204,7 @@ class QuestionField(QWidget):
         self._answer: QWidget | None = None
         self.scale = 1.0
         give_role(self, QAccessible.Role.Grouping)
-        self.statement = QuestionWords(view.number, view.text, self)
+        self.statement = _QuestionWords(view.number, view.text, self)
         self.grid = grid(0, parent=self)
         self.grid.addWidget(self.statement, 0, 0)
         self.grid.setColumnStretch(0, WORDS_SHARE)
@@ -242,7 +242,7 @@ class QuestionField(QWidget):
         self.set_fonts(font("statement", scale=scale), font("label", scale=scale, weight=600), scale)
         margin, gap = self.horizontal_margin, round(8 * scale)
         self.grid.setContentsMargins(margin, gap, margin, gap)
-        self.set_words_columns(NUMBER_WIDTH * scale, 24 * scale)
+        self.set_words_columns(_NUMBER_WIDTH * scale, 24 * scale)
 
     @property
     def horizontal_margin(self) -> int:
@@ -252,7 +252,7 @@ class QuestionField(QWidget):
     def set_fonts(self, statement: QFont, note: QFont, scale: float) -> None:
         """Set the fonts of statement and note; the number is as large as in all rows of a page."""
         number = font("cell", scale=scale * 0.9, weight=700 if self.missing else 400)
-        self.statement.set_fonts(statement, note, number, NOTE_GAP * scale)
+        self.statement.set_fonts(statement, note, number, _NOTE_GAP * scale)
 
     def set_words_columns(self, number: float, after: float) -> None:
         """Set the width of the number's column and the room after the text [px]."""
@@ -366,38 +366,38 @@ def question_of(part: QWidget) -> QuestionField | None:
     return above
 
 
-CENTRE = int(Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap)
-MARK = 19.0
+_CENTRE = int(Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap)
+_MARK = 19.0
 ROOM = 14.0  # between edge and words
-TAKEN = MARK + 6 + ROOM  # of the width, by mark and room
+_TAKEN = _MARK + 6 + ROOM  # of the width, by mark and room
 NO_WORDS = "–"
-GROWS = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
+_GROWS = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
 Look: TypeAlias = Literal["words", "point", "off scale"]
 """Words that can be chosen, a point of a scale, or an answer off it, with an edge of dashes."""
 
 
 @lru_cache(maxsize=1024)
-def widest_word(text: str, scale: float) -> float:
+def _widest_word(text: str, scale: float) -> float:
     """Return the width of an answer's widest word [px]; the points of all rows of a page are alike."""
     metrics = QFontMetricsF(font("chosen", scale=scale))
     return max((metrics.horizontalAdvance(word) for word in text.split()), default=0.0)
 
 
 @lru_cache(maxsize=1024)
-def size_of(text: str, scale: float) -> QSize:
+def _size_of(text: str, scale: float) -> QSize:
     """Return a clickable size, as wide as the longest word [px]."""
     least = target_px(scale)
-    return QSize(round(max(least, widest_word(text, scale) + TAKEN * scale)), round(least))
+    return QSize(round(max(least, _widest_word(text, scale) + _TAKEN * scale)), round(least))
 
 
 @lru_cache(maxsize=1024)
-def height_of(text: str, scale: float, width_px: float) -> float:
+def _height_of(text: str, scale: float, width_px: float) -> float:
     """Return the height of an answer wrapped at a width [px]."""
     room = QRectF(0, 0, width_px, 1e4)
-    return QFontMetricsF(font("chosen", scale=scale)).boundingRect(room, CENTRE, text).height()
+    return QFontMetricsF(font("chosen", scale=scale)).boundingRect(room, _CENTRE, text).height()
 
 
-class OpenLook(NamedTuple):
+class _OpenLook(NamedTuple):
     """How an answer looks that is not chosen: in a size [px], perhaps pointed at, or with strong words."""
 
     words: str
@@ -421,11 +421,11 @@ class OpenLook(NamedTuple):
         painter.drawRoundedRect(body, RADIUS_CONTROL * scale, RADIUS_CONTROL * scale)
         painter.setFont(font("cell", scale=scale))
         painter.setPen(QColor(theme.text if self.strong else theme.text2))
-        painter.drawText(body.adjusted(4, 0, -4, 0), CENTRE, self.words)
+        painter.drawText(body.adjusted(4, 0, -4, 0), _CENTRE, self.words)
 
 
 @lru_cache(maxsize=256)
-def answer_picture(look: OpenLook, ground: str) -> QImage:
+def _answer_picture(look: _OpenLook, ground: str) -> QImage:
     """Return the picture of an answer on a plain ground."""
     made = QImage(look.width, look.height, QImage.Format.Format_RGB32)
     made.fill(QColor(ground))
@@ -456,7 +456,7 @@ class OptionLook(Button):
         self.setAccessibleDescription(description)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the question holds the keyboard
         self.setCursor(Qt.CursorShape.PointingHandCursor)
-        self.setSizePolicy(GROWS)
+        self.setSizePolicy(_GROWS)
 
     def set_scale(self, scale: float) -> None:
         self._scale = scale
@@ -473,7 +473,7 @@ class OptionLook(Button):
         return self.rect().contains(position)
 
     def sizeHint(self) -> QSize:
-        return size_of(self._words, self._scale)
+        return _size_of(self._words, self._scale)
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
@@ -483,7 +483,7 @@ class OptionLook(Button):
         return self._look != "point"
 
     def heightForWidth(self, width: int) -> int:
-        needed = height_of(self._words, self._scale, max(1.0, width - TAKEN * self._scale))
+        needed = _height_of(self._words, self._scale, max(1.0, width - _TAKEN * self._scale))
         return round(max(target_px(self._scale), needed + 12 * self._scale))
 
     def enterEvent(self, event: QEnterEvent) -> None:
@@ -508,13 +508,13 @@ class OptionLook(Button):
         painter = page_painter(self)
         in_focus = self._has_focus()
         strong = self._look == "words" or self.pointed or in_focus
-        look = OpenLook(self._words, self._look, self._scale, self.width(), self.height(), self.pointed, strong)
+        look = _OpenLook(self._words, self._look, self._scale, self.width(), self.height(), self.pointed, strong)
         if self.isChecked():
             self._paint_chosen(painter)
         elif self._look == "point" and self.devicePixelRatioF() == 1 and self.window().graphicsProxyWidget() is None:
             question = question_of(self)
             lit = in_focus or (question is not None and question.missing)
-            painter.drawImage(0, 0, answer_picture(look, PARTICIPANT.selected if lit else PARTICIPANT.window))
+            painter.drawImage(0, 0, _answer_picture(look, PARTICIPANT.selected if lit else PARTICIPANT.window))
         else:
             look.paint(painter)
         painter.end()
@@ -532,17 +532,17 @@ class OptionLook(Button):
         radius = body.height() / 2 if self._look != "words" else min(body.height() / 2, target_px(scale) / 2)
         painter.drawRoundedRect(body, radius, radius)
         face = font("chosen", scale=scale)
-        mark = min(MARK * scale, body.width() * 0.34)
+        mark = min(_MARK * scale, body.width() * 0.34)
         gap = min(6 * scale, body.width() * 0.06) if text else 0.0
         room = QRectF(0, 0, max(1.0, body.width() - mark - gap - ROOM * scale), body.height())
-        width = QFontMetricsF(face).boundingRect(room, CENTRE, text).width()
+        width = QFontMetricsF(face).boundingRect(room, _CENTRE, text).width()
         left = body.center().x() - (mark + gap + width) / 2
         flip = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
         x_mark, x_words = (left + width + gap, left) if flip else (left, left + mark + gap)
         draw_icon(painter, "check", QRectF(x_mark, body.center().y() - mark / 2, mark, mark), theme.on_accent, 2.4)
         painter.setFont(face)
         painter.setPen(QColor(theme.on_accent))
-        painter.drawText(QRectF(x_words - 1, 0, width + 2, body.height()), CENTRE, text)
+        painter.drawText(QRectF(x_words - 1, 0, width + 2, body.height()), _CENTRE, text)
 
 
 class RadioOption(OptionLook, QRadioButton):
@@ -553,7 +553,7 @@ class CheckOption(OptionLook, QCheckBox):
     """One of several answers that can be given together."""
 
 
-MOST_DIGITS = 9
+_MOST_DIGITS = 9
 
 
 class OptionsField(QuestionField):
@@ -581,7 +581,7 @@ class OptionsField(QuestionField):
 
     @property
     def digits(self) -> int:
-        return min(MOST_DIGITS, len(self.options))
+        return min(_MOST_DIGITS, len(self.options))
 
     @property
     def forward(self) -> int:
@@ -690,7 +690,7 @@ class ScaleField(OptionsField):
     @property
     def digits(self) -> int:
         """The number of points that digits choose; the off-scale answer has no digit."""
-        return min(MOST_DIGITS, len(self.labels))
+        return min(_MOST_DIGITS, len(self.labels))
 
     @property
     def answer_keys(self) -> str:
@@ -712,7 +712,7 @@ class ScaleField(OptionsField):
 
 
 ENTER = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
-VERTICAL = (Qt.Key.Key_Up, Qt.Key.Key_Down)
+_VERTICAL = (Qt.Key.Key_Up, Qt.Key.Key_Down)
 
 
 class EntryKeys(Widget):
@@ -720,7 +720,7 @@ class EntryKeys(Widget):
 
     def leaves_to_page(self, event: QKeyEvent) -> bool:
         """Return whether a key belongs to the page: it has no meaning in the field."""
-        return event.key() in (*ENTER, *VERTICAL)
+        return event.key() in (*ENTER, *_VERTICAL)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         escape = event.key() == Qt.Key.Key_Escape

@@ -21,13 +21,13 @@ from study_app.protocol.questions import ItemView
 from study_app.protocol.wording.languages import Words
 from study_app.session.pages import QuestionnairePage
 
-LEAST_CELL = 44.0
-NARROW = 900.0
-FEW = 5  # statements a page at most where a window is too small for all of them
-NUMBER = 32.0
-AFTER_STATEMENT = 16.0
-CELL_GAP = 6.0
-POINTS = 7
+_LEAST_CELL = 44.0
+_NARROW = 900.0
+_FEW = 5  # statements a page at most where a window is too small for all of them
+_NUMBER = 32.0
+_AFTER_STATEMENT = 16.0
+_CELL_GAP = 6.0
+_POINTS = 7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +63,7 @@ class Grid:
 
     @property
     def cell_width(self) -> float:
-        return self.cell_pitch - CELL_GAP * self.scale
+        return self.cell_pitch - _CELL_GAP * self.scale
 
     @property
     def cell_height(self) -> float:
@@ -71,18 +71,18 @@ class Grid:
 
     @property
     def can_be_hit(self) -> bool:
-        return min(self.cell_height, self.cell_width) >= LEAST_CELL * self.scale - 0.01
+        return min(self.cell_height, self.cell_width) >= _LEAST_CELL * self.scale - 0.01
 
     def with_rows(self, room: float, per_page: int) -> Grid:
         """Return the sizes if ``room`` [px] is divided among so many rows."""
         return replace(self, pitch=math.floor(min(room / per_page, 68 * self.text)))
 
 
-def part_sizes(items: int, width: float) -> Iterator[int]:
+def _part_sizes(items: int, width: float) -> Iterator[int]:
     """Yield the possible numbers of statements per page, the largest first: all, then even parts."""
-    if width >= NARROW:
+    if width >= _NARROW:
         yield items
-    for most in range(min(FEW, items), 0, -1):
+    for most in range(min(_FEW, items), 0, -1):
         yield math.ceil(items / math.ceil(items / most))
 
 
@@ -98,35 +98,35 @@ def grid(width: float, height: float, asked: Asked, margin: float, *, text_scale
     roomy = content >= 1100
     judge = max((112 if roomy else 92) * scale, asked.judge * text + 8 * scale) if asked.judge else 0.0
     gap = (42 if roomy else 24) * scale if asked.judge else 0.0
-    number, after = NUMBER * text, AFTER_STATEMENT * scale
+    number, after = _NUMBER * text, _AFTER_STATEMENT * scale
     wide = content - number - after - judge - gap
     statements = 400 * scale if text <= scale else 480 * text  # statements get as much as they need; cells shrink first
     narrowest = max(52 * scale, asked.word * text / 2 + 2)  # a label may be twice as wide as its column
-    fewest = min(max((wide - statements) / POINTS, narrowest), max(98 * scale, narrowest))
-    pitch = min(max((wide - asked.statement * text - 8) / POINTS, fewest), 120 * max(scale, 0.8 * text))
+    fewest = min(max((wide - statements) / _POINTS, narrowest), max(98 * scale, narrowest))
+    pitch = min(max((wide - asked.statement * text - 8) / _POINTS, fewest), 120 * max(scale, 0.8 * text))
     return Grid(
         scale=scale,
         text=text,
         tight=height < 740 * text,
         number_width=number,
-        statement_width=wide - POINTS * pitch + CELL_GAP * scale,
+        statement_width=wide - _POINTS * pitch + _CELL_GAP * scale,
         cell_pitch=pitch,
         judge_gap=gap,
         judge_width=judge,
     )
 
 
-SHRINKING = (1.0, 0.94, 0.88, 0.82, 0.76)  # factors tried on enlarged text if the window is too small
-WRAP_LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap)
+_SHRINKING = (1.0, 0.94, 0.88, 0.82, 0.76)  # factors tried on enlarged text if the window is too small
+_WRAP_LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap)
 
-Fitted: TypeAlias = tuple[QFont, QFont, float, float]
+_Fitted: TypeAlias = tuple[QFont, QFont, float, float]
 
 
 @lru_cache(maxsize=256)
-def statement_height(text: str, scale: float, weight: int, width_px: int) -> float:
+def _statement_height(text: str, scale: float, weight: int, width_px: int) -> float:
     """Return the height of a statement wrapped at a width [px]; cached, since pages of statements recur."""
     room = QRectF(0, 0, width_px, 1e4)
-    return QFontMetricsF(font("statement", scale=scale, weight=weight)).boundingRect(room, WRAP_LEFT, text).height()
+    return QFontMetricsF(font("statement", scale=scale, weight=weight)).boundingRect(room, _WRAP_LEFT, text).height()
 
 
 class StatementField(ScaleField):
@@ -175,9 +175,9 @@ class StatementField(ScaleField):
         self.sizes, self.scale = sizes, sizes.scale
         margin = self.horizontal_margin
         self.grid.setContentsMargins(margin, 0, margin, 0)
-        self.set_words_columns(sizes.number_width, AFTER_STATEMENT * sizes.scale)
+        self.set_words_columns(sizes.number_width, _AFTER_STATEMENT * sizes.scale)
         width, height = math.floor(sizes.cell_width), math.floor(sizes.cell_height + 0.01)
-        self.cells.setSpacing(round(CELL_GAP * sizes.scale))
+        self.cells.setSpacing(round(_CELL_GAP * sizes.scale))
         for point in self.points:
             point.set_scale(sizes.text)
             point.setFixedSize(width, height)
@@ -192,13 +192,13 @@ class StatementField(ScaleField):
         """Return whether statement and ``note`` are legible in a row of these sizes."""
         return self.fitted_fonts(sizes, note) is not None
 
-    def fitted_fonts(self, sizes: Grid, note: str) -> Fitted | None:
+    def fitted_fonts(self, sizes: Grid, note: str) -> _Fitted | None:
         """Return the largest fonts with which statement and note fit the row, and their heights [px]; None if none.
 
         Words that must be so large (``sizes.text`` beyond ``sizes.scale``) are not made smaller; a note may be.
         """
         must = sizes.text > sizes.scale
-        shrunk = ((1.0, 1.0), (1.0, sizes.scale / sizes.text)) if must else ((s, max(s, 0.88)) for s in SHRINKING)
+        shrunk = ((1.0, 1.0), (1.0, sizes.scale / sizes.text)) if must else ((s, max(s, 0.88)) for s in _SHRINKING)
         for shrink, note_shrink in shrunk:
             fitted = self._measured_fonts(sizes, note, shrink, note_shrink)
             if fitted[2] + fitted[3] <= sizes.pitch - 3 * sizes.scale:
@@ -213,7 +213,7 @@ class StatementField(ScaleField):
         super().focusOutEvent(event)
         self._update_state()
 
-    def _smallest_fonts(self, sizes: Grid, note: str) -> Fitted:
+    def _smallest_fonts(self, sizes: Grid, note: str) -> _Fitted:
         """Return the fonts of a row that is alone on its page and still too low."""
         for percent in range(95, 30, -5):
             fitted = self._measured_fonts(sizes, note, percent / 100, percent / 100)
@@ -221,13 +221,13 @@ class StatementField(ScaleField):
                 break
         return fitted
 
-    def _measured_fonts(self, sizes: Grid, note: str, shrink: float, note_shrink: float) -> Fitted:
+    def _measured_fonts(self, sizes: Grid, note: str, shrink: float, note_shrink: float) -> _Fitted:
         weight = 500 if self.missing or self.hasFocus() else 400
         face = font("statement", scale=sizes.text * shrink, weight=weight)
         note_face = font("label", scale=sizes.text * note_shrink, weight=600)
-        height = statement_height(self.view.text, sizes.text * shrink, weight, math.floor(sizes.statement_width))
+        height = _statement_height(self.view.text, sizes.text * shrink, weight, math.floor(sizes.statement_width))
         metrics = QFontMetricsF(note_face)
-        room = sizes.statement_width - NOTE_SIGN * metrics.height() * self.missing
+        room = sizes.statement_width - _NOTE_SIGN * metrics.height() * self.missing
         lines = 0 if not note else 1 if metrics.horizontalAdvance(note) <= room else 2
         return face, note_face, height, lines * metrics.height()
 
@@ -248,24 +248,24 @@ class StatementField(ScaleField):
         painter.drawLine(QPointF(x, middle - half), QPointF(x, middle + half))
 
 
-NOTE_SIGN = 1.6  # width of the sign in front of a note with its gap, in heights of the note's line
-LABEL_WIDTH = 98.0  # in which a label over a column wraps, where there is room
-SHARES = (1.0, 1.2, 1.4, 1.6, 1.8)
+_NOTE_SIGN = 1.6  # width of the sign in front of a note with its gap, in heights of the note's line
+_LABEL_WIDTH = 98.0  # in which a label over a column wraps, where there is room
+_SHARES = (1.0, 1.2, 1.4, 1.6, 1.8)
 
 
-def label_height(labels: tuple[str, ...], widest: float) -> float:
+def _label_height(labels: tuple[str, ...], widest: float) -> float:
     """Return the height of labels at scale 1 wrapped at ``widest`` px [px]."""
     metrics = QFontMetricsF(font("label", weight=600))
-    room = QRectF(0, 0, min(LABEL_WIDTH, 0.95 * widest), 1e3)  # letter widths are not quite proportional to the size
-    return max((metrics.boundingRect(room, WRAP_LEFT, text).height() for text in labels), default=0.0)
+    room = QRectF(0, 0, min(_LABEL_WIDTH, 0.95 * widest), 1e3)  # letter widths are not quite proportional to the size
+    return max((metrics.boundingRect(room, _WRAP_LEFT, text).height() for text in labels), default=0.0)
 
 
-def widest_word(metrics: QFontMetricsF, text: str) -> float:
+def _widest_word(metrics: QFontMetricsF, text: str) -> float:
     """Return the width [px] of the widest word of a text, 0 without any."""
     return max((metrics.horizontalAdvance(word) for word in text.split()), default=0.0)
 
 
-class Heading(QWidget):
+class _Heading(QWidget):
     """The labels over the columns: both ends and the middle, and the one that is pointed at.
 
     ``row`` returns a row of the part that is shown: its cells say where the columns are.
@@ -307,7 +307,7 @@ class Heading(QWidget):
             if column == self._pointed:
                 ink = PARTICIPANT.accent
             else:
-                ink = PARTICIPANT.text2 if column == POINTS else PARTICIPANT.text
+                ink = PARTICIPANT.text2 if column == _POINTS else PARTICIPANT.text
             painter.setPen(QColor(ink))
             painter.drawText(self.column_area(column), flags, self._labels[column])
         painter.end()
@@ -319,7 +319,7 @@ class Heading(QWidget):
         neighbours = {
             column
             for column in self._fixed
-            if abs(column - self._pointed) == 1 and POINTS not in (column, self._pointed)
+            if abs(column - self._pointed) == 1 and _POINTS not in (column, self._pointed)
         }
         if neighbours and self._sizes is not None:
             room = self._sizes.cell_pitch
@@ -331,22 +331,22 @@ class Heading(QWidget):
         """Return whether a label fits ``width`` [px] and the height of the heading."""
         assert self._sizes is not None  # noqa: S101  # asked only when laid out
         metrics = QFontMetricsF(font("label", scale=self._sizes.text, weight=600))
-        bounds = metrics.boundingRect(QRectF(0, 0, width, 1e4), WRAP_LEFT, self._labels[column])
+        bounds = metrics.boundingRect(QRectF(0, 0, width, 1e4), _WRAP_LEFT, self._labels[column])
         return bounds.width() <= width and bounds.height() <= self.height() + 1
 
     def _bounds(self, column: int) -> tuple[float, float]:
         """Return the left and right limits of a label [px]: the scale's labels do not cross the rule at its end."""
         row = self._row()
-        if row.rule is None or column == POINTS:
+        if row.rule is None or column == _POINTS:
             return 0.0, self.width()
-        return (row.rule, self.width()) if row.columns[POINTS] < row.columns[0] else (0.0, row.rule)
+        return (row.rule, self.width()) if row.columns[_POINTS] < row.columns[0] else (0.0, row.rule)
 
     def column_area(self, column: int) -> QRectF:
         """Return the area of a label: its column, and as much as it needs on either side, within the row."""
         assert self._sizes is not None  # noqa: S101  # painted only when laid out
         left, width = self._row().columns[column]
-        pitch = min(self._sizes.cell_pitch, LABEL_WIDTH * self._sizes.text) if column < POINTS else width
-        wide = next((pitch * share for share in SHARES if self._fits(column, pitch * share)), 2 * pitch)
+        pitch = min(self._sizes.cell_pitch, _LABEL_WIDTH * self._sizes.text) if column < _POINTS else width
+        wide = next((pitch * share for share in _SHARES if self._fits(column, pitch * share)), 2 * pitch)
         low, high = self._bounds(column)
         middle = max(min(left + width / 2, high - wide / 2), low + wide / 2)
         return QRectF(middle - wide / 2, 0, wide, self.height())
@@ -359,7 +359,7 @@ class QuestionnaireWidget(QuestionsPage):
 
     def __init__(self, page: QuestionnairePage, context: PageContext) -> None:
         super().__init__(page, context)
-        self._heading = Heading(page.labels, page.cannot_judge, self._row_shown, self)
+        self._heading = _Heading(page.labels, page.cannot_judge, self._row_shown, self)
         self.questions.insertWidget(0, self._heading)
         for field in self.fields:
             field.pointed_at.connect(self._heading.show_pointed)
@@ -402,16 +402,16 @@ class QuestionnaireWidget(QuestionsPage):
         off = () if page.cannot_judge is None else (page.cannot_judge,)
         asked = Asked(
             statement=max(bare.horizontalAdvance(field.view.text) for field in self.fields),
-            judge=widest_word(label, page.cannot_judge or ""),
-            word=max(widest_word(label, text) for text in page.labels),
+            judge=_widest_word(label, page.cannot_judge or ""),
+            word=max(_widest_word(label, text) for text in page.labels),
         )
         across = grid(self.width(), self.height(), asked, self.margin, text_scale=self._text_scale)
         text, scale, tight = across.text, across.scale, across.tight
         named, judged = 2 * across.cell_pitch / text, across.judge_width / text
-        labels = max(label_height(page.labels, named), label_height(off, judged)) * text * 1.03
+        labels = max(_label_height(page.labels, named), _label_height(off, judged)) * text * 1.03
         self._heading.setFixedHeight(round(labels + (2 if tight else 10) * scale))
         note = self._words.please_answer
-        for per_page in part_sizes(many, self.width()):
+        for per_page in _part_sizes(many, self.width()):
             room = self.room_height(tabs=per_page < many) - self._heading.height()
             sizes = across.with_rows(room - (2 if tight else 8) * scale, per_page)
             if sizes.can_be_hit and all(field.fits(sizes, note) for field in self.fields):

@@ -40,12 +40,12 @@ from study_app.protocol.questions import (
 from study_app.protocol.table import UNPRINTABLE, characters
 from study_app.protocol.wording.languages import Words
 
-SHORT = 12  # letters of options of which three stand side by side
-MEDIUM = 28  # of which two do
-MOST_ACROSS = 4
+_SHORT = 12  # letters of options of which three stand side by side
+_MEDIUM = 28  # of which two do
+_MOST_ACROSS = 4
 
 
-class ChoiceField(OptionsField):
+class _ChoiceField(OptionsField):
     """Options in a grid; of several, a key or a click adds one or removes it."""
 
     widget_id: ClassVar[str] = "choice"
@@ -59,7 +59,7 @@ class ChoiceField(OptionsField):
         kind = CheckOption if view.several else RadioOption
         self.set_options([kind(text, text, view.text, self) for _, text in view.options])
         longest = max(len(text) for _, text in view.options)
-        self._across = min(len(self.options), 3 if longest <= SHORT else 2 if longest <= MEDIUM else 1)
+        self._across = min(len(self.options), 3 if longest <= _SHORT else 2 if longest <= _MEDIUM else 1)
         area = QWidget(self)
         self._cells = grid(margins=0, parent=area)
         self._arrange_options(self._across)
@@ -87,7 +87,7 @@ class ChoiceField(OptionsField):
 
     def height_in(self, width: int, room: int) -> int:
         """Return the height at a width [px], with more options side by side if there is too little room."""
-        for across in range(self._across, min(MOST_ACROSS, len(self.options)) + 1):
+        for across in range(self._across, min(_MOST_ACROSS, len(self.options)) + 1):
             self._arrange_options(across)
             if (height := super().height_in(width, room)) <= room:
                 return height
@@ -96,7 +96,7 @@ class ChoiceField(OptionsField):
     def _arrange_options(self, across: int) -> None:
         for number, option in enumerate(self.options):
             self._cells.addWidget(option, number // across, number % across)
-        for column in range(MOST_ACROSS):
+        for column in range(_MOST_ACROSS):
             self._cells.setColumnStretch(column, 1 if column < across else 0)
 
     def set_scale(self, scale: float) -> None:
@@ -117,9 +117,9 @@ class ChoiceField(OptionsField):
         point_screen_reader_at(self.options[place])
 
 
-ACROSS = 6
-WAIT_MS = 400
-FIELD_WIDTH = 120.0
+_ACROSS = 6
+_WAIT_MS = 400
+_FIELD_WIDTH = 120.0
 
 
 class Entry(EntryKeys, QLineEdit):
@@ -130,7 +130,7 @@ class Entry(EntryKeys, QLineEdit):
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.NoContextMenu)
 
 
-class NumberField(TypedField):
+class _NumberField(TypedField):
     """Point or comma; an entry that is not one permitted number is reported and not taken."""
 
     widget_id: ClassVar[str] = "number"
@@ -146,7 +146,7 @@ class NumberField(TypedField):
         self._unit = PlainLabel(view.unit)
         self._unit.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
         more = (*(() if view.whole else (wording.decimal_sign,)), *self._signs())
-        self._pad = DigitPad(self.entry, more, ACROSS, wording.delete_digit, self)
+        self._pad = DigitPad(self.entry, more, _ACROSS, wording.delete_digit, self)
         self._wrong = PlainLabel(wraps=True)
         self._wrong.setStyleSheet(f"color: {PARTICIPANT.warn}; background: transparent;")
         self._wrong.hide()
@@ -154,7 +154,7 @@ class NumberField(TypedField):
         area = QWidget(self)
         vbox(self._row, self._wrong, margins=0, parent=area)
         self.put_answer_part(area)
-        self.give_keyboard_to(self.entry, WAIT_MS, self._take_number)
+        self.give_keyboard_to(self.entry, _WAIT_MS, self._take_number)
 
     @property
     def keys(self) -> list[QPushButton]:
@@ -179,7 +179,7 @@ class NumberField(TypedField):
         super().set_scale(scale)
         side = round(target_px(scale))
         self.entry.setFont(font("cell", scale=scale, tabular=True))
-        self.entry.setFixedSize(round(FIELD_WIDTH * scale), side)
+        self.entry.setFixedSize(round(_FIELD_WIDTH * scale), side)
         self._unit.setFont(font("body", scale=scale))
         self._wrong.setFont(font("label", scale=scale, weight=600))
         self._row.setSpacing(round(10 * scale))
@@ -259,11 +259,11 @@ class NumberField(TypedField):
             announce(self.entry, problem)
 
 
-JUDGE_SHARE = 2  # of the row, where every point has one
-ALL_NAMED = 5  # points whose names stand side by side; of more the ends, the middle and the one pointed at
+_JUDGE_SHARE = 2  # of the row, where every point has one
+_ALL_NAMED = 5  # points whose names stand side by side; of more the ends, the middle and the one pointed at
 
 
-class RatingField(ScaleField):
+class _RatingField(ScaleField):
     """Points with their names above them."""
 
     widget_id: ClassVar[str] = "rating"
@@ -277,7 +277,7 @@ class RatingField(ScaleField):
         self.cells = grid(margins=0, parent=scale)
         self.row = hbox((scale, len(self.points)), margins=0, parent=area)
         if self.judge is not None:
-            self.row.addWidget(self.judge, JUDGE_SHARE, Qt.AlignmentFlag.AlignBottom)
+            self.row.addWidget(self.judge, _JUDGE_SHARE, Qt.AlignmentFlag.AlignBottom)
         self.put_answer_part(area)
         self._names = [PlainLabel() for _ in self._name_columns()]
         for (first, last), label, side in zip(self._name_columns(), self._names, self._name_alignments(), strict=True):
@@ -303,40 +303,45 @@ class RatingField(ScaleField):
     def _name_columns(self) -> list[tuple[int, int]]:
         """Return the first and last column below each name."""
         points = len(self.labels)
-        if points <= ALL_NAMED:
+        if points <= _ALL_NAMED:
             return [(place, place) for place in range(points)]
         end = points // 3
         return [(0, end - 1), (end, points - end - 1), (points - end, points - 1)]
 
     def _name_alignments(self) -> list[Qt.AlignmentFlag]:
         centre = Qt.AlignmentFlag.AlignHCenter
-        if len(self.labels) <= ALL_NAMED:
+        if len(self.labels) <= _ALL_NAMED:
             return [centre] * len(self.labels)
         return [Qt.AlignmentFlag.AlignLeft, centre, Qt.AlignmentFlag.AlignRight]
 
     def _name_points(self, _place: int = -1) -> None:
         """Show the names: all of a short scale; of a long one the ends, and the pointed one in the middle."""
         texts = list(self.labels)
-        if len(texts) > ALL_NAMED:
+        if len(texts) > _ALL_NAMED:
             middle = self.labels[len(texts) // 2] if len(texts) % 2 else ""
             if 0 < self.pointed < len(texts) - 1:
                 middle = f"{self.pointed + 1} {self.labels[self.pointed]}"
             texts = [self.labels[0], middle, self.labels[-1]]
         for place, (label, text) in enumerate(zip(self._names, texts, strict=True)):
-            at = self.pointed == place if len(self.labels) <= ALL_NAMED else place == 1 and self.pointed > 0
+            at = self.pointed == place if len(self.labels) <= _ALL_NAMED else place == 1 and self.pointed > 0
             ink = PARTICIPANT.accent if at else PARTICIPANT.text2
             label.setStyleSheet(f"color: {ink}; background: transparent;")
             label.setText(text)
 
 
-ABSOLUTE = Qt.AlignmentFlag.AlignAbsolute
-KNOB = 12.0  # radius
-TRACK = 6.0
-PAGE_STEPS = 10
-STEP_KEYS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1, Qt.Key.Key_PageDown: -PAGE_STEPS, Qt.Key.Key_PageUp: PAGE_STEPS}
+_ABSOLUTE = Qt.AlignmentFlag.AlignAbsolute
+_KNOB = 12.0  # radius
+_TRACK = 6.0
+_PAGE_STEPS = 10
+_STEP_KEYS = {
+    Qt.Key.Key_Left: -1,
+    Qt.Key.Key_Right: 1,
+    Qt.Key.Key_PageDown: -_PAGE_STEPS,
+    Qt.Key.Key_PageUp: _PAGE_STEPS,
+}
 
 
-class Line(QSlider):
+class _Line(QSlider):
     """The line and its handle; ``set_to(step)`` comes with a click, a key, and where the handle is let go."""
 
     set_to = Signal(int)
@@ -346,7 +351,7 @@ class Line(QSlider):
         self.touched = False
         self._scale = 1.0
         self.setRange(0, steps)
-        self.setPageStep(PAGE_STEPS)
+        self.setPageStep(_PAGE_STEPS)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -370,7 +375,7 @@ class Line(QSlider):
         """Move by steps or to the ends; the first key puts the handle in the middle or at an end."""
         if event.key() in (Qt.Key.Key_Home, Qt.Key.Key_End):
             self._move(self.minimum() if event.key() == Qt.Key.Key_Home else self.maximum())
-        elif (by := STEP_KEYS.get(Qt.Key(event.key()))) is not None:
+        elif (by := _STEP_KEYS.get(Qt.Key(event.key()))) is not None:
             self._move(self.value() + by if self.touched else self.maximum() // 2)
         else:
             event.ignore()
@@ -409,20 +414,20 @@ class Line(QSlider):
         left, right, middle = self._left(), self.width() - self._left(), self.height() / 2
         painter.setPen(QPen(QColor(theme.ctl), 1.5))
         for x in (left, right):
-            painter.drawLine(QPointF(x, middle - KNOB * scale), QPointF(x, middle + KNOB * scale))
+            painter.drawLine(QPointF(x, middle - _KNOB * scale), QPointF(x, middle + _KNOB * scale))
         painter.setPen(QPen(QColor(theme.ctl), 1))
         painter.setBrush(QColor(theme.sunk))
-        half = TRACK * scale / 2
+        half = _TRACK * scale / 2
         painter.drawRoundedRect(QRectF(left, middle - half, right - left, 2 * half), half, half)
         if self.touched:
             x = left + (right - left) * (self.value() / max(1, self.maximum()))
             painter.setPen(QPen(QColor(theme.text), 2))
             painter.setBrush(QColor(theme.accent))
-            painter.drawEllipse(QPointF(x, middle), KNOB * scale, KNOB * scale)
+            painter.drawEllipse(QPointF(x, middle), _KNOB * scale, _KNOB * scale)
         painter.end()
 
     def _left(self) -> float:
-        return (KNOB + 3) * self._scale
+        return (_KNOB + 3) * self._scale
 
     def _drag(self, x: float) -> None:
         width = max(1.0, self.width() - 2 * self._left())
@@ -460,13 +465,13 @@ class SliderField(QuestionField):
         super().__init__(view, wording, parent)
         area = QWidget(self)
         area.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # a scale has the same order in every language
-        self.line = Line(view.steps, area)
+        self.line = _Line(view.steps, area)
         self.line.setAccessibleName(view.text)
         self.line.set_to.connect(lambda step: self.give_answer(view.at(step)))
         self._ends = (PlainLabel(view.low), PlainLabel(wording.no_answer_yet), PlainLabel(view.high))
         for end, side in zip(self._ends, (Qt.AlignmentFlag.AlignLeft, None, Qt.AlignmentFlag.AlignRight), strict=True):
             end.setWordWrap(side is not None)
-            end.setAlignment((side or Qt.AlignmentFlag.AlignHCenter) | ABSOLUTE | Qt.AlignmentFlag.AlignTop)
+            end.setAlignment((side or Qt.AlignmentFlag.AlignHCenter) | _ABSOLUTE | Qt.AlignmentFlag.AlignTop)
             end.setStyleSheet(f"color: {PARTICIPANT.text2 if side else PARTICIPANT.text3}; background: transparent;")
         names = hbox(*((end, 1) for end in self._ends))
         vbox(self.line, names, spacing=0, margins=0, parent=area)
@@ -500,11 +505,11 @@ class SliderField(QuestionField):
         self.line.setAccessibleDescription(f"{self._slider.low} – {self._slider.high}, {self.accessibleDescription()}")
 
 
-TEXT_WAIT_MS = 600
-FRAME = 20.0  # of a field around its lines
+_TEXT_WAIT_MS = 600
+_FRAME = 20.0  # of a field around its lines
 
 
-class TextEntry(EntryKeys, QPlainTextEdit):
+class _TextEntry(EntryKeys, QPlainTextEdit):
     """The field, without a menu; Tab leaves it, and in a single line Enter is the page's."""
 
     def __init__(self, lines: int, parent: QWidget) -> None:
@@ -533,11 +538,11 @@ class TextField(TypedField):
         assert isinstance(view, TextView)  # noqa: S101 - the registry names this widget
         self._shown = view
         super().__init__(view, wording, parent)
-        self.entry = TextEntry(view.lines, self)
+        self.entry = _TextEntry(view.lines, self)
         self.entry.setAccessibleName(view.text)
         self.entry.textChanged.connect(self._edit)
         self.put_answer_part(self.entry)
-        self.give_keyboard_to(self.entry, TEXT_WAIT_MS, self.finish)
+        self.give_keyboard_to(self.entry, _TEXT_WAIT_MS, self.finish)
 
     @property
     def answer_keys(self) -> str:
@@ -557,7 +562,7 @@ class TextField(TypedField):
         super().set_scale(scale)
         face = font("statement", scale=scale)
         self.entry.setFont(face)
-        height = self._shown.lines * QFontMetricsF(face).lineSpacing() + FRAME * scale
+        height = self._shown.lines * QFontMetricsF(face).lineSpacing() + _FRAME * scale
         self.entry.setFixedHeight(round(max(target_px(scale), height)))
 
     def finish(self) -> bool:
@@ -601,6 +606,6 @@ def _utf16(text: str) -> bytes:
 
 
 FIELDS: Final[dict[str, type[QuestionField]]] = {
-    kind.widget_id: kind for kind in (ChoiceField, NumberField, RatingField, SliderField, TextField)
+    kind.widget_id: kind for kind in (_ChoiceField, _NumberField, _RatingField, SliderField, TextField)
 }
 """Every widget by the id that a question names it by."""

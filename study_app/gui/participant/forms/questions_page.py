@@ -33,15 +33,15 @@ from study_app.protocol.wording.languages import Words
 from study_app.session.pages import QuestionnairePage
 from study_app.session.transitions.events import Chosen, ItemShown, Retracted, Submitted
 
-MARK = 22.0
-MOVE_KEYS = "↑ ↓"
-LINE = 1  # over the foot [px]
-GAP = 9.0
-HIGHEST = 2000  # of wrapped words [px]
-WRAPPED = int(Qt.TextFlag.TextWordWrap)
+_MARK = 22.0
+_MOVE_KEYS = "↑ ↓"
+_LINE = 1  # over the foot [px]
+_GAP = 9.0
+_HIGHEST = 2000  # of wrapped words [px]
+_WRAPPED = int(Qt.TextFlag.TextWordWrap)
 
 
-class Foot(QWidget):
+class _Foot(QWidget):
     """One line; the keys give way where a message needs the room. All but the button is painted."""
 
     def __init__(self, wording: Words, parent: QWidget) -> None:
@@ -59,15 +59,15 @@ class Foot(QWidget):
         self._small = font("body", scale=scale * 0.94)
         self._tabular = font("cell", scale=scale * 0.95)
         self.button.set_scale(scale * (0.95 if tight else 1.0))
-        self._row.setContentsMargins(margin, LINE, margin - 4, 0)
-        self.setFixedHeight(LINE + round((72 if tight else 96) * scale))
+        self._row.setContentsMargins(margin, _LINE, margin - 4, 0)
+        self.setFixedHeight(_LINE + round((72 if tight else 96) * scale))
         self.update()
 
     def show_state(self, message: str, done: int, of: int, keys: str) -> None:
         self._message, self._answer_keys = message, keys
         self._count = self._words.answered.format(done=done, of=of)
         kept = self._words.answers_kept if message else ""
-        hints = ((MOVE_KEYS, self._words.key_move), (keys, self._words.key_answer)) if keys else ()
+        hints = ((_MOVE_KEYS, self._words.key_move), (keys, self._words.key_answer)) if keys else ()
         self.setAccessibleName(" ".join(filter(None, (message, kept, self._count))))
         self.setAccessibleDescription(", ".join(f"{key} {text}" for key, text in hints))
         self.update()
@@ -76,12 +76,12 @@ class Foot(QWidget):
         """Draw a line, and below it from the end: the count of answers, the keys, and what is missing."""
         painter = page_painter(self)
         painter.setLayoutDirection(Qt.LayoutDirection.LayoutDirectionAuto)  # the text has its own language's direction
-        painter.fillRect(0, 0, self.width(), LINE, QColor(PARTICIPANT.border))
-        gap = round(GAP * self._scale)
+        painter.fillRect(0, 0, self.width(), _LINE, QColor(PARTICIPANT.border))
+        gap = round(_GAP * self._scale)
         line = self._row.contentsRect()
         end = self._paint_count(painter, line.right() + 1 - self.button.width() - gap)
         room = end - 2 * gap - line.left()
-        room_after_sign = room - round(MARK * self._scale) - gap
+        room_after_sign = room - round(_MARK * self._scale) - gap
         light = QFontMetricsF(self._small).horizontalAdvance(self._words.answers_kept)
         strong = QFontMetricsF(self._strong).horizontalAdvance(self._message) + 4
         needed = max(strong, light) if self._message else 0.0
@@ -89,7 +89,7 @@ class Foot(QWidget):
         if self._message:
             lines = math.ceil(needed / max(1.0, room_after_sign))
             high = lines * QFontMetricsF(self._strong).height() + QFontMetricsF(self._small).height()
-            kept = light <= room_after_sign and high <= self.height() - LINE
+            kept = light <= room_after_sign and high <= self.height() - _LINE
             self._paint_message(painter, end - gap, kept=kept)
         painter.end()
 
@@ -103,11 +103,11 @@ class Foot(QWidget):
 
     def _paint_keys(self, painter: QPainter, end: int, room: float) -> int:
         """Draw the keys up to ``end`` if they fit ``room``; return their start [px]."""
-        gap, wording = round(GAP * self._scale), self._words
-        hints = ((MOVE_KEYS, wording.key_move), (self._answer_keys, wording.key_answer))
+        gap, wording = round(_GAP * self._scale), self._words
+        hints = ((_MOVE_KEYS, wording.key_move), (self._answer_keys, wording.key_answer))
         caps = [round(key_size(key, self._scale)[0]) + 2 for key, _ in hints]
         line = self._row.contentsRect()
-        high = round(key_size(MOVE_KEYS, self._scale)[1]) + 2
+        high = round(key_size(_MOVE_KEYS, self._scale)[1]) + 2
         middle = line.top() + (line.height() - high) // 2 + high / 2
         widths = [self._width(self._small, text) for _, text in hints]
         if not self._answer_keys or sum(caps) + sum(widths) + 6 * gap > room:
@@ -121,11 +121,11 @@ class Foot(QWidget):
 
     def _paint_message(self, painter: QPainter, end: int, *, kept: bool) -> None:
         """Draw the message up to ``end``; ``kept`` adds a line that no answer is lost."""
-        side = round(MARK * self._scale)
-        left = self._row.contentsRect().left() + side + round(GAP * self._scale)
+        side = round(_MARK * self._scale)
+        left = self._row.contentsRect().left() + side + round(_GAP * self._scale)
         sign = self._placed(self._row.contentsRect().left(), side)
         top = sign.top() + (sign.height() - side) // 2
-        size = MARK * self._scale
+        size = _MARK * self._scale
         x = sign.right() + 1 - size if self.layoutDirection() == Qt.LayoutDirection.RightToLeft else sign.left()
         draw_icon(painter, "warning", QRectF(x, top, size, size), PARTICIPANT.warn)
         place = self._placed(left, end - left)
@@ -142,7 +142,7 @@ class Foot(QWidget):
     def _write(self, painter: QPainter, place: QRect, text: str, face: QFont, ink: str) -> None:
         painter.setFont(face)
         painter.setPen(QColor(ink))
-        flags = int(line_start(self) | Qt.AlignmentFlag.AlignVCenter) | WRAPPED
+        flags = int(line_start(self) | Qt.AlignmentFlag.AlignVCenter) | _WRAPPED
         painter.drawText(QRectF(place), flags, text)
 
     def _placed(self, left: int, width: int) -> QRect:
@@ -152,15 +152,15 @@ class Foot(QWidget):
 
     def _width(self, face: QFont, text: str) -> int:
         """Return the width of a text on one line [px]."""
-        return self._bounds(face, text, HIGHEST).width()
+        return self._bounds(face, text, _HIGHEST).width()
 
     def _bounds(self, face: QFont, text: str, width: int) -> QRect:
-        return QFontMetrics(face).boundingRect(0, 0, width, HIGHEST, int(line_start(self)) | WRAPPED, text)
+        return QFontMetrics(face).boundingRect(0, 0, width, _HIGHEST, int(line_start(self)) | _WRAPPED, text)
 
 
-ANSWERING = 0.8  # share of the present trial's bar that is full
-TAB_WIDTH = 60.0
-TAB_STYLE = (
+_ANSWERING = 0.8  # share of the present trial's bar that is full
+_TAB_WIDTH = 60.0
+_TAB_STYLE = (
     "QPushButton {{ background: transparent; border-radius: 8px; padding: 0; min-height: {height}px;"
     " color: {text2}; border: 1px solid {ctl}; }}"
     " QPushButton:checked {{ color: {text}; border: 2px solid {text}; }}"
@@ -184,7 +184,7 @@ class QuestionsPage(PageWidget):
         self._unsent: list[ItemShown] = []
         self.setAccessibleName(page.title)
         self.setAccessibleDescription(page.intro)
-        self._progress = ProgressLine(page.progress, context.words, ANSWERING, self)
+        self._progress = ProgressLine(page.progress, context.words, _ANSWERING, self)
         self._title, self._intro = HeadingLabel(page.title, self), PlainLabel(page.intro, self)
         self._intro.setWordWrap(True)
         self._intro.setVisible(bool(page.intro))
@@ -192,7 +192,7 @@ class QuestionsPage(PageWidget):
             label.setStyleSheet(f"color: {ink}; background: transparent;")
             label.setAlignment(line_start(self) | Qt.AlignmentFlag.AlignVCenter)
         self.fields = tuple(self.make_field(item) for item in page.items)
-        self.foot = Foot(context.words, self)
+        self.foot = _Foot(context.words, self)
         self.foot.button.clicked.connect(self.submit)
         self.tabs: list[QPushButton] = []
         self._shown_parts: list[int] = []
@@ -353,14 +353,14 @@ class QuestionsPage(PageWidget):
         text, face = self.words_scale, font("label", scale=self.words_scale)
         names = [_range_text(part) for part in self.parts]
         widest = max(map(QFontMetricsF(face).horizontalAdvance, names))
-        size = QSize(round(max(TAB_WIDTH * text, widest + 12 * text)), round(target_px(text)))
+        size = QSize(round(max(_TAB_WIDTH * text, widest + 12 * text)), round(target_px(text)))
         shown = self._tabs_shown(size.width())
         while len(self.tabs) > len(shown):
             remove_widget(self.tabs.pop())
         while len(self.tabs) < len(shown):
             self.tabs.append(self._new_tab(len(self.tabs)))
         theme = PARTICIPANT
-        style = TAB_STYLE.format(text=theme.text, text2=theme.text2, ctl=theme.ctl, height=size.height() - 2)
+        style = _TAB_STYLE.format(text=theme.text, text2=theme.text2, ctl=theme.ctl, height=size.height() - 2)
         for tab, part in zip(self.tabs, shown, strict=True):
             tab.setText(names[part])
             tab.setFont(face)
@@ -454,10 +454,10 @@ class QuestionsPage(PageWidget):
             self.event_made.emit(event)
 
 
-MOST_OVER = 0.2  # excess height, as a share of the page, up to which smaller text is tried
-SHRINKING = (0.94, 0.88, 0.82)  # factors tried on enlarged text so that all questions fit
+_MOST_OVER = 0.2  # excess height, as a share of the page, up to which smaller text is tried
+_SHRINKING = (0.94, 0.88, 0.82)  # factors tried on enlarged text so that all questions fit
 
-Parts = list[list[QuestionField]]
+_Parts = list[list[QuestionField]]
 
 
 class FormWidget(QuestionsPage):
@@ -469,7 +469,7 @@ class FormWidget(QuestionsPage):
     def missing_words(self, numbers: Sequence[int]) -> str:
         return self._words.questions_missing(numbers)
 
-    def arrange_parts(self, asked: Sequence[QuestionField]) -> Parts:
+    def arrange_parts(self, asked: Sequence[QuestionField]) -> _Parts:
         """Return the questions in parts that fit; smaller text avoids a second part if that is enough."""
         must = self.words_scale > 1.0 and self._text_scale > 1.0
         parts = self._packed_parts(asked, self.words_scale)
@@ -477,17 +477,17 @@ class FormWidget(QuestionsPage):
             return self._single_part(asked) or self._packed_parts(asked, self.words_scale)
         return parts
 
-    def _single_part(self, asked: Sequence[QuestionField]) -> Parts | None:
+    def _single_part(self, asked: Sequence[QuestionField]) -> _Parts | None:
         """Return all questions in one part with slightly smaller text, None if they do not fit."""
-        for shrink in SHRINKING:
+        for shrink in _SHRINKING:
             parts = self._packed_parts(asked, self.words_scale * shrink)
             if len(parts) == 1:
                 return parts
-            if sum(field.minimumHeight() for field in parts[1]) > MOST_OVER * self.height():
+            if sum(field.minimumHeight() for field in parts[1]) > _MOST_OVER * self.height():
                 return None
         return None
 
-    def _packed_parts(self, asked: Sequence[QuestionField], scale: float) -> Parts:
+    def _packed_parts(self, asked: Sequence[QuestionField], scale: float) -> _Parts:
         """Return the questions at a text size in parts as high as the room."""
         margins = self.questions.contentsMargins()
         width = self.width() - margins.left() - margins.right()
@@ -513,9 +513,9 @@ def _range_text(part: Sequence[QuestionField]) -> str:
     return str(first) if first == last else f"{first}–{last}"
 
 
-def _divide_into_parts(asked: Sequence[QuestionField], heights: Sequence[int], room: int) -> Parts:
+def _divide_into_parts(asked: Sequence[QuestionField], heights: Sequence[int], room: int) -> _Parts:
     """Return the questions in parts no higher than the room [px], as many in each as fit."""
-    parts: Parts = []
+    parts: _Parts = []
     taken = 0
     for field, height in zip(asked, heights, strict=True):
         if not parts or taken + height > room:

@@ -29,18 +29,18 @@ from study_app.session.device_buttons import STEP_S
 from study_app.session.pages import ChoicePage, DesignPage, FeedbackPage, Interval, NumberPage, TaskPage
 from study_app.session.transitions.events import Chosen, ItemShown, Stepped, Submitted
 
-QUESTION_PX = 26
-ASKING = 0.8  # share of the present trial's bar that is full
+_QUESTION_PX = 26
+_ASKING = 0.8  # share of the present trial's bar that is full
 
 
-class AnswerPage(PageWidget):
+class _AnswerPage(PageWidget):
     """The progress, a question and room for its answer below it; ``answer`` answers and continues, once."""
 
     def __init__(self, page: DesignPage, context: PageContext) -> None:
         super().__init__(context)
         self.page = page
         self._answered = False
-        self._progress = ProgressLine(page.progress, context.words, ASKING, self)
+        self._progress = ProgressLine(page.progress, context.words, _ASKING, self)
         self.question = PlainLabel(page.item.text, self, wraps=True, alignment=Qt.AlignmentFlag.AlignCenter)
         self.setAccessibleName(page.item.text)
         self._column = vbox(self._progress, (STRETCH, 2), self.question, 36, parent=self)
@@ -49,7 +49,7 @@ class AnswerPage(PageWidget):
         margin = round((40 if self.width() >= 1100 else 24) * scale)
         self._column.setContentsMargins(margin, round(20 * scale), margin, margin)
         self._progress.set_scale(self.words_scale)
-        self.question.setFont(font_of_height(QUESTION_PX * self.words_scale))
+        self.question.setFont(_font_of_height(_QUESTION_PX * self.words_scale))
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
@@ -64,20 +64,20 @@ class AnswerPage(PageWidget):
         self.event_made.emit(Submitted(self._clock()))
 
 
-def font_of_height(pixels: float) -> QFont:
+def _font_of_height(pixels: float) -> QFont:
     """Return the font of a text height [logical px]."""
     made = font("body")
     made.setPixelSize(round(pixels))
     return made
 
 
-CHOICE_BUTTON_PX = (160, 96)
-CHOICE_GAP_PX = 24
-CHOICE_TEXT_PX = 22
-ARROWS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
+_CHOICE_BUTTON_PX = (160, 96)
+_CHOICE_GAP_PX = 24
+_CHOICE_TEXT_PX = 22
+_ARROWS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
 
 
-class ChoiceWidget(AnswerPage):
+class ChoiceWidget(_AnswerPage):
     """The answers in temporal order; digits choose by number, the arrows by position on the screen.
 
     Nothing is preselected. Of two answers ← is the left one and → the right; of more the arrows go to a button, which
@@ -97,14 +97,14 @@ class ChoiceWidget(AnswerPage):
             self.buttons.append(button)
         self._cap, self._hint = KeyCap(self), PlainLabel(self._words.key_answer, self)
         self._hint.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
-        row = hbox(STRETCH, *self.buttons, STRETCH, spacing=CHOICE_GAP_PX)
+        row = hbox(STRETCH, *self.buttons, STRETCH, spacing=_CHOICE_GAP_PX)
         add_parts(self._column, row, 28, hbox(STRETCH, self._cap, self._hint, STRETCH), (STRETCH, 3))
 
     def lay_out(self, scale: float) -> None:
         super().lay_out(scale)
         for button in self.buttons:
-            button.setMinimumSize(*(round(side * scale) for side in CHOICE_BUTTON_PX))
-            button.setFont(font_of_height(CHOICE_TEXT_PX * self.words_scale))
+            button.setMinimumSize(*(round(side * scale) for side in _CHOICE_BUTTON_PX))
+            button.setFont(_font_of_height(_CHOICE_TEXT_PX * self.words_scale))
         self._cap.show_key(self.page.item.keys, self.words_scale)
         self._hint.setFont(font("body", scale=self.words_scale))
 
@@ -120,7 +120,7 @@ class ChoiceWidget(AnswerPage):
     def _take_key(self, event: QKeyEvent) -> bool:
         """Handle a key of the page; a repeated arrow does nothing."""
         number = digit_of(event)
-        away = ARROWS.get(Qt.Key(event.key()))
+        away = _ARROWS.get(Qt.Key(event.key()))
         if event.isAutoRepeat():
             return True
         if number is not None and 1 <= number <= len(self.buttons):
@@ -144,8 +144,8 @@ class ChoiceWidget(AnswerPage):
         self.buttons[(at + step) % len(self.buttons)].setFocus()
 
 
-BADGE_SCALE = 1.6
-CENTRED = Qt.AlignmentFlag.AlignHCenter
+_BADGE_SCALE = 1.6
+_CENTRED = Qt.AlignmentFlag.AlignHCenter
 
 
 class FeedbackWidget(PageWidget):
@@ -158,11 +158,11 @@ class FeedbackWidget(PageWidget):
         sign, colour = ("check", PARTICIPANT.ok) if page.right else ("minus", PARTICIPANT.text2)
         self._badge, self._word = Badge(sign, colour, self), HeadingLabel(self._text)
         self._word.setStyleSheet(f"color: {PARTICIPANT.text}; background: transparent;")
-        badge, word = (self._badge, 0, CENTRED), (self._word, 0, CENTRED)
+        badge, word = (self._badge, 0, _CENTRED), (self._word, 0, _CENTRED)
         self._column = vbox((STRETCH, 2), badge, word, (STRETCH, 3), parent=self)
 
     def lay_out(self, _scale: float) -> None:
-        self._badge.set_scale(BADGE_SCALE * self.words_scale)
+        self._badge.set_scale(_BADGE_SCALE * self.words_scale)
         self._word.setFont(font("display", scale=self.words_scale))
         self._column.setSpacing(round(14 * self.words_scale))
 
@@ -171,13 +171,13 @@ class FeedbackWidget(PageWidget):
         announce(self, self._text)
 
 
-SQUARE = 16.0
-GAP = 10.0
+_SQUARE = 16.0
+_GAP = 10.0
 
 
 def interval_width(interval: Interval, wording: Words, scale: float) -> float:
     """Return the width of text and squares [px]."""
-    return _words_width(interval, wording, scale) + GAP * scale + interval.of * (SQUARE + GAP) * scale
+    return _words_width(interval, wording, scale) + _GAP * scale + interval.of * (_SQUARE + _GAP) * scale
 
 
 def _words_width(interval: Interval, wording: Words, scale: float) -> float:
@@ -193,7 +193,7 @@ def draw_interval(
     In a rest no square is filled; in a language that is read from right to left the first is on the right.
     """
     text = wording.reached.format(reached=interval.number, of=interval.of)
-    side, gap = SQUARE * scale, GAP * scale
+    side, gap = _SQUARE * scale, _GAP * scale
     painter.save()
     painter.setFont(font("statement", scale=scale, weight=600))
     wide = _words_width(interval, wording, scale)
@@ -214,43 +214,43 @@ def draw_interval(
     painter.restore()
 
 
-FIELD_PX = (400, 96)
-KEY_PX = (60, 52)
-KEY_GAP_PX = 8
-ACROSS = 6
-NUMBER_TEXT_PX = 40
-LONGEST = 12
+_FIELD_PX = (400, 96)
+_KEY_PX = (60, 52)
+_KEY_GAP_PX = 8
+_ACROSS = 6
+_NUMBER_TEXT_PX = 40
+_LONGEST = 12
 
 
-class NumberWidget(AnswerPage):
+class NumberWidget(_AnswerPage):
     """A field for a number, with point or comma; anything but one number above 0 is reported and not accepted."""
 
     def __init__(self, page: NumberPage, context: PageContext) -> None:
         super().__init__(page, context)
         self._permits = page.item.permits
-        self.field = QLineEdit(self, maxLength=LONGEST, alignment=Qt.AlignmentFlag.AlignCenter)
+        self.field = QLineEdit(self, maxLength=_LONGEST, alignment=Qt.AlignmentFlag.AlignCenter)
         self.field.setContextMenuPolicy(Qt.ContextMenuPolicy.NoContextMenu)  # Qt's is in English
         self.field.setAccessibleName(page.item.text)
         self.field.setAccessibleDescription(self._words.number_wanted)
         self.wrong = PlainLabel("", self)
         self.wrong.setStyleSheet(f"color: {PARTICIPANT.warn}; background: transparent;")
         self.field.textChanged.connect(lambda _text: self.wrong.clear())
-        self._pad = DigitPad(self.field, (self._words.decimal_sign,), ACROSS, self._words.delete_digit, self)
+        self._pad = DigitPad(self.field, (self._words.decimal_sign,), _ACROSS, self._words.delete_digit, self)
         self.keys = self._pad.keys
         self.button = GoButton(self._words.continue_, self._words.enter_key, self)
         self.button.clicked.connect(self._confirm)
-        above = ((widget, 0, CENTRED) for widget in (self.field, self.wrong, self._pad))
-        add_parts(self._column, *above, 24, (self.button, 0, CENTRED), (STRETCH, 3))
+        above = ((widget, 0, _CENTRED) for widget in (self.field, self.wrong, self._pad))
+        add_parts(self._column, *above, 24, (self.button, 0, _CENTRED), (STRETCH, 3))
 
     def lay_out(self, scale: float) -> None:
         super().lay_out(scale)
         words_scale = self.words_scale
-        self.field.setFixedSize(*(round(side * scale) for side in FIELD_PX))
-        self.field.setFont(font_of_height(NUMBER_TEXT_PX * scale))
-        self.wrong.setFont(font_of_height(18 * words_scale))
+        self.field.setFixedSize(*(round(side * scale) for side in _FIELD_PX))
+        self.field.setFont(_font_of_height(_NUMBER_TEXT_PX * scale))
+        self.wrong.setFont(_font_of_height(18 * words_scale))
         self.button.set_scale(words_scale)
-        width, height = (round(side * scale) for side in KEY_PX)
-        self._pad.set_size(width, height, round(KEY_GAP_PX * scale), font_of_height(20 * scale))
+        width, height = (round(side * scale) for side in _KEY_PX)
+        self._pad.set_size(width, height, round(_KEY_GAP_PX * scale), _font_of_height(20 * scale))
 
     def focus_first(self) -> None:
         self.field.setFocus()
@@ -275,19 +275,19 @@ class NumberWidget(AnswerPage):
         self.field.selectAll()
 
 
-STEP_MS: Final = round(1000 * STEP_S)
-NOTCH: Final = 120  # of a wheel [eighths of a degree]
-BUTTON_PX: Final = (120, 48)
-GAP_PX: Final = 16
-LEAST_PX: Final = 44
-TEXT_PX: Final = 18
-KEYS: Final = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
+_STEP_MS: Final = round(1000 * STEP_S)
+_NOTCH: Final = 120  # of a wheel [eighths of a degree]
+_BUTTON_PX: Final = (120, 48)
+_GAP_PX: Final = 16
+_LEAST_PX: Final = 44
+_TEXT_PX: Final = 18
+_KEYS: Final = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
 
 
 class SettingControls(QWidget):
     """Says which way the participant moves the level, and that it is set; shown only while it can be set.
 
-    The left key and button are less in every language. What is held makes a step every `STEP_MS`. ``event_made``
+    The left key and button are less in every language. What is held makes a step every `_STEP_MS`. ``event_made``
     carries the session's events. Without ``buttons``, where no pointer is shown, keys and wheel alone are heard.
     """
 
@@ -303,19 +303,19 @@ class SettingControls(QWidget):
         self._buttons = buttons
         self._held = 0
         self._turned = 0
-        self._timer = QTimer(self, interval=STEP_MS)
+        self._timer = QTimer(self, interval=_STEP_MS)
         self._timer.timeout.connect(lambda: self._emit_steps(self._held))
         self.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
         self.setCursor(Qt.CursorShape.ArrowCursor)
         self.less, self.more = (QPushButton(text, self) for text in (f"← {wording.less}", f"{wording.more} →"))
         self.done = GoButton(wording.done, wording.enter_key, self)
-        hbox(self.less, self.more, self.done, spacing=GAP_PX, margins=0, parent=self)
+        hbox(self.less, self.more, self.done, spacing=_GAP_PX, margins=0, parent=self)
         for button, name, way in ((self.less, wording.less, -1), (self.more, wording.more, 1)):
             button.setAccessibleName(name)
             button.setAccessibleDescription(page.question)
             button.setAutoRepeat(True)
-            button.setAutoRepeatDelay(STEP_MS)
-            button.setAutoRepeatInterval(STEP_MS)
+            button.setAutoRepeatDelay(_STEP_MS)
+            button.setAutoRepeatInterval(_STEP_MS)
             button.clicked.connect(lambda _=False, way=way: self._emit_steps(way))
         self.done.clicked.connect(self._confirm)
         for control in (self.less, self.more, self.done):
@@ -330,11 +330,11 @@ class SettingControls(QWidget):
 
     def place_at_foot(self, scale: float, middle: float) -> None:
         """Place the controls at the tank's foot, above the pause hint if both do not fit side by side."""
-        width, height = (round(side * scale) for side in BUTTON_PX)
+        width, height = (round(side * scale) for side in _BUTTON_PX)
         for button in (self.less, self.more):
-            button.setFont(font_of_height(TEXT_PX * scale))
+            button.setFont(_font_of_height(_TEXT_PX * scale))
             button.setStyleSheet("padding: 0 12px; min-height: 0;")
-            button.setFixedHeight(max(height, LEAST_PX))
+            button.setFixedHeight(max(height, _LEAST_PX))
             button.setMinimumWidth(width)
         self.done.set_scale(scale)
         self.adjustSize()
@@ -344,7 +344,7 @@ class SettingControls(QWidget):
 
     def press_key(self, event: QKeyEvent) -> bool:
         """Handle a key press; return whether the key is one of these controls."""
-        way = KEYS.get(Qt.Key(event.key()), 0)
+        way = _KEYS.get(Qt.Key(event.key()), 0)
         if not self._adjusts or (not way and event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter)):
             return False
         if not event.isAutoRepeat():
@@ -357,14 +357,14 @@ class SettingControls(QWidget):
         return True
 
     def release_key(self, event: QKeyEvent) -> None:
-        if KEYS.get(Qt.Key(event.key()), 0) == self._held:
+        if _KEYS.get(Qt.Key(event.key()), 0) == self._held:
             self.stop_stepping()
 
     def turn_wheel(self, event: QWheelEvent) -> None:
         """Step with each notch of the wheel; forwards increases."""
         self._turned += event.angleDelta().y()
-        steps = int(self._turned / NOTCH)
-        self._turned -= steps * NOTCH
+        steps = int(self._turned / _NOTCH)
+        self._turned -= steps * _NOTCH
         self._emit_steps(steps)
 
     def stop_stepping(self) -> None:

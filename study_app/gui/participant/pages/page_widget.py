@@ -37,14 +37,14 @@ if TYPE_CHECKING:
 else:
     Button = object  # Qt permits only one Qt base class
 
-DESIGNED_FOR = (1366.0, 768.0)
-MOST_SCALE = 2.4
-MOST_TEXT = 2.0
+_DESIGNED_FOR = (1366.0, 768.0)
+_MOST_SCALE = 2.4
+_MOST_TEXT = 2.0
 
 
 def page_scale(width: float, height: float) -> float:
     """Return the scale of a page in a window of this size [logical px], at least 1."""
-    return min(max(min(width / DESIGNED_FOR[0], height / DESIGNED_FOR[1]), 1.0), MOST_SCALE)
+    return min(max(min(width / _DESIGNED_FOR[0], height / _DESIGNED_FOR[1]), 1.0), _MOST_SCALE)
 
 
 def words_scale(width: float, height: float, text_scale: float) -> float:
@@ -52,11 +52,11 @@ def words_scale(width: float, height: float, text_scale: float) -> float:
 
     A window that is smaller than designed holds words of 200 % no more: there they grow as far as it can hold them.
     """
-    most = MOST_TEXT * min(width / DESIGNED_FOR[0], height / DESIGNED_FOR[1])
+    most = _MOST_TEXT * min(width / _DESIGNED_FOR[0], height / _DESIGNED_FOR[1])
     return max(page_scale(width, height), min(text_scale, most))
 
 
-def layout_direction(wording: Words) -> Qt.LayoutDirection:
+def _layout_direction(wording: Words) -> Qt.LayoutDirection:
     """Return the layout direction of a language."""
     return Qt.LayoutDirection.RightToLeft if wording.right_to_left else Qt.LayoutDirection.LeftToRight
 
@@ -111,7 +111,7 @@ class PageWidget(QWidget):
         self._words = context.words
         self._clock = context.clock
         self._text_scale = context.text_scale
-        self.setLayoutDirection(layout_direction(context.words))
+        self.setLayoutDirection(_layout_direction(context.words))
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
 
     @property
@@ -139,10 +139,10 @@ class PageWidget(QWidget):
 
 
 BEGINNING = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)  # Qt mirrors it with the painter
-BAR = (40.0, 6.0, 8.0)  # width, height, gap [logical px at scale 1]
+_BAR = (40.0, 6.0, 8.0)  # width, height, gap [logical px at scale 1]
 
 
-def progress_texts(progress: Progress, wording: Words) -> tuple[str, str]:
+def _progress_texts(progress: Progress, wording: Words) -> tuple[str, str]:
     """Return "Part 2 of 2" and "Delay setting 3 of 7"; an only part or setting is not counted."""
     counted = progress.part is not None and progress.parts > 1
     part = wording.part.format(part=progress.part, parts=progress.parts) if counted else ""
@@ -161,7 +161,7 @@ def draw_progress(
     that find no room are left out; the words say the same, and shrink if they would leave ``room``.
     """
     flip = wording.right_to_left
-    part, setting = progress_texts(progress, wording)
+    part, setting = _progress_texts(progress, wording)
     x = 0.0
     texts = [
         (text, weight, colour)
@@ -192,7 +192,7 @@ def _draw_bars(
     painter: QPainter, room: QRectF, x: float, progress: Progress, *, scale: float, share: float, flip: bool
 ) -> float:
     """Draw a bar for each setting from ``x`` on; return their end [px from the start]."""
-    width, height, gap = (size * scale for size in BAR)
+    width, height, gap = (size * scale for size in _BAR)
     painter.setPen(Qt.PenStyle.NoPen)
     for index in range(1, progress.of + 1):
         bar = _rectangle_from_start(room, x, width, height, flip=flip)
@@ -207,7 +207,7 @@ def _draw_bars(
 
 
 def _bars_width(count: int, scale: float) -> float:
-    width, _, gap = (size * scale for size in BAR)
+    width, _, gap = (size * scale for size in _BAR)
     return count * (width + gap) - gap
 
 
@@ -228,7 +228,7 @@ class ProgressLine(QWidget):
         self._scale = 1.0
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         if progress is not None:
-            self.setAccessibleName(" · ".join(filter(None, progress_texts(progress, wording))))
+            self.setAccessibleName(" · ".join(filter(None, _progress_texts(progress, wording))))
         self.set_scale(1.0)
 
     def set_scale(self, scale: float) -> None:
@@ -244,10 +244,10 @@ class ProgressLine(QWidget):
         painter.end()
 
 
-CENTRE = int(Qt.AlignmentFlag.AlignCenter)
-ARROWS = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Left, Qt.Key.Key_Right)
-RING = 4  # room around a button for its focus ring [logical px]
-KEYBOARD = (Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason, Qt.FocusReason.ShortcutFocusReason)
+_CENTRE = int(Qt.AlignmentFlag.AlignCenter)
+_ARROWS = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Left, Qt.Key.Key_Right)
+_RING = 4  # room around a button for its focus ring [logical px]
+_KEYBOARD = (Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason, Qt.FocusReason.ShortcutFocusReason)
 
 
 def key_size(text: str, scale: float = 1.0) -> tuple[float, float]:
@@ -280,7 +280,7 @@ def draw_key(
     painter.setPen(QColor(ink))
     way = painter.layoutDirection()
     painter.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # "1–7" is so on every keyboard
-    painter.drawText(cap, CENTRE, text)
+    painter.drawText(cap, _CENTRE, text)
     painter.setLayoutDirection(way)
     return width
 
@@ -306,14 +306,14 @@ class KeyCap(QWidget):
         painter.end()
 
 
-class LitButton(Button):
+class _LitButton(Button):
     """A button that lights up under the pointer, and has a ring where the keyboard led to it."""
 
     ringed = False
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         """Show the focus ring after keyboard navigation; on a page that begins here, the key cap suffices."""
-        self.ringed = event.reason() in KEYBOARD
+        self.ringed = event.reason() in _KEYBOARD
         super().focusInEvent(event)
 
     def enterEvent(self, event: QEnterEvent) -> None:
@@ -325,7 +325,7 @@ class LitButton(Button):
         self.update()
 
 
-class GoButton(LitButton, QPushButton):
+class GoButton(_LitButton, QPushButton):
     """The filled button of a participant's page, with the key that presses it; never disabled."""
 
     def __init__(self, text: str, key: str, parent: QWidget | None = None) -> None:
@@ -349,12 +349,12 @@ class GoButton(LitButton, QPushButton):
         label = QFontMetricsF(self.font()).horizontalAdvance(self._label)
         cap, _ = key_size(self._key, scale)
         width = max(150 * scale, label + cap + (36 + 12 + 28) * scale)
-        return QSize(round(width + 2 * RING), round(48 * scale + 2 * RING))
+        return QSize(round(width + 2 * _RING), round(48 * scale + 2 * _RING))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = page_painter(self)
         scale, theme = self._scale, PARTICIPANT
-        body = QRectF(self.rect()).adjusted(RING, RING, -RING, -RING)
+        body = QRectF(self.rect()).adjusted(_RING, _RING, -_RING, -_RING)
         flip = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
         radius = RADIUS_CONTROL * scale
         lit = self.underMouse() and not self.isDown()
@@ -369,23 +369,23 @@ class GoButton(LitButton, QPushButton):
         words_at, cap_at = (start + cap + 12 * scale, start) if flip else (start, start + label + 12 * scale)
         painter.setFont(self.font())
         painter.setPen(QColor(theme.on_accent))
-        painter.drawText(QRectF(words_at - 1, body.top(), label + 2, body.height()), CENTRE, self._label)
+        painter.drawText(QRectF(words_at - 1, body.top(), label + 2, body.height()), _CENTRE, self._label)
         ink = theme.on_accent
         draw_key(painter, cap_at, body.center().y(), self._key, scale, ink=ink, edge=ink, strength=0.5)
         painter.end()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Leave arrow keys to the page, where they scroll or move; here they would move the focus."""
-        if event.key() in ARROWS:
+        if event.key() in _ARROWS:
             event.ignore()
         else:
             super().keyPressEvent(event)
 
 
-LEAST_HEIGHT = 44
+_LEAST_HEIGHT = 44
 
 
-class LanguageButton(LitButton, QRadioButton):
+class LanguageButton(_LitButton, QRadioButton):
     """One language: an outline, and a check mark where it is the page's. Enter and Space choose it."""
 
     def __init__(self, language: str, parent: QWidget) -> None:
@@ -404,7 +404,7 @@ class LanguageButton(LitButton, QRadioButton):
 
     def sizeHint(self) -> QSize:
         wide = QFontMetricsF(self.font()).horizontalAdvance(self.text()) + (30 + 24 * self.isChecked()) * self._scale
-        return QSize(round(wide) + 2 * RING, round(LEAST_HEIGHT * self._scale) + 2 * RING)
+        return QSize(round(wide) + 2 * _RING, round(_LEAST_HEIGHT * self._scale) + 2 * _RING)
 
     def hitButton(self, _place: object) -> bool:
         return True
@@ -418,7 +418,7 @@ class LanguageButton(LitButton, QRadioButton):
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = page_painter(self)
         theme, scale, radius = PARTICIPANT, self._scale, RADIUS_CONTROL * self._scale
-        body = QRectF(self.rect()).adjusted(RING + 0.5, RING + 0.5, -RING - 0.5, -RING - 0.5)
+        body = QRectF(self.rect()).adjusted(_RING + 0.5, _RING + 0.5, -_RING - 0.5, -_RING - 0.5)
         painter.setPen(QPen(QColor(theme.text if self.isChecked() else theme.ctl), 1))
         painter.setBrush(QColor(theme.hover if self.underMouse() else theme.surface))
         painter.drawRoundedRect(body, radius, radius)
@@ -437,7 +437,7 @@ class LanguageButton(LitButton, QRadioButton):
             draw_icon(painter, "check", mark, theme.accent, 2.4)
         painter.setFont(self.font())
         painter.setPen(QColor(theme.text if self.isChecked() else theme.text2))
-        painter.drawText(name, CENTRE, self.text())
+        painter.drawText(name, _CENTRE, self.text())
         painter.end()
 
 
@@ -476,8 +476,8 @@ class LanguageSwitch(QGroupBox):
             self.chosen.emit(code)
 
 
-DIGITS = ("1", "2", "3", "4", "5", "6", "7", "8", "9", "0")
-DELETE = "⌫"
+_DIGITS = ("1", "2", "3", "4", "5", "6", "7", "8", "9", "0")
+_DELETE = "⌫"
 
 
 class DigitPad(QWidget):
@@ -489,14 +489,14 @@ class DigitPad(QWidget):
     def __init__(self, field: QLineEdit, more: tuple[str, ...], across: int, delete_name: str, parent: QWidget) -> None:
         super().__init__(parent)
         self._field = field
-        self._typed = (*DIGITS, *more)
+        self._typed = (*_DIGITS, *more)
         field.installEventFilter(self)
         self.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
         self._grid = grid(margins=0, parent=self)
-        self.keys = [QPushButton(text, self) for text in (*self._typed, DELETE)]
+        self.keys = [QPushButton(text, self) for text in (*self._typed, _DELETE)]
         for place, key in enumerate(self.keys):
             key.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-            key.setAccessibleName(delete_name if key.text() == DELETE else key.text())
+            key.setAccessibleName(delete_name if key.text() == _DELETE else key.text())
             key.clicked.connect(lambda _=False, key=key: self._type_digit(key.text()))
             self._grid.addWidget(key, place // across, place % across)
 
@@ -518,7 +518,7 @@ class DigitPad(QWidget):
 
     def _type_digit(self, text: str) -> None:
         self._field.setFocus(Qt.FocusReason.MouseFocusReason)
-        if text == DELETE:
+        if text == _DELETE:
             self._field.backspace()
         else:
             self._field.insert(text)

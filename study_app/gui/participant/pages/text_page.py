@@ -25,19 +25,19 @@ from study_app.gui.widgets.boxes import STRETCH, vbox
 from study_app.session.pages import EndPage, PausePage, TextPage, TroublePage
 from study_app.session.transitions.events import Continue, EndRequested, LanguageChosen, ResumeRequested
 
-COLUMN = 700.0  # a line that reads well [logical px at scale 1]
-LINE_PERCENT = 140
-SCROLLBAR = 16
-LINE_STEP = 48
-GIVING_WAY = ((1.0, True), (0.94, True), (0.89, True), (0.89, False))  # size of the text, whether with a badge
-MUST_BE_READ = ((1.0, True), (1.0, False))  # where text has its minimum size
-LINE_KEYS = {Qt.Key.Key_Up: -1, Qt.Key.Key_Down: 1}
-PAGE_KEYS = {Qt.Key.Key_PageUp: -1, Qt.Key.Key_PageDown: 1}
+_COLUMN = 700.0  # a line that reads well [logical px at scale 1]
+_LINE_PERCENT = 140
+_SCROLLBAR = 16
+_LINE_STEP = 48
+_GIVING_WAY = ((1.0, True), (0.94, True), (0.89, True), (0.89, False))  # size of the text, whether with a badge
+_MUST_BE_READ = ((1.0, True), (1.0, False))  # where text has its minimum size
+_LINE_KEYS = {Qt.Key.Key_Up: -1, Qt.Key.Key_Down: 1}
+_PAGE_KEYS = {Qt.Key.Key_PageUp: -1, Qt.Key.Key_PageDown: 1}
 
 
-def paragraphs_html(paragraphs: tuple[str, ...], gap: float, *, right_to_left: bool = False) -> str:
+def _paragraphs_html(paragraphs: tuple[str, ...], gap: float, *, right_to_left: bool = False) -> str:
     """Return paragraphs with spacing between their lines as HTML for a QLabel."""
-    style = f"line-height: {LINE_PERCENT}%; margin: 0 0 {round(gap)}px 0"
+    style = f"line-height: {_LINE_PERCENT}%; margin: 0 0 {round(gap)}px 0"
     way = "rtl" if right_to_left else "ltr"
     return "".join(f'<p dir="{way}" style="{style}">{html.escape(text)}</p>' for text in paragraphs)
 
@@ -92,7 +92,7 @@ class Column(QWidget):
         self._title.setFont(font("display", scale=scale * text))
         self._body.setFont(font("statement", scale=scale * text * 1.125))
         flip = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
-        self._body.setText(paragraphs_html(self._paragraphs, 10 * scale, right_to_left=flip))
+        self._body.setText(_paragraphs_html(self._paragraphs, 10 * scale, right_to_left=flip))
         self._layout.setSpacing(round(14 * scale))
 
     def needed_height(self, width: int) -> int:
@@ -138,10 +138,10 @@ class ReadingPage(PageWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         bar = self._scroll.verticalScrollBar()
-        if (lines := LINE_KEYS.get(Qt.Key(event.key()))) is not None:
-            bar.setValue(bar.value() + lines * LINE_STEP)
-        elif (pages := PAGE_KEYS.get(Qt.Key(event.key()))) is not None:
-            bar.setValue(bar.value() + pages * (bar.pageStep() - LINE_STEP))
+        if (lines := _LINE_KEYS.get(Qt.Key(event.key()))) is not None:
+            bar.setValue(bar.value() + lines * _LINE_STEP)
+        elif (pages := _PAGE_KEYS.get(Qt.Key(event.key()))) is not None:
+            bar.setValue(bar.value() + pages * (bar.pageStep() - _LINE_STEP))
         else:
             super().keyPressEvent(event)
 
@@ -156,14 +156,14 @@ class ReadingPage(PageWidget):
             self._progress.setGeometry(margin, top, self.width() - 2 * margin, self._progress.height())
             top += self._progress.height()
         top = self._lay_out_head(scale, margin, top)
-        width = min(round(COLUMN * scale), self.width() - 2 * margin)
+        width = min(round(_COLUMN * scale), self.width() - 2 * margin)
         foot = below = 0
         if self.button is not None:
             self.button.set_scale(scale)
             below = self._below_button(width)
             foot = self.button.height() + below + round((16 if least else 28) * scale)
         room = self.height() - top - round((28 if least else 48) * scale) - foot
-        for text, badge in MUST_BE_READ if least else GIVING_WAY:
+        for text, badge in _MUST_BE_READ if least else _GIVING_WAY:
             self._column.set_scale(scale, text=text, badge=badge)
             needed = self._column.needed_height(width)
             if needed <= room:
@@ -172,7 +172,7 @@ class ReadingPage(PageWidget):
         self._column.setFixedSize(width, needed)
         y = top + round((12 if least else 24) * scale) + round((room - height) * 0.42)
         x = (self.width() - width) // 2
-        bar = SCROLLBAR if needed > height else 0
+        bar = _SCROLLBAR if needed > height else 0
         self._scroll.setGeometry(x - (bar if self.mirrored else 0), y, width + bar, height)
         policy = Qt.ScrollBarPolicy
         self._scroll.setVerticalScrollBarPolicy(
@@ -192,11 +192,11 @@ class ReadingPage(PageWidget):
         return top
 
 
-ICONS = {"consent": "pen", "instructions": "drop", "break": "clock", "debrief": "check"}
-TICK_MS = 200
+_ICONS = {"consent": "pen", "instructions": "drop", "break": "clock", "debrief": "check"}
+_TICK_MS = 200
 
 
-class DeclineButton(QPushButton):
+class _DeclineButton(QPushButton):
     """The outlined button of a consent that ends the session."""
 
     def __init__(self, text: str, parent: QWidget) -> None:
@@ -229,12 +229,12 @@ class TextWidget(ReadingPage):
         self._consent = page.kind == "consent"
         key = wording.enter_key if self._consent else wording.space_key
         progress = ProgressLine(page.progress, wording, 0.0) if page.progress is not None else None
-        column = (ICONS[page.kind], page.title, page.paragraphs, PARTICIPANT.accent)
+        column = (_ICONS[page.kind], page.title, page.paragraphs, PARTICIPANT.accent)
         super().__init__(column, context, (page.button, key), progress)
         self._stays_until_s = page.stays_until_s
         self.count_label = PlainLabel("", self)
         self.count_label.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
-        self._ticker = QTimer(self, interval=TICK_MS)
+        self._ticker = QTimer(self, interval=_TICK_MS)
         self._ticker.timeout.connect(self.tick)
         self._stacked = False
         self.languages: LanguageSwitch | None = None
@@ -245,7 +245,7 @@ class TextWidget(ReadingPage):
             for language in self.languages.buttons:
                 assert self.button is not None  # noqa: S101  # these pages have one
                 QWidget.setTabOrder(language, self.button)  # above the text, so before its button in the focus order
-        self.decline = DeclineButton(wording.decline, self) if self._consent else None
+        self.decline = _DeclineButton(wording.decline, self) if self._consent else None
         if self.decline is not None:
             self.decline.clicked.connect(self._decline)
         if page.stays_until_s is not None:
@@ -360,7 +360,7 @@ class TextWidget(ReadingPage):
             self.event_made.emit(Continue(self._clock()))
 
 
-VEIL = 0.80  # opacity of the pause above the page
+_VEIL = 0.80  # opacity of the pause above the page
 
 
 class PauseWidget(ReadingPage):
@@ -399,7 +399,7 @@ class PauseWidget(ReadingPage):
         super().paintEvent(event)
         painter = page_painter(self)
         if self.under is not None and not self.under.isNull():
-            painter.setOpacity(1 - VEIL)
+            painter.setOpacity(1 - _VEIL)
             painter.drawPixmap(self.rect(), self.under)
             painter.setOpacity(1.0)
         space = min(40 * page_scale(self.width(), self.height()), self._content.top(), self._content.left())

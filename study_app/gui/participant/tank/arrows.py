@@ -13,8 +13,8 @@ from study_app.gui.theme.theme import TANK, font
 
 HEIGHTS = 0.55
 """Length of the longest arrow, in heights of the water."""
-LEAST_PX = 9.0
-NAME_PX = 18
+_LEAST_PX = 9.0
+_NAME_PX = 18
 
 
 class Arrow(NamedTuple):
@@ -46,7 +46,7 @@ def paint_arrows(painter: QPainter, camera: Camera, arrows: Sequence[Arrow]) -> 
         start, tip = arrow.ends(camera)
         along = tip - start
         length, ink = math.hypot(along.x(), along.y()), QColor(arrow.colour)
-        if length < LEAST_PX:
+        if length < _LEAST_PX:
             continue
         shown.append((arrow, tip, along, length))
         for colour, width in ((QColor(TANK.shadow), 6.0), (ink, 3.2)):
@@ -58,9 +58,9 @@ def paint_arrows(painter: QPainter, camera: Camera, arrows: Sequence[Arrow]) -> 
         letters = _name_image(arrow.name, arrow.colour, ratio)
         wide = letters.width() / ratio
         middle = tip + along * ((12.0 + wide / 2) / length)
-        place = QRectF(middle.x() - wide / 2, middle.y() - NAME_PX / 2, wide, NAME_PX)
+        place = QRectF(middle.x() - wide / 2, middle.y() - _NAME_PX / 2, wide, _NAME_PX)
         if place.intersects(taken):
-            place.moveTop(taken.bottom() + 2 if middle.y() >= taken.center().y() else taken.top() - NAME_PX - 2)
+            place.moveTop(taken.bottom() + 2 if middle.y() >= taken.center().y() else taken.top() - _NAME_PX - 2)
         painter.drawImage(place.topLeft(), letters)
         taken = place
 
@@ -82,11 +82,11 @@ def _name_image(word: str, colour: str, ratio: float) -> QImage:
     """Return a word with a dark outline, for a screen with pixel ratio ``ratio``."""
     face = font("label", weight=600)
     wide = QFontMetricsF(face).horizontalAdvance(word) + 4
-    image = QImage(math.ceil(wide * ratio), math.ceil(NAME_PX * ratio), QImage.Format.Format_ARGB32_Premultiplied)
+    image = QImage(math.ceil(wide * ratio), math.ceil(_NAME_PX * ratio), QImage.Format.Format_ARGB32_Premultiplied)
     image.setDevicePixelRatio(ratio)
     image.fill(Qt.GlobalColor.transparent)
     letters = QPainterPath()
-    letters.addText(2, NAME_PX - 4.5, face, word)
+    letters.addText(2, _NAME_PX - 4.5, face, word)
     painter = QPainter(image)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.strokePath(letters, QPen(QColor(TANK.shadow), 2.6))

@@ -21,21 +21,21 @@ from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.protocol.wording.languages import Words
 from study_app.session.pages import TaskPage
 
-DESIGNED_FOR = (1920, 1080)
-LEAST_SCALE = 0.72
-INSTRUCTION = 0.72  # of the window's width
-FINE = 0.9
-COUNTED_DOWN_S = 10  # before a task's limit
-CONTROLS_PX = (470, 64)  # of an adjustment's buttons, with the space above and below
-PATCH_ROOM = 88  # of the photodiode's patch in the lower right corner [px]
-CENTRED = int(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap)
+_DESIGNED_FOR = (1920, 1080)
+_LEAST_SCALE = 0.72
+_INSTRUCTION = 0.72  # of the window's width
+_FINE = 0.9
+_COUNTED_DOWN_S = 10  # before a task's limit
+_CONTROLS_PX = (470, 64)  # of an adjustment's buttons, with the space above and below
+_PATCH_ROOM = 88  # of the photodiode's patch in the lower right corner [px]
+_CENTRED = int(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap)
 LEFT_TO_RIGHT, ISOLATE, END = "\u2066", "\u2068", "\u2069"  # of Unicode: isolated runs of text
 RIGHT = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
 
 
-def caption_scale(width: float, height: float) -> float:
+def _caption_scale(width: float, height: float) -> float:
     """Return the scale of text relative to 1920 × 1080 in a window of ``width`` × ``height`` [px]."""
-    return min(max(min(width / DESIGNED_FOR[0], height / DESIGNED_FOR[1]), LEAST_SCALE), 2.0)
+    return min(max(min(width / _DESIGNED_FOR[0], height / _DESIGNED_FOR[1]), _LEAST_SCALE), 2.0)
 
 
 class Captions:
@@ -52,7 +52,7 @@ class Captions:
         self._small: QFont
         self._line: float
         self._way = Qt.LayoutDirection.RightToLeft if wording.right_to_left else Qt.LayoutDirection.LeftToRight
-        self.lay_out(*DESIGNED_FOR, 0.84 * DESIGNED_FOR[1])
+        self.lay_out(*_DESIGNED_FOR, 0.84 * _DESIGNED_FOR[1])
 
     def show_interval(self, page: TaskPage) -> None:
         self._page = page
@@ -73,7 +73,7 @@ class Captions:
     def lay_out(self, width: float, height: float, below: float) -> None:
         """Lay out the texts in a window of ``width`` × ``height``; the tank ends at ``below`` [px]."""
         self._size_words(width, height)
-        scale, margin = self._scale, 64 * caption_scale(width, height)
+        scale, margin = self._scale, 64 * _caption_scale(width, height)
         head, small = 58 * scale, QFontMetricsF(self._small).height()
         count = 300 * scale
         across = width - 2 * margin - (count if self._page.task.targets_m else 0)
@@ -94,14 +94,14 @@ class Captions:
         tall = self._instruction_lines() * self._line
         room = self._top_of_foot(stacked=stacked) - below - self._controls_above
         top = below + max(4 * scale, (room - tall) * 0.55)
-        self._instruction = QRectF((1 - INSTRUCTION) / 2 * width, top, INSTRUCTION * width, max(room, tall))
+        self._instruction = QRectF((1 - _INSTRUCTION) / 2 * width, top, _INSTRUCTION * width, max(room, tall))
 
     def _size_words(self, width: float, height: float) -> None:
         self._width, self._height = width, height
-        base = caption_scale(width, height)
+        base = _caption_scale(width, height)
         least = words_scale(width, height, self._text_scale) if self._text_scale > 1 else 1.0
-        self._scale = max(base, LEAST_SCALE * least)
-        self._fine = max(self._scale, least if self._text_scale > 1 else FINE)  # small text shrinks less than the tank
+        self._scale = max(base, _LEAST_SCALE * least)
+        self._fine = max(self._scale, least if self._text_scale > 1 else _FINE)  # small text shrinks less than the tank
         self._instruction_font = font("instruction", scale=self._scale)
         self._count_font = font("number", scale=self._scale)
         self._small = self._pause_font = font("statement", scale=self._fine)
@@ -109,15 +109,15 @@ class Captions:
 
     def _instruction_lines(self) -> int:
         metrics = QFontMetricsF(self._instruction_font)
-        room = QRectF(0, 0, INSTRUCTION * self._width, 1e4)
+        room = QRectF(0, 0, _INSTRUCTION * self._width, 1e4)
         texts = (self._page.instruction, self._page.question)
-        return max(1, *(round(metrics.boundingRect(room, CENTRED, text).height() / self._line) for text in texts))
+        return max(1, *(round(metrics.boundingRect(room, _CENTRED, text).height() / self._line) for text in texts))
 
     def _room_of_foot(self) -> tuple[float, float]:
         """Return start and width of the foot's room, read from left to right [px]."""
-        margin = 64 * caption_scale(self._width, self._height)
-        start = max(margin, PATCH_ROOM + 12) if self._words.right_to_left else margin
-        return start, self._width - start - (margin if self._words.right_to_left else PATCH_ROOM + 12)
+        margin = 64 * _caption_scale(self._width, self._height)
+        start = max(margin, _PATCH_ROOM + 12) if self._words.right_to_left else margin
+        return start, self._width - start - (margin if self._words.right_to_left else _PATCH_ROOM + 12)
 
     def _longest_hint(self) -> float:
         return max(QFontMetricsF(self._small).horizontalAdvance(text) for text in self._longest_hints()) + 8
@@ -129,7 +129,7 @@ class Captions:
 
     def _foot_middle(self) -> float:
         small = QFontMetricsF(self._small).height()
-        base = caption_scale(self._width, self._height)
+        base = _caption_scale(self._width, self._height)
         return self._height - max(58 * base, 0.5 * small + 24 * base)
 
     def _top_of_foot(self, *, stacked: bool) -> float:
@@ -158,7 +158,7 @@ class Captions:
         if region.intersects(self._instruction.toAlignedRect()):
             rest = page.interval if page.interval is not None and page.interval.resting else None
             said = page.said if rest is None else rest.announced
-            _draw_text(painter, self._instruction, CENTRED, said, self._instruction_font, PARTICIPANT.text)
+            _draw_text(painter, self._instruction, _CENTRED, said, self._instruction_font, PARTICIPANT.text)
         if region.intersects(self._mirrored_place(self._foot).toAlignedRect()):
             self._draw_foot(painter)
         hints = self._hint_words(task, hint)
@@ -184,8 +184,8 @@ class Captions:
     @property
     def _controls_above(self) -> float:
         """The height of the controls above the foot [px]; 0 if they fit beside it, or without controls."""
-        wide, high = (side * self._fine for side in CONTROLS_PX)
-        start = 64 * caption_scale(self._width, self._height)
+        wide, high = (side * self._fine for side in _CONTROLS_PX)
+        start = 64 * _caption_scale(self._width, self._height)
         beside = start + self._foot_width() + 24 <= (self._width - wide) / 2
         return high if self._page.question and not beside else 0.0
 
@@ -206,7 +206,7 @@ class Captions:
     def _longest_hints(self) -> tuple[str, ...]:
         wording = self._words
         counted = wording.seconds_left.format(seconds=999)
-        both = wording.seconds_left.format(seconds=COUNTED_DOWN_S)
+        both = wording.seconds_left.format(seconds=_COUNTED_DOWN_S)
         if self._page.task.targets_m:
             return tuple(f"{away} · {both}" for away in (wording.further_away, wording.nearer, wording.time_is_up))
         if self._page.task.paced:
@@ -239,8 +239,8 @@ class Captions:
             wait = math.ceil(todo.least_s - elapsed_s)
             if wait > 0:
                 return wording.continue_in.format(seconds=wait)
-            return wording.continue_now if left > COUNTED_DOWN_S else f"{wording.continue_now} · {counted}"
-        counts = todo.wanted is None or left <= COUNTED_DOWN_S
+            return wording.continue_now if left > _COUNTED_DOWN_S else f"{wording.continue_now} · {counted}"
+        counts = todo.wanted is None or left <= _COUNTED_DOWN_S
         return " · ".join(filter(None, (hint, counted if counts else "")))
 
     def _count_and_total(self, task: TaskShown | None) -> tuple[int, int | None]:

@@ -17,14 +17,14 @@ from study_app.gui.participant.tank import sprites
 from study_app.gui.theme.theme import TANK
 
 Point: TypeAlias = tuple[float, float, float]
-Pixel: TypeAlias = tuple[float, float]
+_Pixel: TypeAlias = tuple[float, float]
 
-PITCH = math.radians(14.4)
-DISTANCE = 3.3  # from the eye to the middle of the glass, in heights of the water beyond half the depth
-LEAST_WIDTH = 2.05  # of the water, in its heights: a tank looks like a tank
-LEAST_DEPTH = 1.2
-GLASS_ABOVE = 0.13  # of the water's height
-MARGIN_M = 0.0025  # between ball and glass
+_PITCH = math.radians(14.4)
+_DISTANCE = 3.3  # from the eye to the middle of the glass, in heights of the water beyond half the depth
+_LEAST_WIDTH = 2.05  # of the water, in its heights: a tank looks like a tank
+_LEAST_DEPTH = 1.2
+_GLASS_ABOVE = 0.13  # of the water's height
+_MARGIN_M = 0.0025  # between ball and glass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,14 +40,14 @@ class Box:
     @classmethod
     def around(cls, workspace_m: Point, ball_m: float) -> Box:
         """Return the tank in which a ball of radius ``ball_m`` can reach the whole workspace (full sizes)."""
-        spare = 2 * (ball_m + MARGIN_M)
+        spare = 2 * (ball_m + _MARGIN_M)
         width, height, depth = (size + spare for size in workspace_m)
         return cls(
-            x=max(width, LEAST_WIDTH * height) / 2,
+            x=max(width, _LEAST_WIDTH * height) / 2,
             floor=-height / 2,
             water=height / 2,
-            top=height * (0.5 + GLASS_ABOVE),
-            z=max(depth, LEAST_DEPTH * height) / 2,
+            top=height * (0.5 + _GLASS_ABOVE),
+            z=max(depth, _LEAST_DEPTH * height) / 2,
         )
 
     def corners(self) -> tuple[Point, ...]:
@@ -63,13 +63,13 @@ class Camera:
     focal: float
     centre_x: float
     centre_y: float
-    pitch: float = PITCH
+    pitch: float = _PITCH
 
     @classmethod
-    def fitted(cls, box: Box, left: float, top: float, width: float, height: float, *, pitch: float = PITCH) -> Camera:
+    def fitted(cls, box: Box, left: float, top: float, width: float, height: float, *, pitch: float = _PITCH) -> Camera:
         """Return the camera that shows the whole box centred and as large as the rectangle allows [px]."""
         middle = (box.top + box.floor) / 2
-        distance = DISTANCE * (box.water - box.floor) + box.z
+        distance = _DISTANCE * (box.water - box.floor) + box.z
         eye_y = middle + math.sin(pitch) * distance
         eye_z = math.cos(pitch) * distance
         bare = cls(eye_y=eye_y, eye_z=eye_z, focal=1.0, centre_x=0.0, centre_y=0.0, pitch=pitch)
@@ -93,7 +93,7 @@ class Camera:
     def scale(self, point: Point) -> float:
         return self.focal / self.distance(point)
 
-    def point(self, point: Point) -> Pixel:
+    def point(self, point: Point) -> _Pixel:
         """Return the screen position of a point [px]."""
         x, y, z = point
         up = (y - self.eye_y) * math.cos(self.pitch) - (z - self.eye_z) * math.sin(self.pitch)
@@ -102,8 +102,8 @@ class Camera:
 
 
 DEPTH_STEPS = 64
-MARK = 0.8  # a target's mark on the floor, in radii of the target
-PLUMB_HALF_PX = 3.0
+_MARK = 0.8  # a target's mark on the floor, in radii of the target
+_PLUMB_HALF_PX = 3.0
 
 
 class TaskShown(Protocol):
@@ -174,7 +174,7 @@ class TargetPlace:
 def target_place(camera: Camera, box: Box, centre: Point, radius_m: float) -> TargetPlace:
     """Return the drawn place of a target of ``radius_m`` around ``centre`` [m, hand]."""
     x, _, z = centre
-    reach = MARK * radius_m
+    reach = _MARK * radius_m
     circle = [
         (x + reach * math.cos(turn), box.floor, z + reach * math.sin(turn))
         for turn in (math.tau * step / 48 for step in range(48))
@@ -265,7 +265,7 @@ def ball_parts(ball: BallPlace) -> dict[str, Placed]:
     return {
         "ball": Placed(state, QRectF(ball.middle.x() - around, ball.middle.y() - around, 2 * around, 2 * around)),
         "shadow": Placed(state, QRectF(ball.floor.x() - wide, ball.floor.y() - high, 2 * wide, 2 * high)),
-        "plumb": Placed(state, line.adjusted(-PLUMB_HALF_PX, 0, PLUMB_HALF_PX, PLUMB_HALF_PX)),
+        "plumb": Placed(state, line.adjusted(-_PLUMB_HALF_PX, 0, _PLUMB_HALF_PX, _PLUMB_HALF_PX)),
     }
 
 

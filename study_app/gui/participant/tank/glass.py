@@ -24,9 +24,9 @@ from study_app.gui.participant.tank.frame import Box, Camera, Point
 from study_app.gui.theme.theme import TANK
 
 COLUMNS, ROWS = 512, 320
-RAYS = 2  # per cell and axis
-BEND = 0.075  # largest shift of a ray, in widths of the floor
-WAVES = 12
+_RAYS = 2  # per cell and axis
+_BEND = 0.075  # largest shift of a ray, in widths of the floor
+_WAVES = 12
 SEED = 7
 
 
@@ -38,11 +38,11 @@ def brightness() -> NDArray[np.float32]:
     z = _ray_starts(ROWS)[:, None]
     shift_x = np.zeros((z.size, x.size), np.float32)
     shift_z = np.zeros_like(shift_x)
-    for _ in range(WAVES):
+    for _ in range(_WAVES):
         number = math.tau * random.uniform(2.0, 8.0)
         angle = random.uniform(0, math.tau)
         along_x, along_z = math.cos(angle), math.sin(angle)
-        slope = BEND / WAVES * np.cos(number * (along_x * x + along_z * z) + random.uniform(0, math.tau))
+        slope = _BEND / _WAVES * np.cos(number * (along_x * x + along_z * z) + random.uniform(0, math.tau))
         shift_x += along_x * slope
         shift_z += along_z * slope
     landed = _count_rays(x + shift_x, z + shift_z)
@@ -54,9 +54,9 @@ def brightness() -> NDArray[np.float32]:
 
 def _ray_starts(cells: int) -> NDArray[np.float32]:
     """Return the start positions of rays along one axis [widths of the floor], beyond both ends."""
-    beyond = math.ceil(BEND * COLUMNS) * RAYS
-    starts: NDArray[np.float32] = np.arange(-beyond, cells * RAYS + beyond, dtype=np.float32)
-    return (starts + np.float32(0.5)) / np.float32(COLUMNS * RAYS)
+    beyond = math.ceil(_BEND * COLUMNS) * _RAYS
+    starts: NDArray[np.float32] = np.arange(-beyond, cells * _RAYS + beyond, dtype=np.float32)
+    return (starts + np.float32(0.5)) / np.float32(COLUMNS * _RAYS)
 
 
 def _count_rays(x: NDArray[np.float32], z: NDArray[np.float32]) -> NDArray[np.float64]:
@@ -65,7 +65,7 @@ def _count_rays(x: NDArray[np.float32], z: NDArray[np.float32]) -> NDArray[np.fl
     row = np.floor(z * COLUMNS).astype(np.int32).ravel()
     inside = (column >= 0) & (column < COLUMNS) & (row >= 0) & (row < ROWS)
     counts = np.bincount(row[inside] * COLUMNS + column[inside], minlength=ROWS * COLUMNS)
-    return counts.reshape(ROWS, COLUMNS) / RAYS**2
+    return counts.reshape(ROWS, COLUMNS) / _RAYS**2
 
 
 def _blurred(image: NDArray[np.float64], radius: int = 1) -> NDArray[np.float64]:
@@ -81,7 +81,7 @@ def _blurred(image: NDArray[np.float64], radius: int = 1) -> NDArray[np.float64]
     return image
 
 
-FLOOR_LINES = 10
+_FLOOR_LINES = 10
 
 
 def point_on_screen(camera: Camera, point: Point) -> QPointF:
@@ -89,7 +89,7 @@ def point_on_screen(camera: Camera, point: Point) -> QPointF:
     return QPointF(*camera.point(point))
 
 
-def polygon(camera: Camera, points: list[Point]) -> QPolygonF:
+def _polygon(camera: Camera, points: list[Point]) -> QPolygonF:
     """Return the screen polygon of points in the tank."""
     return QPolygonF([point_on_screen(camera, point) for point in points])
 
@@ -101,7 +101,7 @@ def ink(colour: str, alpha: int = 255) -> QColor:
     return made
 
 
-def pen(colour: str, alpha: int, width: float) -> QPen:
+def _pen(colour: str, alpha: int, width: float) -> QPen:
     """Return a solid pen with round ends."""
     return QPen(ink(colour, alpha), width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin)
 
@@ -126,7 +126,7 @@ def fill_shape(painter: QPainter, shape: QPolygonF | QPainterPath, brush: QBrush
 def paint_walls(painter: QPainter, box: Box, camera: Camera) -> None:
     """Paint the back wall, lit from behind, and the two side walls."""
     x, z = box.x, box.z
-    back = polygon(camera, [(-x, box.top, -z), (x, box.top, -z), (x, box.floor, -z), (-x, box.floor, -z)])
+    back = _polygon(camera, [(-x, box.top, -z), (x, box.top, -z), (x, box.floor, -z), (-x, box.floor, -z)])
     frame = back.boundingRect()
     base = QLinearGradient(frame.topLeft(), frame.bottomLeft())
     fill_shape(painter, back, shade(base, (0, "#284A5E", 255), (0.45, "#25475B", 255), (1, "#1A3548", 255)))
@@ -136,7 +136,7 @@ def paint_walls(painter: QPainter, box: Box, camera: Camera) -> None:
     )
     for side in (-1, 1):
         far_edge, near_edge = side * x, side * x
-        wall = polygon(
+        wall = _polygon(
             camera,
             [(far_edge, box.top, -z), (near_edge, box.top, z), (near_edge, box.floor, z), (far_edge, box.floor, -z)],
         )
@@ -150,7 +150,7 @@ def paint_walls(painter: QPainter, box: Box, camera: Camera) -> None:
 def paint_floor(painter: QPainter, box: Box, camera: Camera) -> None:
     """Paint the floor: glass with caustics and a grid for the sense of scale."""
     x, y, z = box.x, box.floor, box.z
-    quad = polygon(camera, [(-x, y, -z), (x, y, -z), (x, y, z), (-x, y, z)])
+    quad = _polygon(camera, [(-x, y, -z), (x, y, -z), (x, y, z), (-x, y, z)])
     far, near = quad.at(0).y(), quad.at(2).y()
     fill_shape(painter, quad, shade(QLinearGradient(0, far, 0, near), (0, "#24485D", 255), (1, "#3A6B85", 255)))
     middle = QRadialGradient(point_on_screen(camera, (0, y, 0)), (quad.at(2).x() - quad.at(3).x()) * 0.5)
@@ -161,8 +161,8 @@ def paint_floor(painter: QPainter, box: Box, camera: Camera) -> None:
         )
         fill_shape(painter, quad, shade(edge, (0, "#122B3C", 110), (1, "#122B3C", 0)))
     _paint_caustics(painter, quad)
-    for index in range(1, FLOOR_LINES):
-        share = 2 * index / FLOOR_LINES - 1
+    for index in range(1, _FLOOR_LINES):
+        share = 2 * index / _FLOOR_LINES - 1
         _paint_grid_line(
             painter, point_on_screen(camera, (share * x, y, -z)), point_on_screen(camera, (share * x, y, z))
         )
@@ -172,7 +172,7 @@ def paint_floor(painter: QPainter, box: Box, camera: Camera) -> None:
 
 
 def _paint_grid_line(painter: QPainter, start: QPointF, end: QPointF) -> None:
-    painter.setPen(pen("#BFE0F0", 34, 1.0))
+    painter.setPen(_pen("#BFE0F0", 34, 1.0))
     painter.drawLine(start, end)
 
 
@@ -236,14 +236,14 @@ def paint_far_edges(painter: QPainter, box: Box, camera: Camera) -> None:
     x, z = box.x, box.z
     far = [(-x, box.top, -z), (x, box.top, -z), (x, box.floor, -z), (-x, box.floor, -z)]
     painter.setBrush(Qt.BrushStyle.NoBrush)
-    painter.setPen(pen(TANK.glass, 92, 1.0))
-    painter.drawPolygon(polygon(camera, far))
+    painter.setPen(_pen(TANK.glass, 92, 1.0))
+    painter.drawPolygon(_polygon(camera, far))
     for side in (-1, 1):
-        painter.setPen(pen(TANK.glass, 92, 1.0))
+        painter.setPen(_pen(TANK.glass, 92, 1.0))
         painter.drawLine(
             point_on_screen(camera, (side * x, box.floor, -z)), point_on_screen(camera, (side * x, box.floor, z))
         )
-        painter.setPen(pen(TANK.glass, 128, 1.0))
+        painter.setPen(_pen(TANK.glass, 128, 1.0))
         painter.drawLine(
             point_on_screen(camera, (side * x, box.top, -z)), point_on_screen(camera, (side * x, box.top, z))
         )
@@ -252,15 +252,15 @@ def paint_far_edges(painter: QPainter, box: Box, camera: Camera) -> None:
 def paint_near_sides(painter: QPainter, box: Box, camera: Camera) -> None:
     """Paint the near edges at the sides and below, which moving parts cannot hide."""
     x, z = box.x, box.z
-    painter.setPen(pen(TANK.glass, 150, 1.25))
+    painter.setPen(_pen(TANK.glass, 150, 1.25))
     corners = [(-x, box.top, z), (-x, box.floor, z), (x, box.floor, z), (x, box.top, z)]
-    painter.drawPolyline(polygon(camera, corners))
+    painter.drawPolyline(_polygon(camera, corners))
 
 
 def paint_near_lines(painter: QPainter, box: Box, camera: Camera) -> None:
     """Paint the near edge of the glass above the water, and the water line, in front of moving parts."""
     for height, colour, alpha, width in ((box.top, TANK.glass, 150, 1.25), (box.water, "#E9F6FD", 215, 1.5)):
-        painter.setPen(pen(colour, alpha, width))
+        painter.setPen(_pen(colour, alpha, width))
         painter.drawLine(
             point_on_screen(camera, (-box.x, height, box.z)), point_on_screen(camera, (box.x, height, box.z))
         )
@@ -270,13 +270,13 @@ def front_area(box: Box, camera: Camera) -> QRectF:
     """Return the area of water surface and near lines, in whole pixels."""
     level = [(side * box.x, box.water, end * box.z) for side in (-1, 1) for end in (-1, 1)]
     glass = [(side * box.x, box.top, box.z) for side in (-1, 1)]
-    return QRectF(polygon(camera, level + glass).boundingRect().adjusted(-2, -2, 2, 2).toAlignedRect())
+    return QRectF(_polygon(camera, level + glass).boundingRect().adjusted(-2, -2, 2, 2).toAlignedRect())
 
 
 def paint_surface(painter: QPainter, box: Box, camera: Camera) -> None:
     """Paint the water's surface, seen from above: a pale skin with a few still ripples."""
     x, y, z = box.x, box.water, box.z
-    skin = polygon(camera, [(-x, y, -z), (x, y, -z), (x, y, z), (-x, y, z)])
+    skin = _polygon(camera, [(-x, y, -z), (x, y, -z), (x, y, z), (-x, y, z)])
     far, near = skin.at(0).y(), skin.at(2).y()
     down = QLinearGradient(0, far, 0, near)
     fill_shape(
@@ -293,7 +293,7 @@ def paint_surface(painter: QPainter, box: Box, camera: Camera) -> None:
     ):
         _paint_ripple(painter, box, camera, depth * z, high, waves, phase, alpha)
     painter.setClipping(False)
-    painter.setPen(pen("#DDEFF8", 120, 1.0))
+    painter.setPen(_pen("#DDEFF8", 120, 1.0))
     painter.drawLine(skin.at(0), skin.at(1))
     painter.drawLine(skin.at(0), skin.at(3))
     painter.drawLine(skin.at(1), skin.at(2))

@@ -117,10 +117,10 @@ def _dithered(image: QImage) -> QImage:
     return made
 
 
-MOVING_MPS = 0.020
-RESTING_MPS = 0.008
-REST_NS = 100_000_000
-BASE_NS = 8_000_000
+_MOVING_MPS = 0.020
+_RESTING_MPS = 0.008
+_REST_NS = 100_000_000
+_BASE_NS = 8_000_000
 
 
 class OnsetPatch:
@@ -142,34 +142,34 @@ class OnsetPatch:
         if self._position is None:
             self._position, self._time_ns = position_m, time_ns
         step_ns = time_ns - self._time_ns
-        if step_ns < BASE_NS:
+        if step_ns < _BASE_NS:
             return self.lit
         speed = math.dist(position_m, self._position) * 1e9 / step_ns
-        if speed > MOVING_MPS:
+        if speed > _MOVING_MPS:
             self.lit ^= self._rested
             self._rested = False
-        if speed >= RESTING_MPS:
+        if speed >= _RESTING_MPS:
             self._slow_since_ns = None
         elif self._slow_since_ns is None:
             self._slow_since_ns = self._time_ns
-        if self._slow_since_ns is not None and time_ns - self._slow_since_ns >= REST_NS:
+        if self._slow_since_ns is not None and time_ns - self._slow_since_ns >= _REST_NS:
             self._rested = True
         self._position, self._time_ns = position_m, time_ns
         return self.lit
 
 
-PATCH = (88.0, 72.0)  # black square, white square in its corner [logical px]
+_PATCH = (88.0, 72.0)  # black square, white square in its corner [logical px]
 
 
 def patch_place(width: float, height: float) -> QRectF:
     """Return the patch's place in a window of this size [logical px]."""
-    black, _ = PATCH
+    black, _ = _PATCH
     return QRectF(width - black, height - black, black, black)
 
 
 def paint_patch(painter: QPainter, place: QRectF, *, lit: bool) -> None:
     """Paint the patch into its place."""
-    black, white = PATCH
+    black, white = _PATCH
     painter.fillRect(place, QColor(Qt.GlobalColor.black))
     if lit:
         painter.fillRect(place.adjusted(black - white, black - white, 0, 0), QColor(Qt.GlobalColor.white))

@@ -10,7 +10,7 @@ from PySide6.QtGui import QColor, QImage, QLinearGradient, QPainter, QPainterPat
 from study_app.gui.theme.theme import TANK
 
 GLOW = 1.55  # reach of the lit ring's light, in radii
-TICK = (1.18, 1.32)
+_TICK = (1.18, 1.32)
 SOFT = 1.5  # reach of a shadow, in radii of the ball
 
 
@@ -130,7 +130,7 @@ def ring_sprite(radius: float, ratio: float, stroke: float) -> Sprite:
     painter.setPen(QPen(_ink(TANK.lit, 0.92), stroke * 0.42))
     for quarter in range(4):
         angle = math.pi / 4 + quarter * math.pi / 2
-        inner, outer = (QPointF(radius * r * math.cos(angle), radius * r * math.sin(angle)) for r in TICK)
+        inner, outer = (QPointF(radius * r * math.cos(angle), radius * r * math.sin(angle)) for r in _TICK)
         painter.drawLine(inner, outer)
     painter.end()
     return sprite

@@ -10,7 +10,7 @@ from study_app.haptics.kernels.vector import clear, copy, square
 from study_app.haptics.model.estimators import KALMAN
 from study_app.haptics.model.layout import Record
 
-NOTHING_MPS2 = 1e-30
+_NOTHING_MPS2 = 1e-30
 
 
 @part
@@ -61,8 +61,8 @@ def accelerate(
         difference_mps2 = (w[axis] - previous_mps[axis]) / interval_s
         once_mps2 = smoothed_mps2[0, axis] + weight * (difference_mps2 - smoothed_mps2[0, axis])
         twice_mps2 = smoothed_mps2[1, axis] + weight * (once_mps2 - smoothed_mps2[1, axis])
-        smoothed_mps2[0, axis] = once_mps2 = once_mps2 if abs(once_mps2) > NOTHING_MPS2 else 0.0
-        smoothed_mps2[1, axis] = twice_mps2 = twice_mps2 if abs(twice_mps2) > NOTHING_MPS2 else 0.0
+        smoothed_mps2[0, axis] = once_mps2 = once_mps2 if abs(once_mps2) > _NOTHING_MPS2 else 0.0
+        smoothed_mps2[1, axis] = twice_mps2 = twice_mps2 if abs(twice_mps2) > _NOTHING_MPS2 else 0.0
         acceleration_mps2[axis] = once_mps2 + lead * (once_mps2 - twice_mps2)
 
 

@@ -22,8 +22,8 @@ from study_app.haptics.model.effects.history import EXPONENTIALS
 from study_app.haptics.model.estimators import KALMAN
 from study_app.haptics.model.layout import Record
 
-TIMES = (0.1, 0.3, 1.0, 3.0, 10.0, 40.0, 190.0, 1000.0, 6500.0, 50000.0)  # t̃_i
-WEIGHTS = (
+_TIMES = (0.1, 0.3, 1.0, 3.0, 10.0, 40.0, 190.0, 1000.0, 6500.0, 50000.0)  # t̃_i
+_WEIGHTS = (
     0.23477481312586,
     0.28549576238194,
     0.28479416718255,
@@ -35,8 +35,8 @@ WEIGHTS = (
     0.48317384225265,
     0.63661146557001,
 )  # a_i
-NOTHING = 1e-30
-ROUNDING_S = 1e-9  # a window of n ticks holds n of them, however their sum is rounded
+_NOTHING = 1e-30
+_ROUNDING_S = 1e-9  # a window of n ticks holds n of them, however their sum is rounded
 
 
 @part
@@ -92,7 +92,7 @@ def _reset_tracks(history: Record, tracks: Record, w: Any, exponentials: Any) ->
     tracks.first = 0
     tracks.held = 0
     for axis in range(3):
-        tracks.smoothed_mps[axis] = tracks.twice_mps[axis] = w[axis] if abs(w[axis]) > NOTHING else 0.0
+        tracks.smoothed_mps[axis] = tracks.twice_mps[axis] = w[axis] if abs(w[axis]) > _NOTHING else 0.0
     for i in range(EXPONENTIALS):
         clear(exponentials[history.tail_row + i].memory)
 
@@ -102,10 +102,10 @@ def _fade(history: Record, exponentials: Any, interval_s: float) -> None:
     """Let the exponentials decay over Δt."""
     for i in range(EXPONENTIALS):
         exponential = exponentials[history.tail_row + i]
-        keep = math.exp(-0.5 * interval_s / (TIMES[i] * history.window_s))
+        keep = math.exp(-0.5 * interval_s / (_TIMES[i] * history.window_s))
         for axis in range(3):
             kept = keep * exponential.memory[axis]
-            exponential.memory[axis] = kept if abs(kept) > NOTHING else 0.0
+            exponential.memory[axis] = kept if abs(kept) > _NOTHING else 0.0
 
 
 @part
@@ -117,11 +117,11 @@ def _append(
     newest = intervals[history.row + _wrapped(tracks.first + tracks.held, history.rows)]
     for axis in range(3):
         change_mps = weight * (w[axis] - tracks.smoothed_mps[axis])
-        if abs(tracks.smoothed_mps[axis] + change_mps) <= NOTHING:
+        if abs(tracks.smoothed_mps[axis] + change_mps) <= _NOTHING:
             change_mps = -tracks.smoothed_mps[axis]
         tracks.smoothed_mps[axis] += change_mps
         twice_mps = weight * (tracks.smoothed_mps[axis] - tracks.twice_mps[axis])
-        if abs(tracks.twice_mps[axis] + twice_mps) <= NOTHING:
+        if abs(tracks.twice_mps[axis] + twice_mps) <= _NOTHING:
             twice_mps = -tracks.twice_mps[axis]
         tracks.twice_mps[axis] += twice_mps
         newest.acceleration_mps2[axis] = (change_mps + lead * (change_mps - twice_mps)) / interval_s
@@ -150,12 +150,12 @@ def _move_to_exponentials(history: Record, tracks: Record, intervals: Any, expon
     while tracks.held > 0:
         interval = intervals[history.row + tracks.first]
         ended_s = oldest_s - interval.duration_s
-        if ended_s < history.window_s - ROUNDING_S and tracks.held < history.rows:
+        if ended_s < history.window_s - _ROUNDING_S and tracks.held < history.rows:
             return
         for i in range(EXPONENTIALS):
-            time_s = TIMES[i] * history.window_s
+            time_s = _TIMES[i] * history.window_s
             share = math.exp(-0.5 * ended_s / time_s) * -math.expm1(-0.5 * interval.duration_s / time_s)
-            weight = 2.0 * WEIGHTS[i] * math.sqrt(math.e * time_s) * share
+            weight = 2.0 * _WEIGHTS[i] * math.sqrt(math.e * time_s) * share
             exponential = exponentials[history.tail_row + i]
             for axis in range(3):
                 exponential.memory[axis] += weight * interval.acceleration_mps2[axis]

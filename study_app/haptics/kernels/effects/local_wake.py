@@ -24,7 +24,7 @@ from study_app.haptics.kernels.vector import clear, norm
 from study_app.haptics.model.effects.local_wake import CELLS
 from study_app.haptics.model.layout import Record
 
-FARTHEST = 40.0  # r²/2σ² beyond which a cell has no effect: e^-40
+_FARTHEST = 40.0  # r²/2σ² beyond which a cell has no effect: e^-40
 
 
 @part
@@ -48,7 +48,7 @@ def local_wake_velocity(
             wide_m2 = narrow_m2 + cell.spread_m2 + 2.0 * wake.spreading_m2ps * age_s
             dx, dy, dz = x - cell.place_m[0], y - cell.place_m[1], z - cell.place_m[2]
             far = 0.5 * (dx * dx + dy * dy + dz * dz) / wide_m2
-            if far < FARTHEST:
+            if far < _FARTHEST:
                 thin = narrow_m2 / wide_m2
                 decay = math.exp(wake.log_decay_per_s * age_s)
                 weight = thin * math.sqrt(thin) * math.exp(-far) * decay

@@ -27,10 +27,10 @@ from study_app.haptics.model.effects import non_newtonian
 from study_app.haptics.model.laws import finite_reynolds
 from study_app.haptics.model.layout import GROWS_AS_SPEED, GROWS_LESS, Record
 
-SLACK_COUNTS = 2.0
+_SLACK_COUNTS = 2.0
 """Encoder counts: motion within them relaxes no stress, otherwise noise would let a hand at rest creep. [choice]"""
 
-MOST_STRAIN = 3.0
+_MOST_STRAIN = 3.0
 """In a tick that strains the liquid more, it flows, with the yield stress as shear stress."""
 
 _herschel_bulkley = part(laws.herschel_bulkley)
@@ -88,7 +88,7 @@ def _yielding(parameters: Record, law: Any, tracks: Record, local: Record, state
         return
     stable = min(limit_nspm / law.full_nspm, 1.0)
     per_m = law.stiffness_npm * stable * stable / law.yield_n
-    x = min(_play_step_m(tracks, SLACK_COUNTS * parameters.count_m * parameters.scale) * per_m, MOST_STRAIN)
+    x = min(_play_step_m(tracks, _SLACK_COUNTS * parameters.count_m * parameters.scale) * per_m, _MOST_STRAIN)
     share = _mean(x)
     for axis in range(3):
         strain[axis] += share * (tracks.step_m[axis] * per_m - x * strain[axis])

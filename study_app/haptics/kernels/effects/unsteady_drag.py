@@ -37,8 +37,8 @@ OVERTAKING = 2.96  # β
 OVERTAKING_REYNOLDS = 11.0  # R₀
 RATES_PER_S = (0.0212334, 0.257773, 1.39978, 7.11516, 36.0112, 182.242, 927.902)  # k_i
 WEIGHTS_RPS = (0.33973, 0.52101, 1.09144, 2.44114, 5.48942, 12.3529, 28.26937)  # b_i [1/√s]
-SHORT = 4.0  # `_mean` needs no exp up to this value
-NOTHING = 1e-30
+_SHORT = 4.0  # `_mean` needs no exp up to this value
+_NOTHING = 1e-30
 
 _over_stokes = part(laws.finite_reynolds)
 
@@ -155,10 +155,10 @@ def _update_memory(law: Any, tracks: Record, u_mps: float, interval_s: float, hi
 @part
 def _mean(x: float) -> float:
     """Return (1 − e^(−x))/x, the mean of a decay over a step; up to x = 4 by 1/(1 + x/2 + x²/12)."""
-    return 1.0 / (1.0 + x * (0.5 + x / 12.0)) if x <= SHORT else -math.expm1(-x) / x
+    return 1.0 / (1.0 + x * (0.5 + x / 12.0)) if x <= _SHORT else -math.expm1(-x) / x
 
 
 @part
 def _cleared(value: float) -> float:
     """Return the value, or 0 if it has decayed to nearly 0."""
-    return value if abs(value) > NOTHING else 0.0
+    return value if abs(value) > _NOTHING else 0.0

@@ -30,7 +30,7 @@ from study_app.haptics.kernels.vector import clear, copy, distance, norm
 from study_app.haptics.model.effects.drag import LAW_CONSTANT
 from study_app.haptics.model.layout import Record
 
-COSINE_TOLERANCE = 1e-12
+_COSINE_TOLERANCE = 1e-12
 
 
 @part
@@ -108,7 +108,7 @@ def _turns(
     reference = elements[wake.row + tracks.reference % wake.length]
     e = reference.velocity_mps
     along = ex * e[0] + ey * e[1] + ez * e[2]
-    least = (wake.breaking_cosine - COSINE_TOLERANCE) * speed_mps * reference.speed_mps
+    least = (wake.breaking_cosine - _COSINE_TOLERANCE) * speed_mps * reference.speed_mps
     return bool(along < least)
 
 
@@ -245,8 +245,8 @@ def _clear(segment: Record) -> None:
 
 
 REST_MPS = 1e-3
-RESPONSE_FLOOR = 0.05
-SMALLEST_SCALE = 1e-60
+_RESPONSE_FLOOR = 0.05
+_SMALLEST_SCALE = 1e-60
 NOTHING_MPS = 1e-30
 
 
@@ -291,7 +291,7 @@ def response(fill: float, exponent: float) -> float:
     if exponent > 1.0:
         return float(fill ** (exponent - 1.0))
     if exponent < 1.0:
-        return float((fill * fill + RESPONSE_FLOOR * RESPONSE_FLOOR) ** (0.5 * (exponent - 1.0)))
+        return float((fill * fill + _RESPONSE_FLOOR * _RESPONSE_FLOOR) ** (0.5 * (exponent - 1.0)))
     return 1.0
 
 
@@ -305,7 +305,7 @@ def update_wake(liquid: Record, local: Record, state: Record, elements: Any, seg
     """
     wake, tracks, h = liquid.wake, local.wake, local.motion_mps
     tracks.scale *= math.exp(wake.log_decay_per_s * interval_s)
-    if tracks.scale < SMALLEST_SCALE or tracks.evicted >= wake.length:
+    if tracks.scale < _SMALLEST_SCALE or tracks.evicted >= wake.length:
         renew(wake, tracks, elements, segments)
     hx, hy, hz = h[0], wake.vertical * h[1], h[2]
     speed_mps = math.sqrt(hx * hx + hy * hy + hz * hz)

@@ -24,7 +24,7 @@ BIT = 1 << 6
 SMOOTHING_S: Final = 0.025
 
 
-class AddedMass(Frozen):
+class _AddedMass(Frozen):
     """The mass of the liquid that is accelerated with the body."""
 
     coefficient: Annotated[
@@ -62,12 +62,12 @@ def damping_nspm(mass_kg: float, filter_per_s: float) -> float:
     return float(mass_kg * filter_per_s) if math.isfinite(filter_per_s) else 0.0
 
 
-PARAMETERS: Fields = (
+_PARAMETERS: Fields = (
     ("mass_kg", FLOAT),  # C_a ρ V
     ("filter_per_s", FLOAT),  # 1/τ
 )
 
-STATE: Fields = (
+_STATE: Fields = (
     ("previous_mps", FLOAT, (3,)),  # w of the tick before
     ("smoothed_mps2", FLOAT, (2, 3)),  # dw/dt, smoothed once and twice
     ("acceleration_mps2", FLOAT, (3,)),  # dw/dt of these two
@@ -81,10 +81,10 @@ EFFECT = Effect(
     exerted_n=_bound_n,
     extent="volume",
     accelerated_n=_accelerated_n,
-    model=AddedMass,
-    default=AddedMass(),
-    parameters=PARAMETERS,
-    state=STATE,
+    model=_AddedMass,
+    default=_AddedMass(),
+    parameters=_PARAMETERS,
+    state=_STATE,
     fill=_fill,
     damping_nspm=lambda record, rate: damping_nspm(record.mass_kg, rate * record.filter_per_s),
     open_values={"filter_s": lambda scene: smoothing_s(scene.velocity, None, SMOOTHING_S)},

@@ -18,8 +18,8 @@ def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -
     record.lift_n = liquid.density_kg_m3 * scene.body.volume_m3 * GRAVITY_MPS2
 
 
-PARAMETERS: Fields = (("lift_n", FLOAT),)  # ρ V g
+_PARAMETERS: Fields = (("lift_n", FLOAT),)  # ρ V g
 
 EFFECT = Effect(
-    name="buoyancy", label="Buoyancy", bit=BIT, bound_n=_bound_n, exerted_n=_bound_n, parameters=PARAMETERS, fill=_fill
+    name="buoyancy", label="Buoyancy", bit=BIT, bound_n=_bound_n, exerted_n=_bound_n, parameters=_PARAMETERS, fill=_fill
 )

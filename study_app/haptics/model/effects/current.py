@@ -14,7 +14,7 @@ BIT = 1 << 3
 
 CURRENT_UNIFORM = 0
 CURRENT_CHANNEL = 1
-CURRENT_VORTEX = 2
+_CURRENT_VORTEX = 2
 
 _START_MPS: Final = 0.5
 
@@ -102,12 +102,12 @@ def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -
         record.across[:] = math.sin(heading), 0.0, math.cos(heading)
         record.size_m = current.width_m / 2
     else:
-        record.kind = CURRENT_VORTEX
+        record.kind = _CURRENT_VORTEX
         record.size_m = current.core_m
         record.peak_mps = current.peak_mps
 
 
-PARAMETERS: Fields = (
+_PARAMETERS: Fields = (
     ("kind", INT),  # CURRENT_*
     ("centre_m", FLOAT, (3,)),
     ("velocity_mps", FLOAT, (3,)),  # uniform: everywhere; channel: midway
@@ -116,7 +116,7 @@ PARAMETERS: Fields = (
     ("peak_mps", FLOAT),  # vortex: at that radius
 )
 
-STATE: Fields = (("velocity_mps", FLOAT, (3,)),)
+_STATE: Fields = (("velocity_mps", FLOAT, (3,)),)
 
 EFFECT = Effect(
     name="current",
@@ -128,8 +128,8 @@ EFFECT = Effect(
     model=Current,
     missing='kind = "uniform", "channel" or "vortex", ...',
     through=("drag", "unsteady_drag", "non_newtonian"),
-    parameters=PARAMETERS,
-    state=STATE,
+    parameters=_PARAMETERS,
+    state=_STATE,
     fill=_fill,
     start=_start,
     controls=(

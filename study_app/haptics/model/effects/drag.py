@@ -13,13 +13,13 @@ from study_app.haptics.model.ranges import Frozen, later, within
 BIT = 1 << 0
 
 LAW_CONSTANT = 0
-LAW_SCHILLER_NAUMANN = 1
+_LAW_SCHILLER_NAUMANN = 1
 LAW_HAIDER_LEVENSPIEL = 2
 LAW_BROWN_LAWLER = 3
 LAW_LINEAR = 4
 _LAWS: Final[dict[Law, int]] = {
     "constant": LAW_CONSTANT,
-    "schiller-naumann": LAW_SCHILLER_NAUMANN,
+    "schiller-naumann": _LAW_SCHILLER_NAUMANN,
     "haider-levenspiel": LAW_HAIDER_LEVENSPIEL,
     "brown-lawler": LAW_BROWN_LAWLER,
     "linear": LAW_LINEAR,
@@ -32,7 +32,7 @@ DAMPING_NSPM: Final = (0.01, 200.0)
 _DAMPING_NSPM: Final = 8.0
 """Initial damping in the lab: more than honey in slow motion, far below any slope limit. [choice]"""
 
-DampingNspm: TypeAlias = Annotated[
+_DampingNspm: TypeAlias = Annotated[
     float,
     within(
         *DAMPING_NSPM,
@@ -54,7 +54,7 @@ class Drag(Frozen):
         description="constant: a constant drag coefficient; schiller-naumann: Schiller & Naumann 1933; "
         "haider-levenspiel: Haider & Levenspiel 1989; brown-lawler: Brown & Lawler 2003; linear: a damper.",
     )
-    damping_nspm: DampingNspm | None = later()
+    damping_nspm: _DampingNspm | None = later()
 
     @model_validator(mode="after")
     def _damping_of_the_linear_law(self) -> Self:
@@ -139,7 +139,7 @@ def _exerted_n(extremes: Extremes) -> float:
     return resistance_n(extremes.scene, extremes.liquid, extremes.relative_mps, extremes.liquid.drag.law)
 
 
-PARAMETERS: Fields = (
+_PARAMETERS: Fields = (
     ("law", INT),  # LAW_*
     ("factor_kg_m", FLOAT),  # ½ ρ C_d A, of the constant law
     ("stokes_nspm", FLOAT),  # 3π µ D, of the laws of the Reynolds number
@@ -159,7 +159,7 @@ EFFECT = Effect(
     model=Drag,
     default=Drag(),
     problem=_problem,
-    parameters=PARAMETERS,
+    parameters=_PARAMETERS,
     fill=_fill,
     with_liquid=True,
     start=lambda kind, _centre_m, _reach_m: (

@@ -91,7 +91,7 @@ def damping_nspm(factor_kg_rs: float, filter_per_s: float) -> float:
     return float(0.7 * factor_kg_rs * math.sqrt(filter_per_s)) if math.isfinite(filter_per_s) else 0.0
 
 
-PARAMETERS: Fields = (
+_PARAMETERS: Fields = (
     ("row", INT),  # its first row in the model's intervals
     ("rows", INT),  # how many it owns
     ("tail_row", INT),  # its first row in the model's exponentials
@@ -100,19 +100,19 @@ PARAMETERS: Fields = (
     ("filter_per_s", FLOAT),  # 1/τ of the velocity
 )
 
-STATE: Fields = (
+_STATE: Fields = (
     ("first", INT),  # where in its rows the oldest interval is; the others follow, around the end
     ("held", INT),  # how many there are
     ("smoothed_mps", FLOAT, (3,)),  # w, smoothed once
     ("twice_mps", FLOAT, (3,)),  # and twice
 )
 
-INTERVAL: Fields = (
+_INTERVAL: Fields = (
     ("acceleration_mps2", FLOAT, (3,)),  # mean dw/dt
     ("duration_s", FLOAT),
 )
 
-EXPONENTIAL: Fields = (("memory", FLOAT, (3,)),)  # of the kernel's tail, times dw/dt [m/s / √s]
+_EXPONENTIAL: Fields = (("memory", FLOAT, (3,)),)  # of the kernel's tail, times dw/dt [m/s / √s]
 
 EFFECT = Effect(
     name="history",
@@ -125,19 +125,19 @@ EFFECT = Effect(
     model=History,
     default=History(),
     problem=_problem,
-    parameters=PARAMETERS,
-    state=STATE,
+    parameters=_PARAMETERS,
+    state=_STATE,
     fill=_fill,
     rows=(
         Rows(
             "intervals of histories",
-            {"intervals": INTERVAL},
+            {"intervals": _INTERVAL},
             lambda liquid, rate_hz: _intervals(liquid.history.window_s, rate_hz),
             lambda rate_hz: _intervals(_LONGEST_WINDOW_S, rate_hz),
         ),
         Rows(
             "exponentials of histories",
-            {"exponentials": EXPONENTIAL},
+            {"exponentials": _EXPONENTIAL},
             lambda liquid, rate_hz: EXPONENTIALS,
             lambda rate_hz: EXPONENTIALS,
         ),

@@ -51,7 +51,7 @@ def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -
     record.spreading_m2ps = wake.spreading_m2ps
 
 
-PARAMETERS: Fields = (
+_PARAMETERS: Fields = (
     ("row", INT),  # its first row in the model's cells
     ("length", INT),  # N, in elements at the scene's rate
     ("scaling", FLOAT),  # S, likewise
@@ -64,7 +64,7 @@ PARAMETERS: Fields = (
     ("spreading_m2ps", FLOAT),  # ν
 )
 
-STATE: Fields = (
+_STATE: Fields = (
     ("first", INT),  # where in its rows the oldest cell is; the others follow, around the end
     ("cells", INT),  # how many there are
     ("held", INT),  # elements in them, those at rest too
@@ -73,7 +73,7 @@ STATE: Fields = (
     ("drift_m", FLOAT, (3,)),  # displacement of the liquid by the current since then
 )
 
-CELL: Fields = (
+_CELL: Fields = (
     ("place_m", FLOAT, (3,)),  # mean place of its elements, in the frame that drifts with the current
     ("velocity_mps", FLOAT, (3,)),  # Σe at ``time_s``
     ("speed_mps", FLOAT),  # Σ|e|
@@ -93,10 +93,10 @@ EFFECT = Effect(
     missing="length, scaling, ...",
     through=("drag",),
     excludes=("wake",),
-    parameters=PARAMETERS,
-    state=STATE,
+    parameters=_PARAMETERS,
+    state=_STATE,
     fill=_fill,
-    rows=(Rows("cells of local wakes", {"cells": CELL}, lambda liquid, rate_hz: CELLS, lambda rate_hz: CELLS),),
+    rows=(Rows("cells of local wakes", {"cells": _CELL}, lambda liquid, rate_hz: CELLS, lambda rate_hz: CELLS),),
     adjustable=False,  # its cells depend on its parameters
     open_values={"reach_m": lambda scene: scene.body.diameter_m},
     start=start_tail,

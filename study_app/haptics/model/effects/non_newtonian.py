@@ -12,11 +12,11 @@ BIT = 1 << 9
 KIND_HERSCHEL_BULKLEY = 0
 KIND_CARREAU = 1
 KIND_MAXWELL = 2
-KIND_SHEAR_THICKENING = 3
+_KIND_SHEAR_THICKENING = 3
 
 STIFFNESS_NPM: Final = 400.0
-"""Greatest elastic stiffness at the hand below the yield stress, of a loop that is stable with `FULL_NSPM`."""
-FULL_NSPM: Final = 53.0
+"""Greatest elastic stiffness at the hand below the yield stress, of a loop that is stable with `_FULL_NSPM`."""
+_FULL_NSPM: Final = 53.0
 VISCOUS_SHARE: Final = 0.75
 """Share of the slope limit for the viscous force of a liquid that is also elastic. [choice]"""
 
@@ -76,7 +76,7 @@ def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -
         record.exponent = rheology.flow_index / 2
         record.yield_n = laws.yield_n(rheology, diameter_m)
         record.stiffness_npm = STIFFNESS_NPM / scene.scale
-        record.full_nspm = FULL_NSPM / scene.scale
+        record.full_nspm = _FULL_NSPM / scene.scale
         return
     record.stokes_nspm = 3 * math.pi * diameter_m * rheology.zero_shear_viscosity_pa_s
     if isinstance(rheology, laws.Carreau):
@@ -87,12 +87,12 @@ def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -
         record.kind = KIND_MAXWELL
         record.relaxation_s = rheology.relaxation_time_s if rheology.relaxation_time_s >= laws.RESOLVED_S else 0.0
     else:
-        record.kind = KIND_SHEAR_THICKENING
+        record.kind = _KIND_SHEAR_THICKENING
         record.thickened_nspm = 3 * math.pi * diameter_m * rheology.thickened_viscosity_pa_s
         record.onset_mps = rheology.onset_shear_rate_per_s * diameter_m / 2
 
 
-PARAMETERS: Fields = (
+_PARAMETERS: Fields = (
     ("kind", INT),  # KIND_*
     ("inertia_kg_m", FLOAT),  # 3π ρ D²
     ("viscous", FLOAT),  # Herschel–Bulkley: a of a w^n [N (s/m)^n]
@@ -108,7 +108,7 @@ PARAMETERS: Fields = (
     ("onset_mps", FLOAT),  # speed of its onset
 )
 
-STATE: Fields = (
+_STATE: Fields = (
     ("strain", FLOAT, (3,)),  # Herschel–Bulkley: s/s_y, elastic displacement over that of yielding, 0 … 1
     ("ahead_m", FLOAT, (3,)),  # distance of the ball from the place that |dp| counts from
     ("velocity_mps", FLOAT, (3,)),  # Maxwell: the velocity at which a Newtonian liquid exerts the same force
@@ -137,8 +137,8 @@ EFFECT = Effect(
     excludes=_REPLACES,
     replaces=("viscosity_pa_s",),
     problem=_problem,
-    parameters=PARAMETERS,
-    state=STATE,
+    parameters=_PARAMETERS,
+    state=_STATE,
     fill=_fill,
     start=lambda kind, _centre_m, _reach_m: {"kind": kind or "herschel-bulkley", **_START[kind or "herschel-bulkley"]},
     controls=(

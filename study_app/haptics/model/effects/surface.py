@@ -19,10 +19,10 @@ def _problem(liquid: Liquid) -> str | None:
     return None
 
 
-STATE: Fields = (
+_STATE: Fields = (
     ("volume", FLOAT),  # share of the body's volume under the surface
     ("upright", FLOAT),  # share of the frontal area of vertical motion
     ("level", FLOAT),  # share of the frontal area of horizontal motion
 )
 
-EFFECT = Effect(name="surface", label="Surface", bit=BIT, bound_n=_bound_n, problem=_problem, state=STATE)
+EFFECT = Effect(name="surface", label="Surface", bit=BIT, bound_n=_bound_n, problem=_problem, state=_STATE)

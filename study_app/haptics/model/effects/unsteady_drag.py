@@ -13,7 +13,7 @@ BIT = 1 << 8
 EXPONENTIALS = 7
 LATE_SHARE: Final = 0.6
 """Share of the remaining slope limit that delayed drag may use."""
-HIGHEST_REYNOLDS: Final = 1000.0
+_HIGHEST_REYNOLDS: Final = 1000.0
 """Above Re 200 no flow solution exists for comparison; up to this value it is closer to experiments."""
 
 _IN_PLACE_OF: Final = (drag.EFFECT, added_mass.EFFECT, history.EFFECT)
@@ -37,11 +37,11 @@ def _bound_n(extremes: Extremes) -> float | None:
 def _bars(extremes: Extremes) -> tuple[tuple[str, ...], str]:
     """Bar the effects it replaces if the Reynolds number permits it; else itself, and the history of creeping flow."""
     reynolds = f"Re is up to {extremes.reynolds:.3g}"
-    if extremes.reynolds <= HIGHEST_REYNOLDS:
+    if extremes.reynolds <= _HIGHEST_REYNOLDS:
         return tuple(
             it.name for it in _IN_PLACE_OF
-        ), f"unsteady drag instead: {reynolds}, not over {HIGHEST_REYNOLDS:g}"
-    return ("unsteady_drag", "history"), f"{reynolds}, over {HIGHEST_REYNOLDS:g}: no solution of the flow confirms it"
+        ), f"unsteady drag instead: {reynolds}, not over {_HIGHEST_REYNOLDS:g}"
+    return ("unsteady_drag", "history"), f"{reynolds}, over {_HIGHEST_REYNOLDS:g}: no solution of the flow confirms it"
 
 
 def _problem(liquid: Liquid) -> str | None:
@@ -65,7 +65,7 @@ def _damping_nspm(record: Any, rate: float) -> float:
     return of_mass_nspm + history.damping_nspm(record.factor_kg_rs, rate * record.history_filter_per_s)
 
 
-PARAMETERS: Fields = (
+_PARAMETERS: Fields = (
     ("stokes_nspm", FLOAT),  # 3π µ D
     ("reynolds_spm", FLOAT),  # ρ D / µ: Re a unit of speed
     ("per_m", FLOAT),  # 1/D
@@ -75,7 +75,7 @@ PARAMETERS: Fields = (
     ("history_filter_per_s", FLOAT),  # 1/τ of dw/dt for the history
 )
 
-STATE: Fields = (
+_STATE: Fields = (
     ("previous_mps", FLOAT, (3,)),  # w of the tick before
     ("smoothed_mps2", FLOAT, (2, 3)),  # dw/dt for the added mass, smoothed once and twice
     ("acceleration_mps2", FLOAT, (3,)),  # dw/dt of these two
@@ -97,8 +97,8 @@ EFFECT = Effect(
     bars=_bars,
     excludes=(*(it.name for it in _IN_PLACE_OF), "wake", "local_wake"),
     problem=_problem,
-    parameters=PARAMETERS,
-    state=STATE,
+    parameters=_PARAMETERS,
+    state=_STATE,
     fill=_fill,
     damping_nspm=_damping_nspm,
 )

@@ -130,7 +130,7 @@ def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -
     record.resolution_m = wake.resolution_m
 
 
-PARAMETERS: Fields = (
+_PARAMETERS: Fields = (
     ("row", INT),  # its first row in the model's elements and segments
     ("length", INT),  # N, in elements at the scene's rate: the rows it owns
     ("scaling", FLOAT),  # S, likewise
@@ -142,7 +142,7 @@ PARAMETERS: Fields = (
     ("vertical", FLOAT),  # 1 where vertical motion enters the tail, else 0
 )
 
-STATE: Fields = (
+_STATE: Fields = (
     ("stored", INT),  # elements stored since it was empty: the number of the next one
     ("held", INT),  # how many of them are still in the list
     ("first_segment", INT),  # number of the oldest segment
@@ -161,14 +161,14 @@ STATE: Fields = (
     ("square_carry_m2ps2", FLOAT),
 )
 
-ELEMENT: Fields = (
+_ELEMENT: Fields = (
     ("velocity_mps", FLOAT, (3,)),  # e, divided by the wake's scale
     ("speed_mps", FLOAT),  # |e|, likewise
     ("arc_m", FLOAT),  # a when it was stored
     ("moving", INT),  # 0 for a zero element
 )
 
-SEGMENT: Fields = (
+_SEGMENT: Fields = (
     ("direction", FLOAT, (3,)),  # unit vector of its newest element
     ("speed_mps", FLOAT),  # Σ|e| of its elements, divided by the wake's scale
     ("speed_carry_mps", FLOAT),  # the rounding error of that sum
@@ -184,13 +184,13 @@ EFFECT = Effect(
     model=Wake,
     missing="length, scaling, ...",
     through=("drag",),
-    parameters=PARAMETERS,
-    state=STATE,
+    parameters=_PARAMETERS,
+    state=_STATE,
     fill=_fill,
     rows=(
         Rows(
             "wake elements",
-            {"elements": ELEMENT, "segments": SEGMENT},
+            {"elements": _ELEMENT, "segments": _SEGMENT},
             lambda liquid, rate_hz: scaled_length(liquid.wake, rate_hz),
         ),
     ),

@@ -23,7 +23,7 @@ elif sys.platform == "darwin":
 else:
     from study_app.haptics.runtime.clocks import linux as platform
 
-MOST_SPIN_US = 1000.0
+_MOST_SPIN_US = 1000.0
 VIRTUAL = np.dtype([("now_ns", np.int64)], align=True)
 _virtual_at = record_at(VIRTUAL)
 
@@ -65,8 +65,8 @@ class SystemClock:
 
     def __init__(self, spin_us: float | None = None) -> None:
         self.spin_us = platform.SPIN_US if spin_us is None else spin_us
-        if not 0.0 <= self.spin_us <= MOST_SPIN_US:
-            raise StudyError(f"a spin lasts 0 to {MOST_SPIN_US:g} µs before a deadline, not {spin_us:g}")
+        if not 0.0 <= self.spin_us <= _MOST_SPIN_US:
+            raise StudyError(f"a spin lasts 0 to {_MOST_SPIN_US:g} µs before a deadline, not {spin_us:g}")
         self.memory = platform.open_clock(round(1000 * self.spin_us))
         self.now, self.sleep = _system_functions()
         self.context = int(self.memory.ctypes.data)

@@ -20,9 +20,9 @@ from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.model.layout import records
 from study_app.haptics.runtime.clocks.grants import NOT_ASKED, REFUSED, Blocks, Grant
 
-SERVICE: Final = "org.freedesktop.RealtimeKit1"
-OBJECT: Final = "/org/freedesktop/RealtimeKit1"
-BUS: Final = "org.freedesktop.DBus"
+_SERVICE: Final = "org.freedesktop.RealtimeKit1"
+_OBJECT: Final = "/org/freedesktop/RealtimeKit1"
+_BUS: Final = "org.freedesktop.DBus"
 PATIENCE_S: Final = 2.0  # the service may have to be started first
 PRIORITY: Final = 20  # highest level granted if the service reports none
 
@@ -42,7 +42,7 @@ def make_real_time(thread: int, address: str | None = None) -> int:
         if hard == resource.RLIM_INFINITY or hard > longest_us:
             resource.setrlimit(resource.RLIMIT_RTTIME, (longest_us, longest_us))
         body = struct.pack("<QI", thread, priority)
-        bus.call(SERVICE, OBJECT, SERVICE, "MakeThreadRealtime", "tu", body)
+        bus.call(_SERVICE, _OBJECT, _SERVICE, "MakeThreadRealtime", "tu", body)
         return priority
 
 
@@ -58,7 +58,7 @@ def make_high_priority(thread: int, nice: int, address: str | None = None) -> in
     """
     with _Bus(address or _system_bus()) as bus:
         level = max(nice, bus.number("MinNiceLevel"))
-        bus.call(SERVICE, OBJECT, SERVICE, "MakeThreadHighPriority", "ti", struct.pack("<Qi", thread, level))
+        bus.call(_SERVICE, _OBJECT, _SERVICE, "MakeThreadHighPriority", "ti", struct.pack("<Qi", thread, level))
         return level
 
 
@@ -90,13 +90,13 @@ class _Bus:
         if not said.startswith(b"OK "):
             raise PermissionError(f"the bus rejects this user: {said.decode(errors='replace').strip()}")
         self._socket.sendall(b"BEGIN\r\n")
-        self.call(BUS, "/org/freedesktop/DBus", BUS, "Hello")
+        self.call(_BUS, "/org/freedesktop/DBus", _BUS, "Hello")
 
     def number(self, name: str) -> int:
         """Return one of the service's properties, a whole number."""
-        body = _string(SERVICE)
+        body = _string(_SERVICE)
         body += bytes(-len(body) % 4) + _string(name)
-        answer = self.call(SERVICE, OBJECT, f"{BUS}.Properties", "Get", "ss", body)
+        answer = self.call(_SERVICE, _OBJECT, f"{_BUS}.Properties", "Get", "ss", body)
         kind = answer[1:2]  # a variant: length of its signature, signature, 0, value
         if kind == b"x":
             return int(struct.unpack_from("<q", answer, 8)[0])
@@ -174,7 +174,7 @@ _PRIORITY = 60  # of 1 to 99: above ordinary real-time audio, below the kernel's
 _NICE = -15
 _LOCK_ALL = 1 | 2 | 4  # present and future pages, each when it is used: unused pages are not loaded
 
-RIGHTS = (
+_RIGHTS = (
     'for real-time priority write "USER - rtprio 70" and "USER - memlock unlimited", with your user\'s name, into '
     "/etc/security/limits.d/liquid-study.conf and log in again, or install rtkit"
 )
@@ -235,8 +235,8 @@ def raise_priority(*, real_time: bool = True) -> Grant:
         return Grant("real-time", f"SCHED_RR {make_real_time(thread)}, through the desktop's service")
     with suppress(OSError):
         os.setpriority(os.PRIO_PROCESS, thread, _NICE)
-        return Grant("raised", f"nice {_NICE}", advice=(RIGHTS,))
-    return Grant("normal", REFUSED, advice=(RIGHTS,))
+        return Grant("raised", f"nice {_NICE}", advice=(_RIGHTS,))
+    return Grant("normal", REFUSED, advice=(_RIGHTS,))
 
 
 def _priorities() -> tuple[int, ...]:

@@ -10,7 +10,7 @@ from study_app.haptics.kernels.c_functions import external, record_at
 from study_app.haptics.model.layout import records
 from study_app.haptics.runtime.clocks.grants import NOT_ASKED, REFUSED, Blocks, Grant
 
-SPIN_US = 0.0  # by default the timer is trusted
+_SPIN_US = 0.0  # by default the timer is trusted
 
 TIMEBASE = np.dtype(
     [("numerator", np.int64), ("denominator", np.int64), ("spin_ns", np.int64), ("spun_ns", np.int64)], align=True
@@ -25,8 +25,8 @@ _COMPUTATION_NS = 150_000
 _CONSTRAINT_NS = 500_000
 _PERIOD_NS = 1_000_000
 
-RIGHTS = "this system grants real-time priority to any program: close other audio and video programs"
-MEMORY = "to lock it raise the limit: ulimit -l unlimited"
+_RIGHTS = "this system grants real-time priority to any program: close other audio and video programs"
+_MEMORY = "to lock it raise the limit: ulimit -l unlimited"
 
 
 class _TimebaseInfo(ctypes.Structure):
@@ -42,7 +42,7 @@ class _TimeConstraint(ctypes.Structure):
     )
 
 
-def open_clock(spin_ns: int) -> Any:
+def _open_clock(spin_ns: int) -> Any:
     """Return the memory of a clock: nanoseconds = ticks · numerator / denominator."""
     info = _TimebaseInfo()
     ctypes.CDLL(None).mach_timebase_info(ctypes.byref(info))
@@ -74,11 +74,11 @@ def sleep(context: int, deadline_ns: int) -> Any:
     return time * base.numerator // base.denominator
 
 
-def raise_priority(*, real_time: bool = True) -> Grant:
+def _raise_priority(*, real_time: bool = True) -> Grant:
     """Declare short ticks to the scheduler (time-constraint policy), so that they start on time."""
     if not real_time:
         return NOT_ASKED
-    base = open_clock(0)[0]
+    base = _open_clock(0)[0]
 
     def ticks(nanoseconds: int) -> int:
         return int(nanoseconds * base.denominator // base.numerator)
@@ -89,10 +89,10 @@ def raise_priority(*, real_time: bool = True) -> Grant:
     library.thread_policy_set.argtypes = [ctypes.c_uint32, ctypes.c_int, ctypes.c_void_p, ctypes.c_uint32]
     thread = library.mach_thread_self()
     refused = library.thread_policy_set(thread, _THREAD_TIME_CONSTRAINT_POLICY, ctypes.byref(policy), 4)
-    return Grant("normal", REFUSED, advice=(RIGHTS,)) if refused else Grant("real-time", "time constraint")
+    return Grant("normal", REFUSED, advice=(_RIGHTS,)) if refused else Grant("real-time", "time constraint")
 
 
-def lock_memory(blocks: Blocks) -> bool:
+def _lock_memory(blocks: Blocks) -> bool:
     """Lock ``blocks`` in memory; return whether they are locked."""
     library = ctypes.CDLL(None)
     return all(library.mlock(ctypes.c_void_p(address), ctypes.c_size_t(size)) == 0 for address, size in blocks)
